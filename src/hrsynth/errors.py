@@ -1,0 +1,117 @@
+"""Everything that can go wrong because of what a user gave: one class a situation, the facts as data."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+
+class HrsynthError(Exception):
+    """Base of all errors of this package; ``exit_status`` is what the command line answers with."""
+
+    exit_status = 2
+
+    def lines(self) -> list[str]:
+        """One line a defect, without the program's name."""
+        return [str(self)]
+
+
+@dataclass(frozen=True)
+class Defect:
+    """One thing wrong in a file: where, what, the value found, what is allowed."""
+
+    file: str
+    line: int | None
+    what: str
+    value: str | None = None
+    allowed: str | None = None
+
+    def __str__(self) -> str:
+        where = self.file if self.line is None else f"{self.file}:{self.line}"
+        text = f"{where}: {self.what}"
+        if self.value is not None:
+            text += f", found {self.value}"
+        if self.allowed is not None:
+            text += f", allowed: {self.allowed}"
+        return " ".join(text.split())
+
+
+class BadRobotFile(HrsynthError):
+    """A robot file with defects, all of them, in the order of their lines."""
+
+    def __init__(self, defects: Iterable[Defect]) -> None:
+        self.defects = tuple(sorted(defects, key=lambda d: (d.line is None, d.line or 0)))
+        super().__init__("; ".join(map(str, self.defects)))
+
+    def lines(self) -> list[str]:
+        return [str(defect) for defect in self.defects]
+
+
+class BadRequest(HrsynthError):
+    """An argument that does not fit the robot: what, the value found, what is allowed."""
+
+    def __init__(self, what: str, value: object = None, allowed: str | Sequence[str] | None = None) -> None:
+        self.what, self.value = what, value
+        self.allowed = allowed if allowed is None or isinstance(allowed, str) else ", ".join(allowed)
+        text = what
+        if value is not None:
+            text += f", found {value!r}"
+        if self.allowed:
+            text += f", allowed: {self.allowed}"
+        super().__init__(text)
+
+
+class BadMechanism(BadRequest):
+    """A mechanism whose parts contradict each other (a joint of an unknown link, a zero axis)."""
+
+
+class LoopsNotClosed(HrsynthError):
+    """The loops cannot be closed: the residual that is left, and the loop that misses most."""
+
+    exit_status = 3
+
+    def __init__(self, robot: str, residual: float, tolerance: float, loop: str) -> None:
+        self.robot, self.residual, self.tolerance, self.loop = robot, residual, tolerance, loop
+        super().__init__(
+            f"{robot}: the loop {loop!r} cannot be closed, residual {residual:.3g}, allowed: {tolerance:.3g}"
+        )
+
+
+class RankUndecided(HrsynthError):
+    """A rank whose gap is too small for a verdict."""
+
+    exit_status = 3
+
+    def __init__(self, what: str, gap: float, needed: float) -> None:
+        self.what, self.gap, self.needed = what, gap, needed
+        super().__init__(f"{what}: the singular values leave a gap of {gap:.3g}, needed: {needed:.3g}")
+
+
+class NotSampled(HrsynthError):
+    """Too few closed configurations could be reached from the zero configuration."""
+
+    exit_status = 3
+
+    def __init__(self, robot: str, reached: int, wanted: int) -> None:
+        self.robot, self.reached, self.wanted = robot, reached, wanted
+        super().__init__(f"{robot}: only {reached} closed configurations could be reached, needed: {wanted}")
+
+
+class NotCertified(HrsynthError):
+    """No hidden robot passed the certificate: the best angle seen."""
+
+    exit_status = 3
+
+    def __init__(self, robot: str, angle: float, tolerance: float) -> None:
+        self.robot, self.angle, self.tolerance = robot, angle, tolerance
+        super().__init__(
+            f"{robot}: no hidden robot passed the certificate, largest angle {angle:.3g}, allowed: {tolerance:.3g}"
+        )
+
+
+class MissingExtra(HrsynthError):
+    """An optional package is not installed: the extra that brings it."""
+
+    def __init__(self, package: str, extra: str) -> None:
+        self.package, self.extra = package, extra
+        super().__init__(f"this needs {package}, which is not installed: pip install 'hrsynth[{extra}]'")

@@ -1,0 +1,117 @@
+"""The certificate: a hidden robot follows the real one and has the same relation ρ (theory 3.1-3.3)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..mechanism import Mechanism
+from ..mechanism.vectors import Array
+from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
+from .configuration import ClosedConfiguration, Target, closed
+from .ranks import kernel_basis, largest_angle
+from .relation import Question, Relation, relation
+from .sampling import Samples
+from .twin import Twin
+
+
+@dataclass(frozen=True, eq=False)
+class Mismatch:
+    """A configuration at which two relations differ."""
+
+    real: Relation
+    hidden: Relation
+
+
+@dataclass(frozen=True, eq=False)
+class Certificate:
+    """What was compared: configurations, the largest angle between ρ and ρ_H, the smallest rank gap, the largest
+    residual at which the hidden robot follows; ``reason`` says why it did not pass."""
+
+    samples: int
+    discarded: int
+    largest_angle: float
+    smallest_gap: float
+    residual: float
+    passed: bool
+    reason: str
+    mismatch: Mismatch | None = None
+
+
+def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bodies: tuple[str, ...] = (),
+            complete: bool = True, progress: Callable[[], None] | None = None) -> Certificate:
+    """Compare ρ of the real robot's samples with ρ of ``hidden`` at the same poses and directions.
+
+    ``bodies`` are further links whose twists must agree too. Only the first ``count`` samples are used. The actuators'
+    rates must be functions of the directions' rates, and where the hidden robot is ``complete`` the converse too.
+    """
+    members = samples.members[:count]
+    question = samples.question
+    blind = frozenset(o.link for o in question.observations if o.link not in hidden.links)
+    asked = replace(question, bodies=bodies)
+    twin = Twin(hidden, samples.twin.length)
+    active = twin.actuated()
+    angle = worst = 0.0
+    gap = np.inf
+
+    def verdict(reason: str, mismatch: Mismatch | None = None) -> Certificate:
+        return Certificate(len(members), samples.discarded, angle, gap, worst, not reason, reason, mismatch)
+
+    start = float(np.linalg.norm(twin.residual(twin.q0)))
+    if start > FOLLOWED:
+        worst = start
+        angle = np.pi / 2
+        return verdict(f"not assembled at the zero configuration (loop {twin.worst_loop(twin.q0)[0]!r} misses)")
+    for member in members:
+        q = twin.q0
+        for target in member.way:
+            goal = _visible(target, blind)
+            exact = target is member.way[-1]
+            q, residual = closed(twin, q, goal, tolerance=1e-12 if exact else 1e-6, iterations=25)
+        worst = max(worst, residual)
+        if not residual <= FOLLOWED:
+            angle = np.pi / 2
+            return verdict(f"cannot follow the real robot: misses by {residual:.2g}")
+        at = ClosedConfiguration.of(twin, q, FOLLOWED)
+        theirs = relation(at, asked, blind=blind)
+        ours = member.relation if not bodies else relation(member.configuration, asked)
+        gap = min(gap, theirs.gap, ours.gap)
+        angle = max(angle, largest_angle(ours.basis, theirs.basis))
+        if gap < RANK_GAP:
+            return verdict(f"a rank is not clear: gap {gap:.2g}", Mismatch(ours, theirs))
+        if not angle <= SAME_RELATION:
+            return verdict(_difference(ours, theirs, angle), Mismatch(ours, theirs))
+        if active and not _parametrise(at, asked, active, blind, complete):
+            angle = np.pi / 2
+            return verdict("the virtual actuators do not parametrise the observed directions")
+        if progress is not None:
+            progress()
+    return verdict("")
+
+
+def _visible(target: Target, blind: frozenset[str]) -> Target:
+    if not blind:
+        return target
+    return replace(target, measured=tuple(pair for pair in target.measured if pair[0].link not in blind))
+
+
+def _difference(ours: Relation, theirs: Relation, angle: float) -> str:
+    if theirs.dimension != ours.dimension:
+        return f"dim ρ becomes {theirs.dimension} instead of {ours.dimension}"
+    return f"ρ turns by {angle:.2g} rad"
+
+
+def _parametrise(at: ClosedConfiguration, question: Question, active: list[int], blind: frozenset[str],
+                 complete: bool) -> bool:
+    """Whether direction rates determine actuator rates, and (``complete``) the other way round."""
+    kernel, _ = at.kernel()
+    rows = question.rows(at, blind=blind)
+    measured: Array = rows[question.twist_rows : question.twist_rows + 3 * len(question.observations)] @ kernel
+    motors = kernel[active]
+    unseen, _ = kernel_basis(measured, 1.0)
+    if np.linalg.norm(motors @ unseen) > SAME_RELATION:
+        return False
+    locked, _ = kernel_basis(motors, 1.0)
+    return not complete or bool(np.linalg.norm(measured @ locked) <= SAME_RELATION)

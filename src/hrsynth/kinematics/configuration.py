@@ -1,0 +1,112 @@
+"""Closed configurations: a type that exists only if its loops are closed.
+
+Solved by damped Gauss-Newton from a nearby configuration; targets (a platform pose, measured values) are solved along
+with the loops.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import LoopsNotClosed
+from ..mechanism.observation import Observation
+from ..mechanism.vectors import Array, frozen
+from ..tolerances import CLOSED
+from .ranks import Rank, kernel_basis
+from .twin import Twin
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedConfiguration:
+    """A configuration of a twin whose loops are closed to ``tolerances.CLOSED``; ``q`` is read-only."""
+
+    twin: Twin
+    q: Array
+    residual: float
+
+    @classmethod
+    def of(cls, twin: Twin, q: Array, tolerance: float = CLOSED) -> ClosedConfiguration:
+        """``q`` itself, if it is closed; raises ``LoopsNotClosed`` with the loop that misses most."""
+        residual = float(np.linalg.norm(twin.residual(q)))
+        if not residual <= tolerance:
+            raise LoopsNotClosed(twin.mechanism.name, residual, tolerance, twin.worst_loop(q)[0])
+        return cls(twin, frozen(q), residual)
+
+    def pose(self, link: str) -> Array:
+        """X_BL (4, 4), metres."""
+        return self.twin.pose(self.q, link)
+
+    def velocity(self, link: str) -> Array:
+        """V (6, nv) of a link's frame, see :meth:`Twin.velocity`."""
+        return self.twin.velocity(self.q, link)
+
+    def kernel(self) -> tuple[Array, Rank]:
+        """A basis of T_qC, shape (nv, mobility), and the constraints' rank."""
+        return kernel_basis(self.twin.jacobian(self.q))
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """What a configuration is to reach besides closed loops: the pose X_BP of ``link`` (its origin only where ``point``),
+    and measured values."""
+
+    link: str
+    pose: Array
+    point: bool
+    reference: str
+    measured: tuple[tuple[Observation, Array], ...]
+
+    def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+        """Error (reached − wanted) and its Jacobian."""
+        X = twin.pose(q, self.link)
+        V = twin.velocity(q, self.link)
+        errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length]
+        blocks = [V[:3]]
+        if not self.point:
+            D = X[:3, :3] @ self.pose[:3, :3].T
+            errors.append(0.5 * np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]]))
+            blocks.append(V[3:])
+        X_reference, V_reference = twin.pose(q, self.reference), twin.velocity(q, self.reference)
+        for observation, wanted in self.measured:
+            X_link, V_link = twin.pose(q, observation.link), twin.velocity(q, observation.link)
+            errors.append(observation.value(X_reference, X_link) - wanted)
+            blocks.append(observation.rate(X_reference, X_link, V_reference, V_link))
+        return np.concatenate(errors), np.vstack(blocks)
+
+
+def closed(twin: Twin, q: Array, target: Target | None = None, *, tolerance: float = CLOSED,
+           iterations: int = 30) -> tuple[Array, float]:
+    """Damped Gauss-Newton from ``q``: the configuration reached and the residual left (loops and target)."""
+    identity = np.eye(twin.nv)
+    damping = 1e-10
+    error, J = _system(twin, q, target)
+    size = float(np.linalg.norm(error))
+    for _ in range(iterations):
+        if size <= tolerance:
+            break
+        step = np.linalg.solve(J.T @ J + damping * identity, -(J.T @ error))
+        length = float(np.max(np.abs(step), initial=0.0))
+        if length > 0.5:
+            step *= 0.5 / length
+        trial = twin.moved(q, step)
+        trial_error, trial_J = _system(twin, trial, target)
+        trial_size = float(np.linalg.norm(trial_error))
+        if trial_size < size:
+            stalled = trial_size > 0.9 * size
+            q, error, J, size = trial, trial_error, trial_J, trial_size
+            damping = max(damping * (1.0 if stalled else 0.1), 1e-12)
+        else:
+            damping = max(damping * 100.0, 1e-8)
+            if damping > 1e2:
+                break
+    return q, size
+
+
+def _system(twin: Twin, q: Array, target: Target | None) -> tuple[Array, Array]:
+    error, J = twin.residual(q), twin.jacobian(q)
+    if target is None:
+        return error, J
+    extra, rows = target.rows(twin, q)
+    return np.concatenate([error, extra]), np.vstack([J, rows])

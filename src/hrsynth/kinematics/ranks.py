@@ -1,0 +1,70 @@
+"""Ranks with their evidence: the gap between the last kept and the first dropped singular value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import RankUndecided
+from ..mechanism.vectors import Array
+from ..tolerances import RANK_CUTOFF, RANK_GAP
+
+
+@dataclass(frozen=True)
+class Rank:
+    """A rank, and the ratio of the last kept to the first dropped singular value (a clean zero counts as ε)."""
+
+    value: int
+    gap: float
+
+    def decided(self, what: str) -> int:
+        """The rank, if the gap is large enough for a verdict; raises ``RankUndecided`` otherwise."""
+        if self.gap < RANK_GAP:
+            raise RankUndecided(what, self.gap, RANK_GAP)
+        return self.value
+
+
+def rank_of(singular_values: Array, scale: float | None = None) -> Rank:
+    """The rank that descending singular values show; ``scale`` (default: the largest) is what zero is relative to."""
+    values = np.asarray(singular_values, dtype=float)
+    if values.size == 0:
+        return Rank(0, np.inf)
+    largest = float(values[0]) if scale is None else max(scale, float(values[0]))
+    if largest <= np.finfo(float).tiny:
+        return Rank(0, np.inf)
+    floor = np.finfo(float).eps * largest
+    kept = int(np.sum(values > RANK_CUTOFF * largest))
+    last = float(values[kept - 1]) if kept else largest
+    dropped = max(float(values[kept]), floor) if kept < values.size else floor
+    return Rank(kept, last / dropped)
+
+
+def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
+    """An orthonormal basis (rows of ``matrix`` long) of the column space, with the rank."""
+    if 0 in matrix.shape:
+        return np.zeros((matrix.shape[0], 0)), Rank(0, np.inf)
+    U, s, _ = np.linalg.svd(matrix, full_matrices=False)
+    rank = rank_of(s, scale)
+    return U[:, : rank.value], rank
+
+
+def kernel_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
+    """An orthonormal basis of the kernel, shape (columns, nullity), with the rank of the matrix."""
+    columns = matrix.shape[1]
+    if 0 in matrix.shape:
+        return np.eye(columns), Rank(0, np.inf)
+    _, s, Vt = np.linalg.svd(matrix, full_matrices=True)
+    rank = rank_of(s, scale)
+    return Vt[rank.value :].T, rank
+
+
+def largest_angle(A: Array, B: Array) -> float:
+    """The largest principal angle (radians) between two column spaces given by orthonormal bases; π/2 where their
+    dimensions differ."""
+    if A.shape[1] != B.shape[1]:
+        return float(np.pi / 2)
+    if A.shape[1] == 0:
+        return 0.0
+    outside = B - A @ (A.T @ B)
+    return float(np.arcsin(min(1.0, np.linalg.norm(outside, 2))))

@@ -1,0 +1,131 @@
+"""Random closed configurations on the component of the zero configuration (theory 3.1).
+
+Each sample is reached from the zero configuration by small steps; every step is checked: it closes, it does not jump,
+and the mobility stays the generic one. What fails is discarded and counted.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import NotSampled
+from ..mechanism.vectors import Array
+from .configuration import ClosedConfiguration, Target, closed
+from .ranks import range_basis
+from .relation import Question, Relation, relation
+from .twin import Twin
+
+STEP = 0.09
+STEPS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class Sample:
+    """A closed configuration, the targets passed on the way to it (the last one its own), and ρ there."""
+
+    configuration: ClosedConfiguration
+    way: tuple[Target, ...]
+    relation: Relation
+
+
+@dataclass(frozen=True, eq=False)
+class Samples:
+    """Samples of one mechanism for one question; ``discarded`` draws did not stay on the branch or came too near to a
+    singularity."""
+
+    question: Question
+    twin: Twin
+    start: ClosedConfiguration
+    members: tuple[Sample, ...]
+    discarded: int
+
+    @property
+    def mobility(self) -> int:
+        """The generic mobility, idle motions included."""
+        return self.members[0].relation.mobility
+
+
+def draw(twin: Twin, question: Question, count: int, seed: int = 0, *,
+         progress: Callable[[], None] | None = None) -> Samples:
+    """``count`` random samples; raises ``NotSampled`` where too few can be reached."""
+    rng = np.random.default_rng(seed)
+    start = ClosedConfiguration.of(twin, twin.q0)
+    members: list[Sample] = []
+    discarded = 0
+    for _ in range(4 * count):
+        sample = _walk(start, question, rng)
+        if sample is None:
+            discarded += 1
+            continue
+        members.append(sample)
+        if progress is not None:
+            progress()
+        if len(members) >= count:
+            usual, dropped = _usual(members)
+            discarded += dropped
+            members = usual
+            if len(members) >= count:
+                break
+    if len(members) < count:
+        raise NotSampled(twin.mechanism.name, len(members), count)
+    return Samples(question, twin, start, tuple(members), discarded)
+
+
+def _usual(members: list[Sample]) -> tuple[list[Sample], int]:
+    """The members whose mobility and dimensions are the generic ones: the smallest mobility, the most frequent rest."""
+    smallest = min(member.relation.mobility for member in members)
+    kept = [m for m in members if m.relation.mobility == smallest]
+    signature = Counter((m.relation.dimension, m.relation.dof.value, m.relation.lost.shape[1]) for m in kept)
+    best = max(signature, key=lambda key: (signature[key], key[0]))
+    kept = [m for m in kept
+            if (m.relation.dimension, m.relation.dof.value, m.relation.lost.shape[1]) == best]
+    return kept, len(members) - len(kept)
+
+
+def _velocity(at: ClosedConfiguration, question: Question, wish: Array | None,
+              rng: np.random.Generator) -> tuple[Array, Array] | None:
+    """A joint velocity without idle motion whose (t, u̇) is a unit vector: near ``wish``, or random."""
+    kernel, _ = at.kernel()
+    image = question.rows(at) @ kernel
+    basis, rank = range_basis(image, 1.0)
+    if rank.value == 0:
+        return None
+    wanted = basis @ (rng.normal(size=rank.value) if wish is None else basis.T @ wish
+                      + 0.2 * rng.normal(size=rank.value) / np.sqrt(rank.value))
+    norm = float(np.linalg.norm(wanted))
+    if norm < 1e-6:
+        return None
+    wanted = wanted / norm
+    return kernel @ np.linalg.lstsq(image, wanted, rcond=1e-9)[0], wanted
+
+
+def _walk(start: ClosedConfiguration, question: Question, rng: np.random.Generator) -> Sample | None:
+    twin = start.twin
+    here, wish = start, None
+    way: list[Target] = []
+    for _ in range(STEPS):
+        for shrink in (1.0, 0.4, 0.15):
+            moving = _velocity(here, question, wish, rng)
+            if moving is None:
+                return None
+            velocity, direction = moving
+            step = STEP * shrink * velocity
+            largest = float(np.max(np.abs(step), initial=0.0))
+            if largest > 3 * STEP:
+                step *= 3 * STEP / largest
+            predicted = twin.moved(here.q, step)
+            q, residual = closed(twin, predicted, tolerance=1e-12)
+            if residual <= 1e-10 and np.linalg.norm(q - predicted) <= 0.5 * np.linalg.norm(step) + 1e-9:
+                break
+        else:
+            return None
+        here, wish = ClosedConfiguration.of(twin, q), direction
+        way.append(question.target(here))
+    found = relation(here, question)
+    if found.gap < 1e3:
+        return None
+    return Sample(here, tuple(way), found)

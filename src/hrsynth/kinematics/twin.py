@@ -1,0 +1,224 @@
+"""The Pinocchio twin of a mechanism: a spanning tree and exact loop constraints for every joint type.
+
+The twin measures lengths in characteristic lengths of the mechanism it was given (``length``), so that its Jacobians
+mix no metres with radians. Every tree joint's frame has the base's orientation at the zero configuration. A spherical
+loop is Pinocchio's point constraint; any other loop is cut through the joint: the joint is added as a leaf and the leaf
+welded to the other link.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import networkx as nx
+import numpy as np
+import pinocchio as pin
+
+from ..errors import BadMechanism
+from ..mechanism import Joint, JointType, Mechanism
+from ..mechanism.vectors import Array
+
+_WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
+
+
+class Twin:
+    """A Pinocchio model of a mechanism; ``at(q)`` brings its kinematics up to date."""
+
+    def __init__(self, mechanism: Mechanism, length: float | None = None) -> None:
+        self.mechanism = mechanism
+        self.length = mechanism.length if length is None else length
+        self.model = pin.Model()
+        self._body: dict[str, int] = {mechanism.base: 0}
+        self._centre: dict[int, Array] = {0: np.zeros(3)}
+        self.coordinates: dict[str, tuple[int, ...]] = {}
+        """Velocity indices of each joint, in the order of its axes, signed by ``signs``."""
+        self.signs: dict[str, float] = {}
+        tree, loops = self._span()
+        for joint, parent in tree:
+            self._add_tree(joint, parent)
+        constraints = [self._loop(joint) for joint in loops]
+        self.loops = tuple(joint.name for joint in loops)
+        self._gears = self._gear_rows()
+        self.data = self.model.createData()
+        self._models = pin.StdVec_ConstraintModel()
+        self._datas = pin.StdVec_ConstraintData()
+        for constraint in constraints:
+            self._models.append(constraint)
+        for constraint in self._models:
+            self._datas.append(constraint.createData())
+        self._pairs = list(zip(self._models, self._datas, strict=True))
+        self._views = [data.extract() for data in self._datas]
+        self.nv: int = self.model.nv
+        self.q0: Array = pin.neutral(self.model)
+        self._links = {
+            name: (self._body[name], np.linalg.inv(_shift(self._centre[self._body[name]] * self.length)) @ link.pose)
+            for name, link in mechanism.links.items()}
+        self._q: Array | None = None
+
+    def _span(self) -> tuple[list[tuple[Joint, str]], list[Joint]]:
+        mechanism = self.mechanism
+        graph = nx.Graph()
+        graph.add_nodes_from(mechanism.links)
+        geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
+        for joint in mechanism.joints.values():
+            weight = _WEIGHT[joint.type.value] - (0.5 if joint.successor in geared else 0)
+            old = graph.get_edge_data(*joint.links)
+            if old is None or weight < old["weight"]:
+                graph.add_edge(*joint.links, weight=weight, joint=joint)
+        tree = nx.minimum_spanning_tree(graph)
+        ordered: list[tuple[Joint, str]] = []
+        for parent, child in nx.bfs_edges(tree, mechanism.base):
+            ordered.append((tree.edges[parent, child]["joint"], parent))
+        if len(ordered) != len(mechanism.links) - 1:
+            missing = sorted(set(mechanism.links) - nx.node_connected_component(tree, mechanism.base))
+            raise BadMechanism(f"{mechanism.name}: links that no joint connects to the base", ", ".join(missing))
+        used = {joint.name for joint, _ in ordered}
+        loops = [j for j in mechanism.joints.values() if j.name not in used and j.type is not JointType.FREE]
+        return ordered, loops
+
+    def _chain(self, joint: Joint, parent: str) -> list[object]:
+        """Pinocchio's joint models for a joint seen from ``parent``."""
+        turned = joint if joint.predecessor == parent else joint.turned()
+        match joint.type:
+            case JointType.REVOLUTE:
+                return [pin.JointModelRevoluteUnaligned(turned.axis)]
+            case JointType.PRISMATIC:
+                return [pin.JointModelPrismaticUnaligned(turned.axis)]
+            case JointType.UNIVERSAL:
+                return [pin.JointModelRevoluteUnaligned(axis) for axis in turned.axes]
+            case JointType.CYLINDRICAL:
+                return [pin.JointModelPrismaticUnaligned(turned.axis), pin.JointModelRevoluteUnaligned(turned.axis)]
+            case JointType.SPHERICAL:
+                return [pin.JointModelSpherical()]
+            case JointType.PLANAR:
+                x = np.linalg.svd(turned.axis[None, :])[2][1]
+                return [pin.JointModelPrismaticUnaligned(x),
+                        pin.JointModelPrismaticUnaligned(np.cross(turned.axis, x)),
+                        pin.JointModelRevoluteUnaligned(turned.axis)]
+            case JointType.FREE:
+                return [pin.JointModelFreeFlyer()]
+            case _:
+                return []
+
+    def _add(self, joint: Joint, parent: str, suffix: str) -> int:
+        """Add the joint models on ``parent``; the last one's index. Its frame sits at the joint's centre."""
+        index = self._body[parent]
+        turned = joint.predecessor != parent
+        point = joint.point / self.length
+        placement = pin.SE3(np.eye(3), point - self._centre[index])
+        start = self.model.nv
+        for number, model in enumerate(self._chain(joint, parent)):
+            index = self.model.addJoint(index, model, placement, f"{joint.name}{suffix}{number or ''}")
+            placement = pin.SE3.Identity()
+        self._centre[index] = point
+        span = range(start, self.model.nv)
+        self.coordinates[joint.name] = tuple(reversed(span)) if turned and joint.type is JointType.UNIVERSAL else tuple(span)
+        self.signs[joint.name] = -1.0 if turned and joint.type is JointType.UNIVERSAL else 1.0
+        return index
+
+    def _add_tree(self, joint: Joint, parent: str) -> None:
+        child = joint.other(parent)
+        self._body[child] = self._body[parent] if joint.type is JointType.FIXED else self._add(joint, parent, "")
+
+    def _loop(self, joint: Joint) -> object:
+        a, b = (self._body[link] for link in joint.links)
+        point = joint.point / self.length
+        if joint.type is JointType.SPHERICAL:
+            return pin.ConstraintModel(pin.PointAnchorConstraintModel(
+                self.model, a, pin.SE3(np.eye(3), point - self._centre[a]),
+                b, pin.SE3(np.eye(3), point - self._centre[b])))
+        if joint.type is JointType.FIXED:
+            half, offset = a, pin.SE3(np.eye(3), point - self._centre[a])
+        else:
+            half, offset = self._add(joint, joint.predecessor, "__cut"), pin.SE3.Identity()
+        return pin.ConstraintModel(pin.FrameAnchorConstraintModel(
+            self.model, half, offset, b, pin.SE3(np.eye(3), point - self._centre[b])))
+
+    def _gear_rows(self) -> Array:
+        """One row a coupling: successor's rate − ratio × predecessor's rate."""
+        rows = np.zeros((len(self.mechanism.couplings), self.model.nv))
+        for row, coupling in zip(rows, self.mechanism.couplings, strict=True):
+            for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
+                carriers = [j for j in self.mechanism.joints.values()
+                            if j.successor == link and j.in_tree and j.type.freedoms == 1]
+                if not carriers:
+                    raise BadMechanism(f"coupling {coupling.name!r}: no single joint carries the link", link)
+                row[self.coordinates[carriers[0].name][0]] += factor
+        return rows
+
+    def at(self, q: Array) -> None:
+        """Bring poses, Jacobians and loop constraints up to date with ``q``."""
+        if self._q is q:
+            return
+        pin.computeJointJacobians(self.model, self.data, q)
+        for model, data in self._pairs:
+            model.calc(self.model, self.data, data)
+        self._q = q
+
+    def residual(self, q: Array) -> Array:
+        """Loop residuals, stacked in the order of ``loops`` (characteristic lengths, radians)."""
+        self.at(q)
+        parts = [view.constraint_position_error for view in self._views]
+        if len(self._gears):
+            parts.append(self._gears @ pin.difference(self.model, self.q0, q))
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def jacobian(self, q: Array) -> Array:
+        """The derivative of :meth:`residual` at closure, shape (rows, nv)."""
+        self.at(q)
+        J = (pin.getConstraintsJacobian(self.model, self.data, self._models, self._datas)
+             if self._pairs else np.zeros((0, self.nv)))
+        return np.vstack([J, self._gears]) if len(self._gears) else J
+
+    def worst_loop(self, q: Array) -> tuple[str, float]:
+        """The loop that misses most, and by how much."""
+        self.at(q)
+        misses = [(float(np.linalg.norm(view.constraint_position_error)), name)
+                  for view, name in zip(self._views, self.loops, strict=True)]
+        miss, name = max(misses, default=(0.0, "none"))
+        return name, miss
+
+    def pose(self, q: Array, link: str) -> Array:
+        """X_BL of a link in the base frame (4, 4), metres."""
+        self.at(q)
+        body, offset = self._links[link]
+        if body == 0:
+            return offset
+        placement = self.data.oMi[body]
+        X = np.empty((4, 4))
+        X[3] = (0, 0, 0, 1)
+        R = placement.rotation
+        X[:3, :3] = R @ offset[:3, :3]
+        X[:3, 3] = placement.translation * self.length + R @ offset[:3, 3]
+        return X
+
+    def velocity(self, q: Array, link: str) -> Array:
+        """V (6, nv): joint rates to the (linear, angular) velocity of the link frame's origin, base axes; linear part in
+        characteristic lengths a second."""
+        self.at(q)
+        body, offset = self._links[link]
+        if body == 0:
+            return np.zeros((6, self.nv))
+        V = pin.getJointJacobian(self.model, self.data, body, pin.LOCAL_WORLD_ALIGNED)
+        arm = self.data.oMi[body].rotation @ offset[:3, 3] / self.length
+        V[:3] -= np.array([[0.0, -arm[2], arm[1]], [arm[2], 0.0, -arm[0]], [-arm[1], arm[0], 0.0]]) @ V[3:]
+        return V
+
+    def moved(self, q: Array, step: Array) -> Array:
+        """The configuration that ``step`` (nv) leads to from ``q``."""
+        return pin.integrate(self.model, q, step)
+
+    def actuated(self) -> list[int]:
+        """Velocity indices of the actuated joints' coordinates."""
+        return [i for joint in self.mechanism.joints.values() if joint.actuated for i in self.coordinates[joint.name]]
+
+
+def _shift(point: Array) -> Array:
+    X = np.eye(4)
+    X[:3, 3] = point
+    return X
+
+
+def stacked(parts: Sequence[Array], columns: int) -> Array:
+    """Row blocks on top of each other; an empty list gives (0, columns)."""
+    return np.vstack(parts) if parts else np.zeros((0, columns))

@@ -1,0 +1,6 @@
+"""Joint graphs: links, joints, normal form, legs, notation, screws."""
+
+from .model import Coupling, Joint, JointType, Limits, Link, Mechanism, Motor
+from .observation import Direction, Observation
+
+__all__ = ["Coupling", "Direction", "Joint", "JointType", "Limits", "Link", "Mechanism", "Motor", "Observation"]

@@ -1,0 +1,228 @@
+"""Composite joints, recognised by geometry and never declared: planar parallelograms, equal parallel rods, sliders.
+
+The joint graph is contracted step by step: every edge carries the word of what it stands for, and the joints and links
+inside it, until nothing contracts any more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Iterator
+from dataclasses import dataclass
+from itertools import combinations
+
+import networkx as nx
+import numpy as np
+
+from ..tolerances import SAME_POINT
+from . import lines
+from .model import Joint, JointType, Mechanism
+from .normal import centre_pair
+from .notation import Bar, Carrier, Letter, Rods, Word
+from .vectors import Array
+
+
+@dataclass(frozen=True)
+class Edge:
+    """What stands between two links: ``word`` read from ``tail`` to ``head``, the joints and the links inside."""
+
+    tail: str
+    head: str
+    word: Word
+    joints: tuple[str, ...]
+    inside: tuple[str, ...] = ()
+
+    def word_from(self, link: str) -> Word:
+        """The word read from ``link`` to the other end."""
+        return self.word if link == self.tail else self.word.reversed()
+
+    def other(self, link: str) -> str:
+        """The other end."""
+        return self.head if link == self.tail else self.tail
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A link with a ball (or universal) joint at each end, from ``near`` to ``far`` (joint names)."""
+
+    link: str
+    near: str
+    far: str
+
+
+class WordGraph:
+    """The contracted joint graph of a mechanism; ``kept`` links never disappear into an edge."""
+
+    def __init__(self, mechanism: Mechanism, kept: Collection[str], links: Iterable[str] | None = None) -> None:
+        self.mechanism = mechanism
+        self.kept = set(kept)
+        self.graph = nx.MultiGraph()
+        inside = set(mechanism.links if links is None else links)
+        self.graph.add_nodes_from(name for name in mechanism.links if name in inside)
+        self._number = 0
+        for joint in mechanism.joints.values():
+            if joint.type is not JointType.FREE and set(joint.links) <= inside:
+                letter = Letter(joint.type.value, joint.actuated)
+                self._add(Edge(joint.predecessor, joint.successor, Word((letter,)), (joint.name,)))
+
+    def _add(self, edge: Edge) -> None:
+        self._number += 1
+        self.graph.add_edge(edge.tail, edge.head, key=self._number, edge=edge)
+
+    def edges_at(self, link: str) -> list[tuple[int, Edge]]:
+        """Keys and edges at a link, oldest first."""
+        return sorted(((key, data["edge"]) for _, _, key, data in self.graph.edges(link, keys=True, data=True)),
+                      key=lambda pair: pair[0])
+
+    def edges(self) -> list[Edge]:
+        """All edges, oldest first."""
+        return [edge for _, edge in sorted((key, data["edge"]) for _, _, key, data
+                                           in self.graph.edges(keys=True, data=True))]
+
+    def between(self, a: str, b: str) -> list[tuple[int, Edge]]:
+        """Keys and edges between two links."""
+        return [(key, edge) for key, edge in self.edges_at(a) if edge.other(a) == b] if a in self.graph else []
+
+    def recognise(self) -> WordGraph:
+        """Contract planar parallelograms and equal parallel rods, nothing else."""
+        for found in iter(lambda: next(self._rods(), None) or next(self._parallelograms(), None), None):
+            edge, links = found
+            self.graph.remove_nodes_from(links)
+            self._add(edge)
+        return self
+
+    def reduce(self) -> WordGraph:
+        """Contract everything that stands in series or in parallel as well."""
+        while True:
+            self.recognise()
+            if not (self._carrier() or self._series() or self._parallel()):
+                return self
+
+    def _binary(self) -> Iterator[tuple[str, Edge, Edge]]:
+        for link in self.mechanism.links:
+            if link in self.graph and link not in self.kept:
+                edges = self.edges_at(link)
+                if len(edges) == 2 and edges[0][1].other(link) != edges[1][1].other(link):
+                    yield link, edges[0][1], edges[1][1]
+
+    def _groups(self, letters: set[str]) -> Iterator[tuple[str, str, list[Rod]]]:
+        """Binary links whose two joints are single joints of the given types, grouped by the pair they join."""
+        table: dict[frozenset[str], list[tuple[str, Edge, Edge]]] = {}
+        for link, first, second in self._binary():
+            if all(len(edge.joints) == 1 and self.mechanism.joints[edge.joints[0]].type.value in letters
+                   for edge in (first, second)):
+                table.setdefault(frozenset((first.other(link), second.other(link))), []).append((link, first, second))
+        for members in table.values():
+            if len(members) < 2:
+                continue
+            link, first, second = members[0]
+            tail, head = first.other(link), second.other(link)
+            rods = []
+            for link, first, second in members:
+                near, far = (first, second) if first.other(link) == tail else (second, first)
+                rods.append(Rod(link, near.joints[0], far.joints[0]))
+            yield tail, head, rods
+
+    def _vector(self, rod: Rod) -> tuple[Array, Array]:
+        near, far = centre_pair(self.mechanism.joints[rod.near], self.mechanism.joints[rod.far])
+        return near, far - near
+
+    def _rods(self) -> Iterator[tuple[Edge, list[str]]]:
+        tolerance = SAME_POINT * self.mechanism.length
+        for tail, head, rods in self._groups({"S", "U"}):
+            for rod in rods:
+                near, vector = self._vector(rod)
+                words = {self._rod_word(rod)}
+                same = [rod]
+                for other in rods:
+                    start, along = self._vector(other)
+                    words_match = self._shape(other) == self._shape(rod)
+                    if (other.link != rod.link and words_match and np.linalg.norm(along - vector) <= tolerance
+                            and np.linalg.norm(start - near) > tolerance):
+                        same.append(other)
+                        words.add(self._rod_word(other))
+                if len(same) >= 2:
+                    word = max(words, key=lambda w: sum(letter.actuated for letter in w.items))  # type: ignore[union-attr]
+                    joints = tuple(name for each in same for name in (each.near, each.far))
+                    links = [each.link for each in same]
+                    yield Edge(tail, head, Word((Rods(len(same), word),)), joints, tuple(links)), links
+                    break
+
+    def _rod_word(self, rod: Rod) -> Word:
+        return Word(tuple(Letter(self.mechanism.joints[name].type.value, self.mechanism.joints[name].actuated)
+                          for name in (rod.near, rod.far)))
+
+    def _shape(self, rod: Rod) -> str:
+        return self.mechanism.joints[rod.near].type.value + self.mechanism.joints[rod.far].type.value
+
+    def _parallelograms(self) -> Iterator[tuple[Edge, list[str]]]:
+        joints = self.mechanism.joints
+        tolerance = SAME_POINT * self.mechanism.length
+        for tail, head, cranks in self._groups({"R"}):
+            for one, two in combinations(cranks, 2):
+                axis = joints[one.near].axis
+                if not all(lines.parallel(axis, joints[name].axis) for name in (one.far, two.near, two.far)):
+                    continue
+                (a, along), (b, beside) = self._vector(one), self._vector(two)
+                flat = np.eye(3) - np.outer(axis, axis)
+                if (np.linalg.norm(flat @ (along - beside)) <= tolerance
+                        and np.linalg.norm(np.cross(flat @ along, flat @ (b - a))) > tolerance**2
+                        and np.linalg.norm(flat @ along) > tolerance):
+                    motor = any(joints[n].actuated for c in (one, two) for n in (c.near, c.far))
+                    names = tuple(n for c in (one, two) for n in (c.near, c.far))
+                    links = [one.link, two.link]
+                    yield Edge(tail, head, Word((Letter("Pi", motor),)), names, tuple(links)), links
+
+    def _series(self) -> bool:
+        for link, first, second in self._binary():
+            self.graph.remove_node(link)
+            a, b = first.other(link), second.other(link)
+            self._add(Edge(a, b, first.word_from(a) + second.word_from(link), first.joints + second.joints,
+                           (*first.inside, link, *second.inside)))
+            return True
+        return False
+
+    def _parallel(self) -> bool:
+        for a, b in {tuple(sorted(pair[:2])) for pair in self.graph.edges(keys=True)}:
+            edges = self.between(a, b)
+            if len(edges) > 1:
+                tail, head = edges[0][1].tail, edges[0][1].head
+                branches: list[Word] = []
+                for key, edge in edges:
+                    self.graph.remove_edge(a, b, key=key)
+                    word = edge.word_from(tail)
+                    bar = word.items[0]
+                    branches.extend(bar.branches if isinstance(bar, Bar) and len(word.items) == 1 else (word,))
+                self._add(Edge(tail, head, Word((Bar(tuple(branches)),)),
+                               tuple(n for _, edge in edges for n in edge.joints),
+                               tuple(n for _, edge in edges for n in edge.inside)))
+                return True
+        return False
+
+    def _carrier(self) -> bool:
+        """{chain-sliders}: a link held by P joints from another, and carried by the end of a chain from it."""
+        for link in self.mechanism.links:
+            if link not in self.graph:
+                continue
+            for key, sliders in self.edges_at(link):
+                foot = sliders.other(link)
+                word = sliders.word_from(foot)
+                if not all(isinstance(i, Letter) and i.letter == "P" and not i.actuated for i in word.items):
+                    continue
+                beside = [(k, e) for k, e in self.between(foot, link) if k != key]
+                for other, chain in beside:
+                    path = chain.word_from(foot)
+                    follower = path.items[-1]
+                    if (len(path.items) >= 2 and isinstance(follower, Letter) and follower.letter in "RS"
+                            and not follower.actuated and len(self.edges_at(link)) >= 3):
+                        self.graph.remove_edge(foot, link, key=key)
+                        self.graph.remove_edge(foot, link, key=other)
+                        self._add(Edge(foot, link, Word((Carrier(Word(path.items[:-1]), word),)),
+                                       chain.joints + sliders.joints, chain.inside + sliders.inside))
+                        return True
+        return False
+
+
+def rod_joints(mechanism: Mechanism, link: str) -> tuple[Joint, Joint] | None:
+    """The two joints of a binary link, or None."""
+    joints = mechanism.joints_of(link)
+    return (joints[0], joints[1]) if len(joints) == 2 else None

@@ -1,0 +1,363 @@
+"""Legs and platform, found by structure: never by names.
+
+The platform is the smallest set of links around the platform link that leaves the greatest number of legs, each joined
+to the base and to one link of the platform (an articulated platform has several links). In a single loop in which one
+chain has one freedom more than the other, the platform link is the last segment of the shorter one: the legs share the
+end joint.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+
+import networkx as nx
+import numpy as np
+
+from ..errors import BadMechanism, BadRequest, BadRobotFile, Defect
+from ..tolerances import SAME_POINT
+from . import lines
+from .composites import Edge, WordGraph
+from .model import Joint, JointType, Mechanism
+from .normal import centre_pair
+from .notation import Architecture, Bar, Letter, Word
+from .observation import Direction
+from .vectors import Array, unit
+
+
+@dataclass(frozen=True)
+class Leg:
+    """A leg: its label, its links (base and platform excluded), its joints, the platform link it ends on.
+
+    ``takes_platform`` says that the platform link itself is its last segment; its end joint is then not among its joints.
+    """
+
+    label: str
+    links: tuple[str, ...]
+    joints: tuple[str, ...]
+    attach: str
+    takes_platform: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Anatomy:
+    """A mechanism taken apart: platform links and legs, in the order of the mechanism's links."""
+
+    mechanism: Mechanism
+    platform: tuple[str, ...]
+    legs: tuple[Leg, ...]
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The legs' labels, in order."""
+        return tuple(leg.label for leg in self.legs)
+
+    def leg(self, label: str) -> Leg:
+        """The leg with this label; raises ``BadRequest`` with the labels there are."""
+        for leg in self.legs:
+            if leg.label == label:
+                return leg
+        raise BadRequest(f"{self.mechanism.name} has no leg", label, self.labels)
+
+    def leg_of(self, link: str) -> Leg | None:
+        """The leg that holds a link, or None."""
+        for leg in self.legs:
+            if link in leg.links or (leg.takes_platform and link == self.mechanism.platform):
+                return leg
+        return None
+
+    @cached_property
+    def point_platform(self) -> bool:
+        """Whether the platform is a point body: all its joints are coaxial R, or it has one S (theory 1)."""
+        joints = self.mechanism.joints_of(self.mechanism.platform)
+        if len(joints) == 1:
+            return joints[0].type is JointType.SPHERICAL
+        tolerance = SAME_POINT * self.mechanism.length
+        first = joints[0]
+        return all(j.type is JointType.REVOLUTE and lines.parallel(j.axis, first.axis)
+                   and lines.distance(j.point, first.point, first.axis) <= tolerance for j in joints)
+
+    def word(self, leg: Leg) -> Word:
+        """The leg's word, from the base to the platform (without the end joint where it takes the platform)."""
+        mechanism = self.mechanism
+        links = {mechanism.base, leg.attach, *leg.links}
+        kept = {mechanism.base, leg.attach}
+        graph = WordGraph(mechanism, kept, links)
+        graph.graph.remove_edges_from([(a, b, k) for a, b, k, data in graph.graph.edges(keys=True, data=True)
+                                       if not set(data["edge"].joints) <= set(leg.joints)])
+        graph.reduce()
+        edges = [edge for _, edge in graph.between(mechanism.base, leg.attach)]
+        if len(graph.graph) == 2 and len(edges) == 1:
+            return edges[0].word_from(mechanism.base)
+        return _paths_word(graph, mechanism.base, leg.attach)
+
+    def architecture(self) -> Architecture:
+        """The legs as a sum of words; a single loop whose legs share their end joint as one word."""
+        if len(self.legs) == 2:
+            loop = self._loop_word(*self.legs)
+            if loop is not None:
+                return Architecture.of([loop])
+        return Architecture.of([self.word(leg) for leg in self.legs])
+
+    def _loop_word(self, one: Leg, two: Leg) -> Word | None:
+        if one.takes_platform or two.takes_platform:
+            return self.word(one) + self.word(two).reversed()
+        if self.point_platform and one.attach == two.attach == self.mechanism.platform:
+            first, second = self.word(one), self.word(two)
+            if first.items[-1] == second.items[-1] == Letter("R"):
+                return first + Word(second.items[:-1]).reversed()
+        return None
+
+    def path(self, leg: Leg) -> list[Edge]:
+        """The shortest chain of edges from the base to the leg's end, composites contracted."""
+        mechanism = self.mechanism
+        graph = WordGraph(mechanism, {mechanism.base, leg.attach}, {mechanism.base, leg.attach, *leg.links})
+        graph.recognise()
+        nodes = nx.shortest_path(graph.graph, mechanism.base, leg.attach)
+        return [graph.between(a, b)[0][1] for a, b in zip(nodes, nodes[1:], strict=False)]
+
+
+def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
+    """What neither series nor parallel reduces: its simple paths side by side."""
+    words = []
+    for path in nx.all_simple_edge_paths(graph.graph, start, end):
+        word = Word(())
+        here = start
+        for a, b, key in path:
+            edge: Edge = graph.graph.edges[a, b, key]["edge"]
+            word += edge.word_from(here)
+            here = edge.other(here)
+        words.append(word)
+    return Word((Bar(tuple(words)),)) if len(words) > 1 else words[0]
+
+
+def dissect(mechanism: Mechanism) -> Anatomy:
+    """Platform and legs of a mechanism in normal form; raises ``BadMechanism`` where there is no leg, ``BadRobotFile``
+    where the observations contradict the legs."""
+    graph = WordGraph(mechanism, {mechanism.base, mechanism.platform}).recognise().graph
+    platform = _platform(mechanism, graph)
+    order = {name: i for i, name in enumerate(mechanism.links)}
+    legs: list[Leg] = []
+    moving = nx.MultiGraph()
+    moving.add_nodes_from(name for name in mechanism.links if name != mechanism.base and name not in platform)
+    live = [j for j in mechanism.joints.values() if j.type is not JointType.FREE]
+    moving.add_edges_from(j.links for j in live if set(j.links) <= set(moving))
+    for part in nx.connected_components(moving):
+        joints = [j for j in live if part & set(j.links)]
+        ends = {j.other(link) for j in joints for link in j.links if link in part} - part
+        if mechanism.base in ends and len(ends) == 2:
+            legs.append(Leg("", tuple(sorted(part, key=order.__getitem__)), tuple(j.name for j in joints),
+                            next(iter(ends - {mechanism.base}))))
+    for joint in live:
+        if mechanism.base in joint.links and joint.other(mechanism.base) in platform:
+            legs.append(Leg("", (), (joint.name,), joint.other(mechanism.base)))
+    if not legs:
+        raise BadMechanism(f"{mechanism.name}: no leg joins the base {mechanism.base!r} and the platform",
+                           mechanism.platform, "a platform that is reached through at least one leg")
+    legs = _segment_platform(mechanism, platform, legs)
+    joint_order = {name: i for i, name in enumerate(mechanism.joints)}
+    legs.sort(key=lambda leg: (order[leg.links[0]] if leg.links else order[leg.attach], joint_order[leg.joints[0]]))
+    return _labelled(Anatomy(mechanism, tuple(sorted(platform, key=order.__getitem__)), tuple(legs)))
+
+
+def _platform(mechanism: Mechanism, graph: nx.MultiGraph) -> set[str]:
+    """The smallest set around the platform link that leaves the most legs (articulated platforms)."""
+    base, root = mechanism.base, mechanism.platform
+    if base not in graph or root not in graph:
+        return {root}
+    rest = nx.Graph(graph)
+    rest.remove_node(base)
+    contacts = set(graph[base])
+    order = {name: i for i, name in enumerate(mechanism.links)}
+    reachable = nx.node_connected_component(rest, root)
+    branching = sorted((n for n in reachable - {root} if rest.degree(n) >= 3 and n not in contacts),
+                       key=lambda n: (nx.shortest_path_length(rest, root, n), order[n]))[:12]
+
+    def legs_of(members: set[str]) -> int:
+        others = rest.subgraph(set(rest) - members)
+        count = sum(1 for part in graph[base] if part in members)
+        for part in nx.connected_components(others):
+            if not part & contacts:
+                continue
+            ends = {n for link in part for n in rest[link] if n in members}
+            if len(ends) > 1:
+                return 0
+            count += len(ends)
+        return count
+
+    best, score = {root}, legs_of({root})
+    for size in range(1, min(4, len(branching)) + 1):
+        for chosen in combinations(branching, size):
+            members = {root, *chosen}
+            members |= {n for n in reachable - members - contacts
+                        if rest.degree(n) == 2 and all(m in members for m in rest[n])}
+            if nx.is_connected(rest.subgraph(members)) and (found := legs_of(members)) > score:
+                best, score = members, found
+    return best
+
+
+def _segment_platform(mechanism: Mechanism, platform: set[str], legs: list[Leg]) -> list[Leg]:
+    """In a single loop with one freedom more on one side, the platform is the last segment of the shorter leg."""
+    if len(platform) != 1 or len(legs) != 2 or len(mechanism.joints_of(mechanism.platform)) != 2:
+        return legs
+    freedoms = [sum(mechanism.joints[name].type.freedoms for name in leg.joints) for leg in legs]
+    single = [len(leg.joints) == len(leg.links) + 1 for leg in legs]
+    if not all(single) or abs(freedoms[0] - freedoms[1]) != 1:
+        return legs
+    short, long = sorted(range(2), key=freedoms.__getitem__)
+    end = next(name for name in legs[long].joints if mechanism.platform in mechanism.joints[name].links)
+    if mechanism.joints[end].type is not JointType.REVOLUTE:
+        return legs
+    result = list(legs)
+    result[short] = replace(legs[short], takes_platform=True)
+    return result
+
+
+def _labelled(anatomy: Anatomy) -> Anatomy:
+    """Labels of the observations where there are any, numbers elsewhere."""
+    given: dict[int, str] = {}
+    defects: list[Defect] = []
+    mechanism = anatomy.mechanism
+    file = mechanism.file or mechanism.name
+    for observation in mechanism.observations:
+        line = getattr(observation, "line", None)
+        index = next((i for i, leg in enumerate(anatomy.legs) if anatomy.leg_of(observation.link) == leg), None)
+        if index is None:
+            defects.append(Defect(file, line, "observe of a link that is in no leg", observation.link,
+                                  "links of the legs: " + ", ".join(n for leg in anatomy.legs for n in leg.links)))
+        elif given.setdefault(index, observation.leg) != observation.leg:
+            defects.append(Defect(file, line, f"link {observation.link!r} is in the leg labelled {given[index]!r}, "
+                                  "but is labelled", observation.leg, given[index]))
+        elif any(label == observation.leg and i != index for i, label in given.items()):
+            defects.append(Defect(file, line, "a leg's label used for links of two different legs", observation.leg,
+                                  "one label a leg"))
+    if defects:
+        raise BadRobotFile(defects)
+    numbers = [str(i + 1) for i in range(len(anatomy.legs))]
+    free = [n for n in numbers if n not in given.values()]
+    labels: list[str] = []
+    for i, number in enumerate(numbers):
+        if i in given:
+            labels.append(given[i])
+        elif number in free:
+            free.remove(number)
+            labels.append(number)
+        else:
+            labels.append(free.pop(0))
+    return replace(anatomy, legs=tuple(replace(leg, label=label)
+                                       for leg, label in zip(anatomy.legs, labels, strict=True)))
+
+
+def default_observation(anatomy: Anatomy, leg: Leg) -> Direction:
+    """The default segment of a leg (theory 1): the axis of a P that joins two moving links; else the last segment
+    before the platform (of equal parallel rods the first)."""
+    mechanism = anatomy.mechanism
+    path = anatomy.path(leg)
+    nodes = [mechanism.base]
+    for edge in path:
+        nodes.append(edge.other(nodes[-1]))
+    for i, edge in enumerate(path):
+        joint = _single(mechanism, edge)
+        if joint is not None and joint.type is JointType.PRISMATIC and mechanism.base not in (nodes[i], nodes[i + 1]):
+            return _axis_direction(mechanism, leg, nodes[i], joint, path, i)
+    if leg.takes_platform:
+        return _segment(mechanism, leg, mechanism.platform)
+    last = path[-1]
+    if last.inside:
+        return _segment(mechanism, leg, last.inside[0])
+    if len(nodes) < 3:
+        raise BadRequest(f"leg {leg.label} has no segment to observe: it is one joint", last.joints[0])
+    joint = _single(mechanism, last)
+    if joint is not None and joint.type.slides:
+        return _axis_direction(mechanism, leg, nodes[-2], joint, path, len(path) - 1)
+    before = _single(mechanism, path[-2])
+    if before is not None and before.type.slides:
+        return _axis_direction(mechanism, leg, nodes[-2], before, path, len(path) - 2)
+    return _centres(mechanism, leg, nodes[-2], path[-2], last)
+
+
+def observation_of(anatomy: Anatomy, link: str) -> Direction:
+    """The segment direction of any link of a leg: centre to centre, or along the axis of its P."""
+    leg = anatomy.leg_of(link)
+    if leg is None:
+        raise BadRequest(f"{anatomy.mechanism.name}: no leg has the link", link,
+                         [n for each in anatomy.legs for n in each.links])
+    mechanism = anatomy.mechanism
+    path = anatomy.path(leg)
+    nodes = [mechanism.base]
+    for edge in path:
+        nodes.append(edge.other(nodes[-1]))
+    if link in nodes[1:-1]:
+        i = nodes.index(link)
+        for k in (i, i - 1):
+            joint = _single(mechanism, path[k])
+            if joint is not None and joint.type.slides:
+                return _axis_direction(mechanism, leg, link, joint, path, k)
+        return _centres(mechanism, leg, link, path[i - 1], path[i])
+    return _segment(mechanism, leg, link)
+
+
+def _single(mechanism: Mechanism, edge: Edge) -> Joint | None:
+    return mechanism.joints[edge.joints[0]] if len(edge.joints) == 1 else None
+
+
+def _edge_centre(mechanism: Mechanism, edge: Edge, at: str) -> Joint | Array:
+    """The joint that the edge is, or the mean of the centres of its joints on the link ``at``."""
+    joint = _single(mechanism, edge)
+    if joint is not None:
+        return joint
+    return np.mean([mechanism.joints[n].point for n in edge.joints if at in mechanism.joints[n].links], axis=0)
+
+
+def _centres(mechanism: Mechanism, leg: Leg, link: str, before: Edge, after: Edge) -> Direction:
+    a, b = _edge_centre(mechanism, before, link), _edge_centre(mechanism, after, link)
+    if isinstance(a, Joint) and isinstance(b, Joint):
+        start, end = centre_pair(a, b)
+    else:
+        start, end = (_foot(x, y) for x, y in ((a, b), (b, a)))
+    return _direction(mechanism, leg, link, end - start)
+
+
+def _foot(of: Joint | Array, seen_from: Joint | Array) -> Array:
+    if not isinstance(of, Joint):
+        return of
+    if of.type is not JointType.REVOLUTE:
+        return of.point
+    return lines.foot(seen_from.point if isinstance(seen_from, Joint) else seen_from, of.point, of.axis)
+
+
+def _segment(mechanism: Mechanism, leg: Leg, link: str) -> Direction:
+    """A binary link: from the joint nearer to the base to the other."""
+    joints = mechanism.joints_of(link)
+    if len(joints) != 2:
+        raise BadRequest(f"link {link!r} of leg {leg.label} has {len(joints)} joints: it has no direction of its own",
+                         None, "an observe element with an axis")
+    far = nx.Graph(mechanism.graph)
+    far.remove_node(link)
+    if link != mechanism.platform and mechanism.platform in far:
+        far.remove_node(mechanism.platform)
+    own = {mechanism.base, *leg.links}
+    distance = nx.single_source_shortest_path_length(far.subgraph(own), mechanism.base)
+    a, b = sorted(joints, key=lambda j: distance.get(j.other(link), len(mechanism.links)))
+    for joint in (b, a):
+        if joint.type.slides:
+            return _direction(mechanism, leg, link, joint.axis)
+    start, end = centre_pair(a, b)
+    return _direction(mechanism, leg, link, end - start)
+
+
+def _axis_direction(mechanism: Mechanism, leg: Leg, link: str, joint: Joint, path: list[Edge], index: int) -> Direction:
+    """Along the P's axis, from the base side to the platform side."""
+    before = mechanism.joints[path[index - 1].joints[0]].point if index else joint.point
+    after = (mechanism.joints[path[index + 1].joints[0]].point if index + 1 < len(path)
+             else mechanism.links[leg.attach].pose[:3, 3])
+    along = float(joint.axis @ (after - before))
+    return _direction(mechanism, leg, link, -joint.axis if along < -SAME_POINT * mechanism.length else joint.axis)
+
+
+def _direction(mechanism: Mechanism, leg: Leg, link: str, vector: Array) -> Direction:
+    if np.linalg.norm(vector) <= SAME_POINT * mechanism.length:
+        raise BadRequest(f"the observed segment {link!r} of leg {leg.label} has no length", float(np.linalg.norm(vector)),
+                         "two joint centres apart from each other")
+    return Direction(leg.label, link, mechanism.links[link].pose[:3, :3].T @ unit(vector))

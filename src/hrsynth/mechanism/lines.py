@@ -1,0 +1,54 @@
+"""Lines in space: feet, common perpendiculars, meeting points. Points (3,), unit directions (3,), metres."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..tolerances import SAME_DIRECTION
+from .vectors import Array
+
+
+def parallel(a: Array, b: Array) -> bool:
+    """Whether two unit vectors are parallel (of either sense)."""
+    return bool(np.linalg.norm(np.cross(a, b)) < SAME_DIRECTION)
+
+
+def perpendicular(a: Array, b: Array) -> bool:
+    """Whether two unit vectors are perpendicular."""
+    return bool(abs(float(a @ b)) < SAME_DIRECTION)
+
+
+def foot(point: Array, on: Array, along: Array) -> Array:
+    """The foot of the perpendicular from ``point`` to the line through ``on`` with direction ``along``."""
+    return on + along * float(along @ (point - on))
+
+
+def distance(point: Array, on: Array, along: Array) -> float:
+    """The distance of ``point`` from the line through ``on`` with direction ``along``."""
+    return float(np.linalg.norm(point - foot(point, on, along)))
+
+
+def common_perpendicular(p: Array, a: Array, q: Array, b: Array) -> tuple[Array, Array]:
+    """The feet, on the lines (p, a) and (q, b), of their common perpendicular (parallel lines: the one through p)."""
+    if parallel(a, b):
+        return p, foot(p, q, b)
+    cosine = float(a @ b)
+    gap = q - p
+    s = (float(gap @ a) - float(gap @ b) * cosine) / (1 - cosine**2)
+    t = (float(gap @ a) * cosine - float(gap @ b)) / (1 - cosine**2)
+    return p + s * a, q + t * b
+
+
+def meeting_point(lines: list[tuple[Array, Array]], tolerance: float) -> Array | None:
+    """The point common to lines (point, direction) that are not all parallel, or None; ``tolerance`` in metres."""
+    first_point, first = lines[0]
+    for point, direction in lines[1:]:
+        if not parallel(first, direction):
+            near, far = common_perpendicular(first_point, first, point, direction)
+            centre = 0.5 * (near + far)
+            break
+    else:
+        return None
+    if all(distance(centre, point, direction) <= tolerance for point, direction in lines):
+        return centre
+    return None

@@ -1,0 +1,282 @@
+"""Links, joints and the mechanism they make: a frozen multigraph, its geometry given at the zero configuration.
+
+All points and directions are in the base link's frame *at the zero configuration*, where every loop is closed. A joint
+therefore needs no frames of its own: a centre and its axes say all. SI units, radians.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from enum import StrEnum
+from functools import cached_property
+
+import networkx as nx
+import numpy as np
+
+from ..errors import BadMechanism
+from ..tolerances import SAME_GEOMETRY
+from .observation import Observation
+from .vectors import Array, frozen, unit
+
+
+class JointType(StrEnum):
+    """The joint types of the theory, by their letter; the value is what notation prints."""
+
+    REVOLUTE = "R"
+    PRISMATIC = "P"
+    UNIVERSAL = "U"
+    SPHERICAL = "S"
+    CYLINDRICAL = "C"
+    PLANAR = "E"
+    FIXED = "F"
+    FREE = "6"
+
+    @property
+    def freedoms(self) -> int:
+        """Freedoms that the joint leaves between its two links."""
+        return {"R": 1, "P": 1, "U": 2, "S": 3, "C": 2, "E": 3, "F": 0, "6": 6}[self.value]
+
+    @property
+    def axes(self) -> int:
+        """Number of axes that the type needs."""
+        return {"R": 1, "P": 1, "U": 2, "S": 0, "C": 1, "E": 1, "F": 0, "6": 0}[self.value]
+
+    @property
+    def slides(self) -> bool:
+        """Whether the joint lets its two links translate along its axis (P and C)."""
+        return self.value in ("P", "C")
+
+
+@dataclass(frozen=True)
+class Limits:
+    """Limits of a joint's coordinate, kept for writing back; None where the file gives none."""
+
+    lower: float | None = None
+    upper: float | None = None
+    velocity: float | None = None
+    effort: float | None = None
+
+
+@dataclass(frozen=True)
+class Motor:
+    """An actuator: the name of its transmission; ``xml`` keeps the element of the file it came from."""
+
+    name: str
+    xml: str | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Link:
+    """A rigid body: its frame's pose X_BL at the zero configuration (4, 4); ``xml`` keeps unknown child elements."""
+
+    name: str
+    pose: Array = field(default_factory=lambda: frozen(np.eye(4)))
+    xml: tuple[str, ...] = ()
+    line: int | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pose", frozen(self.pose))
+
+
+@dataclass(frozen=True, eq=False)
+class Joint:
+    """A joint: ``point`` its centre (3,), ``axes`` unit vectors (R, P, C: one; planar: the normal; U: the first fixed
+    in the predecessor, the second in the successor); its coordinate is the successor's motion seen from the predecessor.
+    """
+
+    name: str
+    type: JointType
+    predecessor: str
+    successor: str
+    point: Array
+    axes: tuple[Array, ...] = ()
+    motor: Motor | None = None
+    limits: Limits | None = None
+    in_tree: bool = True
+    """Whether a file writes it as a tree joint (else as a loop)."""
+    xml: tuple[str, ...] = ()
+    line: int | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "type", JointType(self.type))
+        object.__setattr__(self, "point", frozen(self.point))
+        if len(self.axes) != self.type.axes:
+            raise BadMechanism(f"joint {self.name!r} of type {self.type.value}: number of axes", len(self.axes),
+                               str(self.type.axes))
+        try:
+            object.__setattr__(self, "axes", tuple(frozen(unit(axis)) for axis in self.axes))
+        except ValueError as error:
+            raise BadMechanism(f"joint {self.name!r}: axis", str(error), "a non-zero vector") from None
+
+    @property
+    def axis(self) -> Array:
+        """The (first) axis."""
+        return self.axes[0]
+
+    @property
+    def actuated(self) -> bool:
+        """Whether a motor drives the joint."""
+        return self.motor is not None
+
+    @property
+    def links(self) -> tuple[str, str]:
+        """Predecessor and successor."""
+        return self.predecessor, self.successor
+
+    def other(self, link: str) -> str:
+        """The link at the other end."""
+        return self.successor if link == self.predecessor else self.predecessor
+
+    def turned(self) -> Joint:
+        """The same joint with predecessor and successor exchanged (its coordinate keeps its sign)."""
+        axes = self.axes[::-1] if self.type is JointType.UNIVERSAL else tuple(-axis for axis in self.axes)
+        return replace(self, predecessor=self.successor, successor=self.predecessor, axes=axes)
+
+    def relinked(self, old: str, new: str) -> Joint:
+        """The joint with its end on ``old`` moved to ``new``."""
+        if old == self.predecessor:
+            return replace(self, predecessor=new)
+        return replace(self, successor=new)
+
+
+@dataclass(frozen=True)
+class Coupling:
+    """A gear: coordinate of the joint that carries ``successor`` = ratio × that of the one that carries ``predecessor``."""
+
+    name: str
+    predecessor: str
+    successor: str
+    ratio: float
+    line: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Mechanism:
+    """Links, joints, a base, a platform, observations: a frozen value; every change returns a new one."""
+
+    name: str
+    links: Mapping[str, Link]
+    joints: Mapping[str, Joint]
+    base: str
+    platform: str
+    observations: tuple[Observation, ...] = ()
+    couplings: tuple[Coupling, ...] = ()
+    camera: str | None = None
+    """The reference link, the one that carries the camera; None means the base."""
+    xml: tuple[str, ...] = ()
+    file: str | None = None
+
+    def __post_init__(self) -> None:
+        for key, joint in self.joints.items():
+            if key != joint.name:
+                raise BadMechanism(f"joint {joint.name!r} is filed under", key, joint.name)
+            for link in joint.links:
+                if link not in self.links:
+                    raise BadMechanism(f"joint {joint.name!r} names an unknown link", link, sorted(self.links))
+            if joint.predecessor == joint.successor:
+                raise BadMechanism(f"joint {joint.name!r} joins a link to itself", joint.predecessor)
+        for role, link in (("base", self.base), ("platform", self.platform), ("camera", self.reference)):
+            if link not in self.links:
+                raise BadMechanism(f"unknown {role} link", link, sorted(self.links))
+
+    @classmethod
+    def of(cls, name: str, links: Iterable[Link], joints: Iterable[Joint], **rest: object) -> Mechanism:
+        """A mechanism from sequences of links and joints; the first link is the base unless ``base`` is given."""
+        table = {link.name: link for link in links}
+        rest.setdefault("base", next(iter(table)))
+        return cls(name=name, links=table, joints={joint.name: joint for joint in joints}, **rest)  # type: ignore[arg-type]
+
+    @property
+    def reference(self) -> str:
+        """The reference link: observed directions are relative to it."""
+        return self.base if self.camera is None else self.camera
+
+    @cached_property
+    def graph(self) -> nx.MultiGraph:
+        """The joint graph: nodes are link names, edges are keyed by joint names; read-only."""
+        graph = nx.MultiGraph()
+        graph.add_nodes_from(self.links)
+        for joint in self.joints.values():
+            graph.add_edge(joint.predecessor, joint.successor, key=joint.name, joint=joint)
+        return nx.freeze(graph)
+
+    @cached_property
+    def length(self) -> float:
+        """The characteristic length (m): mean distance of the joint centres from their centroid."""
+        if not self.joints:
+            return 1.0
+        points = np.array([joint.point for joint in self.joints.values()])
+        spread = float(np.mean(np.linalg.norm(points - points.mean(axis=0), axis=1)))
+        return spread if spread > 0 else 1.0
+
+    @cached_property
+    def _joints_of(self) -> dict[str, tuple[Joint, ...]]:
+        table: dict[str, list[Joint]] = {name: [] for name in self.links}
+        for joint in self.joints.values():
+            table[joint.predecessor].append(joint)
+            table[joint.successor].append(joint)
+        return {name: tuple(joints) for name, joints in table.items()}
+
+    def joints_of(self, link: str) -> tuple[Joint, ...]:
+        """The joints of a link, in the order of the mechanism."""
+        return self._joints_of[link]
+
+    def between(self, a: str, b: str) -> tuple[Joint, ...]:
+        """The joints that join ``a`` and ``b`` directly."""
+        return tuple(joint for joint in self._joints_of[a] if joint.other(a) == b)
+
+    def changed(self, *, remove_links: Iterable[str] = (), remove_joints: Iterable[str] = (),
+                links: Iterable[Link] = (), joints: Iterable[Joint] = (), **fields: object) -> Mechanism:
+        """A new mechanism: links removed with all their joints, joints removed, links and joints added or replaced."""
+        gone = set(remove_links)
+        new_links = {name: link for name, link in self.links.items() if name not in gone}
+        new_links.update({link.name: link for link in links})
+        dropped = set(remove_joints)
+        new_joints = {name: joint for name, joint in self.joints.items()
+                      if name not in dropped and not gone & set(joint.links)}
+        new_joints.update({joint.name: joint for joint in joints})
+        return replace(self, links=new_links, joints=new_joints, **fields)  # type: ignore[arg-type]
+
+    def fresh(self, name: str) -> str:
+        """``name``, or ``name_2``, ``name_3`` … if it is taken by a link or a joint."""
+        taken = set(self.links) | set(self.joints)
+        if name not in taken:
+            return name
+        number = 2
+        while f"{name}_{number}" in taken:
+            number += 1
+        return f"{name}_{number}"
+
+    def differences(self, other: Mechanism, tolerance: float = SAME_GEOMETRY) -> list[str]:
+        """What differs from ``other``, in words; empty where they are the same mechanism (names, order, geometry)."""
+        found: list[str] = []
+
+        def compare(what: str, mine: object, theirs: object) -> None:
+            if mine != theirs:
+                found.append(f"{what}: {mine!r} / {theirs!r}")
+
+        def near(what: str, mine: Iterable[float], theirs: Iterable[float]) -> None:
+            gap = np.max(np.abs(np.asarray(mine) - np.asarray(theirs)), initial=0.0)
+            if not gap <= tolerance:
+                found.append(f"{what}: differs by {gap:.3g}")
+
+        for role in ("base", "platform", "reference", "couplings"):
+            compare(role, getattr(self, role), getattr(other, role))
+        compare("links", set(self.links), set(other.links))
+        compare("joints", set(self.joints), set(other.joints))
+        compare("observations", [(o.leg, o.link) for o in self.observations],
+                [(o.leg, o.link) for o in other.observations])
+        for name in self.links.keys() & other.links.keys():
+            near(f"pose of link {name}", self.links[name].pose, other.links[name].pose)
+            compare(f"content of link {name}", self.links[name].xml, other.links[name].xml)
+        for name in self.joints.keys() & other.joints.keys():
+            a, b = self.joints[name], other.joints[name]
+            for what in ("type", "links", "limits", "actuated", "in_tree", "xml"):
+                compare(f"{what} of joint {name}", getattr(a, what), getattr(b, what))
+            near(f"centre of joint {name}", a.point, b.point)
+            if len(a.axes) == len(b.axes):
+                near(f"axes of joint {name}", np.ravel(a.axes), np.ravel(b.axes))
+        for mine, theirs in zip(self.observations, other.observations, strict=False):
+            found.extend(mine.differences(theirs, tolerance))
+        return found

@@ -1,0 +1,181 @@
+"""The normal form of a mechanism: joints that act as one are one.
+
+* links held together by a fixed joint are one link;
+* two coaxial R are one R, two parallel P one P;
+* two perpendicular R that meet are a U; three independent R that meet (or a U and an R) are an S; an R through the
+  centre of an S adds nothing.
+
+A link between two merged joints disappears; the base, the platform, the camera's link and observed links never do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import BadMechanism
+from ..tolerances import SAME_POINT
+from . import lines
+from .model import Joint, JointType, Mechanism
+from .observation import Direction
+from .vectors import Array
+
+
+@dataclass(frozen=True, eq=False)
+class NormalForm:
+    """The mechanism in normal form, and where its links went: ``into[old]`` is the link that took ``old`` in."""
+
+    mechanism: Mechanism
+    into: dict[str, str]
+
+
+def normal_form(mechanism: Mechanism) -> NormalForm:
+    """Merge until nothing merges; names, frames and order of what stays are kept."""
+    into = {name: name for name in mechanism.links}
+    current = _without_fixed(mechanism, into)
+    while (merge := _next_merge(current)) is not None:
+        between, gone, joint = merge
+        current = _replaced(current, between, gone, joint)
+    return NormalForm(current, into)
+
+
+def _protected(mechanism: Mechanism) -> set[str]:
+    return {mechanism.base, mechanism.platform, mechanism.reference} | {o.link for o in mechanism.observations}
+
+
+def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
+    current = mechanism
+    while True:
+        joint = next((j for j in current.joints.values() if j.type is JointType.FIXED), None)
+        if joint is None:
+            return current
+        rank = [current.base, current.platform, current.reference, *(o.link for o in current.observations)]
+
+        def weight(link: str, rank: list[str] = rank) -> int:
+            return rank.index(link) if link in rank else len(rank)
+
+        kept, gone = sorted(joint.links, key=weight)
+        if gone == current.platform:
+            raise BadMechanism("the platform is fixed to the base", joint.name, "a platform that moves")
+        for name, target in into.items():
+            if target == gone:
+                into[name] = kept
+        observations = tuple(
+            replace(o, link=kept, direction=current.links[kept].pose[:3, :3].T
+                    @ current.links[gone].pose[:3, :3] @ o.direction)
+            if isinstance(o, Direction) and o.link == gone else o
+            for o in current.observations)
+        joints = []
+        for other in current.joints_of(gone):
+            moved = other.relinked(gone, kept)
+            if other.name != joint.name and moved.predecessor != moved.successor:
+                joints.append(moved)
+        link = current.links[kept]
+        order = {name: i for i, name in enumerate(current.joints)}
+        merged = current.changed(
+            remove_links=[gone], links=[replace(link, xml=link.xml + current.links[gone].xml)], joints=joints,
+            observations=observations,
+            couplings=tuple(replace(c, predecessor=into[c.predecessor], successor=into[c.successor])
+                            for c in current.couplings),
+            camera=into[current.reference] if current.camera is not None else None)
+        current = replace(merged, joints={n: merged.joints[n] for n in sorted(merged.joints, key=order.__getitem__)})
+
+
+def _next_merge(mechanism: Mechanism) -> tuple[list[str], list[Joint], Joint] | None:
+    """The links between, the joints that go, and the joint that takes their place."""
+    held = _protected(mechanism) | {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
+    free = [name for name in mechanism.links if name not in held and len(mechanism.joints_of(name)) == 2]
+    for x in free:
+        first, second = mechanism.joints_of(x)
+        if first.other(x) == second.other(x) or first.actuated != second.actuated:
+            continue
+        a = first if first.successor == x else first.turned()
+        b = second if second.predecessor == x else second.turned()
+        merged = _pair(mechanism, a, b)
+        if merged is not None:
+            return [x], [first, second], merged
+    for chain in _chains_of_three(mechanism, set(free)):
+        merged = _triple(mechanism, *chain)
+        if merged is not None:
+            return [chain[0].successor, chain[1].successor], list(chain), merged
+    return None
+
+
+def _pair(mechanism: Mechanism, a: Joint, b: Joint) -> Joint | None:
+    """The joint that acts as a then b (b after a), or None."""
+    near = SAME_POINT * mechanism.length
+    kinds = a.type.value + b.type.value
+    ends = {"predecessor": a.predecessor, "successor": b.successor, "limits": None}
+    if kinds == "RR":
+        if lines.parallel(a.axis, b.axis):
+            return replace(a, **ends) if lines.distance(b.point, a.point, a.axis) <= near else None
+        centre = lines.meeting_point([(a.point, a.axis), (b.point, b.axis)], near)
+        if centre is not None and lines.perpendicular(a.axis, b.axis):
+            return replace(a, type=JointType.UNIVERSAL, point=centre, axes=(a.axis, b.axis), **ends)
+    elif kinds == "PP" and lines.parallel(a.axis, b.axis):
+        return replace(a, **ends)
+    elif kinds in ("RU", "UR"):
+        centre, arm = (a.point, b) if a.type is JointType.UNIVERSAL else (b.point, a)
+        if lines.distance(centre, arm.point, arm.axis) <= near:
+            axes = np.array([*a.axes, *b.axes])
+            if abs(np.linalg.det(axes)) > 1e-3:
+                return replace(a, type=JointType.SPHERICAL, point=centre, axes=(), **ends)
+            inner = a.axes[-1], b.axes[0]
+            if lines.parallel(*inner):
+                return replace(a, type=JointType.UNIVERSAL, point=centre, axes=(a.axes[0], b.axes[-1]), **ends)
+    elif kinds in ("RS", "SR"):
+        ball, arm = (a, b) if a.type is JointType.SPHERICAL else (b, a)
+        if lines.distance(ball.point, arm.point, arm.axis) <= near:
+            return replace(a, type=JointType.SPHERICAL, point=ball.point, axes=(), **ends)
+    return None
+
+
+def _triple(mechanism: Mechanism, a: Joint, b: Joint, c: Joint) -> Joint | None:
+    if {a.type, b.type, c.type} != {JointType.REVOLUTE} or len({a.actuated, b.actuated, c.actuated}) > 1:
+        return None
+    near = SAME_POINT * mechanism.length
+    centre = lines.meeting_point([(j.point, j.axis) for j in (a, b, c)], near)
+    if centre is None or abs(np.linalg.det(np.array([a.axis, b.axis, c.axis]))) < 1e-3:
+        return None
+    return replace(a, type=JointType.SPHERICAL, point=centre, axes=(), predecessor=a.predecessor,
+                   successor=c.successor, limits=None)
+
+
+def _chains_of_three(mechanism: Mechanism, free: set[str]) -> Iterator[tuple[Joint, Joint, Joint]]:
+    for x in mechanism.links:
+        if x not in free:
+            continue
+        for before, middle in (mechanism.joints_of(x), mechanism.joints_of(x)[::-1]):
+            y = middle.other(x)
+            if y not in free:
+                continue
+            after = next((j for j in mechanism.joints_of(y) if j.name != middle.name), None)
+            if after is None or before.other(x) == after.other(y):
+                continue
+            yield (before if before.successor == x else before.turned(),
+                   middle if middle.predecessor == x else middle.turned(),
+                   after if after.predecessor == y else after.turned())
+
+
+def _replaced(mechanism: Mechanism, between: list[str], gone: list[Joint], joint: Joint) -> Mechanism:
+    """``joint`` in the place (name and order) of the first of ``gone`` in the mechanism's order."""
+    first = min((j.name for j in gone), key=list(mechanism.joints).index)
+    joint = replace(joint, name=first, xml=())
+    order = list(mechanism.joints)
+    changed = mechanism.changed(remove_links=between, remove_joints=[j.name for j in gone], joints=[joint])
+    return replace(changed, joints={n: changed.joints[n] for n in sorted(changed.joints, key=order.index)})
+
+
+def centre_pair(a: Joint, b: Joint) -> tuple[Array, Array]:
+    """The centres of two joints of one link, as a segment sees them: an R's centre is the foot, on its axis, of the
+    perpendicular from the other's centre (two R: the feet of their common perpendicular)."""
+    a_line, b_line = a.type is JointType.REVOLUTE, b.type is JointType.REVOLUTE
+    if a_line and b_line:
+        return lines.common_perpendicular(a.point, a.axis, b.point, b.axis)
+    if a_line:
+        return lines.foot(b.point, a.point, a.axis), b.point
+    if b_line:
+        return a.point, lines.foot(a.point, b.point, b.axis)
+    return a.point, b.point

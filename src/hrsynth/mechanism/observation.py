@@ -1,0 +1,69 @@
+"""What a camera measures: observations, each with its own measured space."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..errors import BadMechanism
+from .vectors import Array, frozen, unit
+
+
+@dataclass(frozen=True, eq=False)
+class Observation:
+    """A measurement of one link of a leg, seen from the reference link.
+
+    A subclass gives the measured value and its rate; nothing else in the project knows what is measured. Poses are
+    X_BL (4, 4) in the base frame, Jacobians V (6, n) map joint velocities to (linear, angular) velocities of the link
+    frame's origin in base axes.
+    """
+
+    leg: str
+    link: str
+    line: int | None = field(default=None, kw_only=True)
+
+    def value(self, X_reference: Array, X_link: Array) -> Array:
+        """The measured value, seen from the reference link."""
+        raise NotImplementedError
+
+    def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
+        """The rate of :meth:`value` for each joint velocity; one row a component."""
+        raise NotImplementedError
+
+    def differences(self, other: Observation, tolerance: float) -> list[str]:
+        """What differs from another observation, in words."""
+        same = type(self) is type(other) and (self.leg, self.link) == (other.leg, other.link)
+        return [] if same else [f"observation of leg {self.leg}: {self!r} / {other!r}"]
+
+
+@dataclass(frozen=True, eq=False)
+class Direction(Observation):
+    """The unit vector u = R_cᵀ R_ℓ d of a direction d fixed in link ℓ (theory: observation; MMT 2.3.1).
+
+    ``direction`` is d in the *link's* frame, shape (3,).
+    """
+
+    direction: Array
+
+    def __post_init__(self) -> None:
+        try:
+            object.__setattr__(self, "direction", frozen(unit(self.direction)))
+        except ValueError:
+            raise BadMechanism(f"observation of leg {self.leg!r}: direction", "0 0 0", "a non-zero vector") from None
+
+    def value(self, X_reference: Array, X_link: Array) -> Array:
+        """u, shape (3,), a unit vector in the reference link's frame."""
+        return X_reference[:3, :3].T @ X_link[:3, :3] @ self.direction
+
+    def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
+        """u̇ = R_cᵀ ((ω_ℓ − ω_c) × R_ℓ d), shape (3, n)."""
+        u = X_link[:3, :3] @ self.direction
+        omega = V_link[3:] - V_reference[3:]
+        return X_reference[:3, :3].T @ np.cross(omega, u[:, None], axisa=0, axisb=0, axisc=0)
+
+    def differences(self, other: Observation, tolerance: float) -> list[str]:
+        found = super().differences(other, tolerance)
+        if not found and isinstance(other, Direction) and np.max(np.abs(self.direction - other.direction)) > tolerance:
+            found.append(f"direction of leg {self.leg}: {self.direction} / {other.direction}")
+        return found

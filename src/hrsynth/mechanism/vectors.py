@@ -1,0 +1,80 @@
+"""Small vector helpers shared by all rooms: unit vectors, rotations, homogeneous poses (SI, radians)."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+
+def frozen(values: ArrayLike) -> Array:
+    """A read-only copy of ``values`` as floats."""
+    array = np.array(values, dtype=float)
+    array.setflags(write=False)
+    return array
+
+
+def unit(vector: ArrayLike) -> Array:
+    """``vector`` divided by its length; shape (3,). Raises ``ValueError`` for a zero vector."""
+    array = np.asarray(vector, dtype=float)
+    length = float(np.linalg.norm(array))
+    if not length > 0 or not np.isfinite(length):
+        raise ValueError("a zero or infinite vector has no direction")
+    return array / length
+
+
+def hat(vector: ArrayLike) -> Array:
+    """The matrix [v]ₓ with [v]ₓ w = v × w; shape (3, 3)."""
+    x, y, z = np.asarray(vector, dtype=float)
+    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+
+
+def pose(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Array:
+    """The homogeneous pose X_AB with p_AB and R_AB; shape (4, 4)."""
+    matrix = np.eye(4)
+    matrix[:3, 3] = position
+    if rotation is not None:
+        matrix[:3, :3] = rotation
+    return matrix
+
+
+def inverse(X_AB: Array) -> Array:
+    """X_BA of X_AB; shape (4, 4)."""
+    rotation = X_AB[:3, :3].T
+    return pose(-rotation @ X_AB[:3, 3], rotation)
+
+
+def rotation_about(axis: ArrayLike, angle: float) -> Array:
+    """Rodrigues: the rotation by ``angle`` about the unit vector along ``axis``; shape (3, 3)."""
+    K = hat(unit(axis))
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
+
+
+def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
+    """URDF's fixed-axis roll, pitch, yaw: Rz(yaw) Ry(pitch) Rx(roll); shape (3, 3)."""
+    return (
+        rotation_about((0, 0, 1), yaw) @ rotation_about((0, 1, 0), pitch) @ rotation_about((1, 0, 0), roll)
+    )
+
+
+def rpy_from_rotation(R: Array) -> tuple[float, float, float]:
+    """Roll, pitch, yaw of a rotation (yaw = 0 where pitch = ±90°): the inverse of :func:`rotation_from_rpy`."""
+    cos_pitch = float(np.hypot(R[0, 0], R[1, 0]))
+    pitch = float(np.arctan2(-R[2, 0], cos_pitch))
+    if cos_pitch < 1e-9:
+        return float(np.arctan2(-R[1, 2], R[1, 1])), pitch, 0.0
+    return float(np.arctan2(R[2, 1], R[2, 2])), pitch, float(np.arctan2(R[1, 0], R[0, 0]))
+
+
+def perpendicular(axis: ArrayLike, near: ArrayLike | None = None) -> Array:
+    """A unit vector normal to ``axis``: the part of ``near`` normal to it where that is not (nearly) zero."""
+    n = unit(axis)
+    candidates: Iterable[ArrayLike] = ([] if near is None else [near]) + [np.eye(3)[i] for i in np.argsort(np.abs(n))]
+    for candidate in candidates:
+        rest = np.asarray(candidate, dtype=float) - n * float(n @ np.asarray(candidate, dtype=float))
+        if np.linalg.norm(rest) > 1e-6:
+            return unit(rest)
+    raise AssertionError("three coordinate axes cannot all be parallel to one vector")

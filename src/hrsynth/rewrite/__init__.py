@@ -1,0 +1,1 @@
+"""Rewriting a mechanism into its hidden robot: rules, strategy, derivation. The certificate is an argument."""

@@ -1,0 +1,203 @@
+"""What the rules may know of the real robot: loci of directions and anchors, over whole motions, never at one pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import networkx as nx
+import numpy as np
+
+from ..kinematics.configuration import ClosedConfiguration, closed
+from ..kinematics.ranks import kernel_basis
+from ..kinematics.sampling import Samples
+from ..kinematics.twin import Twin
+from ..mechanism import Joint, JointType, Mechanism
+from ..mechanism.legs import Anatomy
+from ..mechanism.normal import centre_pair
+from ..mechanism.vectors import Array, unit
+from ..tolerances import LOCUS
+
+
+@dataclass(frozen=True, eq=False)
+class Locus:
+    """The set a point or a direction moves on: its dimension as a flat (0 fixed, 1 line, 2 plane, 3 space), and
+    orthonormal ``axes`` with the flat's directions first, the normals last (rows)."""
+
+    dimension: int
+    axes: Array
+
+    @property
+    def normal(self) -> Array:
+        """The normal of a plane."""
+        return self.axes[2]
+
+
+def locus(points: Array, scale: float) -> Locus:
+    """The smallest flat that holds all points, shape (n, 3); ``scale`` is what no extent is relative to."""
+    centred = points - points.mean(axis=0)
+    _, s, Vt = np.linalg.svd(centred / np.sqrt(len(points)), full_matrices=True)
+    return Locus(int(np.sum(s > LOCUS * scale)), Vt)
+
+
+@dataclass(frozen=True, eq=False)
+class Proximal:
+    """The part of a leg between the reference link and the observed link ℓ, moved on its own.
+
+    ``joints`` are its joints, ``before`` its last link, ``knee`` the joint K to ℓ, ``anchor`` A at zero.
+    """
+
+    joints: tuple[Joint, ...]
+    before: str
+    knee: Joint
+    anchor: Array
+    rotations: Array
+    """Orientations of ``before`` seen from the reference link, relative to the zero configuration, (n, 3, 3)."""
+    anchors: Array
+    """Positions of A, (n, 3), in base coordinates with the reference link held."""
+    length: float
+
+    @cached_property
+    def anchor_locus(self) -> Locus:
+        """The flat on which A moves."""
+        return locus(self.anchors, self.length)
+
+    @cached_property
+    def translates(self) -> bool:
+        """Whether the link before K only translates relative to the reference link."""
+        return bool(np.max(np.abs(self.rotations - np.eye(3))) < LOCUS)
+
+    def keeps(self, direction: Array) -> bool:
+        """Whether a direction fixed in the link before K is constant seen from the reference link."""
+        return bool(np.max(np.abs(self.rotations @ direction - direction)) < LOCUS)
+
+    @cached_property
+    def turning_axis(self) -> Array | None:
+        """The constant direction about which the link before K turns, or None."""
+        spread = np.concatenate([R - np.eye(3) for R in self.rotations])
+        _, s, Vt = np.linalg.svd(spread)
+        if s[0] < LOCUS or s[2] > LOCUS * len(self.rotations):
+            return None
+        return Vt[2]
+
+    @cached_property
+    def single_revolute(self) -> Joint | None:
+        """The base R joint, if the proximal chain is that joint alone."""
+        if len(self.joints) == 1 and self.joints[0].type is JointType.REVOLUTE:
+            return self.joints[0]
+        return None
+
+
+class Evidence:
+    """Facts about the real robot, gathered from its samples and from its legs moved on their own."""
+
+    def __init__(self, anatomy: Anatomy, samples: Samples) -> None:
+        self.anatomy = anatomy
+        self.samples = samples
+        self.mechanism: Mechanism = anatomy.mechanism
+        self.reference = samples.question.reference
+        self._proximal: dict[str, Proximal | None] = {}
+
+    def directions(self, index: int) -> Array:
+        """All sampled values of observation ``index``, (n, 3), in base coordinates with the reference link held."""
+        home = self.mechanism.links[self.reference].pose[:3, :3]
+        values = [target.measured[index][1] for member in self.samples.members for target in member.way]
+        return np.asarray(values) @ home.T
+
+    def index_of(self, link: str, leg: str) -> int:
+        """The observation of a leg on ``link``."""
+        return next(i for i, o in enumerate(self.samples.question.observations) if (o.link, o.leg) == (link, leg))
+
+    def spins(self, link: str, direction: Array) -> bool:
+        """Whether a link can turn about its own direction with every other link at rest.
+
+        Links that it carries along on a P of the same direction may turn with it.
+        """
+        companions = {link}
+        for joint in self.mechanism.joints_of(link):
+            if joint.type is JointType.PRISMATIC and np.linalg.norm(np.cross(joint.axis, direction)) < LOCUS:
+                companions.add(joint.other(link))
+        if companions & {self.mechanism.base, self.mechanism.platform, self.reference}:
+            return False
+        at = self.samples.members[0].configuration
+        kernel, _ = at.kernel()
+        rest = [at.velocity(name) @ kernel for name in self.mechanism.links if name not in companions]
+        still, _ = kernel_basis(np.vstack(rest), 1.0)
+        if still.shape[1] == 0:
+            return False
+        moves = at.velocity(link) @ kernel @ still
+        turning = np.linalg.svd(moves[3:], full_matrices=False)
+        if turning[1][0] < 1e-6:
+            return False
+        local = self.mechanism.links[link].pose[:3, :3].T @ direction
+        axis = at.pose(link)[:3, :3] @ local
+        return bool(np.linalg.norm(np.cross(turning[0][:, 0], axis)) < 1e-6)
+
+    def proximal(self, link: str) -> Proximal | None:
+        """The chain before ``link``, or None where it is not a chain of its own (a camera elsewhere, several knees,
+        a sliding knee)."""
+        if link not in self._proximal:
+            self._proximal[link] = self._find_proximal(link)
+        return self._proximal[link]
+
+    def knees(self, link: str) -> list[Joint]:
+        """The joints of ``link`` on the reference link's side."""
+        mechanism, leg = self.mechanism, self.anatomy.leg_of(link)
+        if leg is None or self.reference not in (mechanism.base, mechanism.platform) or link == self.reference:
+            return []
+        side = mechanism.graph.subgraph({self.reference, *leg.links} - {link})
+        near = nx.node_connected_component(side, self.reference)
+        return [j for j in mechanism.joints_of(link) if j.other(link) in near and j.type is not JointType.FREE]
+
+    def _find_proximal(self, link: str) -> Proximal | None:
+        knees = self.knees(link)
+        if len(knees) != 1 or knees[0].type not in (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL):
+            return None
+        knee, before = knees[0], knees[0].other(link)
+        onward = [j for j in self.mechanism.joints_of(link) if j.name != knee.name]
+        anchor = knee.point
+        if onward and not onward[0].type.slides:
+            anchor = centre_pair(knee, onward[0])[0]
+        leg = self.anatomy.leg_of(link)
+        assert leg is not None
+        side = nx.Graph(self.mechanism.graph.subgraph({self.reference, *leg.links} - {link}))
+        nodes = {self.reference}
+        if before != self.reference:
+            for path in nx.all_simple_paths(side, self.reference, before):
+                nodes.update(path)
+        joints = tuple(j for j in self.mechanism.joints.values() if set(j.links) <= nodes)
+        rotations, anchors = _moved(self.mechanism, self.reference, nodes, joints, before, anchor)
+        return Proximal(joints, before, knee, anchor, rotations, anchors, self.mechanism.length)
+
+
+def _moved(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequence[Joint], before: str,
+           anchor: Array, count: int = 12) -> tuple[Array, Array]:
+    """Orientations of ``before`` and positions of the anchor over random motions of the part alone."""
+    if before == reference:
+        return np.eye(3)[None], anchor[None]
+    part = Mechanism.of("part", [mechanism.links[n] for n in mechanism.links if n in nodes], joints, base=reference,
+                        platform=before)
+    twin = Twin(part, mechanism.length)
+    rng = np.random.default_rng(1)
+    home = part.links[before].pose
+    local = home[:3, :3].T @ (anchor - home[:3, 3])
+    rotations, anchors = [], []
+    for _ in range(count):
+        q = twin.q0
+        if not twin.loops:
+            q = twin.moved(q, rng.uniform(-0.6, 0.6, twin.nv))
+        else:
+            for _ in range(4):
+                kernel, _ = ClosedConfiguration.of(twin, q).kernel()
+                q, _ = closed(twin, twin.moved(q, 0.12 * kernel @ rng.normal(size=kernel.shape[1])), tolerance=1e-12)
+        X = twin.pose(q, before)
+        rotations.append(X[:3, :3] @ home[:3, :3].T)
+        anchors.append(X[:3, :3] @ local + X[:3, 3])
+    return np.asarray(rotations), np.asarray(anchors)
+
+
+def far_from(directions: Array) -> Array:
+    """A unit vector as far as possible from all given unit vectors (n, 3): the smallest axis of their scatter."""
+    _, vectors = np.linalg.eigh(directions.T @ directions)
+    return unit(vectors[:, 0])

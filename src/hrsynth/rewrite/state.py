@@ -1,0 +1,120 @@
+"""What is rewritten: the mechanism so far, and the virtual chain of each observation in it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+from ..mechanism import Joint, JointType, Mechanism, Observation
+from ..mechanism.legs import Anatomy, Leg
+from ..mechanism.notation import Architecture
+from ..mechanism.vectors import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """The virtual chain of one observation: reference –sliders– carrier T –actuator– (bearing W –roll R(d)–) link ℓ.
+
+    ``anchor`` is A and ``direction`` u at the zero configuration, in the base frame. ``knee`` names the real joint K
+    before ℓ, ``before`` the link before it; ``carrier`` may be a real link that only translates.
+    """
+
+    leg: str
+    link: str
+    direction: Array
+    anchor: Array
+    knee: str | None
+    before: str | None
+    carrier: str
+    sliders: tuple[str, ...]
+    slider_links: tuple[str, ...]
+    actuator: str
+    bearing: str | None
+    roll: str | None
+    taken: bool = False
+    spins: bool = False
+    """Whether the takeover was of the kind that leaves the actuator's axes free."""
+
+    @property
+    def virtual_links(self) -> tuple[str, ...]:
+        """Links that are in no real robot and still belong to the sliding part."""
+        return self.slider_links
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """A mechanism on its way from the real robot to its hidden robot."""
+
+    real: Anatomy
+    mechanism: Mechanism
+    chains: tuple[Chain, ...] = ()
+    removed: tuple[str, ...] = ()
+    """Labels of the legs that were dropped."""
+    owners: Mapping[str, str] = field(default_factory=dict)
+    """The leg of each virtual link."""
+
+    def chain(self, leg: str) -> tuple[Chain, ...]:
+        """The chains of a leg."""
+        return tuple(chain for chain in self.chains if chain.leg == leg)
+
+    def with_chain(self, old: Chain, new: Chain | None, mechanism: Mechanism,
+                   owners: Mapping[str, str] | None = None) -> State:
+        """The state with one chain replaced (or dropped) and another mechanism."""
+        chains = tuple(c for each in self.chains for c in ((new,) if each is old else (each,)) if c is not None)
+        table = {**self.owners, **(owners or {})}
+        return replace(self, mechanism=mechanism, chains=chains,
+                       owners={k: v for k, v in table.items() if k in mechanism.links})
+
+    def observed(self) -> tuple[str, ...]:
+        """Labels of the legs that still have a virtual chain, in order."""
+        return tuple(dict.fromkeys(chain.leg for chain in self.chains))
+
+    def anatomy(self) -> Anatomy:
+        """The legs of the rewritten mechanism: the real ones that are left, with their virtual links."""
+        mechanism = self.mechanism
+        legs = []
+        for leg in self.real.legs:
+            if leg.label in self.removed:
+                continue
+            links = [n for n in leg.links if n in mechanism.links]
+            links += [n for n in mechanism.links if self.owners.get(n) == leg.label]
+            legs.append(replace(leg, links=tuple(links), joints=tuple(self._joints(leg, set(links)))))
+        return Anatomy(mechanism, tuple(n for n in self.real.platform if n in mechanism.links), tuple(legs))
+
+    def _joints(self, leg: Leg, links: set[str]) -> list[str]:
+        mechanism = self.mechanism
+        ends = {mechanism.base, leg.attach}
+        names = []
+        others = {n for other in self.real.legs if other.label != leg.label for n in other.links}
+        for joint in mechanism.joints.values():
+            touches = set(joint.links)
+            if touches & links and not (touches - links) & others:
+                names.append(joint.name)
+            elif touches == ends and (joint.name in leg.joints or leg.takes_platform
+                                      or any(c.leg == leg.label and c.actuator == joint.name for c in self.chains)):
+                names.append(joint.name)
+        return names
+
+    def architecture(self) -> Architecture:
+        """The architecture so far, in words."""
+        return self.anatomy().architecture()
+
+
+def passive(joint: Joint) -> Joint:
+    """The joint without its motor."""
+    return replace(joint, motor=None)
+
+
+def towards(joint: Joint, before: str) -> Joint:
+    """The joint with ``before`` as its predecessor."""
+    return joint if joint.predecessor == before else joint.turned()
+
+
+def ball_to_universal(joint: Joint, before: str, axes: tuple[Array, Array]) -> Joint:
+    """An S made a U whose first axis is fixed in ``before``."""
+    return replace(towards(joint, before), type=JointType.UNIVERSAL, axes=axes)
+
+
+def observation_in(mechanism: Mechanism, observation: Observation) -> bool:
+    """Whether the observed link is still there."""
+    return observation.link in mechanism.links

@@ -1,0 +1,35 @@
+"""Every tolerance of the project, each with its meaning.
+
+Lengths are made comparable with angles by a robot's *characteristic length* (the mean distance of its joint centres
+from their centroid): a length divided by it is a pure number, as an angle is.
+"""
+
+ASSEMBLED = 1e-12
+"""Residual (characteristic lengths, radians) below which a shipped or written file counts as assembled at zero."""
+
+CLOSED = 1e-10
+"""Residual (characteristic lengths, radians) below which a configuration counts as closed."""
+
+FOLLOWED = 1e-9
+"""Residual below which a hidden robot has reached the pose and the directions of the real one."""
+
+SAME_RELATION = 1e-6
+"""Largest principal angle (radians) at which two relations count as the same."""
+
+RANK_GAP = 1e3
+"""Smallest ratio of the last kept to the first dropped singular value at which a rank is a verdict."""
+
+RANK_CUTOFF = 1e-7
+"""Singular values below this fraction of the largest are candidates for zero; the gap around it is what decides."""
+
+SAME_POINT = 1e-7
+"""Distance (characteristic lengths) below which two points are one: joint centres that meet, axes that intersect."""
+
+SAME_DIRECTION = 1e-7
+"""Sine of the angle below which two directions are parallel, cosine below which they are perpendicular."""
+
+SAME_GEOMETRY = 1e-9
+"""Largest difference (metres, pure numbers) at which two mechanisms count as the same."""
+
+LOCUS = 1e-7
+"""Singular value, relative to the spread of a locus, below which the locus has no extent in that direction."""
