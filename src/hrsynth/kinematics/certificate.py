@@ -11,7 +11,7 @@ from ..mechanism import Mechanism
 from ..mechanism.vectors import Array
 from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
 from .configuration import ClosedConfiguration, Target, closed
-from .ranks import kernel_basis, largest_angle
+from .ranks import CLEAN, kernel_basis, largest_angle
 from .relation import Question, Relation, relation
 from .sampling import Samples
 from .twin import Twin
@@ -54,7 +54,7 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
     twin = Twin(hidden, samples.twin.length)
     active = twin.actuated()
     angle = worst = 0.0
-    gap = np.inf
+    gap = CLEAN
 
     def verdict(reason: str, mismatch: Mismatch | None = None) -> Certificate:
         return Certificate(len(members), samples.discarded, angle, gap, worst, not reason, reason, mismatch)

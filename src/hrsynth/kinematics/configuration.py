@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import LoopsNotClosed
 from ..mechanism.observation import Observation
-from ..mechanism.vectors import Array, frozen
+from ..mechanism.vectors import Array, frozen, hat
 from ..tolerances import CLOSED
 from .ranks import Rank, kernel_basis
 from .twin import Twin
@@ -49,12 +49,12 @@ class ClosedConfiguration:
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """What a configuration is to reach besides closed loops: the pose X_BP of ``link`` (its origin only where ``point``),
-    and measured values."""
+    """What a configuration is to reach besides closed loops: the pose X_BP of ``link`` (only the position of ``point``,
+    given in the link's frame, where there is one), and measured values."""
 
     link: str
     pose: Array
-    point: bool
+    point: Array | None
     reference: str
     measured: tuple[tuple[Observation, Array], ...]
 
@@ -62,9 +62,13 @@ class Target:
         """Error (reached − wanted) and its Jacobian."""
         X = twin.pose(q, self.link)
         V = twin.velocity(q, self.link)
-        errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length]
-        blocks = [V[:3]]
-        if not self.point:
+        if self.point is not None:
+            errors = [(X[:3, :3] @ self.point + X[:3, 3] - self.pose[:3, :3] @ self.point - self.pose[:3, 3])
+                      / twin.length]
+            blocks = [point_velocity(V, X, self.point, twin.length)]
+        else:
+            errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length]
+            blocks = [V[:3]]
             D = X[:3, :3] @ self.pose[:3, :3].T
             errors.append(0.5 * np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]]))
             blocks.append(V[3:])
@@ -74,6 +78,11 @@ class Target:
             errors.append(observation.value(X_reference, X_link) - wanted)
             blocks.append(observation.rate(X_reference, X_link, V_reference, V_link))
         return np.concatenate(errors), np.vstack(blocks)
+
+
+def point_velocity(V: Array, X: Array, point: Array, length: float) -> Array:
+    """The linear rows of V moved from a link frame's origin to ``point`` (3,) in that frame; X is the link's pose."""
+    return V[:3] - hat(X[:3, :3] @ point / length) @ V[3:]
 
 
 def closed(twin: Twin, q: Array, target: Target | None = None, *, tolerance: float = CLOSED,

@@ -10,6 +10,9 @@ from ..errors import RankUndecided
 from ..mechanism.vectors import Array
 from ..tolerances import RANK_CUTOFF, RANK_GAP
 
+CLEAN = float(1 / np.finfo(float).eps)
+"""The gap of a rank that nothing contradicts: no singular value is dropped, or all are exactly zero."""
+
 
 @dataclass(frozen=True)
 class Rank:
@@ -29,21 +32,21 @@ def rank_of(singular_values: Array, scale: float | None = None) -> Rank:
     """The rank that descending singular values show; ``scale`` (default: the largest) is what zero is relative to."""
     values = np.asarray(singular_values, dtype=float)
     if values.size == 0:
-        return Rank(0, np.inf)
+        return Rank(0, CLEAN)
     largest = float(values[0]) if scale is None else max(scale, float(values[0]))
     if largest <= np.finfo(float).tiny:
-        return Rank(0, np.inf)
+        return Rank(0, CLEAN)
     floor = np.finfo(float).eps * largest
     kept = int(np.sum(values > RANK_CUTOFF * largest))
     last = float(values[kept - 1]) if kept else largest
     dropped = max(float(values[kept]), floor) if kept < values.size else floor
-    return Rank(kept, last / dropped)
+    return Rank(kept, float(last / dropped))
 
 
 def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
     """An orthonormal basis (rows of ``matrix`` long) of the column space, with the rank."""
     if 0 in matrix.shape:
-        return np.zeros((matrix.shape[0], 0)), Rank(0, np.inf)
+        return np.zeros((matrix.shape[0], 0)), Rank(0, CLEAN)
     U, s, _ = np.linalg.svd(matrix, full_matrices=False)
     rank = rank_of(s, scale)
     return U[:, : rank.value], rank
@@ -53,7 +56,7 @@ def kernel_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank
     """An orthonormal basis of the kernel, shape (columns, nullity), with the rank of the matrix."""
     columns = matrix.shape[1]
     if 0 in matrix.shape:
-        return np.eye(columns), Rank(0, np.inf)
+        return np.eye(columns), Rank(0, CLEAN)
     _, s, Vt = np.linalg.svd(matrix, full_matrices=True)
     rank = rank_of(s, scale)
     return Vt[rank.value :].T, rank

@@ -9,17 +9,20 @@ import numpy as np
 
 from ..mechanism.observation import Observation
 from ..mechanism.vectors import Array
-from .configuration import ClosedConfiguration, Target
+from .configuration import ClosedConfiguration, Target, point_velocity
 from .ranks import Rank, kernel_basis, range_basis
 
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is asked of a mechanism: the twist t of ``platform`` (of its origin alone where ``point``) and the rates of
-    ``observations`` seen from ``reference``; ``bodies`` are further links whose twists count too."""
+    """What is asked of a mechanism: the twist t of ``platform`` and the rates of ``observations`` seen from ``reference``;
+    ``bodies`` are further links whose twists count too.
+
+    Where ``point`` is given, t is the velocity of that point alone, in the platform's frame (a point body, theory 1).
+    """
 
     platform: str
-    point: bool
+    point: Array | None
     reference: str
     observations: tuple[Observation, ...]
     bodies: tuple[str, ...] = ()
@@ -27,7 +30,7 @@ class Question:
     @property
     def twist_rows(self) -> int:
         """Rows of t: 3 for a point body, else 6."""
-        return 3 if self.point else 6
+        return 6 if self.point is None else 3
 
     def target(self, at: ClosedConfiguration) -> Target:
         """The platform pose and the measured values of a configuration."""
@@ -39,7 +42,7 @@ class Question:
         """The map from joint rates to (t, measured rates, twists of ``bodies``), shape (rows, nv); links in ``blind``
         are not in the mechanism, their rates are zero."""
         V = at.velocity(self.platform)
-        parts = [V[: self.twist_rows]]
+        parts = [V if self.point is None else point_velocity(V, at.pose(self.platform), self.point, at.twin.length)]
         X_reference, V_reference = at.pose(self.reference), at.velocity(self.reference)
         for observation in self.observations:
             if observation.link in blind:
@@ -66,33 +69,47 @@ class Relation:
         """dim ρ."""
         return self.basis.shape[1]
 
-    def _twists(self) -> Array:
+    @property
+    def twist_part(self) -> Array:
+        """The rows of t, shape (twist rows, dim ρ)."""
         return self.basis[: self.twist_rows]
 
-    def _rates(self) -> Array:
+    @property
+    def rates(self) -> Array:
+        """The rows of the measured rates, shape (measured rows, dim ρ)."""
         return self.basis[self.twist_rows : self.twist_rows + self.measured_rows]
 
     @cached_property
     def dof(self) -> Rank:
         """dim of the platform's twists: the robot's dof."""
-        return range_basis(self._twists(), 1.0)[1]
+        return range_basis(self.twist_part, 1.0)[1]
 
     @cached_property
     def twists(self) -> Array:
         """An orthonormal basis of the platform's twists."""
-        return range_basis(self._twists(), 1.0)[0]
+        return range_basis(self.twist_part, 1.0)[0]
 
     @cached_property
+    def _unseen(self) -> tuple[Array, Rank]:
+        kernel, evidence = kernel_basis(self.rates, 1.0)
+        basis, rank = range_basis(self.twist_part @ kernel, 1.0)
+        return basis, Rank(rank.value, min(rank.gap, evidence.gap))
+
+    @property
     def lost(self) -> Array:
         """A basis of {t : (t, 0) ∈ ρ}, the twists that no observation sees, shape (twist rows, RO)."""
-        kernel, _ = kernel_basis(self._rates(), 1.0)
-        return range_basis(self._twists() @ kernel, 1.0)[0]
+        return self._unseen[0]
+
+    @property
+    def lost_rank(self) -> Rank:
+        """RO = dim {t : (t, 0) ∈ ρ}, with its gap."""
+        return self._unseen[1]
 
     @cached_property
     def unexplained(self) -> int:
         """RI = dim {u̇ : (0, u̇) ∈ ρ}: where it is not zero, Mᵀ does not exist."""
-        kernel, _ = kernel_basis(self._twists(), 1.0)
-        return range_basis(self._rates() @ kernel, 1.0)[1].value
+        kernel, _ = kernel_basis(self.twist_part, 1.0)
+        return range_basis(self.rates @ kernel, 1.0)[1].value
 
     @cached_property
     def rank(self) -> int:

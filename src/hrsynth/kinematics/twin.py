@@ -31,8 +31,7 @@ class Twin:
         self._body: dict[str, int] = {mechanism.base: 0}
         self._centre: dict[int, Array] = {0: np.zeros(3)}
         self.coordinates: dict[str, tuple[int, ...]] = {}
-        """Velocity indices of each joint, in the order of its axes, signed by ``signs``."""
-        self.signs: dict[str, float] = {}
+        """Velocity indices of each joint, in the order of its axes."""
         tree, loops = self._span()
         for joint, parent in tree:
             self._add_tree(joint, parent)
@@ -113,7 +112,6 @@ class Twin:
         self._centre[index] = point
         span = range(start, self.model.nv)
         self.coordinates[joint.name] = tuple(reversed(span)) if turned and joint.type is JointType.UNIVERSAL else tuple(span)
-        self.signs[joint.name] = -1.0 if turned and joint.type is JointType.UNIVERSAL else 1.0
         return index
 
     def _add_tree(self, joint: Joint, parent: str) -> None:

@@ -68,15 +68,21 @@ class Anatomy:
         return None
 
     @cached_property
-    def point_platform(self) -> bool:
-        """Whether the platform is a point body: all its joints are coaxial R, or it has one S (theory 1)."""
+    def point(self) -> Array | None:
+        """Where the platform is a point body (all its joints are coaxial R, or it has one S, theory 1): that point, in the
+        platform's frame, (3,); on a common axis the foot of the frame's origin. None for any other platform."""
         joints = self.mechanism.joints_of(self.mechanism.platform)
-        if len(joints) == 1:
-            return joints[0].type is JointType.SPHERICAL
-        tolerance = SAME_POINT * self.mechanism.length
+        frame = self.mechanism.links[self.mechanism.platform].pose
         first = joints[0]
-        return all(j.type is JointType.REVOLUTE and lines.parallel(j.axis, first.axis)
-                   and lines.distance(j.point, first.point, first.axis) <= tolerance for j in joints)
+        tolerance = SAME_POINT * self.mechanism.length
+        if len(joints) == 1 and first.type is JointType.SPHERICAL:
+            centre = first.point
+        elif all(j.type is JointType.REVOLUTE and lines.parallel(j.axis, first.axis)
+                                     and lines.distance(j.point, first.point, first.axis) <= tolerance for j in joints):
+            centre = lines.foot(frame[:3, 3], first.point, first.axis)
+        else:
+            return None
+        return frame[:3, :3].T @ (centre - frame[:3, 3])
 
     def word(self, leg: Leg) -> Word:
         """The leg's word, from the base to the platform (without the end joint where it takes the platform)."""
@@ -103,7 +109,7 @@ class Anatomy:
     def _loop_word(self, one: Leg, two: Leg) -> Word | None:
         if one.takes_platform or two.takes_platform:
             return self.word(one) + self.word(two).reversed()
-        if self.point_platform and one.attach == two.attach == self.mechanism.platform:
+        if self.point is not None and one.attach == two.attach == self.mechanism.platform:
             first, second = self.word(one), self.word(two)
             if first.items[-1] == second.items[-1] == Letter("R"):
                 return first + Word(second.items[:-1]).reversed()

@@ -130,7 +130,7 @@ class Joint:
 
     def turned(self) -> Joint:
         """The same joint with predecessor and successor exchanged (its coordinate keeps its sign)."""
-        axes = self.axes[::-1] if self.type is JointType.UNIVERSAL else tuple(-axis for axis in self.axes)
+        axes = tuple(-axis for axis in reversed(self.axes))
         return replace(self, predecessor=self.successor, successor=self.predecessor, axes=axes)
 
     def relinked(self, old: str, new: str) -> Joint:
@@ -148,7 +148,7 @@ class Coupling:
     predecessor: str
     successor: str
     ratio: float
-    line: int | None = None
+    line: int | None = field(default=None, compare=False)
 
 
 @dataclass(frozen=True, eq=False)

@@ -1,0 +1,69 @@
+# Everything happens in .venv, made by the first target that needs it: locked versions, checked by hash.
+PYTHON ?= python3
+JOBS ?= 2
+VENV := .venv
+BIN := $(VENV)/bin
+PIP := $(BIN)/python -m pip --quiet --quiet --no-input --disable-pip-version-check
+# one thread a test process: the matrices are small, and the processes share the cores
+PYTEST = OMP_NUM_THREADS=1 $(BIN)/pytest -q -n $(JOBS)
+LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
+	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test test-all lint types robots lock setup setup-dev setup-all clean
+.DELETE_ON_ERROR:
+
+help:  ## this list
+	@awk -F ':.*## +' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+
+demo: setup  ## derive the hidden robot of a Quattro of which legs 1 and 4 are observed
+	@$(BIN)/hrsynth derive robots/quattro.urdf --observe 1,4
+
+test: setup-dev  ## the tests, without the slow ones
+	@$(PYTEST) -m "not slow and not browser" tests
+
+test-all: setup-dev  ## all tests
+	@$(PYTEST) tests
+
+lint: setup-dev  ## style and import order
+	@$(BIN)/ruff check --quiet . && echo "lint: no complaint"
+
+types: setup-dev  ## type check
+	@$(BIN)/mypy
+
+robots: setup  ## regenerate robots/*.urdf from the families
+	@$(BIN)/python -m hrsynth.families
+
+lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
+	@$(LOCK) --output-file requirements/main.txt
+	@$(LOCK) --group dev --constraint requirements/main.txt --output-file requirements/dev.txt
+	@$(LOCK) --group dev --extra all --constraint requirements/dev.txt --output-file requirements/all.txt
+
+setup: $(VENV)/main.stamp  ## .venv with what hrsynth needs to run
+	@:
+
+setup-dev: $(VENV)/dev.stamp  ## the same, with the tools of development
+	@:
+
+setup-all: $(VENV)/all.stamp  ## the same, with every extra
+	@:
+
+$(BIN)/python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || \
+		{ echo "hrsynth needs Python 3.11 or newer, and PYTHON=$(PYTHON) is not: make PYTHON=/path/to/python3.11" >&2; exit 1; }
+	@$(PYTHON) -m venv $(VENV)
+
+# all.txt holds all of dev.txt, and dev.txt all of main.txt: the stamps of the smaller ones are set with the larger
+$(VENV)/%.stamp: requirements/%.txt pyproject.toml | $(BIN)/python
+	@echo "setting up $(VENV) from requirements/$*.txt (once, a minute or two)" >&2
+	@$(PIP) install --require-hashes --requirement requirements/$*.txt
+	@$(PIP) install --no-deps --no-build-isolation --editable .
+	@cd $(VENV) && touch $(STAMPS_$*)
+
+STAMPS_main := main.stamp
+STAMPS_dev := main.stamp dev.stamp
+STAMPS_all := main.stamp dev.stamp all.stamp
+
+clean:  ## remove .venv, builds and caches
+	@rm -rf $(VENV) build dist src/*.egg-info .pytest_cache .mypy_cache .ruff_cache .hypothesis
+	@find . -name __pycache__ -type d -prune -exec rm -rf {} +

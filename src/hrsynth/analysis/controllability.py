@@ -1,0 +1,120 @@
+"""Which legs must be watched: the verdict of every set of observed legs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from ..kinematics.ranks import Rank
+from ..kinematics.relation import Relation, relation
+from ..kinematics.sampling import Samples
+from ..mechanism import Mechanism
+from ..mechanism.vectors import Array
+from ..tolerances import RANK_GAP
+from .freedoms import Freedom, name_freedoms
+from .setting import Setting, prepare, selected
+
+CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncontrollable"
+LARGEST_COMPLETE = 10
+"""Number of legs up to which all sets are tried; beyond, sets of up to three legs and the whole."""
+
+
+@dataclass(frozen=True, eq=False)
+class Verdict:
+    """What one set of observed legs sees of the platform, at generic configurations."""
+
+    legs: tuple[str, ...]
+    verdict: str
+    dof: int
+    rank: int
+    lost: tuple[Freedom, ...]
+    gap: float
+    graph: bool = True
+    """Whether Mᵀ exists: no observed direction moves while the platform rests."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"legs": list(self.legs), "verdict": self.verdict, "rank": self.rank,
+                "lost": [freedom.to_dict() for freedom in self.lost], "gap": self.gap, "interaction_matrix": self.graph}
+
+
+@dataclass(frozen=True, eq=False)
+class Legs:
+    """The verdict of every set of observed legs, and the smallest sets of the best rank."""
+
+    robot: str
+    architecture: str
+    dof: int
+    sets: tuple[Verdict, ...]
+    complete: bool
+    """Whether all sets were tried."""
+    minimal: tuple[tuple[str, ...], ...] = field(default=())
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"robot": self.robot, "architecture_ascii": self.architecture, "dof": self.dof,
+                "sets": [each.to_dict() for each in self.sets], "complete": self.complete,
+                "minimal": [list(each) for each in self.minimal]}
+
+
+def verdict_of(setting: Setting, legs: Sequence[str], samples: Samples) -> Verdict:
+    """The verdict for ``samples``, whose observations are those of ``legs``.
+
+    The generic rank is the largest over the samples; raises ``RankUndecided`` where its gap is too small.
+    """
+    found = [member.relation for member in samples.members]
+    rank = max(each.rank for each in found)
+    gap = min(min(each.gap, each.lost_rank.gap) for each in found if each.rank == rank)
+    Rank(rank, gap).decided(f"what legs {', '.join(legs)} see")
+    dof = setting.dof
+    verdict = CONTROLLABLE if rank == dof else BLIND if rank == 0 else PARTIAL
+    lost: tuple[Freedom, ...] = ()
+    if rank < dof:
+        lost = name_freedoms(_lost_twists(setting, samples, dof - rank), setting.anatomy, tuple(legs))
+    graph = min(each.unexplained for each in found) == 0
+    return Verdict(tuple(legs), verdict, dof, rank, lost, gap, graph)
+
+
+def _lost_twists(setting: Setting, samples: Samples, count: int) -> Array:
+    """The lost twists at the zero configuration where it is generic, else at the first sample; metres, (6, count)."""
+    start = relation(samples.start, samples.question)
+    found = start.lost if start.lost.shape[1] == count and start.gap >= RANK_GAP else next(
+        member.relation.lost for member in samples.members if member.relation.lost.shape[1] == count)
+    twists = np.zeros((6, found.shape[1]))
+    twists[: found.shape[0]] = found
+    twists[:3] *= setting.everything.twin.length
+    return twists
+
+
+def legs(robot: Mechanism, camera: str | None = None, *, progress: Callable[[], None] | None = None,
+         seed: int = 0) -> Legs:
+    """The verdict of every set of legs at their default segments (theory 3, verdicts)."""
+    setting = prepare(robot, None, camera, seed=seed)
+    anatomy = setting.anatomy
+    labels = tuple(o.leg for o in setting.everything.question.observations[: setting.defaults])
+    sets = []
+    complete = len(labels) <= LARGEST_COMPLETE
+    for size in range(1, len(labels) + 1):
+        if not complete and 3 < size < len(labels):
+            continue
+        for places in combinations(range(len(labels)), size):
+            samples = _chosen(setting, places)
+            sets.append(verdict_of(setting, [labels[i] for i in places], samples))
+            if progress is not None:
+                progress()
+    best = max(each.rank for each in sets)
+    smallest = min(len(each.legs) for each in sets if each.rank == best)
+    minimal = tuple(each.legs for each in sets if each.rank == best and len(each.legs) == smallest)
+    return Legs(robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), complete, minimal)
+
+
+def _chosen(setting: Setting, places: tuple[int, ...]) -> Samples:
+    everything = setting.everything
+    question = replace(everything.question, observations=tuple(everything.question.observations[i] for i in places))
+    members = tuple(replace(m, relation=selected(m.relation, places), way=()) for m in everything.members)
+    return Samples(question, everything.twin, everything.start, members, everything.discarded)
+

@@ -1,0 +1,235 @@
+"""From a robot to its certified hidden robot: rewriting, certificate, verdict, and the paper's own form beside it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..description.tree import spanning
+from ..errors import BadRequest, NotCertified
+from ..kinematics.certificate import Certificate, certify
+from ..kinematics.ranks import range_basis
+from ..kinematics.sampling import Samples
+from ..mechanism import Mechanism
+from ..mechanism.legs import Anatomy
+from ..mechanism.notation import Architecture
+from ..mechanism.vectors import Array
+from ..rewrite import strategy
+from ..rewrite.evidence import Evidence
+from ..rewrite.state import State
+from ..rewrite.strategy import Rewriting, Step
+from ..tolerances import SAME_RELATION
+from .controllability import Verdict, verdict_of
+from .freedoms import Freedom, name_freedoms
+from .setting import Mobility, Setting, prepare
+
+STEP_SAMPLES = 3
+"""Configurations at which a single step is checked."""
+FORMS = ("simplified", "general")
+
+
+@dataclass(frozen=True, eq=False)
+class PaperForm:
+    """The architecture that the paper's rules alone give, and whether it is equivalent; freedoms it gains or loses."""
+
+    hidden: Architecture
+    equivalent: bool
+    largest_angle: float
+    gains: tuple[Freedom, ...] = ()
+    loses: tuple[Freedom, ...] = ()
+    reason: str = ""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"hidden_ascii": self.hidden.ascii, "equivalent": self.equivalent, "largest_angle": self.largest_angle,
+                "gains": [f.to_dict() for f in self.gains], "loses": [f.to_dict() for f in self.loses],
+                "reason": self.reason}
+
+
+@dataclass(frozen=True, eq=False)
+class Derivation:
+    """A robot, what is observed, its hidden robot (None where every leg is blind), how it came about, and the proof."""
+
+    robot: Mechanism
+    setting: Setting
+    form: str
+    architecture: Architecture
+    hidden: Mechanism | None
+    hidden_architecture: Architecture | None
+    verdict: Verdict
+    steps: tuple[Step, ...]
+    certificate: Certificate
+    paper: PaperForm | None
+
+    @property
+    def dof(self) -> int:
+        """The robot's dof."""
+        return self.setting.dof
+
+    @property
+    def mobility(self) -> Mobility:
+        """Mobility of the normal form."""
+        return self.setting.mobility
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line, without the command's own fields."""
+        hidden = self.hidden_architecture
+        certificate = self.certificate
+        written = self.setting.mobility_as_written
+        return {
+            "observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
+            "camera": self.setting.mechanism.reference,
+            "notation": {"real": self.architecture.unicode, "hidden": hidden and hidden.unicode,
+                         "real_ascii": self.architecture.ascii, "hidden_ascii": hidden and hidden.ascii,
+                         "hidden_latex": hidden and hidden.latex},
+            "form": self.form,
+            "dof": self.dof,
+            "mobility": {"total": self.mobility.total, "idle": self.mobility.idle,
+                         "as_written": {"total": written.total, "idle": written.idle}},
+            "verdict": self.verdict.verdict,
+            "lost": [freedom.to_dict() for freedom in self.verdict.lost],
+            "rank": self.verdict.rank,
+            "interaction_matrix": self.verdict.graph,
+            "architecture": {"verdict": None, "exact": False},
+            "paper_form": self.paper and self.paper.to_dict(),
+            "steps": [{"rule": s.rule, "leg": s.leg, "accepted": s.accepted, "reason": s.reason,
+                       "largest_angle": s.largest_angle} for s in self.steps],
+            "certificate": {"samples": certificate.samples, "discarded": certificate.discarded,
+                            "largest_angle": certificate.largest_angle, "smallest_gap": certificate.smallest_gap,
+                            "residual": certificate.residual, "passed": certificate.passed,
+                            "reason": certificate.reason},
+        }
+
+
+def derive(robot: Mechanism, observe: Sequence[str] | None = None, camera: str | None = None, *,
+           form: str = "simplified", seed: int = 0, progress: Callable[[str], None] | None = None) -> Derivation:
+    """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; theory 2 and 3).
+
+    ``observe`` holds leg labels or link names (default: all legs); ``camera`` names the link that carries the camera
+    (default: the base); ``form`` is ``simplified`` or ``general``. Raises ``BadRequest`` for unknown names,
+    ``NotCertified`` if even the exact lift fails.
+    """
+    if form not in FORMS:
+        raise BadRequest("unknown form", form, FORMS)
+
+    def tell(text: str) -> None:
+        if progress is not None:
+            progress(text)
+
+    tell("sampling")
+    setting = prepare(robot, observe, camera, seed=seed)
+    anatomy, samples = setting.anatomy, setting.samples
+    verdict = verdict_of(setting, tuple(dict.fromkeys(o.leg for o in setting.observed)), samples)
+    evidence = Evidence(anatomy, samples)
+
+    def check(mechanism: Mechanism, bodies: tuple[str, ...]) -> Certificate:
+        return certify(samples, mechanism, count=STEP_SAMPLES, bodies=bodies, complete=False)
+
+    run = strategy.simplified if form == "simplified" else strategy.general
+    result = run(anatomy, evidence, check, tell)
+    paper = None
+    if result.state.chains:
+        tell("certificate")
+        hidden: Mechanism | None = finished(setting, result.state)
+        assert hidden is not None
+        certificate = certify(samples, hidden)
+        if not certificate.passed:
+            result, hidden, certificate = _fallback(setting, evidence, samples, certificate, result)
+        architecture: Architecture | None = result.state.architecture()
+        if form == "simplified" and architecture is not None:
+            tell("the paper's form")
+            paper = _paper_form(setting, evidence, samples, architecture, certificate)
+    else:
+        hidden = architecture = None
+        certificate = _blind(samples)
+    return Derivation(robot, setting, form, anatomy.architecture(), hidden, architecture, verdict, result.steps,
+                      certificate, paper)
+
+
+def finished(setting: Setting, state: State) -> Mechanism:
+    """The hidden robot as a file writes it: a spanning tree, names of its own, its observations."""
+    mechanism = state.mechanism
+    observations = tuple(o for o in setting.observed if o.link in mechanism.links)
+    return spanning(replace(mechanism, name=f"{setting.robot.name}_hidden", observations=observations, file=None))
+
+
+def _fallback(setting: Setting, evidence: Evidence, samples: Samples, failed: Certificate,
+              result: Rewriting) -> tuple[Rewriting, Mechanism, Certificate]:
+    """Where the certificate at all samples sees what three did not: check every step at all samples."""
+
+    def check(mechanism: Mechanism, bodies: tuple[str, ...]) -> Certificate:
+        return certify(samples, mechanism, bodies=bodies, complete=False)
+
+    for run in (strategy.simplified, strategy.general):
+        again = run(setting.anatomy, evidence, check)
+        hidden = finished(setting, again.state)
+        certificate = certify(samples, hidden)
+        if certificate.passed:
+            return again, hidden, certificate
+    raise NotCertified(setting.robot.name, failed.largest_angle, SAME_RELATION)
+
+
+def _blind(samples: Samples) -> Certificate:
+    """What is certified where every leg is blind: the directions do not move at all."""
+    angle = max(float(np.linalg.norm(member.relation.rates, 2)) if member.relation.dimension else 0.0
+                for member in samples.members)
+    gap = min(member.relation.gap for member in samples.members)
+    passed = angle <= SAME_RELATION
+    reason = "u̇ vanishes: every observed direction is constant" if passed else "an observed direction moves"
+    return Certificate(len(samples.members), samples.discarded, angle, gap, 0.0, passed, reason)
+
+
+def _paper_form(setting: Setting, evidence: Evidence, samples: Samples, certified: Architecture,
+                certificate: Certificate) -> PaperForm:
+    """Apply the paper's rules without looking, and compare what they give with the real robot.
+
+    The ends of the legs are changed only where the hidden robot would not keep its dof otherwise (MMT 3.2).
+    """
+    dof = setting.dof
+    planar = _planar(samples)
+    change = dof < (3 if planar else 6) and len(samples.question.observations) < len(setting.anatomy.legs)
+    tried: list[tuple[Certificate, Architecture]] = []
+    forms = strategy.trusting(setting.anatomy, evidence, change_ends=False)
+    if change:
+        forms += strategy.trusting(setting.anatomy, evidence, change_ends=True)
+    for rewriting in forms:
+        architecture = rewriting.state.architecture()
+        if architecture == certified:
+            return PaperForm(architecture, True, certificate.largest_angle, reason="it is the certified form")
+        found = certify(samples, rewriting.state.mechanism, count=STEP_SAMPLES, complete=False)
+        if found.passed:
+            return PaperForm(architecture, True, found.largest_angle, reason="equivalent, but not the simplest form")
+        tried.append((found, architecture))
+    found, architecture = min(reversed(tried), key=lambda pair: pair[0].largest_angle)
+    gains, loses = _exchanged(setting.anatomy, found, samples.twin.length)
+    return PaperForm(architecture, False, found.largest_angle, gains, loses, found.reason)
+
+
+def _planar(samples: Samples) -> bool:
+    """Whether all platform motions are those of one plane."""
+    twists = np.hstack([member.relation.twists for member in samples.members])
+    if twists.shape[0] == 3:
+        return range_basis(twists)[1].value <= 2
+    return range_basis(twists[3:])[1].value <= 1 and range_basis(twists[:3])[1].value <= 2
+
+
+def _exchanged(anatomy: Anatomy, found: Certificate,
+               length: float) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
+    """The platform's freedoms that a wrong hidden robot gains and loses, at the configuration where they differ."""
+    if found.mismatch is None or found.mismatch.real.twist_rows != 6:
+        return (), ()
+    real, hidden = found.mismatch.real, found.mismatch.hidden
+
+    def beyond(inner: Array, outer: Array) -> tuple[Freedom, ...]:
+        rest = range_basis(inner - outer @ (outer.T @ inner), 1.0)[0].copy()
+        rest[:3] *= length
+        return name_freedoms(rest, anatomy)
+
+    gains, loses = beyond(hidden.twists, real.twists), beyond(real.twists, hidden.twists)
+    if not gains and not loses:
+        gains, loses = beyond(hidden.lost, real.lost), beyond(real.lost, hidden.lost)
+    return gains, loses
+

@@ -1,0 +1,151 @@
+"""Freedoms of the platform in words: translations first, then rotations about lines the robot has, then screws."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..kinematics.ranks import kernel_basis, range_basis
+from ..mechanism import JointType
+from ..mechanism.legs import Anatomy
+from ..mechanism.vectors import Array, unit
+
+_AXES = "xyz"
+_NEAR = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Freedom:
+    """A twist (vx, vy, vz, wx, wy, wz) at the platform frame's origin, base axes (m, rad), with its name."""
+
+    twist: Array
+    name: str
+
+    def to_dict(self) -> dict[str, object]:
+        """The record of the command line."""
+        return {"twist": [round(float(value), 12) + 0.0 for value in self.twist], "name": self.name}
+
+
+def name_freedoms(twists: Array, anatomy: Anatomy, labels: tuple[str, ...] | None = None) -> tuple[Freedom, ...]:
+    """Named twists that span the columns of ``twists`` (6, k), metres and radians, at the zero configuration.
+
+    ``labels`` are the legs whose tips are tried as points of rotation axes (default: all).
+    """
+    if twists.shape[1] == 0:
+        return ()
+    twists = range_basis(twists)[0]
+    found: list[Freedom] = []
+    free, _ = kernel_basis(twists[3:], 1.0)
+    translations = range_basis(twists[:3] @ free, 1.0)[0] if free.shape[1] else np.zeros((3, 0))
+    for direction in _nice_directions(translations, anatomy):
+        found.append(Freedom(np.concatenate([direction, np.zeros(3)]), f"translation along {_name(direction, anatomy)}"))
+    for point, direction, name in _lines(anatomy, labels):
+        if len(found) == twists.shape[1]:
+            break
+        twist = _rotation(anatomy, point, direction)
+        if _inside(twist, twists) and not _spanned(twist, found):
+            found.append(Freedom(twist, f"rotation about {name}"))
+    for column in twists.T:
+        if len(found) == twists.shape[1]:
+            break
+        rest = _without(column, found)
+        if np.linalg.norm(rest[3:]) > _NEAR and not _spanned(rest, found):
+            twist = rest / np.linalg.norm(rest[3:])
+            found.append(Freedom(twist, _screw(anatomy, twist)))
+    return tuple(found)
+
+
+def _inside(twist: Array, span: Array) -> bool:
+    unit_twist = twist / np.linalg.norm(twist)
+    return bool(np.linalg.norm(unit_twist - span @ (span.T @ unit_twist)) < _NEAR)
+
+
+def _without(twist: Array, found: list[Freedom]) -> Array:
+    if not found:
+        return twist
+    basis = range_basis(np.column_stack([f.twist for f in found]))[0]
+    return twist - basis @ (basis.T @ twist)
+
+
+def _spanned(twist: Array, found: list[Freedom]) -> bool:
+    return bool(np.linalg.norm(_without(twist / np.linalg.norm(twist), found)) < _NEAR)
+
+
+def _nice_directions(basis: Array, anatomy: Anatomy) -> list[Array]:
+    """Directions that span ``basis`` (3, k): base axes first, then P axes of the robot, then whatever is left."""
+    candidates = [*np.eye(3)]
+    candidates += [j.axis for j in anatomy.mechanism.joints.values() if j.type is JointType.PRISMATIC]
+    candidates += list(basis.T)
+    chosen: list[Array] = []
+    for candidate in candidates:
+        inside = basis @ (basis.T @ candidate)
+        if len(chosen) < basis.shape[1] and np.linalg.norm(inside - candidate) < _NEAR:
+            stacked = np.column_stack([*chosen, candidate])
+            if np.linalg.matrix_rank(stacked, tol=1e-6) == len(chosen) + 1:
+                chosen.append(unit(candidate))
+    return chosen
+
+
+def _name(direction: Array, anatomy: Anatomy) -> str:
+    for i in range(3):
+        if abs(abs(direction[i]) - 1) < _NEAR:
+            return _AXES[i]
+    along = [j.name for j in anatomy.mechanism.joints.values()
+             if j.type is JointType.PRISMATIC and np.linalg.norm(np.cross(j.axis, direction)) < _NEAR]
+    text = "(" + " ".join(f"{value + 0.0:.4g}" for value in direction) + ")"
+    return f"{text}, the axis of {along[0]}" if along else text
+
+
+def _tips(anatomy: Anatomy, labels: tuple[str, ...] | None) -> list[tuple[str, Array]]:
+    """The centre of each leg's joints on the platform, by label."""
+    tips = []
+    for leg in anatomy.legs:
+        if labels is None or leg.label in labels:
+            joints = [j for j in anatomy.mechanism.joints_of(leg.attach) if j.name in leg.joints]
+            if joints:
+                tips.append((leg.label, np.mean([j.point for j in joints], axis=0)))
+    return tips
+
+
+def _lines(anatomy: Anatomy, labels: tuple[str, ...] | None) -> list[tuple[Array, Array, str]]:
+    """Lines (point, direction, name) that an engineer would name."""
+    mechanism = anatomy.mechanism
+    origin = mechanism.links[mechanism.platform].pose[:3, 3]
+    tips = _tips(anatomy, labels)
+    lines: list[tuple[Array, Array, str]] = []
+    for i, (a, p) in enumerate(tips):
+        for b, q in tips[i + 1:]:
+            if np.linalg.norm(q - p) > _NEAR:
+                lines.append((p, unit(q - p), f"the line B{a} B{b}"))
+    for axis, name in zip(np.eye(3), _AXES, strict=True):
+        lines.append((origin, axis, f"the platform's {name} axis"))
+    for joint in mechanism.joints.values():
+        if joint.type in (JointType.REVOLUTE, JointType.CYLINDRICAL):
+            lines.append((joint.point, joint.axis, f"the axis of {joint.name}"))
+        if joint.type is JointType.UNIVERSAL:
+            for axis, order in zip(joint.axes, ("first", "second"), strict=True):
+                lines.append((joint.point, axis, f"the {order} axis of {joint.name}"))
+    for a, p in tips:
+        for axis, name in zip(np.eye(3), _AXES, strict=True):
+            lines.append((p, axis, f"the line through B{a} along {name}"))
+    return lines
+
+
+def _rotation(anatomy: Anatomy, point: Array, direction: Array) -> Array:
+    origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3]
+    return np.concatenate([np.cross(direction, origin - point), direction])
+
+
+def _screw(anatomy: Anatomy, twist: Array) -> str:
+    """The screw of a twist with unit angular part: its axis and pitch (m/rad)."""
+    origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3]
+    v, w = twist[:3], twist[3:]
+    point = origin + np.cross(w, v)
+    pitch = float(w @ v)
+
+    def text(vector: Array) -> str:
+        return "(" + " ".join(f"{value + 0.0:.4g}" for value in vector) + ")"
+
+    kind = "rotation" if abs(pitch) < _NEAR else f"screw motion of pitch {pitch:.4g} m/rad"
+    return f"{kind} about the line through {text(point)} along {text(w)}"

@@ -1,0 +1,162 @@
+"""What every question starts from: the robot in normal form, its legs, what is observed, and samples of its motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+from ..errors import BadRequest, HrsynthError
+from ..kinematics.ranks import range_basis
+from ..kinematics.relation import Question, Relation
+from ..kinematics.sampling import Sample, Samples, draw
+from ..kinematics.twin import Twin
+from ..mechanism import Mechanism, Observation
+from ..mechanism.legs import Anatomy, default_observation, dissect, observation_of
+from ..mechanism.normal import NormalForm, normal_form
+
+SAMPLES = 20
+"""Configurations of a certificate and of a generic verdict."""
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """Freedoms of a mechanism: all of them, and those that move neither the platform nor any default segment."""
+
+    total: int
+    idle: int
+
+
+@dataclass(frozen=True, eq=False)
+class Setting:
+    """A robot as read, its normal form and legs, the observations asked for, and samples in which all legs count."""
+
+    robot: Mechanism
+    normal: NormalForm
+    anatomy: Anatomy
+    observed: tuple[Observation, ...]
+    everything: Samples
+    """Samples for the question of all default segments, and of the observed ones besides."""
+    defaults: int
+    """How many of the observations of ``everything`` are default segments; they come first."""
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism in normal form."""
+        return self.anatomy.mechanism
+
+    @cached_property
+    def samples(self) -> Samples:
+        """The samples, for the observed segments alone."""
+        return restricted(self.everything, self.observed)
+
+    @property
+    def dof(self) -> int:
+        """The robot's dof: the dimension of its platform's twists."""
+        return self.everything.members[0].relation.dof.decided("the robot's dof")
+
+    @cached_property
+    def mobility(self) -> Mobility:
+        """Mobility of the normal form, with its idle motions."""
+        first = self.everything.members[0].relation
+        rows = first.basis[: first.twist_rows + 3 * self.defaults]
+        return Mobility(first.mobility, first.mobility - range_basis(rows, 1.0)[1].value)
+
+    @cached_property
+    def mobility_as_written(self) -> Mobility:
+        """Mobility of the file's own links and joints."""
+        if (len(self.robot.links), len(self.robot.joints)) == (len(self.mechanism.links), len(self.mechanism.joints)):
+            return self.mobility
+        question = replace(self.everything.question, observations=tuple(
+            o for o in self.everything.question.observations[: self.defaults] if o.link in self.robot.links))
+        written = draw(Twin(self.robot, self.mechanism.length), question, 3, seed=1)
+        total = written.mobility
+        return Mobility(total, total - (self.mobility.total - self.mobility.idle))
+
+
+def prepare(robot: Mechanism, observe: Sequence[str] | None = None, camera: str | None = None, *,
+            samples: int = SAMPLES, seed: int = 0, progress: Callable[[], None] | None = None) -> Setting:
+    """Normal form, legs, observations and samples of a robot.
+
+    ``observe`` holds leg labels or link names; None or ``["all"]`` means all legs at their default segments. ``camera``
+    names the link that carries the camera. Raises ``BadRequest`` for labels and links that there are not.
+    """
+    if camera is not None:
+        if camera not in robot.links:
+            raise BadRequest(f"{robot.name} has no link for the camera", camera, sorted(robot.links))
+        robot = replace(robot, camera=camera)
+    normal = normal_form(robot)
+    anatomy = dissect(normal.mechanism)
+    defaults = _defaults(anatomy)
+    observed = _observed(anatomy, normal, defaults, observe)
+    known = {(o.leg, o.link) for o in defaults.values()}
+    extra = tuple(o for o in observed if (o.leg, o.link) not in known)
+    question = Question(normal.mechanism.platform, anatomy.point, normal.mechanism.reference,
+                        (*defaults.values(), *extra))
+    drawn = draw(Twin(normal.mechanism), question, samples, seed, progress=progress)
+    return Setting(robot, normal, anatomy, observed, drawn, len(defaults))
+
+
+def _defaults(anatomy: Anatomy) -> dict[str, Observation]:
+    """The segment of each leg that has one: the file's choice, else the theory's."""
+    table: dict[str, Observation] = {}
+    given = {o.leg: o for o in reversed(anatomy.mechanism.observations)}
+    for leg in anatomy.legs:
+        if leg.label in given:
+            table[leg.label] = given[leg.label]
+            continue
+        try:
+            table[leg.label] = default_observation(anatomy, leg)
+        except HrsynthError:
+            continue
+    return table
+
+
+def _observed(anatomy: Anatomy, normal: NormalForm, defaults: dict[str, Observation],
+              observe: Sequence[str] | None) -> tuple[Observation, ...]:
+    if not observe or list(observe) == ["all"]:
+        for leg in anatomy.legs:
+            if leg.label not in defaults:
+                default_observation(anatomy, leg)
+        return tuple(defaults.values())
+    chosen: dict[tuple[str, str], Observation] = {}
+    for name in observe:
+        if name in anatomy.labels:
+            observation = defaults.get(name) or default_observation(anatomy, anatomy.leg(name))
+        elif name in normal.into:
+            link = normal.into[name]
+            if link not in anatomy.mechanism.links:
+                raise BadRequest(f"link {name!r} acts inside a joint and has no direction of its own")
+            given = next((o for o in anatomy.mechanism.observations if o.link == link), None)
+            observation = given or observation_of(anatomy, link)
+        else:
+            raise BadRequest(f"{anatomy.mechanism.name} has no leg or link", name,
+                             "legs " + ", ".join(anatomy.labels) + "; links "
+                             + ", ".join(n for leg in anatomy.legs for n in leg.links))
+        chosen[(observation.leg, observation.link)] = observation
+    return tuple(chosen.values())
+
+
+def restricted(samples: Samples, observations: Iterable[Observation]) -> Samples:
+    """The same samples for fewer observations (all of them among the samples' own)."""
+    wanted = tuple(observations)
+    all_of = samples.question.observations
+    keys = [(o.leg, o.link) for o in all_of]
+    places = [keys.index((o.leg, o.link)) for o in wanted]
+    question = replace(samples.question, observations=tuple(all_of[i] for i in places))
+    members = tuple(
+        Sample(m.configuration,
+               tuple(replace(t, measured=tuple(t.measured[i] for i in places)) for t in m.way),
+               selected(m.relation, places))
+        for m in samples.members)
+    return Samples(question, samples.twin, samples.start, members, samples.discarded)
+
+
+def selected(relation: Relation, places: Sequence[int]) -> Relation:
+    """ρ for some of the observations: the projection of ρ for all."""
+    rows = list(range(relation.twist_rows))
+    for place in places:
+        start = relation.twist_rows + 3 * place
+        rows += [start, start + 1, start + 2]
+    basis, rank = range_basis(relation.basis[rows], 1.0)
+    return Relation(basis, relation.twist_rows, 3 * len(places), relation.mobility, min(relation.gap, rank.gap))

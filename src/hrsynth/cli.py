@@ -1,0 +1,203 @@
+"""The command line: thin. Text to standard output, progress and warnings to standard error; exit status 0, 2 or 3."""
+
+from __future__ import annotations
+
+import os
+import sys
+import time
+from types import TracebackType
+from typing import Annotated, Any
+
+import typer
+
+app = typer.Typer(
+    name="hrsynth", invoke_without_command=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False,
+    help="Hidden robots of parallel robots that are controlled by watching the directions of their legs.")
+
+Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file, or the name of a shipped robot.")]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
+Camera = Annotated[str | None, typer.Option("--camera", metavar="LINK", help="The link that carries the camera.")]
+Seed = Annotated[int, typer.Option("--seed", help="Seed of the random configurations.")]
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from . import __version__
+
+        typer.echo(f"hrsynth {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _options(context: typer.Context, version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True,
+                                                   help="Print the version.")] = False) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+@app.command()
+def derive(
+    robot: Robot,
+    observe: Annotated[str, typer.Option(metavar="LEGS", help="Legs to watch (1,4), links, or all.")] = "all",
+    camera: Camera = None,
+    form: Annotated[str, typer.Option(help="simplified (as in the paper) or general (sliders, all legs kept).")]
+    = "simplified",
+    output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Write the hidden robot.")]
+    = None,
+    json: Json = False,
+    seed: Seed = 0,
+) -> None:
+    """The hidden robot of a robot, how it is derived, its certificate, and what the controller can see."""
+    from .analysis.derive import derive as run
+    from .description import load, save
+    from .present import records, text
+
+    with Progress() as progress:
+        found = run(load(robot), _list(observe), camera, form=form, seed=seed, progress=progress.tell)
+    written = None
+    if output is not None and found.hidden is not None:
+        save(found.hidden, output)
+        written = output
+    if json:
+        typer.echo(records.record("derive", found.robot.name, {**found.to_dict(), "hidden_file": written}))
+    else:
+        typer.echo(text.derivation(found, written))
+    if output is not None and found.hidden is None:
+        typer.echo("hrsynth: nothing was written: every leg is blind, there is no hidden robot", err=True)
+
+
+@app.command()
+def legs(robot: Robot, camera: Camera = None, json: Json = False, seed: Seed = 0) -> None:
+    """Every set of observed legs: its verdict, the freedoms it loses, and the smallest sets that see most."""
+    from .analysis.controllability import legs as run
+    from .description import load
+    from .present import records, text
+
+    with Progress() as progress:
+        found = run(load(robot), camera, seed=seed, progress=progress.tell)
+    typer.echo(records.record("legs", found.robot, found.to_dict()) if json else text.legs(found))
+
+
+@app.command()
+def robots(json: Json = False) -> None:
+    """The shipped robots."""
+    from .description import shipped
+    from .families.table import ROBOTS
+    from .mechanism.notation import parse
+    from .present import records, text
+
+    files = shipped()
+    rows = [{"name": each.name, "file": str(files.get(each.name, "")), "architecture_ascii": each.architecture,
+             "dof": each.dof, "section": each.section, "dimensions": each.provenance} for each in ROBOTS]
+    if json:
+        typer.echo(records.record("robots", None, {"robots": rows}))
+    else:
+        typer.echo(text.table([(str(r["name"]), str(parse(str(r["architecture_ascii"]))), str(r["dof"]),
+                                str(r["section"])) for r in rows], ("name", "architecture", "dof", "source")))
+
+
+@app.command()
+def convert(
+    source: Annotated[str, typer.Argument(metavar="IN", help="A robot file, or the name of a shipped robot.")],
+    target: Annotated[str, typer.Argument(metavar="OUT", help="The file to write.")],
+    json: Json = False,
+) -> None:
+    """Read a robot and write it again (native dialect)."""
+    from .description import load, save
+    from .present import records
+
+    mechanism = load(source)
+    save(mechanism, target)
+    fields: dict[str, Any] = {"file": target, "links": len(mechanism.links), "joints": len(mechanism.joints)}
+    typer.echo(records.record("convert", mechanism.name, fields) if json
+               else f"{mechanism.name}: {fields['links']} links, {fields['joints']} joints, written to {target}")
+
+
+def _list(text: str) -> list[str]:
+    from .errors import BadRequest
+
+    names = [name.strip() for name in text.split(",")]
+    if not all(names):
+        raise BadRequest("--observe: an empty name", text, "labels or links set apart by commas, or all")
+    return names
+
+
+class Progress:
+    """A line on standard error once a command has taken more than a second; nothing where that is no terminal."""
+
+    def __init__(self) -> None:
+        self._start = time.monotonic()
+        self._bar: Any = None
+        self._steps = 0
+
+    def __enter__(self) -> Progress:
+        return self
+
+    def tell(self, what: str = "sets of legs") -> None:
+        """One more step done."""
+        self._steps += 1
+        if self._bar is None and time.monotonic() - self._start > 1.0 and sys.stderr.isatty():
+            from rich.console import Console
+            from rich.progress import BarColumn, TextColumn, TimeElapsedColumn
+            from rich.progress import Progress as Bar
+
+            self._bar = Bar(TextColumn("{task.description}"), BarColumn(), TextColumn("step {task.completed:.0f}"),
+                            TimeElapsedColumn(), console=Console(stderr=True), transient=True)
+            self._bar.start()
+            self._bar.add_task(what, total=None)
+        if self._bar is not None:
+            self._bar.update(self._bar.task_ids[0], description=what, completed=self._steps)
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
+                 trace: TracebackType | None) -> None:
+        if self._bar is not None:
+            self._bar.stop()
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line; every failure is one line a defect, never a traceback."""
+    for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(library, "1")
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(encoding="utf-8", errors="replace")
+    sys.exit(_run(arguments))
+
+
+def _run(arguments: list[str] | None) -> int:
+    try:
+        status = app(args=arguments, standalone_mode=False)
+        sys.stdout.flush()
+        return int(status or 0)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        return 130
+    except Exception as error:
+        return _told(error)
+
+
+def _told(error: Exception) -> int:
+    """Say what went wrong; the exit status."""
+    from .errors import HrsynthError
+
+    if isinstance(error, HrsynthError):
+        for line in error.lines():
+            typer.echo(f"hrsynth: {line}", err=True)
+        return error.exit_status
+    usage = getattr(error, "format_message", None)
+    if usage is not None:
+        message = " ".join(str(usage()).split())
+        if message:
+            typer.echo(f"hrsynth: {message}", err=True)
+        return 2
+    if os.environ.get("HRSYNTH_DEBUG"):
+        raise error
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    typer.echo(f"hrsynth: a defect of hrsynth itself, please report it: {what}", err=True)
+    return 3
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,138 @@
+"""Joints of several freedoms in a tree of one-freedom joints: N is N__1, N__2, N__3 through bare links of their own.
+
+| joint | chain                                   |
+| ----- | --------------------------------------- |
+| U     | R about axis, R about axis2             |
+| S     | R about x, y, z of the first link       |
+| C     | P, R along one axis                     |
+| E     | P, P normal to the axis, R about it     |
+
+A joint N whose centre is not the origin of the link that it carries ends at a bare link ``N__tip``, to which a fixed
+joint of that name joins the link. Points and axes are compared at the zero configuration.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor
+from ..mechanism.vectors import Array, perpendicular
+from ..tolerances import SAME_DIRECTION, SAME_POINT
+
+TIP = "__tip"
+_FIRST = re.compile(r"(?P<name>.+)__1", re.DOTALL)
+_R, _P = JointType.REVOLUTE, JointType.PRISMATIC
+
+
+def part(name: str, number: int) -> str:
+    """The name of the ``number``-th joint (and of the link that it carries) of the chain of joint ``name``."""
+    return f"{name}__{number}"
+
+
+def parts(kind: JointType, axes: Sequence[Array]) -> list[tuple[JointType, Array]]:
+    """The one-freedom joints, type and axis, that a tree joint is a chain of; empty where it needs none.
+
+    ``axes`` are those of the joint in the frame of the first link of the chain, and so are the axes of the parts.
+    """
+    match kind:
+        case JointType.UNIVERSAL:
+            return [(_R, axes[0]), (_R, axes[1])]
+        case JointType.SPHERICAL:
+            return [(_R, axis) for axis in np.eye(3)]
+        case JointType.CYLINDRICAL:
+            return [(_P, axes[0]), (_R, axes[0])]
+        case JointType.PLANAR:
+            first = perpendicular(axes[0])
+            return [(_P, first), (_P, np.cross(axes[0], first)), (_R, axes[0])]
+    return []
+
+
+def merged(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with every chain and every tip merged into one joint; what only looks like one stays as it is."""
+    links, joints = dict(mechanism.links), dict(mechanism.joints)
+    busy = {mechanism.base, mechanism.platform, mechanism.reference}
+    busy |= {observation.link for observation in mechanism.observations}
+    busy |= {link for coupling in mechanism.couplings for link in (coupling.predecessor, coupling.successor)}
+    degree: dict[str, int] = {}
+    for joint in joints.values():
+        for end in joint.links:
+            degree[end] = degree.get(end, 0) + 1
+
+    def bare(link: Link | None) -> bool:
+        return link is not None and link.name not in busy and not link.xml and degree.get(link.name) == 2
+
+    carrier = {joint.successor: name for name, joint in joints.items() if joint.in_tree}
+    for name in [name for name in joints if name.endswith(TIP)]:
+        fixed = joints[name]
+        stem = name.removesuffix(TIP)
+        if (fixed.type is JointType.FIXED and fixed.in_tree and fixed.predecessor == name and bare(links.get(name))
+                and not fixed.xml and fixed.limits is None):
+            last = carrier.get(name)
+            if last is not None and re.fullmatch(re.escape(stem) + r"(__[123])?", last):
+                joints[last] = replace(joints[last], successor=fixed.successor)
+                carrier[fixed.successor] = last
+                del joints[name], links[name]
+
+    for match in [match for name in joints if (match := _FIRST.fullmatch(name))]:
+        name = match["name"]
+        chain = [joints[each] for number in (1, 2, 3) if (each := part(name, number)) in joints]
+        if name in joints or len(chain) < 2 or [joint.name for joint in chain] != [
+                part(name, number + 1) for number in range(len(chain))]:
+            continue
+        between = [links.get(part(name, number)) for number in range(1, len(chain))]
+        whole = _whole(name, chain, between, mechanism.length) if all(map(bare, between)) else None
+        if whole is not None:
+            for number in range(1, len(chain)):
+                del links[part(name, number)]
+            joints = _exchanged(joints, chain, whole)
+    return replace(mechanism, links=links, joints=joints)
+
+
+def _exchanged(joints: dict[str, Joint], chain: list[Joint], whole: Joint) -> dict[str, Joint]:
+    gone = {joint.name for joint in chain[1:]}
+    return {(whole.name if name == chain[0].name else name): (whole if name == chain[0].name else joint)
+            for name, joint in joints.items() if name not in gone}
+
+
+def _whole(name: str, chain: list[Joint], between: list[Link | None], length: float) -> Joint | None:
+    """The joint that a chain is, or None where it is none by its links, geometry, motors or limits."""
+    first = chain[0]
+    for number, (before, after) in enumerate(pairwise(chain), 1):
+        if not before.successor == after.predecessor == part(name, number):
+            return None
+    if any(not joint.in_tree or np.linalg.norm(joint.point - first.point) > SAME_POINT * length
+           or joint.limits != first.limits or joint.actuated != first.actuated or (joint.xml and joint is not first)
+           for joint in chain):
+        return None
+    axes = [joint.axis for joint in chain if joint.type in (_R, _P)]
+    gram = np.array([[a @ b for a in axes] for b in axes])
+    orthogonal = np.max(np.abs(gram - np.eye(len(axes)))) <= SAME_DIRECTION
+    link = between[0]
+    kind: JointType
+    match "".join(joint.type.value for joint in chain):
+        case "RR" if orthogonal:
+            kind, kept = JointType.UNIVERSAL, tuple(axes)
+        case "RRR" if link is not None and np.max(np.abs(np.array(axes).T - link.pose[:3, :3])) <= SAME_DIRECTION:
+            kind, kept = JointType.SPHERICAL, ()
+        case "PR" if np.linalg.norm(axes[0] - axes[1]) <= SAME_DIRECTION:
+            kind, kept = JointType.CYLINDRICAL, (axes[1],)
+        case "PPR" if orthogonal:
+            kind, kept = JointType.PLANAR, (axes[2],)
+        case _:
+            return None
+    return replace(first, name=name, type=kind, successor=chain[-1].successor, axes=kept, motor=_motor(chain))
+
+
+def _motor(chain: list[Joint]) -> Motor | None:
+    motors = [joint.motor for joint in chain if joint.motor is not None]
+    if not motors:
+        return None
+    stem = motors[0].name.removesuffix("__1")
+    same = [motor.name for motor in motors] == [part(stem, number + 1) for number in range(len(motors))]
+    fragments = list(dict.fromkeys(motor.xml for motor in motors if motor.xml is not None))
+    return Motor(stem if same else motors[0].name, "".join(fragments) or None)

@@ -1,0 +1,110 @@
+"""Numbers in files: read strictly, written on a grid so that writing what was read gives the same digits.
+
+A written number is a multiple of 10^-n, with n so large that rounding stays below every tolerance and so small that
+the noise of floating-point products (a few units of 1e-16) never moves a number to the next multiple.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..mechanism.vectors import Array, pose, rotation_about, rotation_from_rpy
+
+ANGLE_DECIMALS = 13
+"""Decimals of angles and of the components of axes."""
+
+LARGEST = 1e9
+"""Largest magnitude of a number that a robot file may hold (metres, radians)."""
+
+_NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+def parsed(text: str, count: int) -> Array:
+    """The ``count`` numbers of ``text``; shape (count,). Raises ``ValueError`` that says what was expected."""
+    words = text.split()
+    for word in words:
+        if not _NUMBER.fullmatch(word):
+            raise ValueError("finite numbers")
+        if not abs(float(word)) <= LARGEST:
+            raise ValueError(f"numbers up to {LARGEST:g}")
+    if len(words) != count:
+        raise ValueError("one number" if count == 1 else f"{count} numbers")
+    return np.array([float(word) for word in words])
+
+
+def printed(value: float, decimals: int) -> str:
+    """``value`` rounded to ``decimals``, at most 15 significant digits, in its shortest form; -0 is 0."""
+    rounded = round(float(value), decimals)
+    return f"{rounded:.15g}" if rounded else "0"
+
+
+def exact(value: float) -> str:
+    """``value`` in the shortest form that reads back as the same float; whole numbers without a point."""
+    text = repr(float(value))
+    return text.removesuffix(".0") if text != "-0.0" else "0"
+
+
+def length_decimals(scale: float) -> int:
+    """Decimals of a length in a robot whose largest coordinate is ``scale`` metres: 14 significant digits of it."""
+    return 13 - math.floor(math.log10(scale * (1 + 1e-7))) if scale > 0 else ANGLE_DECIMALS
+
+
+def vector(values: ArrayLike, decimals: int) -> str:
+    """The numbers of a vector, each rounded to ``decimals``."""
+    return " ".join(printed(value, decimals) for value in np.asarray(values, dtype=float))
+
+
+def axis(direction: ArrayLike) -> str:
+    """A unit vector of shape (3,): two components on the grid, the largest one such that the length is one."""
+    values = np.asarray(direction, dtype=float)
+    values = values / np.linalg.norm(values)
+    sizes = np.abs(values)
+    largest = int(np.flatnonzero(sizes >= sizes.max() - 1e-9)[0])
+    grid = [round(float(value), ANGLE_DECIMALS) for value in values]
+    rest = sum(value**2 for index, value in enumerate(grid) if index != largest)
+    grid[largest] = math.copysign(math.sqrt(max(0.0, 1.0 - rest)), values[largest])
+    return " ".join(printed(value, 15) for value in grid)
+
+
+def rpy(rotation: Array) -> tuple[float, float, float]:
+    """Roll, pitch, yaw of a rotation (3, 3), rounded.
+
+    Where the pitch is nearly ±90° the yaw is rounded as coarsely as it is undetermined, and the roll makes up for it.
+    """
+    cosine = math.hypot(rotation[0, 0], rotation[1, 0])
+    yaw = 0.0
+    if cosine > 1e-13:
+        decimals = min(ANGLE_DECIMALS, math.floor(14.37 + math.log10(cosine)))  # .37: changes at no round number
+        yaw = round(math.atan2(rotation[1, 0], rotation[0, 0]), decimals)
+    rest = rotation_about((0, 0, 1), -yaw) @ rotation
+    pitch = round(math.atan2(-rest[2, 0], rest[0, 0]), ANGLE_DECIMALS)
+    roll = round(math.atan2(-rest[1, 2], rest[1, 1]), ANGLE_DECIMALS)
+    return _half_open(roll), _half_open(pitch), _half_open(yaw)
+
+
+def _half_open(angle: float) -> float:
+    """The angle, with -π taken as π."""
+    return math.pi if abs(abs(angle) - math.pi) < 1e-12 else angle
+
+
+def origin(X: Array, decimals: int) -> tuple[Array, dict[str, str]]:
+    """A pose as the attributes of an ``<origin>``, and the pose (4, 4) that reading them gives."""
+    attributes = {}
+    xyz = vector(X[:3, 3], decimals)
+    if xyz != "0 0 0":
+        attributes["xyz"] = xyz
+    angles = " ".join(printed(angle, ANGLE_DECIMALS) for angle in rpy(X[:3, :3]))
+    if angles != "0 0 0":
+        attributes["rpy"] = angles
+    return from_origin(parsed(xyz, 3), parsed(angles, 3)), attributes
+
+
+def from_origin(xyz: Array, angles: Array) -> Array:
+    """The pose (4, 4) that an ``<origin>`` means."""
+    if not np.any(angles):
+        return pose(xyz)
+    return pose(xyz, rotation_from_rpy(*angles))

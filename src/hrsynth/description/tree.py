@@ -1,0 +1,115 @@
+"""Every mechanism is a spanning tree and loops: the choice of that tree."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import networkx as nx
+import numpy as np
+
+from ..errors import BadMechanism
+from ..mechanism.model import Joint, JointType, Link, Mechanism
+from ..mechanism.vectors import inverse
+from . import chains
+
+_COST = {
+    JointType.FREE: 0, JointType.FIXED: 2, JointType.REVOLUTE: 4, JointType.PRISMATIC: 4, JointType.UNIVERSAL: 6,
+    JointType.CYLINDRICAL: 8, JointType.PLANAR: 10, JointType.SPHERICAL: 12,
+}
+"""Reluctance to have a joint of this type in the tree; a free joint closes no loop, so it is never one."""
+_OUTSIDE = 20
+"""Added to the cost of a joint that was no tree joint before."""
+
+
+def spanning(mechanism: Mechanism) -> Mechanism:
+    """The same mechanism, its ``in_tree`` joints a spanning tree rooted at the base, each directed away from the base.
+
+    Unchanged where that holds already. Otherwise the tree is a minimum spanning tree that prefers the tree joints of
+    before, then fixed joints, R and P, U, C, E, S, and actuated joints among equals; links and joints are ordered
+    depth-first from the base, loops last. All geometry is expressed in the base link's frame. Tree joints that a file
+    would hold as one joint, by their names, are that joint.
+
+    Raises
+    ------
+    BadMechanism
+        Where a link hangs on nothing, or a joint between two links of the tree has all six freedoms.
+    """
+    mechanism = _in_base_frame(mechanism)
+    return chains.merged(mechanism if is_spanning(mechanism) else _cut(mechanism))
+
+
+def _cut(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with a new spanning tree."""
+    graph: nx.MultiGraph[object] = nx.MultiGraph()
+    graph.add_nodes_from(mechanism.links)
+    for joint in mechanism.joints.values():
+        graph.add_edge(*joint.links, key=joint.name, weight=_cost(joint))
+    lost = set(mechanism.links) - nx.node_connected_component(graph, mechanism.base)
+    if lost:
+        raise BadMechanism("a link that no chain of joints joins to the base", min(lost))
+    chosen = {key for _, _, key in nx.minimum_spanning_edges(graph, keys=True, data=False)}
+
+    links: dict[str, Link] = {}
+    tree: dict[str, Joint] = {}
+    pending: list[tuple[str, Joint | None]] = [(mechanism.base, None)]
+    while pending:
+        link, carrier = pending.pop()
+        links[link] = mechanism.links[link]
+        if carrier is not None:
+            tree[carrier.name] = carrier
+        for joint in reversed(mechanism.joints_of(link)):
+            if joint.name in chosen and joint.other(link) not in links:
+                away = joint if joint.predecessor == link else joint.turned()
+                pending.append((away.successor, replace(away, in_tree=True)))
+    loops = {name: replace(joint, in_tree=False) for name, joint in mechanism.joints.items() if name not in chosen}
+    for joint in loops.values():
+        if joint.type is JointType.FREE:
+            raise BadMechanism(f"joint {joint.name!r} closes a loop without constraining it", joint.type.value)
+    return replace(mechanism, links=links, joints=tree | loops)
+
+
+def is_spanning(mechanism: Mechanism) -> bool:
+    """Whether the ``in_tree`` joints are a spanning tree rooted at the base, each directed away from the base."""
+    carriers = {joint.successor: joint for joint in mechanism.joints.values() if joint.in_tree}
+    count = sum(joint.in_tree for joint in mechanism.joints.values())
+    if not count == len(carriers) == len(mechanism.links) - 1 or mechanism.base in carriers:
+        return False
+    if any(joint.type is JointType.FREE and not joint.in_tree for joint in mechanism.joints.values()):
+        return False
+    return len(outward(mechanism)) == count
+
+
+def outward(mechanism: Mechanism) -> list[Joint]:
+    """The tree joints that hang on the base, every joint after the one that carries its predecessor."""
+    hanging: dict[str, list[Joint]] = {}
+    for joint in mechanism.joints.values():
+        if joint.in_tree:
+            hanging.setdefault(joint.predecessor, []).append(joint)
+    order: list[Joint] = []
+    reached = [mechanism.base]
+    for link in reached:
+        for joint in hanging.pop(link, ()):
+            order.append(joint)
+            reached.append(joint.successor)
+    return order
+
+
+def _cost(joint: Joint) -> int:
+    if joint.type is JointType.FREE:
+        return 0
+    return _COST[joint.type] + (not joint.actuated) + (0 if joint.in_tree else _OUTSIDE)
+
+
+def _in_base_frame(mechanism: Mechanism) -> Mechanism:
+    X_WB = mechanism.links[mechanism.base].pose
+    if np.array_equal(X_WB, np.eye(4)):
+        return mechanism
+    X_BW = inverse(X_WB)
+    links = {name: replace(link, pose=X_BW @ link.pose) for name, link in mechanism.links.items()}
+    links[mechanism.base] = replace(links[mechanism.base], pose=np.eye(4))
+    joints = {
+        name: replace(joint, point=X_BW[:3, :3] @ joint.point + X_BW[:3, 3],
+                      axes=tuple(X_BW[:3, :3] @ axis for axis in joint.axes))
+        for name, joint in mechanism.joints.items()
+    }
+    return replace(mechanism, links=links, joints=joints)  # observations are given in their links' frames

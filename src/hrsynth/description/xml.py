@@ -1,0 +1,133 @@
+"""XML documents: read without trust, their unknown parts kept as text."""
+
+from __future__ import annotations
+
+import re
+import stat
+from collections.abc import Iterable
+from pathlib import Path
+from typing import TypeAlias
+
+from lxml import etree
+
+from ..errors import BadRequest, BadRobotFile, Defect
+
+Element: TypeAlias = etree._Element
+
+LARGEST_FILE = 20_000_000
+"""Bytes above which a file is not read at all."""
+
+_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+_DECLARATION = re.compile(rb"<!\s*(DOCTYPE|ENTITY)")
+
+_ATTRIBUTE = re.compile(r"@(?P<name>(\{[^}]*\})?[^=]*)=(?P<value>.*)", re.DOTALL)
+
+
+def _parser() -> etree.XMLParser:
+    return etree.XMLParser(resolve_entities=False, no_network=True, load_dtd=False, huge_tree=False,
+                           remove_comments=False, remove_pis=True)
+
+
+def content(path: str | Path) -> bytes:
+    """The bytes of a robot file; raises :class:`BadRobotFile` for what is no readable file of a sensible size."""
+    file = str(path)
+
+    def refuse(what: str, value: str | None = None, allowed: str | None = None) -> BadRobotFile:
+        return BadRobotFile([Defect(file, None, what, value, allowed)])
+
+    try:
+        status = Path(path).stat()
+        if stat.S_ISDIR(status.st_mode):
+            raise refuse("a directory, not a robot file")
+        if not stat.S_ISREG(status.st_mode):
+            raise refuse("not a regular file")
+        if status.st_size > LARGEST_FILE:
+            raise refuse("file too large", f"{status.st_size} bytes", f"up to {LARGEST_FILE}")
+        with open(path, "rb") as stream:
+            data = stream.read(LARGEST_FILE + 1)
+    except FileNotFoundError:
+        raise refuse("no such file") from None
+    except (OSError, ValueError) as error:
+        raise refuse("cannot be read", getattr(error, "strerror", None) or str(error)) from None
+    if len(data) > LARGEST_FILE:
+        raise refuse("file too large", f"more than {LARGEST_FILE} bytes", f"up to {LARGEST_FILE}")
+    return data
+
+
+def document(text: bytes | str, file: str) -> Element:
+    """The root element of an XML document; raises :class:`BadRobotFile` with the line where it stops being one."""
+    data = text.encode() if isinstance(text, str) else text
+
+    def refuse(line: int | None, what: str, value: str | None = None) -> BadRobotFile:
+        return BadRobotFile([Defect(file, line, what, value)])
+
+    if not data.strip():
+        raise refuse(None, "an empty file")
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        raise refuse(data.count(b"\n", 0, error.start) + 1, "not UTF-8 text", hex(data[error.start])) from None
+    bare = _COMMENT.sub(lambda match: b"\n" * match[0].count(b"\n"), data)
+    if declaration := _DECLARATION.search(bare):
+        raise refuse(bare.count(b"\n", 0, declaration.start()) + 1, "a document type declaration")
+    try:
+        return etree.fromstring(data, _parser())
+    except etree.XMLSyntaxError as error:
+        what = (error.msg or "syntax error").split(", line ")[0]
+        raise refuse(error.lineno or 1, "malformed XML", what) from None
+    except (ValueError, LookupError) as error:
+        raise refuse(1, "malformed XML", str(error)) from None
+
+
+def line(element: Element) -> int | None:
+    """The line of its file that an element starts in."""
+    number: object = element.sourceline
+    return number if isinstance(number, int) else None
+
+
+def children(element: Element) -> list[Element]:
+    """The child elements, without comments."""
+    return [child for child in element if isinstance(child.tag, str)]
+
+
+def kept(element: Element) -> str:
+    """An element as one line of text that means the same; stable when written and read again."""
+    copy = etree.fromstring(etree.tostring(element, with_tail=False), _parser())
+    for part in copy.iter():
+        if part.text is not None and not part.text.strip():
+            part.text = None
+        if part.tail is not None and not part.tail.strip():
+            part.tail = None
+    etree.cleanup_namespaces(copy)
+    return etree.tostring(copy, encoding="unicode")
+
+
+def unknown(element: Element, attributes: Iterable[str], tags: Iterable[str]) -> tuple[str, ...]:
+    """What this project does not know of an element: ``@name=value`` for attributes, then child elements."""
+    known_attributes, known_tags = set(attributes), set(tags)
+    given = sorted((str(name), str(value)) for name, value in element.attrib.items())
+    found = [f"@{name}={value}" for name, value in given if name not in known_attributes]
+    return (*found, *(kept(child) for child in children(element) if child.tag not in known_tags))
+
+
+def restore(element: Element, fragments: Iterable[str]) -> None:
+    """Put back what :func:`unknown` kept."""
+    for fragment in fragments:
+        if attribute := _ATTRIBUTE.fullmatch(fragment):
+            element.set(attribute["name"], attribute["value"])
+        else:
+            element.append(parsed(fragment))
+
+
+def parsed(fragment: str) -> Element:
+    """The element of a kept fragment; raises :class:`BadRequest` where it is none."""
+    try:
+        return etree.fromstring(fragment.encode(), _parser())
+    except etree.XMLSyntaxError as error:
+        raise BadRequest("a kept fragment is not XML", fragment, error.msg) from None
+
+
+def text_of(root: Element) -> str:
+    """A document as text, indented by two spaces."""
+    etree.indent(root, "  ")
+    return '<?xml version="1.0" encoding="utf-8"?>\n' + etree.tostring(root, encoding="unicode") + "\n"

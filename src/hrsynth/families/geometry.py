@@ -1,0 +1,62 @@
+"""Where joints lie once the platform's pose is chosen: points on circles, lines and spheres, in closed form."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..errors import BadRequest
+from ..mechanism.vectors import Array, unit
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def polar(radius: float, angle: float, height: float = 0.0) -> Array:
+    """The point [r cos θ, r sin θ, z], shape (3,); lengths in m, the angle in rad."""
+    return np.array([radius * math.cos(angle), radius * math.sin(angle), height])
+
+
+def radial(angle: float) -> Array:
+    """The unit vector [cos θ, sin θ, 0], shape (3,)."""
+    return polar(1.0, angle)
+
+
+def tangent(angle: float) -> Array:
+    """The unit vector [-sin θ, cos θ, 0] = z × radial, shape (3,)."""
+    return polar(1.0, angle + math.pi / 2)
+
+
+def on_circle(centre: Array, x: Array, z: Array, radius: float, target: Array, length: float, outward: bool) -> Array:
+    """The point B on a circle with ‖B − target‖ = length: MMT (B.4), solved without the half-angle tangent.
+
+    The circle lies in the plane of the unit vectors ``x`` and ``z`` about ``centre``. Of the two solutions, ``outward``
+    takes the one farther along ``x`` (the knee points away from the axis). Shapes (3,), lengths in m. Raises
+    :class:`BadRequest` where the target is out of reach.
+    """
+    rest = target - centre
+    along, up = float(rest @ x), float(rest @ z)
+    reach = math.hypot(along, up)
+    cosine = (float(rest @ rest) + radius**2 - length**2) / (2 * radius * reach)
+    if not abs(cosine) < 1:
+        raise BadRequest("the tip is out of the leg's reach", round(float(np.linalg.norm(rest)), 6),
+                         f"a distance that links of {radius} m and {length} m can bridge")
+    angles = [math.atan2(up, along) + sign * math.acos(cosine) for sign in (1, -1)]
+    angle = (max if outward else min)(angles, key=math.cos)
+    return centre + radius * (math.cos(angle) * x + math.sin(angle) * z)
+
+
+def on_line(point: Array, direction: ArrayLike, target: Array, length: float, forward: bool = False) -> Array:
+    """The point B on a line with ‖B − target‖ = length; ``forward`` takes the solution farther along ``direction``.
+
+    Shapes (3,), lengths in m. Raises :class:`BadRequest` where the line does not come so near.
+    """
+    d = unit(direction)
+    rest = target - point
+    foot = float(rest @ d)
+    square = length**2 - float(rest @ rest) + foot**2
+    if not square > 0:
+        raise BadRequest("the rail does not come near enough to the tip", round(math.sqrt(length**2 - square), 6),
+                         f"a distance below {length} m")
+    return point + (foot + (1 if forward else -1) * math.sqrt(square)) * d

@@ -1,0 +1,296 @@
+"""The planar robots of MMT Table 1, with two and three degrees of freedom, moving in the plane z = 0 of the base.
+
+A leg is a chain base – ``prox_i`` – ``dist_i`` – platform with three joints of type R (axis z) or P. Joint names say
+the place and the type: ``shoulder_i`` (R) or ``guide_i`` (P) on the base, ``elbow_i`` (R) or ``slide_i`` (P) between
+the two links, ``wrist_i`` (R) or ``slide_i`` (P) on the platform. All dimensions are free choices (the papers give
+none): generic ones, so that neither the robots nor their hidden robots are near a singularity at the zero
+configuration. Lengths in m.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import BadRequest
+from ..mechanism.builder import Builder
+from ..mechanism.model import Mechanism
+from ..mechanism.vectors import Array, unit
+from .geometry import Z, on_circle, on_line, polar, radial
+
+Pairs = Sequence[tuple[float, float]]
+
+BASE: Pairs = ((0.300, math.radians(88)), (0.310, math.radians(211)), (0.290, math.radians(332)))
+"""Polar coordinates of A_i in the base: a slightly irregular triangle."""
+PLATFORM: Pairs = ((0.100, math.radians(93)), (0.105, math.radians(208)), (0.095, math.radians(329)))
+"""Polar coordinates of C_i in the platform."""
+HOME = (0.010, -0.015, math.radians(22))
+"""Platform pose x, y (m), φ (rad) at the zero configuration."""
+
+
+@dataclass(frozen=True)
+class _Leg:
+    """The points of a leg's three joints and, where a joint is a P, its axis; shapes (3,)."""
+
+    points: tuple[Array, Array, Array]
+    axes: tuple[Array, Array, Array] = (Z, Z, Z)
+
+
+def _add(b: Builder, leg: int, types: str, geometry: _Leg, motor: int, frame: Array | None = None) -> None:
+    """Adds ``prox_i`` and ``dist_i`` with the first two joints; ``frame``: the origin of ``dist_i``."""
+    if motor not in (1, 2):
+        raise BadRequest("motor: the actuated joint of each leg", motor, "1 or 2")
+    place = [{"R": turning, "P": sliding}[letter]
+             for turning, sliding, letter in zip(("shoulder", "elbow"), ("guide", "slide"), types, strict=False)]
+    for number, (link, parent) in enumerate(((f"prox_{leg}", "base"), (f"dist_{leg}", f"prox_{leg}"))):
+        point = geometry.points[number]
+        b.link(link, at=point if frame is None or number == 0 else frame)
+        b.joint(f"{place[number]}_{leg}", types[number], parent, link, at=point, axis=geometry.axes[number],
+                motor=f"motor_{leg}" if motor == number + 1 else False)
+
+
+def _elbow(A: Array, C: Array, proximal: float, distal: float, left: bool) -> Array:
+    """The elbow of two links from A to C, to the left or the right of AC; shape (3,)."""
+    side = np.cross(Z, unit(C - A)) * (1 if left else -1)
+    return on_circle(A, side, unit(C - A), proximal, C, distal, outward=True)
+
+
+# ------------------------------------------------------------------------------------------ two degrees of freedom
+
+
+def _pair(name: str, types: str, legs: Sequence[_Leg], motor: int, point_body: bool = False) -> Mechanism:
+    """Two planar legs that share their end joint; the platform is ``dist_1`` with its frame there, or a point body."""
+    b = Builder(name)
+    b.link("base")
+    end = legs[0].points[2]
+    for number, geometry in enumerate(legs, start=1):
+        _add(b, number, types, geometry, motor, end if number == 1 and not point_body else None)
+    if not point_body:
+        b.joint("end", "R", "dist_1", "dist_2", at=end, axis=Z, loop=True)
+        return b.build(platform="dist_1")
+    b.link("platform", at=end)
+    for number in (1, 2):
+        b.joint(f"wrist_{number}", "R", f"dist_{number}", "platform", at=end, axis=Z, loop=number == 2)
+    return b.build(platform="platform")
+
+
+def rrrrr(*, motor: int = 1, base_distance: float = 0.2, proximal: float = 0.16, distal: float = 0.2,
+          home: tuple[float, float] = (0.02, 0.24)) -> Mechanism:
+    """The five-bar RRRRR: its end joint moves in the plane (MMT 4.1.2, Fig. 5).
+
+    Parameters
+    ----------
+    motor
+        The actuated joint of each leg, 1 or 2: R̲RRRR̲ or RR̲RR̲R.
+    base_distance
+        Distance of the two base joints.
+    proximal, distal
+        Lengths of the links; elbows outwards.
+    home
+        The end joint at the zero configuration, x and y.
+    """
+    P = np.array([*home, 0.0])
+    legs = []
+    for sign in (-1, 1):
+        A = np.array([sign * base_distance / 2, 0.0, 0.0])
+        legs.append(_Leg((A, _elbow(A, P, proximal, distal, left=sign < 0), P)))
+    return _pair(f"rrrrr_m{motor}", "RRR", legs, motor)
+
+
+def rprpr(*, motor: int = 1, base_distance: float = 0.3, home: tuple[float, float] = (0.03, 0.22)) -> Mechanism:
+    """RPRPR: two telescopic legs that share their end joint (MMT 4.1.2).
+
+    ``motor`` 1: R̲PRPR̲; 2: RP̲RP̲R. Other parameters as in :func:`rrrrr`.
+    """
+    P = np.array([*home, 0.0])
+    legs = []
+    for sign in (-1, 1):
+        A = np.array([sign * base_distance / 2, 0.0, 0.0])
+        legs.append(_Leg((A, (A + P) / 2, P), (Z, P - A, Z)))
+    return _pair(f"rprpr_m{motor}", "RPR", legs, motor)
+
+
+def _prrrp(name: str, motor: int, base_distance: float, rails: tuple[float, float], distal: float,
+           home: tuple[float, float], point_body: bool = False) -> Mechanism:
+    P = np.array([*home, 0.0])
+    legs = []
+    for sign, angle in zip((-1, 1), rails, strict=True):
+        B = on_line(np.array([sign * base_distance / 2, 0.0, 0.0]), radial(angle), P, distal)
+        legs.append(_Leg((B, B, P), (radial(angle), Z, Z)))
+    return _pair(name, "PRR", legs, motor, point_body)
+
+
+def prrrp(*, motor: int = 1, base_distance: float = 0.4, rails: tuple[float, float] = (math.radians(60),
+          math.radians(105)), distal: float = 0.3, home: tuple[float, float] = (0.02, 0.2)) -> Mechanism:
+    """PRRRP with rails that are not parallel (MMT 4.1.2).
+
+    Parameters
+    ----------
+    motor
+        The actuated joint of each leg, 1 or 2: P̲RRRP̲ or PR̲RR̲P.
+    base_distance
+        Distance, along x, of the points where the rails start.
+    rails
+        Angles of the rails to the x axis (rad).
+    distal
+        Length of the links.
+    home
+        The end joint at the zero configuration, x and y.
+    """
+    return _prrrp(f"prrrp_m{motor}", motor, base_distance, rails, distal, home)
+
+
+def prrrp_parallel(*, base_distance: float = 0.4, distal: float = 0.3, home: tuple[float, float] = (0.03, 0.1),
+                   point_body: bool = False) -> Mechanism:
+    """P̲RRRP̲ with both rails along y: the translation along them cannot be seen in the legs (MMT 4.3, Fig. 17).
+
+    ``point_body``: the platform is a separate link on two coaxial R at the end joint (its spin is idle), instead of
+    the last segment of leg 1. Other parameters as in :func:`prrrp`.
+    """
+    name = "prrrp_parallel_point" if point_body else "prrrp_parallel"
+    return _prrrp(name, 1, base_distance, (math.pi / 2, math.pi / 2), distal, home, point_body)
+
+
+# ---------------------------------------------------------------------------------------- three degrees of freedom
+
+
+def _corners(base: Pairs, platform: Pairs, home: tuple[float, float, float]) -> list[tuple[Array, Array]]:
+    """A_i and C_i of the three legs in the base frame at the zero configuration."""
+    x, y, phi = home
+    return [(polar(*a), np.array([x, y, 0.0]) + polar(radius, angle + phi))
+            for a, (radius, angle) in zip(base, platform, strict=True)]
+
+
+def _triple(name: str, types: str, legs: Sequence[_Leg], motor: int, home: tuple[float, float, float]) -> Mechanism:
+    """Three planar legs and a rigid platform; the platform frame has the axes of the base at the zero configuration."""
+    b = Builder(name)
+    b.link("base")
+    for number, geometry in enumerate(legs, start=1):
+        _add(b, number, types, geometry, motor)
+    b.link("platform", at=(home[0], home[1], 0.0))
+    for number, geometry in enumerate(legs, start=1):
+        kind = types[2]
+        b.joint(f"{'wrist' if kind == 'R' else 'slide'}_{number}", kind, f"dist_{number}", "platform",
+                at=geometry.points[2], axis=geometry.axes[2], loop=number != 1)
+    return b.build(platform="platform")
+
+
+def three_rrr(*, motor: int = 1, proximal: float = 0.17, distal: float = 0.16, base: Pairs = BASE,
+              platform: Pairs = PLATFORM, home: tuple[float, float, float] = HOME) -> Mechanism:
+    """3-RRR: three planar freedoms (MMT 4.1.1, Table 1; Fig. 6).
+
+    Parameters
+    ----------
+    motor
+        The actuated joint of each leg, 1 or 2: 3-R̲RR or 3-RR̲R.
+    proximal, distal
+        Lengths of the links; elbows to the left of A_i C_i.
+    base, platform
+        Polar coordinates (m, rad) of A_i in the base frame, and of C_i about P before the turn by φ.
+    home
+        Platform pose x, y, φ at the zero configuration.
+    """
+    legs = [_Leg((A, _elbow(A, C, proximal, distal, left=True), C)) for A, C in _corners(base, platform, home)]
+    return _triple(f"3rrr_m{motor}", "RRR", legs, motor, home)
+
+
+def three_rpr(*, motor: int = 1, base: Pairs = BASE, platform: Pairs = PLATFORM,
+              home: tuple[float, float, float] = HOME) -> Mechanism:
+    """3-RPR: three planar freedoms (MMT 4.1.1, Table 1).
+
+    ``motor`` 1: 3-R̲PR; 2: 3-RP̲R. Other parameters as in :func:`three_rrr`.
+    """
+    legs = [_Leg((A, (A + C) / 2, C), (Z, C - A, Z)) for A, C in _corners(base, platform, home)]
+    return _triple(f"3rpr_m{motor}", "RPR", legs, motor, home)
+
+
+def three_prr(*, motor: int = 1, distal: float = 0.2, rail: float = math.radians(50), base: Pairs = BASE,
+              platform: Pairs = PLATFORM, home: tuple[float, float, float] = HOME) -> Mechanism:
+    """3-PRR: three planar freedoms (MMT 4.1.1, Table 1).
+
+    Parameters
+    ----------
+    motor
+        The actuated joint of each leg, 1 or 2: 3-P̲RR or 3-PR̲R.
+    distal
+        Length of the links.
+    rail
+        Angle (rad) of rail i, through A_i, to the radius of A_i.
+    base, platform, home
+        As in :func:`three_rrr`.
+    """
+    legs = []
+    for (_, angle), (A, C) in zip(base, _corners(base, platform, home), strict=True):
+        direction = radial(angle + rail)
+        B = on_line(A, direction, C, distal, forward=True)
+        legs.append(_Leg((B, B, C), (direction, Z, Z)))
+    return _triple(f"3prr_m{motor}", "PRR", legs, motor, home)
+
+
+def three_prp(*, reach: float = 0.15, rail: float = math.radians(75), slot: float = math.radians(15),
+              platform: Pairs = PLATFORM, home: tuple[float, float, float] = HOME) -> Mechanism:
+    """3-P̲RP: three planar freedoms, of which the legs show the rotation only (MMT 4.1.1, Table 1).
+
+    Parameters
+    ----------
+    reach
+        Distance of the middle joint from C_i, along the P axis on the platform.
+    rail, slot
+        Angles (rad) of the base's and of the platform's P axes to the radius of C_i.
+    platform, home
+        As in :func:`three_rrr`.
+    """
+    legs = []
+    for (_, angle), (_, C) in zip(platform, _corners(BASE, platform, home), strict=True):
+        along = radial(angle + home[2] + slot)
+        B = C + reach * along
+        legs.append(_Leg((B, B, C), (radial(angle + home[2] + rail), Z, -along)))
+    return _triple("3prp", "PRP", legs, 1, home)
+
+
+def three_rrp(*, reach: float = 0.15, proximal: float = 0.18, bend: float = math.radians(80),
+              slot: float = math.radians(15), platform: Pairs = PLATFORM,
+              home: tuple[float, float, float] = HOME) -> Mechanism:
+    """3-R̲RP: three planar freedoms, of which the legs show the rotation only (MMT 4.1.1, Table 1).
+
+    Parameters
+    ----------
+    proximal
+        Length of the first link.
+    bend
+        Angle (rad) of the first link, seen from its elbow, to the radius of C_i.
+    reach, slot, platform, home
+        As in :func:`three_prp`.
+    """
+    legs = []
+    for (_, angle), (_, C) in zip(platform, _corners(BASE, platform, home), strict=True):
+        along = radial(angle + home[2] + slot)
+        B = C + reach * along
+        legs.append(_Leg((B + proximal * radial(angle + home[2] + bend), B, C), (Z, Z, -along)))
+    return _triple("3rrp", "RRP", legs, 1, home)
+
+
+def three_ppr(*, motor: int = 1, first: float = math.radians(50), second: float = math.radians(-40),
+              base: Pairs = BASE, platform: Pairs = PLATFORM,
+              home: tuple[float, float, float] = HOME) -> Mechanism:
+    """3-PPR: three planar freedoms, legs whose last segments never turn: nothing can be seen (MMT 4.1.1, Table 1).
+
+    Parameters
+    ----------
+    motor
+        The actuated joint of each leg, 1 or 2: 3-P̲PR or 3-PP̲R.
+    first, second
+        Angles (rad) of the two P axes to the radius of A_i.
+    base, platform, home
+        As in :func:`three_rrr`.
+    """
+    legs = []
+    for (_, angle), (A, C) in zip(base, _corners(base, platform, home), strict=True):
+        d, e = radial(angle + first), radial(angle + second)
+        travel = np.linalg.solve(np.column_stack([d[:2], e[:2]]), (C - A)[:2])
+        B = A + travel[0] * d
+        legs.append(_Leg((B, B, C), (d, e, Z)))
+    return _triple(f"3ppr_m{motor}", "PPR", legs, motor, home)

@@ -1,0 +1,223 @@
+"""The rules of the house that a machine can check: who imports whom, what is named where, what each test asserts."""
+
+from __future__ import annotations
+
+import ast
+import re
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from functools import cache
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+PACKAGE = ROOT / "src" / "hrsynth"
+
+# A module imports only from its own folder and from those above it here.
+FOLDERS = [
+    {"errors", "tolerances"},
+    {"mechanism"},
+    {"description"},
+    {"families"},
+    {"kinematics"},
+    {"rewrite"},
+    {"analysis"},
+    {"servo"},
+    {"present"},
+    {"catalog"},
+    {"cli", "__main__"},
+]
+LEVEL = {name: level for level, names in enumerate(FOLDERS) for name in names}
+
+ENGINE = {"mechanism", "description", "kinematics", "rewrite", "analysis", "servo", "present"}
+ROBOTS = re.compile(
+    r"(?<![a-z])(quattro|delta|orthoglide|gough|stewart|hexaglide|uranesx|i4l|tsai)(?![a-z])", re.IGNORECASE
+)
+
+# Packages that are slow to import: only inside functions, save in the one folder that is named.
+SLOW = {"pinocchio": "kinematics"} | dict.fromkeys(
+    ["cv2", "dask", "example_robot_data", "flint", "joblib", "matplotlib", "meshcat", "mujoco", "numba", "scipy"]
+    + ["sympy", "trimesh", "yourdfpy"]
+)
+NOT_FOR_HELP = ["pinocchio", "sympy", "networkx", "scipy", "yourdfpy", "matplotlib", "flint", "mujoco"]
+
+# Spelt apart, so that this file does not hold them.
+NOT_IN_FILES = ["TO" "DO", "FIX" "ME", "/wo" "rk/", "pypi" ".org", "python" "hosted", "--extra-" "index-url"]
+
+MODULES = sorted(PACKAGE.rglob("*.py"))
+TESTS = sorted((ROOT / "tests").rglob("test_*.py"))
+
+
+@cache
+def tree_of(path: Path) -> ast.Module:
+    return ast.parse(path.read_text(encoding="utf-8"), filename=str(path))
+
+
+def where(path: Path, line: int) -> str:
+    return f"{path.relative_to(ROOT)}:{line}"
+
+
+def folder_of(path: Path) -> str:
+    """The folder (or the module right below the package) that a file belongs to; "" for the package's own file."""
+    top = path.relative_to(PACKAGE).parts[0].removesuffix(".py")
+    return "" if top == "__init__" else top
+
+
+def imports_of(path: Path) -> Iterator[tuple[int, str]]:
+    """Line and dotted name of everything that a module imports, also inside functions; relative ones made full."""
+    package = ["hrsynth", *path.relative_to(PACKAGE).parent.parts]
+    for node in ast.walk(tree_of(path)):
+        if isinstance(node, ast.Import):
+            for alias in node.names:
+                yield node.lineno, alias.name
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else []
+            base = [*base, *(node.module or "").split(".")] if node.module else base
+            for alias in node.names:
+                yield node.lineno, ".".join([*base, alias.name])
+
+
+def own_imports() -> Iterator[tuple[Path, int, list[str]]]:
+    """File, line and parts below the package of each import of this package by itself."""
+    for path in MODULES:
+        for line, name in imports_of(path):
+            parts = name.split(".")
+            if parts[0] == "hrsynth" and parts[1:] not in ([], ["__version__"]):
+                yield path, line, parts[1:]
+
+
+def at_head(node: ast.AST) -> Iterator[ast.AST]:
+    """The nodes that run when the module is imported: not the bodies of functions, not ``if TYPE_CHECKING``."""
+    for child in ast.iter_child_nodes(node):
+        if isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.Lambda):
+            continue
+        if isinstance(child, ast.If) and "TYPE_CHECKING" in ast.unparse(child.test):
+            continue
+        yield child
+        yield from at_head(child)
+
+
+def assert_none(complaints: list[str], law: str) -> None:
+    assert not complaints, f"{law}:\n  " + "\n  ".join(complaints)
+
+
+def test_every_folder_has_its_place():
+    known = LEVEL.keys() | {""}
+    assert_none(
+        [where(path, 1) for path in MODULES if folder_of(path) not in known],
+        "a module in no folder of the list (give it a place in FOLDERS, or move it)",
+    )
+
+
+def test_data_walks_one_way():
+    complaints = []
+    for path, line, parts in own_imports():
+        own = folder_of(path)
+        if own and parts[0] != own and LEVEL.get(parts[0], 99) > LEVEL.get(own, 99):
+            complaints.append(f"{where(path, line)}: {own} imports {'.'.join(parts)}, which comes after it")
+    assert_none(complaints, "a module imports only from its own folder and from those above it")
+
+
+def test_the_package_itself_imports_nothing():
+    assert_none([where(PACKAGE / "__init__.py", line) for line, _ in imports_of(PACKAGE / "__init__.py")], "imports")
+
+
+def test_the_certificate_lies_outside_the_rules():
+    assert_none(
+        [
+            f"{where(path, line)}: imports {'.'.join(parts)}"
+            for path, line, parts in own_imports()
+            if folder_of(path) == "rewrite" and parts[0] == "kinematics" and "certificate" in ".".join(parts)
+        ],
+        "rewrite takes the certificate as an argument",
+    )
+
+
+def test_the_engine_names_no_robot():
+    complaints = [
+        f"{where(path, number)}: {found.group()}"
+        for path in MODULES
+        if folder_of(path) in ENGINE
+        for number, line in enumerate(path.read_text(encoding="utf-8").splitlines(), 1)
+        for found in ROBOTS.finditer(line)
+    ]
+    assert_none(complaints, "the engine knows mechanisms, not robots (robots belong to families/)")
+
+
+def test_slow_packages_are_imported_where_they_are_used():
+    complaints = []
+    for path in MODULES:
+        heads = [node for node in at_head(tree_of(path)) if isinstance(node, ast.Import | ast.ImportFrom)]
+        for node in heads:
+            modules = [a.name for a in node.names] if isinstance(node, ast.Import) else [node.module or ""]
+            for name in {m.split(".")[0] for m in modules if not getattr(node, "level", 0)} & SLOW.keys():
+                if SLOW[name] is None or SLOW[name] != folder_of(path):
+                    complaints.append(f"{where(path, node.lineno)}: {name}")
+    assert_none(complaints, "imported at the head of a module, wanted inside the function that uses it")
+
+
+@pytest.mark.skipif(not list(PACKAGE.glob("cli*")), reason="there is no command line yet")
+def test_the_command_line_starts_without_slow_packages():
+    code = "import sys, hrsynth.cli; print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert_none([name for name in NOT_FOR_HELP if name in run.stdout.split()], "`import hrsynth.cli` brings in")
+
+
+def asserts(node: ast.AST) -> bool:
+    """Whether a node is an assertion, or a call that stands for one."""
+    if isinstance(node, ast.Assert):
+        return True
+    if not isinstance(node, ast.Call):
+        return False
+    name = ast.unparse(node.func)
+    return name in ("pytest.raises", "pytest.warns") or bool(re.search("check|assert|law", name.split(".")[-1]))
+
+
+@pytest.mark.parametrize("path", TESTS, ids=lambda path: str(path.relative_to(ROOT)))
+def test_every_test_asserts_something(path: Path):
+    complaints = [
+        f"{where(path, function.lineno)}: {function.name}"
+        for function in ast.walk(tree_of(path))
+        if isinstance(function, ast.FunctionDef | ast.AsyncFunctionDef) and function.name.startswith("test")
+        if not any(asserts(node) for statement in function.body for node in ast.walk(statement))
+    ]
+    assert_none(complaints, "asserts nothing")
+
+
+def project_files() -> list[Path]:
+    """The files that git knows or would take; in a copy without git, all but those of tools."""
+    if (ROOT / ".git").exists() and shutil.which("git"):
+        command = ["git", "ls-files", "-z", "--cached", "--others", "--exclude-standard"]
+        listing = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True)
+        found = [ROOT / name for name in listing.stdout.split("\0") if name]
+    else:
+        tools = re.compile(r"^(\.venv|\.git|\.hypothesis|\..*_cache|__pycache__|build|dist|.*\.egg-info)$")
+        found = [p for p in ROOT.rglob("*") if not any(tools.match(part) for part in p.relative_to(ROOT).parts)]
+    return sorted(path for path in found if path.is_file())
+
+
+def test_no_file_holds_addresses_paths_or_notes_to_self():
+    complaints = []
+    for path in project_files():
+        text = path.read_bytes().decode("utf-8", errors="ignore")
+        for word in NOT_IN_FILES:
+            if word in text:
+                complaints.append(f"{where(path, text.count(chr(10), 0, text.index(word)) + 1)}: {word}")
+    assert_none(complaints, "a file of the project must not hold this")
+
+
+def test_the_locks_hold_hashes_and_no_addresses():
+    for path in sorted((ROOT / "requirements").glob("*.txt")):
+        pinned = re.findall(r"^\S+==\S+.*\\$\n    --hash=sha256:", path.read_text(), flags=re.MULTILINE)
+        named = re.findall(r"^[a-z].*$", path.read_text(), flags=re.MULTILINE)
+        assert len(pinned) == len(named) > 0, f"{path.name}: {len(named)} requirements, {len(pinned)} with a hash"
+        assert "://" not in path.read_text(), f"{path.name} holds an address"
+        assert "pinocchio==" not in path.read_text().replace("libpinocchio==", ""), f"{path.name}: pin is the package"
+
+
+def test_the_shipped_robots_lie_in_the_package():
+    shipped = sorted(path.name for path in (PACKAGE / "robots").glob("*.urdf"))
+    assert shipped == sorted(path.name for path in (ROOT / "robots").glob("*.urdf"))
