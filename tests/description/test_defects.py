@@ -42,7 +42,8 @@ def edited(*changes: tuple[str, str] | tuple[int, str]) -> str:
 
 # name: (changes, [(line, words of the message)])
 DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
-    "malformed": ([(3, '  <link name="crank">')], [(42, "malformed XML")]),
+    "malformed": ([(3, '  <link name="crank">')], [
+        (41, "malformed XML, Opening and ending tag mismatch: link line 3 and robot")]),
     "cut off": ([(19, "<joint")], [(20, "malformed XML")]),
     "two root elements": ([(42, "<robot/>")], [(42, "malformed XML")]),
     "other root": ([(1, '<model name="x">'), (41, "</model>")], [(1, "root element, model, robot")]),
@@ -78,10 +79,10 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     "two roots": ([(5, '<link name="rocker"/><link name="moon"/>')], [(5, "second root beside 'base'")]),
     "two parents": ([(18, '</joint><joint name="g" type="fixed"><parent link="rocker"/><child link="bar"/></joint>')],
                     [(18, "joint 'g': its child has a parent already, by joint 'b' (a loop is written as")]),
-    "ring": ([(7, '<parent link="bar"/>')], [(13, "tree joints that make a ring (a loop is written as <loop>), a b"),
-                                            (38, "platform not reachable from the base 'base', bar")]),
+    "ring": ([(7, '<parent link="bar"/>')], [
+        (13, "tree joints that make a ring (a loop is written as <loop>), a b")]),
     "ring of all": ([(7, '<parent link="bar"/>'), (20, '<parent link="bar"/>'), (2, "")], [
-        (13, "tree joints that make a ring"), ]),
+        (13, "tree joints that make a ring")]),
     "joint to itself": ([(20, '<parent link="rocker"/>')], [(5, "second root"), (19, "'c' joins a link to itself")]),
     "no platform": ([(38, "")], [(37, "no <platform>")]),
     "no own element": ([(37, ""), (38, ""), (39, ""), (40, "")], [(1, "no <hrsynth> element")]),
@@ -124,7 +125,7 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
                                    '<coupling name="g"><predecessor link="crank"/><ratio value="1 2"/></coupling>'
                                    '<transmission name="m">')],
                              [(34, "coupling without <ratio>, g"), (34, "second coupling of the same name, g"),
-                              (34, "coupling without <successor>, g")]),
+                              (34, "coupling without <successor>, g"), (34, "value of <ratio>, 1 2, one number")]),
     "document type": ([(1, '<!DOCTYPE robot [<!ENTITY a "b">]>\n<robot name="&a;">')],
                       [(1, "a document type declaration")]),
 }
@@ -168,7 +169,7 @@ def test_a_message_is_one_line_with_file_line_value_and_what_is_allowed():
 ])
 def test_what_is_no_robot_at_all(text: str | bytes, line: int | None, what: str):
     found = defects(text)
-    assert (found[0][0], found[0][1].startswith(what)) == (line, True)
+    assert (line, True) in [(number, message.startswith(what)) for number, message in found]
 
 
 def test_an_entity_bomb_is_refused_at_once():

@@ -61,12 +61,12 @@ def test_what_is_no_file_is_refused(tmp_path: Path):
 
 
 def test_an_unknown_name_gets_close_matches(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    robots = {name: tmp_path / f"{name}.urdf" for name in ("hinge", "linkage", "pendulum")}
+    robots = {name: tmp_path / f"{name}.urdf" for name in ("scissors", "linkage", "pendulum")}
     monkeypatch.setattr(description, "shipped", lambda: robots)
     with pytest.raises(BadRequest) as caught:
         description.load("linkge")
     assert caught.value.lines() == ["neither a file nor a shipped robot, found 'linkge', allowed: linkage"]
-    with pytest.raises(BadRequest, match="allowed: hinge, linkage, pendulum"):
+    with pytest.raises(BadRequest, match="allowed: scissors, linkage, pendulum"):
         description.load("zzz")
     robots["linkage"].write_text(FOUR_BAR)
     assert description.load("linkage").name == "four_bar"

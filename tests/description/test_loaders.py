@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from description.samples import every_joint, with_rods
-from hrsynth.description import native, spanning
+from hrsynth.description import load, native, shipped, spanning
 from hrsynth.mechanism.model import JointType, Mechanism
 
 ROBOTS = {"rods": with_rods()} | {
@@ -16,6 +16,7 @@ ROBOTS = {"rods": with_rods()} | {
                                  [kind for kind in JointType if kind is not JointType.FREE], seed)
     for seed in range(3)
 } | {"free": every_joint([JointType.FREE, JointType.PRISMATIC], [JointType.SPHERICAL], 5)}
+ROBOTS |= {name: load(path) for name, path in shipped().items()}
 
 
 @pytest.fixture(params=ROBOTS.values(), ids=ROBOTS)

@@ -177,7 +177,7 @@ def test_two_revolutes_that_one_motor_drives_stay_two():
     driven = both.changed(joints=joints)
     lines = native.write(driven).splitlines()
     start = next(number for number, line in enumerate(lines) if '<transmission name="m__2">' in line)
-    one = native.parse("\n".join(lines[:start] + lines[start + 5:]))
+    one = native.parse("\n".join(lines[:start] + lines[start + 7:]))
     assert {name: joint.actuated for name, joint in one.joints.items() if joint.in_tree and joint.type.freedoms} == {
         "tree_0__1": True, "tree_0__2": False}
     check_round_trip(one)
@@ -207,6 +207,17 @@ def test_both_motors_of_a_universal_joint_are_one():
     text = native.write(robot)
     assert text.count("<transmission") - text.count('<transmission name="drive_loop') == 2
     assert native.parse(text).joints["tree_0"].motor == Motor("m")
+
+
+INTERFACE = "<hardwareInterface>hardware_interface/VelocityJointInterface</hardwareInterface>"
+
+
+@pytest.mark.parametrize("interface", ["", INTERFACE])
+def test_a_motor_of_the_usual_form_is_but_a_name(interface: str):
+    text = FOUR_BAR.replace('<joint name="a"/>', f"""<type>transmission_interface/SimpleTransmission</type>
+        <joint name="a">{interface}</joint><actuator name="m"/>""")
+    assert native.parse(text).joints["a"].motor == Motor("m")
+    assert "<hardwareInterface>" in native.write(native.parse(text))
 
 
 @pytest.mark.parametrize("kind", ["planar", "floating"])

@@ -44,7 +44,7 @@ def load(robot: str | Path) -> Mechanism:
             return native.read(robots[robot])
         if not os.path.exists(robot):
             raise BadRequest("neither a file nor a shipped robot", robot,
-                             difflib.get_close_matches(robot, robots, n=5, cutoff=0.4) or list(robots))
+                             difflib.get_close_matches(robot, robots, n=5) or list(robots))
     return native.read(path)
 
 
@@ -57,11 +57,11 @@ def save(mechanism: Mechanism, path: str | Path) -> None:
         Where the file cannot be written, or the mechanism not be said in the native dialect.
     """
     text = native.write(mechanism)
-    target = Path(os.path.realpath(path))
-    if target.is_dir():
-        raise BadRequest("cannot write the file: a directory", str(path))
-    draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
     try:
+        target = Path(os.path.realpath(path))
+        if target.is_dir():
+            raise BadRequest("cannot write the file: a directory", str(path))
+        draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
         try:
             draft.write_text(text, encoding="utf-8", newline="\n")
             if target.exists():

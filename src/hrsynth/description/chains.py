@@ -71,13 +71,15 @@ def merged(mechanism: Mechanism) -> Mechanism:
         fixed = joints[name]
         stem = name.removesuffix(TIP)
         if (fixed.type is JointType.FIXED and fixed.in_tree and fixed.predecessor == name and bare(links.get(name))
-                and not fixed.xml and fixed.limits is None):
+                and not fixed.xml and fixed.limits is None and fixed.motor is None):
             last = carrier.get(name)
             if last is not None and re.fullmatch(re.escape(stem) + r"(__[123])?", last):
                 joints[last] = replace(joints[last], successor=fixed.successor)
                 carrier[fixed.successor] = last
                 del joints[name], links[name]
 
+    wholes: dict[str, Joint] = {}
+    gone: set[str] = set()
     for match in [match for name in joints if (match := _FIRST.fullmatch(name))]:
         name = match["name"]
         chain = [joints[each] for number in (1, 2, 3) if (each := part(name, number)) in joints]
@@ -89,14 +91,10 @@ def merged(mechanism: Mechanism) -> Mechanism:
         if whole is not None:
             for number in range(1, len(chain)):
                 del links[part(name, number)]
-            joints = _exchanged(joints, chain, whole)
-    return replace(mechanism, links=links, joints=joints)
-
-
-def _exchanged(joints: dict[str, Joint], chain: list[Joint], whole: Joint) -> dict[str, Joint]:
-    gone = {joint.name for joint in chain[1:]}
-    return {(whole.name if name == chain[0].name else name): (whole if name == chain[0].name else joint)
-            for name, joint in joints.items() if name not in gone}
+            wholes[chain[0].name] = whole
+            gone |= {joint.name for joint in chain[1:]}
+    kept = [wholes.get(name, joint) for name, joint in joints.items() if name not in gone]
+    return replace(mechanism, links=links, joints={joint.name: joint for joint in kept})
 
 
 def _whole(name: str, chain: list[Joint], between: list[Link | None], length: float) -> Joint | None:

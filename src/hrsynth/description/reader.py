@@ -122,7 +122,7 @@ class _Reader:
         if link is None:
             return False
         if link not in table:
-            close = difflib.get_close_matches(link, table, n=3)
+            close = difflib.get_close_matches(link, table, n=3) if len(table) < 1000 else []
             self.defect(line, what, link, ", ".join(close) or None)
         return link in table
 
@@ -142,8 +142,9 @@ class _Reader:
                 read(element)
         for element in root.findall("transmission"):
             self.transmission(element)
+        gears: set[str] = set()
         for element in root.findall("coupling"):
-            self.coupling(element)
+            self.coupling(element, gears)
         self.own(root.findall("hrsynth"))
         self.rest[:0] = xml.unknown(root, ["name"], readers)
         base = self.structure()
@@ -295,10 +296,11 @@ class _Reader:
                     simple = text in [xml.kept(simple_transmission(name, target, each)) for each in (INTERFACE, None)]
                     self.motors[each] = Motor(name, None if simple else text)
 
-    def coupling(self, element: xml.Element) -> None:
+    def coupling(self, element: xml.Element, names: set[str]) -> None:
         name = self.attribute(element, "name")
-        if name is not None and any(coupling.name == name for coupling in self.couplings):
+        if name in names:
             self.defect(xml.line(element), "second coupling of the same name", name)
+        names.add(name or "")
         ends: list[str | None] = []
         for tag in ("predecessor", "successor"):
             end = self.only(element, tag)
@@ -311,9 +313,10 @@ class _Reader:
         ratio = self.only(element, "ratio")
         if ratio is None:
             self.defect(xml.line(element), "coupling without <ratio>", name)
-        elif self.attribute(ratio, "value") is not None and name and ends[0] and ends[1]:
+        elif self.attribute(ratio, "value") is not None:
             value = float(self.numbers(ratio, "value", (1,))[0])
-            self.couplings.append(Coupling(name, ends[0], ends[1], value, xml.line(element)))
+            if name and ends[0] and ends[1]:
+                self.couplings.append(Coupling(name, ends[0], ends[1], value, xml.line(element)))
 
     def own(self, elements: list[xml.Element]) -> None:
         """The ``<hrsynth>`` element: platform, camera, observations."""

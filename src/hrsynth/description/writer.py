@@ -208,12 +208,11 @@ def _limit(element: xml.Element, kind: JointType, limits: Limits | None) -> None
     """Append a ``<limit>`` with all that URDF demands; ``free`` names the values that stand for no limit."""
     given = {} if limits is None else {key: getattr(limits, key) for key in _WIDE}
     known = {key: value for key, value in given.items() if value is not None}
-    needed = list(_WIDE)
-    if kind not in (JointType.REVOLUTE, JointType.PRISMATIC):
-        needed = []
-    elif kind is JointType.REVOLUTE and not {"lower", "upper"} & set(known):
-        needed = ["effort", "velocity"] if known else []
-    if not known and not needed:
+    if kind is JointType.PRISMATIC or (kind is JointType.REVOLUTE and {"lower", "upper"} & set(known)):
+        needed = list(_WIDE)
+    elif known:
+        needed = ["effort", "velocity"]
+    else:
         return
     free = [key for key in needed if key not in known]
     values = known | {key: _WIDE[key] for key in free}

@@ -10,10 +10,10 @@ import numpy as np
 from ..mechanism import Mechanism
 from ..mechanism.vectors import Array
 from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
-from .configuration import ClosedConfiguration, Target, closed
+from .configuration import ClosedConfiguration, Target
 from .ranks import CLEAN, kernel_basis, largest_angle
 from .relation import Question, Relation, relation
-from .sampling import Samples
+from .sampling import Samples, followed
 from .twin import Twin
 
 
@@ -65,11 +65,7 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         angle = np.pi / 2
         return verdict(f"not assembled at the zero configuration (loop {twin.worst_loop(twin.q0)[0]!r} misses)")
     for member in members:
-        q = twin.q0
-        for target in member.way:
-            goal = _visible(target, blind)
-            exact = target is member.way[-1]
-            q, residual = closed(twin, q, goal, tolerance=1e-12 if exact else 1e-6, iterations=25)
+        q, residual = followed(twin, [_visible(target, blind) for target in member.way])
         worst = max(worst, residual)
         if not residual <= FOLLOWED:
             angle = np.pi / 2

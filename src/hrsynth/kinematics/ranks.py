@@ -16,10 +16,12 @@ CLEAN = float(1 / np.finfo(float).eps)
 
 @dataclass(frozen=True)
 class Rank:
-    """A rank, and the ratio of the last kept to the first dropped singular value (a clean zero counts as ε)."""
+    """A rank, the ratio of the last kept to the first dropped singular value (a clean zero counts as ε), and the last
+    kept singular value as a fraction of the largest."""
 
     value: int
     gap: float
+    weakest: float = 1.0
 
     def decided(self, what: str) -> int:
         """The rank, if the gap is large enough for a verdict; raises ``RankUndecided`` otherwise."""
@@ -40,7 +42,7 @@ def rank_of(singular_values: Array, scale: float | None = None) -> Rank:
     kept = int(np.sum(values > RANK_CUTOFF * largest))
     last = float(values[kept - 1]) if kept else largest
     dropped = max(float(values[kept]), floor) if kept < values.size else floor
-    return Rank(kept, float(last / dropped))
+    return Rank(kept, float(last / dropped), last / largest)
 
 
 def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:

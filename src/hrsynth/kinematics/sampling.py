@@ -1,26 +1,32 @@
 """Random closed configurations on the component of the zero configuration (theory 3.1).
 
 Each sample is reached from the zero configuration by small steps; every step is checked: it closes, it does not jump,
-and the mobility stays the generic one. What fails is discarded and counted.
+it keeps away from singularities of the loops, and the mobility stays the generic one; and the robot, led again along
+the poses and directions of the way, arrives at the same configuration. What fails is discarded and counted.
 """
 
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ..errors import NotSampled
 from ..mechanism.vectors import Array
+from ..tolerances import FOLLOWED, RANK_GAP
 from .configuration import ClosedConfiguration, Target, closed
 from .ranks import range_basis
 from .relation import Question, Relation, relation
 from .twin import Twin
 
 STEP = 0.09
+"""Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
 STEPS = 5
+"""Steps from the zero configuration to a sample."""
+WEAKEST = 0.05
+"""Fraction to which the loops' smallest singular value may fall below that of the zero configuration."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,6 +113,7 @@ def _walk(start: ClosedConfiguration, question: Question, rng: np.random.Generat
     twin = start.twin
     here, wish = start, None
     way: list[Target] = []
+    weakest = WEAKEST * start.kernel()[1].weakest
     for _ in range(STEPS):
         for shrink in (1.0, 0.4, 0.15):
             moving = _velocity(here, question, wish, rng)
@@ -124,8 +131,19 @@ def _walk(start: ClosedConfiguration, question: Question, rng: np.random.Generat
         else:
             return None
         here, wish = ClosedConfiguration.of(twin, q), direction
+        if here.kernel()[1].weakest < weakest:
+            return None
         way.append(question.target(here))
     found = relation(here, question)
-    if found.gap < 1e3:
+    if found.gap < RANK_GAP or followed(twin, way)[1] > FOLLOWED:
         return None
     return Sample(here, tuple(way), found)
+
+
+def followed(twin: Twin, way: Sequence[Target]) -> tuple[Array, float]:
+    """The configuration a twin reaches when it is led from its zero configuration along a way, and the residual."""
+    q, residual = twin.q0, 0.0
+    for target in way:
+        exact = target is way[-1]
+        q, residual = closed(twin, q, target, tolerance=1e-12 if exact else 1e-6, iterations=120)
+    return q, residual

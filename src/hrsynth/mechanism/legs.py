@@ -135,7 +135,8 @@ def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
             word += edge.word_from(here)
             here = edge.other(here)
         words.append(word)
-    return Word((Bar(tuple(words)),)) if len(words) > 1 else words[0]
+    branches = tuple(dict.fromkeys(words))
+    return Word((Bar(branches),)) if len(branches) > 1 else branches[0]
 
 
 def dissect(mechanism: Mechanism) -> Anatomy:
