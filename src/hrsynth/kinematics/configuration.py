@@ -7,6 +7,7 @@ with the loops.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -42,9 +43,13 @@ class ClosedConfiguration:
         """V (6, nv) of a link's frame, see :meth:`Twin.velocity`."""
         return self.twin.velocity(self.q, link)
 
+    @cached_property
+    def _kernel(self) -> tuple[Array, Rank]:
+        return kernel_basis(self.twin.jacobian(self.q))
+
     def kernel(self) -> tuple[Array, Rank]:
         """A basis of T_qC, shape (nv, mobility), and the constraints' rank."""
-        return kernel_basis(self.twin.jacobian(self.q))
+        return self._kernel
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,23 +65,25 @@ class Target:
 
     def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
-        X = twin.pose(q, self.link)
-        V = twin.velocity(q, self.link)
+        observations = tuple(o for o, _ in self.measured)
+        frames, velocities = twin.frames(q, (self.link, self.reference, *(o.link for o in observations)))
+        X, V = frames[0], velocities[0]
         if self.point is not None:
             errors = [(X[:3, :3] @ self.point + X[:3, 3] - self.pose[:3, :3] @ self.point - self.pose[:3, 3])
                       / twin.length]
             blocks = [point_velocity(V, X, self.point, twin.length)]
         else:
-            errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length]
-            blocks = [V[:3]]
             D = X[:3, :3] @ self.pose[:3, :3].T
-            errors.append(0.5 * np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]]))
-            blocks.append(V[3:])
-        X_reference, V_reference = twin.pose(q, self.reference), twin.velocity(q, self.reference)
-        for observation, wanted in self.measured:
-            X_link, V_link = twin.pose(q, observation.link), twin.velocity(q, observation.link)
-            errors.append(observation.value(X_reference, X_link) - wanted)
-            blocks.append(observation.rate(X_reference, X_link, V_reference, V_link))
+            errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length,
+                      0.5 * np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])]
+            blocks = [V]
+        for kind in dict.fromkeys(type(o) for o in observations):
+            places = [i for i, o in enumerate(observations) if type(o) is kind]
+            at = [place + 2 for place in places]
+            values, rates = kind.together([observations[i] for i in places], frames[1], frames[at], velocities[1],
+                                          velocities[at])
+            errors.append(values - np.concatenate([self.measured[i][1] for i in places]))
+            blocks.append(rates)
         return np.concatenate(errors), np.vstack(blocks)
 
 

@@ -21,10 +21,12 @@ from .ranks import range_basis
 from .relation import Question, Relation, relation
 from .twin import Twin
 
-STEP = 0.09
+STEP = 0.11
 """Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
-STEPS = 5
+STEPS = 4
 """Steps from the zero configuration to a sample."""
+EASY = 10
+"""Iterations within which the robot itself must find each configuration of the way again; more are a fold nearby."""
 WEAKEST = 0.05
 """Fraction to which the loops' smallest singular value may fall below that of the zero configuration."""
 
@@ -135,15 +137,15 @@ def _walk(start: ClosedConfiguration, question: Question, rng: np.random.Generat
             return None
         way.append(question.target(here))
     found = relation(here, question)
-    if found.gap < RANK_GAP or followed(twin, way)[1] > FOLLOWED:
+    if found.gap < RANK_GAP or followed(twin, way, iterations=EASY)[1] > FOLLOWED:
         return None
     return Sample(here, tuple(way), found)
 
 
-def followed(twin: Twin, way: Sequence[Target]) -> tuple[Array, float]:
+def followed(twin: Twin, way: Sequence[Target], iterations: int = 120) -> tuple[Array, float]:
     """The configuration a twin reaches when it is led from its zero configuration along a way, and the residual."""
     q, residual = twin.q0, 0.0
     for target in way:
         exact = target is way[-1]
-        q, residual = closed(twin, q, target, tolerance=1e-12 if exact else 1e-6, iterations=120)
+        q, residual = closed(twin, q, target, tolerance=1e-12 if exact else 1e-3, iterations=iterations)
     return q, residual

@@ -52,6 +52,7 @@ class Twin:
         self._links = {
             name: (self._body[name], np.linalg.inv(_shift(self._centre[self._body[name]] * self.length)) @ link.pose)
             for name, link in mechanism.links.items()}
+        self._masks: dict[tuple[str, ...], Array] = {}
         self._q: Array | None = None
 
     def _span(self) -> tuple[list[tuple[Joint, str]], list[Joint]]:
@@ -182,25 +183,34 @@ class Twin:
         body, offset = self._links[link]
         if body == 0:
             return offset
-        placement = self.data.oMi[body]
-        X = np.empty((4, 4))
-        X[3] = (0, 0, 0, 1)
-        R = placement.rotation
-        X[:3, :3] = R @ offset[:3, :3]
-        X[:3, 3] = placement.translation * self.length + R @ offset[:3, 3]
-        return X
+        placement: Array = self.data.oMi[body].homogeneous
+        placement[:3, 3] *= self.length
+        return placement @ offset
 
     def velocity(self, q: Array, link: str) -> Array:
         """V (6, nv): joint rates to the (linear, angular) velocity of the link frame's origin, base axes; linear part in
         characteristic lengths a second."""
         self.at(q)
-        body, offset = self._links[link]
-        if body == 0:
-            return np.zeros((6, self.nv))
-        V = pin.getJointJacobian(self.model, self.data, body, pin.LOCAL_WORLD_ALIGNED)
-        arm = self.data.oMi[body].rotation @ offset[:3, 3] / self.length
-        V[:3] -= np.array([[0.0, -arm[2], arm[1]], [arm[2], 0.0, -arm[0]], [-arm[1], arm[0], 0.0]]) @ V[3:]
-        return V
+        return self.frames(q, (link,))[1][0]
+
+    def frames(self, q: Array, links: tuple[str, ...]) -> tuple[Array, Array]:
+        """Poses (k, 4, 4) and velocities (k, 6, nv) of several links at once."""
+        X = np.array([self.pose(q, link) for link in links])
+        masks = self._masks.get(links)
+        if masks is None:
+            masks = np.array([self._supports(self._links[link][0]) for link in links])[:, None, :]
+            self._masks[links] = masks
+        V = self.data.J * masks
+        V[:, :3] += _cross_rows(V[:, 3:], X[:, :3, 3] / self.length)
+        return X, V
+
+    def _supports(self, body: int) -> Array:
+        """1 for the velocity indices that move a body, 0 for the others, (nv,)."""
+        mask = np.zeros(self.nv)
+        for joint in self.model.supports[body]:
+            start = self.model.joints[joint].idx_v
+            mask[start : start + self.model.joints[joint].nv] = 1.0
+        return mask
 
     def moved(self, q: Array, step: Array) -> Array:
         """The configuration that ``step`` (nv) leads to from ``q``."""
@@ -209,6 +219,13 @@ class Twin:
     def actuated(self) -> list[int]:
         """Velocity indices of the actuated joints' coordinates."""
         return [i for joint in self.mechanism.joints.values() if joint.actuated for i in self.coordinates[joint.name]]
+
+
+def _cross_rows(omega: Array, arms: Array) -> Array:
+    """ω × r for each column of ω (k, 3, n) and each arm r (k, 3)."""
+    x, y, z = arms[:, 0, None], arms[:, 1, None], arms[:, 2, None]
+    wx, wy, wz = omega[:, 0], omega[:, 1], omega[:, 2]
+    return np.stack([wy * z - wz * y, wz * x - wx * z, wx * y - wy * x], axis=1)
 
 
 def _shift(point: Array) -> Array:

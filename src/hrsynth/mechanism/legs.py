@@ -85,10 +85,17 @@ class Anatomy:
         return frame[:3, :3].T @ (centre - frame[:3, 3])
 
     def word(self, leg: Leg) -> Word:
-        """The leg's word, from the base to the platform (without the end joint where it takes the platform)."""
+        """The leg's word, from the base to the platform (without the end joint where it takes the platform).
+
+        What a virtual chain hangs on, seen from a camera on another leg, is written as if it hung on the base.
+        """
         mechanism = self.mechanism
         links = {mechanism.base, leg.attach, *leg.links}
         kept = {mechanism.base, leg.attach}
+        if mechanism.reference not in links:
+            hung = [j.relinked(mechanism.reference, mechanism.base) for j in mechanism.joints_of(mechanism.reference)
+                    if j.name in leg.joints]
+            mechanism = mechanism.changed(joints=hung)
         graph = WordGraph(mechanism, kept, links)
         graph.graph.remove_edges_from([(a, b, k) for a, b, k, data in graph.graph.edges(keys=True, data=True)
                                        if not set(data["edge"].joints) <= set(leg.joints)])

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from ..errors import BadMechanism
-from .vectors import Array, frozen, unit
+from .vectors import Array, frozen, hat, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,6 +31,15 @@ class Observation:
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
         """The rate of :meth:`value` for each joint velocity; one row a component."""
         raise NotImplementedError
+
+    @classmethod
+    def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
+                 V_links: Array) -> tuple[Array, Array]:
+        """Values and rates of several observations of this class, stacked: (rows,), (rows, n)."""
+        values = [o.value(X_reference, X) for o, X in zip(observations, X_links, strict=True)]
+        rates = [o.rate(X_reference, X, V_reference, V)
+                 for o, X, V in zip(observations, X_links, V_links, strict=True)]
+        return np.concatenate(values), np.concatenate(rates)
 
     def differences(self, other: Observation, tolerance: float) -> list[str]:
         """What differs from another observation, in words."""
@@ -59,8 +69,18 @@ class Direction(Observation):
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
         """u̇ = R_cᵀ ((ω_ℓ − ω_c) × R_ℓ d), shape (3, n)."""
         u = X_link[:3, :3] @ self.direction
-        omega = V_link[3:] - V_reference[3:]
-        return X_reference[:3, :3].T @ np.cross(omega, u[:, None], axisa=0, axisb=0, axisc=0)
+        return (X_reference[:3, :3].T @ -hat(u)) @ (V_link[3:] - V_reference[3:])
+
+    @classmethod
+    def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
+                 V_links: Array) -> tuple[Array, Array]:
+        directions = np.array([o.direction for o in observations if isinstance(o, Direction)])
+        seen = X_reference[:3, :3].T
+        u = np.matmul(X_links[:, :3, :3], directions[:, :, None])[:, :, 0]
+        zero = np.zeros(len(u))
+        crosses = np.array([[zero, u[:, 2], -u[:, 1]], [-u[:, 2], zero, u[:, 0]], [u[:, 1], -u[:, 0], zero]])
+        rates = (seen @ crosses.transpose(2, 0, 1)) @ (V_links[:, 3:] - V_reference[3:])
+        return (u @ seen.T).ravel(), rates.reshape(-1, rates.shape[2])
 
     def differences(self, other: Observation, tolerance: float) -> list[str]:
         found = super().differences(other, tolerance)

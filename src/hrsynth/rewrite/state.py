@@ -86,6 +86,8 @@ class State:
         ends = {mechanism.base, leg.attach}
         names = []
         others = {n for other in self.real.legs if other.label != leg.label for n in other.links}
+        others |= {n for n, owner in self.owners.items() if owner != leg.label}
+        others.discard(mechanism.reference)
         for joint in mechanism.joints.values():
             touches = set(joint.links)
             if touches & links and not (touches - links) & others:

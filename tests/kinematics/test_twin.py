@@ -1,0 +1,172 @@
+"""The Pinocchio twin and the oracle, which shares nothing with it, agree: closure, mobility, relation, derivatives."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.relation import Question, relation
+from hrsynth.kinematics.twin import Twin
+from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.model import JointType, Mechanism
+from hrsynth.mechanism.vectors import Array
+from kinematics.robots import ROBOTS, seen_by_oracle, setting_of, state_of, walked
+from oracle import Oracle, same_relation
+from strategies import deltas, planar, pods, random_direction, random_normal, random_rotation, recut, transformed
+
+AGREE = 1e-9
+
+CYCLES = {
+    "R": "RRRRRRR", "P": "PPPP", "U": "UUUU", "C": "CCCC", "E": "ERUUR", "S": "SRSR", "F": "RRRRRRR",
+}
+"""Joints of one loop whose last one to be cut is of each type."""
+
+
+def cycle(letters: str, rng: np.random.Generator, welded: bool = False) -> Mechanism:
+    """A loop of joints in general position; ``welded``: one of its links is three links in a triangle of welds."""
+    builder = Builder("loop_" + letters)
+    builder.link("base")
+    names = ["base"]
+    for number in range(1, len(letters)):
+        names.append(f"link_{number}")
+        builder.link(names[-1], rng.normal(size=3), random_rotation(rng))
+    ends = [*names, "base"]
+    starts = list(names)
+    if welded:
+        for extra in ("half", "third"):
+            builder.link(extra, rng.normal(size=3), random_rotation(rng))
+        builder.joint("weld_1", "F", "link_3", "half")
+        builder.joint("weld_2", "F", "half", "third")
+        builder.joint("weld_3", "F", "link_3", "third", loop=True)
+        starts[3] = "third"
+    for number, letter in enumerate(letters):
+        first = random_direction(rng)
+        axis = first if JointType(letter).axes else None
+        axis2 = random_normal(rng, first) if letter == "U" else None
+        builder.joint(f"joint_{number}", letter, starts[number], ends[number + 1], 0.7 * rng.normal(size=3), axis=axis,
+                      axis2=axis2, loop=number == len(letters) - 1)
+    for leg, link in enumerate((names[1], names[-1]), 1):
+        builder.observe(str(leg), link, random_direction(rng))
+    return builder.build(platform=names[2])
+
+
+def agrees(at: ClosedConfiguration, question: Question) -> None:
+    """Closure, mobility and relation are the same for the twin and for the oracle at one configuration."""
+    oracle = Oracle(at.twin.mechanism)
+    state = state_of(at.twin, at.q)
+    assert oracle.error(state) < AGREE
+    kernel, rank = at.kernel()
+    assert rank.gap > 1e3
+    assert oracle.mobility(state) == kernel.shape[1]
+    ours = relation(at, question)
+    assert ours.mobility == kernel.shape[1]
+    theirs = seen_by_oracle(oracle, state, question, at.twin.length)
+    assert same_relation(ours.basis, theirs) < AGREE
+    values = [o.value(at.pose(question.reference), at.pose(o.link)) for o in question.observations]
+    np.testing.assert_allclose(np.reshape(values, (-1, 3)), oracle.directions(state, question.observations), atol=1e-12)
+
+
+def question_of(mechanism: Mechanism) -> Question:
+    return Question(mechanism.platform, None, mechanism.reference, mechanism.observations)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_twin_and_oracle_agree_on_every_robot(robot: str) -> None:
+    everything = setting_of(robot).everything
+    agrees(everything.start, everything.question)
+    for member in everything.members:
+        assert np.linalg.norm(everything.twin.residual(member.configuration.q)) < 1e-10
+        assert np.max(np.abs(member.configuration.q - everything.start.q)) > 0.01
+        agrees(member.configuration, everything.question)
+
+
+@pytest.mark.parametrize("camera", ["platform", "arm_2"])
+def test_twin_and_oracle_agree_with_a_carried_camera(camera: str) -> None:
+    everything = setting_of("delta", None, camera).everything
+    assert everything.question.reference == camera
+    for member in everything.members:
+        agrees(member.configuration, everything.question)
+
+
+@pytest.mark.parametrize("letter", CYCLES)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_every_type_of_loop(letter: str, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    mechanism = cycle(CYCLES[letter], rng, welded=letter == "F")
+    twin = Twin(mechanism)
+    assert letter in {mechanism.joints[name].type.value for name in twin.loops}
+    assert np.linalg.norm(twin.residual(twin.q0)) < 1e-12
+    agrees(ClosedConfiguration.of(twin, twin.q0), question_of(mechanism))
+    agrees(walked(twin, seed), question_of(mechanism))
+
+
+@pytest.mark.parametrize("letters", ["RRRRRRR", "UUUU", "CCCC", "ERUUR", "SRSR", "UPSR", "CRSP"])
+def test_mobility_of_a_loop_is_its_freedoms_less_six(letters: str) -> None:
+    twin = Twin(cycle(letters, np.random.default_rng(5)))
+    assert walked(twin).kernel()[0].shape[1] == sum(JointType(each).freedoms for each in letters) - 6
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("kind", ["planar", "pods", "deltas"])
+def test_random_robots_in_any_cut(kind: str, seed: int) -> None:
+    """Which joints a file writes as loops, and where the robot stands, change neither mobility nor agreement."""
+    rng = np.random.default_rng(seed)
+    robot = (planar(["RRR", "RPR", "PRR"], rng, [{0}, {1}, {0}]) if kind == "planar"
+             else pods(["UPS", "RPS", "UPS"], rng) if kind == "pods"
+             else deltas(["R", "P", "R"], ["2-SS", "UU", "US"], rng))
+    mobilities = set()
+    for each in (robot, recut(robot, rng), transformed(robot, random_rotation(rng), rng.normal(size=3))):
+        twin = Twin(each)
+        at = walked(twin, seed, size=0.05)
+        agrees(at, question_of(each))
+        mobilities.add(at.kernel()[0].shape[1])
+    assert len(mobilities) == 1
+
+
+def central(values: Array, others: Array, h: float) -> Array:
+    return (values - others) / (2 * h)
+
+
+@pytest.mark.parametrize("robot", ["delta", "quattro", "3upu", "3rrr_m1", "prrrp_parallel_point", "i4l", "3rps"])
+def test_derivatives_of_residual_pose_and_target(robot: str) -> None:
+    """Jacobians are what finite differences give: the loops' at closure, poses and targets at any configuration."""
+    everything = setting_of(robot).everything
+    twin, question = everything.twin, everything.question
+    at = everything.members[0].configuration
+    h = 1e-6
+    J, V = twin.jacobian(at.q), at.velocity(question.platform)
+    target = question.target(at)
+    _, rows = target.rows(twin, at.q)
+    assert J.shape == (twin.residual(at.q).size, twin.nv)
+    for column in range(twin.nv):
+        step = np.zeros(twin.nv)
+        step[column] = h
+        up, down = twin.moved(at.q, step), twin.moved(at.q, -step)
+        np.testing.assert_allclose(central(twin.residual(up), twin.residual(down), h), J[:, column], atol=1e-8)
+        np.testing.assert_allclose(central(target.rows(twin, up)[0], target.rows(twin, down)[0], h), rows[:, column],
+                                   atol=1e-8)
+        X, Y = twin.pose(up, question.platform), twin.pose(down, question.platform)
+        np.testing.assert_allclose(central(X[:3, 3], Y[:3, 3], h) / twin.length, V[:3, column], atol=1e-8)
+        spin = central(X[:3, :3], Y[:3, :3], h) @ at.pose(question.platform)[:3, :3].T
+        np.testing.assert_allclose([spin[2, 1], spin[0, 2], spin[1, 0]], V[3:, column], atol=1e-8)
+
+
+def test_length_only_scales() -> None:
+    """A twin in other units of length has the same poses, and the same relation once the unit is the same."""
+    everything = setting_of("delta").everything
+    mechanism, question = everything.twin.mechanism, everything.question
+    other = Twin(mechanism, 3 * mechanism.length)
+    at = ClosedConfiguration.of(other, other.q0)
+    np.testing.assert_allclose(at.pose("platform"), everything.start.pose("platform"), atol=1e-14)
+    basis = seen_by_oracle(Oracle(mechanism), state_of(other, other.q0), question, 3 * mechanism.length)
+    assert same_relation(relation(at, question).basis, basis) < AGREE
+    assert same_relation(relation(everything.start, question).basis, basis) > 0.1
+
+
+def test_actuated_coordinates_are_those_of_the_motors() -> None:
+    twin = setting_of("quattro").everything.twin
+    names = [joint.name for joint in twin.mechanism.joints.values() if joint.actuated]
+    assert len(names) == 4
+    assert twin.actuated() == [i for name in names for i in twin.coordinates[name]]
+    assert len(set(twin.actuated())) == 4
