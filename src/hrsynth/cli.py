@@ -11,7 +11,8 @@ from typing import Annotated, Any
 import typer
 
 app = typer.Typer(
-    name="hrsynth", invoke_without_command=True, add_completion=False, rich_markup_mode=None, pretty_exceptions_enable=False,
+    name="hrsynth", invoke_without_command=True, add_completion=False, rich_markup_mode=None,
+    pretty_exceptions_enable=False,
     help="Hidden robots of parallel robots that are controlled by watching the directions of their legs.")
 
 Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file, or the name of a shipped robot.")]
@@ -29,8 +30,11 @@ def _version(wanted: bool) -> None:
 
 
 @app.callback()
-def _options(context: typer.Context, version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True,
-                                                   help="Print the version.")] = False) -> None:
+def _options(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")]
+    = False,
+) -> None:
     if context.invoked_subcommand is None:
         typer.echo(context.get_help())
 

@@ -10,7 +10,10 @@ from hypothesis import strategies as st
 from hrsynth.errors import LoopsNotClosed, NotSampled, RankUndecided
 from hrsynth.kinematics.configuration import ClosedConfiguration, closed
 from hrsynth.kinematics.ranks import CLEAN, Rank, kernel_basis, largest_angle, range_basis, rank_of
+from hrsynth.kinematics.relation import Question
 from hrsynth.kinematics.sampling import draw
+from hrsynth.kinematics.twin import Twin
+from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.vectors import rotation_about
 from hrsynth.tolerances import CLOSED, RANK_GAP
 from kinematics.robots import setting_of
@@ -196,10 +199,6 @@ def test_samples_are_the_same_for_the_same_seed() -> None:
 
 def test_nothing_to_sample() -> None:
     """A triangle of R joints does not move: no sample is far from the start."""
-    from hrsynth.kinematics.relation import Question
-    from hrsynth.kinematics.twin import Twin
-    from hrsynth.mechanism.builder import Builder
-
     builder = Builder("triangle")
     for name in ("base", "left", "right"):
         builder.link(name)

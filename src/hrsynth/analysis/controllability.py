@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..kinematics.ranks import Rank
-from ..kinematics.relation import Relation, relation
+from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.vectors import Array

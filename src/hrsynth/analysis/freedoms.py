@@ -39,7 +39,8 @@ def name_freedoms(twists: Array, anatomy: Anatomy, labels: tuple[str, ...] | Non
     free, _ = kernel_basis(twists[3:], 1.0)
     translations = range_basis(twists[:3] @ free, 1.0)[0] if free.shape[1] else np.zeros((3, 0))
     for direction in _nice_directions(translations, anatomy):
-        found.append(Freedom(np.concatenate([direction, np.zeros(3)]), f"translation along {_name(direction, anatomy)}"))
+        twist = np.concatenate([direction, np.zeros(3)])
+        found.append(Freedom(twist, f"translation along {_name(direction, anatomy)}"))
     for point, direction, name in _lines(anatomy, labels):
         if len(found) == twists.shape[1]:
             break

@@ -72,4 +72,4 @@ def largest_angle(A: Array, B: Array) -> float:
     if A.shape[1] == 0:
         return 0.0
     outside = B - A @ (A.T @ B)
-    return float(np.arcsin(min(1.0, np.linalg.norm(outside, 2))))
+    return float(np.arcsin(min(1.0, float(np.linalg.norm(outside, 2)))))

@@ -1,4 +1,4 @@
-"""The relation ρ between the platform's twist and the rates of what is observed (theory 1; MMT eq. 7 where it is a graph)."""
+"""The relation ρ between the platform's twist and the rates of what is observed (theory 1; as a graph, MMT eq. 7)."""
 
 from __future__ import annotations
 
@@ -15,8 +15,8 @@ from .ranks import Rank, kernel_basis, range_basis
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """What is asked of a mechanism: the twist t of ``platform`` and the rates of ``observations`` seen from ``reference``;
-    ``bodies`` are further links whose twists count too.
+    """What is asked of a mechanism: the twist t of ``platform`` and the rates of ``observations`` seen from
+    ``reference``; ``bodies`` are further links whose twists count too.
 
     Where ``point`` is given, t is the velocity of that point alone, in the platform's frame (a point body, theory 1).
     """

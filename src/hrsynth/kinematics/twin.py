@@ -57,7 +57,7 @@ class Twin:
 
     def _span(self) -> tuple[list[tuple[Joint, str]], list[Joint]]:
         mechanism = self.mechanism
-        graph = nx.Graph()
+        graph: nx.Graph[str] = nx.Graph()
         graph.add_nodes_from(mechanism.links)
         geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
         for joint in mechanism.joints.values():
@@ -112,7 +112,8 @@ class Twin:
             placement = pin.SE3.Identity()
         self._centre[index] = point
         span = range(start, self.model.nv)
-        self.coordinates[joint.name] = tuple(reversed(span)) if turned and joint.type is JointType.UNIVERSAL else tuple(span)
+        swapped = turned and joint.type is JointType.UNIVERSAL
+        self.coordinates[joint.name] = tuple(reversed(span)) if swapped else tuple(span)
         return index
 
     def _add_tree(self, joint: Joint, parent: str) -> None:
@@ -188,8 +189,8 @@ class Twin:
         return placement @ offset
 
     def velocity(self, q: Array, link: str) -> Array:
-        """V (6, nv): joint rates to the (linear, angular) velocity of the link frame's origin, base axes; linear part in
-        characteristic lengths a second."""
+        """V (6, nv): joint rates to the (linear, angular) velocity of the link frame's origin, base axes; linear part
+        in characteristic lengths a second."""
         self.at(q)
         return self.frames(q, (link,))[1][0]
 

@@ -27,7 +27,7 @@ class Builder:
         self._couplings: list[Coupling] = []
 
     def link(self, name: str, at: ArrayLike = (0, 0, 0), rotation: ArrayLike | None = None) -> None:
-        """A link whose frame's origin lies at ``at`` (and has the axes ``rotation``, (3, 3)) at the zero configuration."""
+        """A link whose frame's origin lies at ``at``, with the axes ``rotation`` (3, 3), at the zero configuration."""
         self._links.append(Link(name, pose(at, rotation)))
 
     def joint(self, name: str, type: str, predecessor: str, successor: str, at: ArrayLike = (0, 0, 0), *,

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..tolerances import SAME_POINT
 from . import lines
-from .model import Joint, JointType, Mechanism
+from .model import JointType, Mechanism
 from .normal import centre_pair
 from .notation import Bar, Carrier, Letter, Rods, Word
 from .vectors import Array
@@ -55,10 +55,12 @@ class WordGraph:
     def __init__(self, mechanism: Mechanism, kept: Collection[str], links: Iterable[str] | None = None) -> None:
         self.mechanism = mechanism
         self.kept = set(kept)
-        self.graph = nx.MultiGraph()
+        self.graph: nx.MultiGraph[str] = nx.MultiGraph()
         inside = set(mechanism.links if links is None else links)
         self.graph.add_nodes_from(name for name in mechanism.links if name in inside)
+        self._links = inside
         self._number = 0
+        self._carriers: list[Edge] = []
         for joint in mechanism.joints.values():
             if joint.type is not JointType.FREE and set(joint.links) <= inside:
                 letter = Letter(joint.type.value, joint.actuated)
@@ -90,11 +92,24 @@ class WordGraph:
             self._add(edge)
         return self
 
+    def recognise_carriers(self) -> WordGraph:
+        """Contract carriers as well: links held by sliders at the end of a chain."""
+        probe = WordGraph(self.mechanism, self.kept, self._links)
+        while probe.recognise() and (probe._series() or probe._carrier()):
+            pass
+        for edge in probe._carriers:
+            self.graph.remove_nodes_from(edge.inside)
+            for key, old in self.between(edge.tail, edge.head):
+                if set(old.joints) <= set(edge.joints):
+                    self.graph.remove_edge(edge.tail, edge.head, key=key)
+            self._add(edge)
+        return self
+
     def reduce(self) -> WordGraph:
         """Contract everything that stands in series or in parallel as well."""
         while True:
             self.recognise()
-            if not (self._carrier() or self._series() or self._parallel()):
+            if not (self._series() or self._carrier() or self._parallel()):
                 return self
 
     def _binary(self) -> Iterator[tuple[str, Edge, Edge]]:
@@ -201,10 +216,12 @@ class WordGraph:
     def _carrier(self) -> bool:
         """{chain-sliders}: a link held by P joints from another, and carried by the end of a chain from it."""
         for link in self.mechanism.links:
-            if link not in self.graph:
+            if link not in self.graph or link in self.kept:
                 continue
             for key, sliders in self.edges_at(link):
                 foot = sliders.other(link)
+                if foot not in self.kept:
+                    continue
                 word = sliders.word_from(foot)
                 if not all(isinstance(i, Letter) and i.letter == "P" and not i.actuated for i in word.items):
                     continue
@@ -216,13 +233,8 @@ class WordGraph:
                             and not follower.actuated and len(self.edges_at(link)) >= 3):
                         self.graph.remove_edge(foot, link, key=key)
                         self.graph.remove_edge(foot, link, key=other)
-                        self._add(Edge(foot, link, Word((Carrier(Word(path.items[:-1]), word),)),
-                                       chain.joints + sliders.joints, chain.inside + sliders.inside))
+                        self._carriers.append(Edge(foot, link, Word((Carrier(Word(path.items[:-1]), word),)),
+                                                   chain.joints + sliders.joints, chain.inside + sliders.inside))
+                        self._add(self._carriers[-1])
                         return True
         return False
-
-
-def rod_joints(mechanism: Mechanism, link: str) -> tuple[Joint, Joint] | None:
-    """The two joints of a binary link, or None."""
-    joints = mechanism.joints_of(link)
-    return (joints[0], joints[1]) if len(joints) == 2 else None

@@ -10,7 +10,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
+from itertools import combinations, pairwise
+from typing import cast
 
 import networkx as nx
 import numpy as np
@@ -21,7 +22,7 @@ from . import lines
 from .composites import Edge, WordGraph
 from .model import Joint, JointType, Mechanism
 from .normal import centre_pair
-from .notation import Architecture, Bar, Letter, Word
+from .notation import Architecture, Bar, Carrier, Letter, Word
 from .observation import Direction
 from .vectors import Array, unit
 
@@ -30,7 +31,8 @@ from .vectors import Array, unit
 class Leg:
     """A leg: its label, its links (base and platform excluded), its joints, the platform link it ends on.
 
-    ``takes_platform`` says that the platform link itself is its last segment; its end joint is then not among its joints.
+    ``takes_platform`` says that the platform link itself is its last segment; its end joint is then not among its
+    joints.
     """
 
     label: str
@@ -69,8 +71,8 @@ class Anatomy:
 
     @cached_property
     def point(self) -> Array | None:
-        """Where the platform is a point body (all its joints are coaxial R, or it has one S, theory 1): that point, in the
-        platform's frame, (3,); on a common axis the foot of the frame's origin. None for any other platform."""
+        """Where the platform is a point body (all its joints are coaxial R, or it has one S, theory 1): that point, in
+        the platform's frame, (3,); on a common axis the foot of the frame's origin. None for any other platform."""
         joints = self.mechanism.joints_of(self.mechanism.platform)
         frame = self.mechanism.links[self.mechanism.platform].pose
         first = joints[0]
@@ -128,7 +130,7 @@ class Anatomy:
         graph = WordGraph(mechanism, {mechanism.base, leg.attach}, {mechanism.base, leg.attach, *leg.links})
         graph.recognise()
         nodes = nx.shortest_path(graph.graph, mechanism.base, leg.attach)
-        return [graph.between(a, b)[0][1] for a, b in zip(nodes, nodes[1:], strict=False)]
+        return [graph.between(a, b)[0][1] for a, b in pairwise(nodes)]
 
 
 def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
@@ -137,7 +139,7 @@ def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
     for path in nx.all_simple_edge_paths(graph.graph, start, end):
         word = Word(())
         here = start
-        for a, b, key in path:
+        for a, b, key in cast("list[tuple[str, str, int]]", path):
             edge: Edge = graph.graph.edges[a, b, key]["edge"]
             word += edge.word_from(here)
             here = edge.other(here)
@@ -149,11 +151,11 @@ def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
 def dissect(mechanism: Mechanism) -> Anatomy:
     """Platform and legs of a mechanism in normal form; raises ``BadMechanism`` where there is no leg, ``BadRobotFile``
     where the observations contradict the legs."""
-    graph = WordGraph(mechanism, {mechanism.base, mechanism.platform}).recognise().graph
+    graph = WordGraph(mechanism, {mechanism.base, mechanism.platform}).recognise().recognise_carriers().graph
     platform = _platform(mechanism, graph)
     order = {name: i for i, name in enumerate(mechanism.links)}
     legs: list[Leg] = []
-    moving = nx.MultiGraph()
+    moving: nx.MultiGraph[str] = nx.MultiGraph()
     moving.add_nodes_from(name for name in mechanism.links if name != mechanism.base and name not in platform)
     live = [j for j in mechanism.joints.values() if j.type is not JointType.FREE]
     moving.add_edges_from(j.links for j in live if set(j.links) <= set(moving))
@@ -175,12 +177,12 @@ def dissect(mechanism: Mechanism) -> Anatomy:
     return _labelled(Anatomy(mechanism, tuple(sorted(platform, key=order.__getitem__)), tuple(legs)))
 
 
-def _platform(mechanism: Mechanism, graph: nx.MultiGraph) -> set[str]:
+def _platform(mechanism: Mechanism, graph: nx.MultiGraph[str]) -> set[str]:
     """The smallest set around the platform link that leaves the most legs (articulated platforms)."""
     base, root = mechanism.base, mechanism.platform
     if base not in graph or root not in graph:
         return {root}
-    rest = nx.Graph(graph)
+    rest: nx.Graph[str] = nx.Graph(graph)
     rest.remove_node(base)
     contacts = set(graph[base])
     order = {name: i for i, name in enumerate(mechanism.links)}
@@ -215,17 +217,30 @@ def _segment_platform(mechanism: Mechanism, platform: set[str], legs: list[Leg])
     """In a single loop with one freedom more on one side, the platform is the last segment of the shorter leg."""
     if len(platform) != 1 or len(legs) != 2 or len(mechanism.joints_of(mechanism.platform)) != 2:
         return legs
-    freedoms = [sum(mechanism.joints[name].type.freedoms for name in leg.joints) for leg in legs]
-    single = [len(leg.joints) == len(leg.links) + 1 for leg in legs]
-    if not all(single) or abs(freedoms[0] - freedoms[1]) != 1:
+    anatomy = Anatomy(mechanism, tuple(platform), tuple(legs))
+    one, two = (_freedoms(anatomy.word(leg)) for leg in legs)
+    if one is None or two is None or abs(one - two) != 1:
         return legs
-    short, long = sorted(range(2), key=freedoms.__getitem__)
+    short, long = (0, 1) if one < two else (1, 0)
     end = next(name for name in legs[long].joints if mechanism.platform in mechanism.joints[name].links)
     if mechanism.joints[end].type is not JointType.REVOLUTE:
         return legs
     result = list(legs)
     result[short] = replace(legs[short], takes_platform=True)
     return result
+
+
+def _freedoms(word: Word) -> int | None:
+    """The freedoms of joints in series (a Π has one, a carrier those of its chain), or None for rods side by side."""
+    total = 0
+    for item in word.items:
+        if isinstance(item, Letter):
+            total += 1 if item.letter == "Pi" else JointType(item.letter).freedoms
+        elif isinstance(item, Carrier) and (inner := _freedoms(item.chain)) is not None:
+            total += inner
+        else:
+            return None
+    return total
 
 
 def _labelled(anatomy: Anatomy) -> Anatomy:
@@ -347,7 +362,7 @@ def _segment(mechanism: Mechanism, leg: Leg, link: str) -> Direction:
     if len(joints) != 2:
         raise BadRequest(f"link {link!r} of leg {leg.label} has {len(joints)} joints: it has no direction of its own",
                          None, "an observe element with an axis")
-    far = nx.Graph(mechanism.graph)
+    far: nx.Graph[str] = nx.Graph(mechanism.graph)
     far.remove_node(link)
     if link != mechanism.platform and mechanism.platform in far:
         far.remove_node(mechanism.platform)
@@ -372,6 +387,6 @@ def _axis_direction(mechanism: Mechanism, leg: Leg, link: str, joint: Joint, pat
 
 def _direction(mechanism: Mechanism, leg: Leg, link: str, vector: Array) -> Direction:
     if np.linalg.norm(vector) <= SAME_POINT * mechanism.length:
-        raise BadRequest(f"the observed segment {link!r} of leg {leg.label} has no length", float(np.linalg.norm(vector)),
-                         "two joint centres apart from each other")
+        raise BadRequest(f"the observed segment {link!r} of leg {leg.label} has no length",
+                         float(np.linalg.norm(vector)), "two joint centres apart from each other")
     return Direction(leg.label, link, mechanism.links[link].pose[:3, :3].T @ unit(vector))

@@ -82,7 +82,8 @@ class Link:
 @dataclass(frozen=True, eq=False)
 class Joint:
     """A joint: ``point`` its centre (3,), ``axes`` unit vectors (R, P, C: one; planar: the normal; U: the first fixed
-    in the predecessor, the second in the successor); its coordinate is the successor's motion seen from the predecessor.
+    in the predecessor, the second in the successor); its coordinate is the successor's motion seen from the
+    predecessor.
     """
 
     name: str
@@ -142,7 +143,7 @@ class Joint:
 
 @dataclass(frozen=True)
 class Coupling:
-    """A gear: coordinate of the joint that carries ``successor`` = ratio × that of the one that carries ``predecessor``."""
+    """A gear: coordinate of the joint that carries ``successor`` = ratio × that of the carrier of ``predecessor``."""
 
     name: str
     predecessor: str
@@ -193,9 +194,9 @@ class Mechanism:
         return self.base if self.camera is None else self.camera
 
     @cached_property
-    def graph(self) -> nx.MultiGraph:
+    def graph(self) -> nx.MultiGraph[str]:
         """The joint graph: nodes are link names, edges are keyed by joint names; read-only."""
-        graph = nx.MultiGraph()
+        graph: nx.MultiGraph[str] = nx.MultiGraph()
         graph.add_nodes_from(self.links)
         for joint in self.joints.values():
             graph.add_edge(joint.predecessor, joint.successor, key=joint.name, joint=joint)

@@ -107,29 +107,36 @@ def _pair(mechanism: Mechanism, a: Joint, b: Joint) -> Joint | None:
     """The joint that acts as a then b (b after a), or None."""
     near = SAME_POINT * mechanism.length
     kinds = a.type.value + b.type.value
-    ends = {"predecessor": a.predecessor, "successor": b.successor, "limits": None}
     if kinds == "RR":
         if lines.parallel(a.axis, b.axis):
-            return replace(a, **ends) if lines.distance(b.point, a.point, a.axis) <= near else None
+            return _joined(a, b) if lines.distance(b.point, a.point, a.axis) <= near else None
         centre = lines.meeting_point([(a.point, a.axis), (b.point, b.axis)], near)
         if centre is not None and lines.perpendicular(a.axis, b.axis):
-            return replace(a, type=JointType.UNIVERSAL, point=centre, axes=(a.axis, b.axis), **ends)
+            return _joined(a, b, JointType.UNIVERSAL, centre, (a.axis, b.axis))
     elif kinds == "PP" and lines.parallel(a.axis, b.axis):
-        return replace(a, **ends)
+        return _joined(a, b)
     elif kinds in ("RU", "UR"):
         centre, arm = (a.point, b) if a.type is JointType.UNIVERSAL else (b.point, a)
         if lines.distance(centre, arm.point, arm.axis) <= near:
             axes = np.array([*a.axes, *b.axes])
             if abs(np.linalg.det(axes)) > 1e-3:
-                return replace(a, type=JointType.SPHERICAL, point=centre, axes=(), **ends)
+                return _joined(a, b, JointType.SPHERICAL, centre)
             inner = a.axes[-1], b.axes[0]
             if lines.parallel(*inner):
-                return replace(a, type=JointType.UNIVERSAL, point=centre, axes=(a.axes[0], b.axes[-1]), **ends)
+                return _joined(a, b, JointType.UNIVERSAL, centre, (a.axes[0], b.axes[-1]))
     elif kinds in ("RS", "SR"):
         ball, arm = (a, b) if a.type is JointType.SPHERICAL else (b, a)
         if lines.distance(ball.point, arm.point, arm.axis) <= near:
-            return replace(a, type=JointType.SPHERICAL, point=ball.point, axes=(), **ends)
+            return _joined(a, b, JointType.SPHERICAL, ball.point)
     return None
+
+
+def _joined(a: Joint, b: Joint, type: JointType | None = None, point: Array | None = None,
+            axes: tuple[Array, ...] = ()) -> Joint:
+    """One joint from a's predecessor to b's successor, without limits: of a's type and place where none is given."""
+    if type is None or point is None:
+        return replace(a, predecessor=a.predecessor, successor=b.successor, limits=None)
+    return replace(a, type=type, point=point, axes=axes, predecessor=a.predecessor, successor=b.successor, limits=None)
 
 
 def _triple(mechanism: Mechanism, a: Joint, b: Joint, c: Joint) -> Joint | None:
@@ -139,8 +146,7 @@ def _triple(mechanism: Mechanism, a: Joint, b: Joint, c: Joint) -> Joint | None:
     centre = lines.meeting_point([(j.point, j.axis) for j in (a, b, c)], near)
     if centre is None or abs(np.linalg.det(np.array([a.axis, b.axis, c.axis]))) < 1e-3:
         return None
-    return replace(a, type=JointType.SPHERICAL, point=centre, axes=(), predecessor=a.predecessor,
-                   successor=c.successor, limits=None)
+    return _joined(a, c, JointType.SPHERICAL, centre)
 
 
 def _chains_of_three(mechanism: Mechanism, free: set[str]) -> Iterator[tuple[Joint, Joint, Joint]]:

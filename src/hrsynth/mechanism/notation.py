@@ -155,7 +155,8 @@ def _braced(text: str, style: Style) -> str:
     return rf"\{{{text}\}}" if style is Style.LATEX else f"{{{text}}}"
 
 
-_TOKEN = re.compile(r"\s*(?:(?P<letter>Pi|Π|[RPUSCEF6])(?P<motor>\*|\u0332|_)?|(?P<number>[0-9]+)(?=-)|(?P<sign>[-+{}|]))")
+_TOKEN = re.compile(
+    r"\s*(?:(?P<letter>Pi|Π|[RPUSCEF6])(?P<motor>\*|\u0332|_)?|(?P<number>[0-9]+)(?=-)|(?P<sign>[-+{}|]))")
 
 
 def parse(text: str) -> Architecture:

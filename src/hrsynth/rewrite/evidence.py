@@ -161,7 +161,7 @@ class Evidence:
             anchor = centre_pair(knee, onward[0])[0]
         leg = self.anatomy.leg_of(link)
         assert leg is not None
-        side = nx.Graph(self.mechanism.graph.subgraph({self.reference, *leg.links} - {link}))
+        side: nx.Graph[str] = nx.Graph(self.mechanism.graph.subgraph({self.reference, *leg.links} - {link}))
         nodes = {self.reference}
         if before != self.reference:
             for path in nx.all_simple_paths(side, self.reference, before):

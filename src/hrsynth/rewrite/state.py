@@ -90,10 +90,9 @@ class State:
         others.discard(mechanism.reference)
         for joint in mechanism.joints.values():
             touches = set(joint.links)
-            if touches & links and not (touches - links) & others:
-                names.append(joint.name)
-            elif touches == ends and (joint.name in leg.joints or leg.takes_platform
-                                      or any(c.leg == leg.label and c.actuator == joint.name for c in self.chains)):
+            alone = touches == ends and (joint.name in leg.joints or leg.takes_platform or any(
+                c.leg == leg.label and c.actuator == joint.name for c in self.chains))
+            if alone or (touches & links and not (touches - links) & others):
                 names.append(joint.name)
         return names
 

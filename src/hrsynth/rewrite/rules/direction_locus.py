@@ -22,7 +22,8 @@ def propose(state: State, evidence: Evidence, leg: str, trust: bool) -> Iterator
     for chain in state.chain(leg):
         found = locus(evidence.directions(_index(evidence, chain)), 1.0)
         if found.dimension == 0:
-            gone = {chain.carrier, *chain.slider_links, chain.bearing} & set(state.owners)
+            links = (chain.carrier, chain.bearing, *chain.slider_links)
+            gone = {link for link in links if link is not None and link in state.owners}
             state = state.with_chain(chain, None, state.mechanism.changed(
                 remove_links=gone, remove_joints=[chain.actuator, *([chain.roll] if chain.roll else [])]))
             notes.append("the direction is constant: the leg is blind")

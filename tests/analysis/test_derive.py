@@ -1,0 +1,390 @@
+"""From a robot to its certified hidden robot: what the papers state, and what must hold of every derivation."""
+
+from __future__ import annotations
+
+import io
+from itertools import combinations
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+import pytest
+import yourdfpy
+
+from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL
+from hrsynth.analysis.derive import Derivation, derive
+from hrsynth.analysis.setting import SAMPLES
+from hrsynth.description import load, native
+from hrsynth.errors import BadRequest
+from hrsynth.kinematics.twin import Twin
+from hrsynth.mechanism.model import JointType
+from hrsynth.mechanism.observation import Direction
+from hrsynth.tolerances import ASSEMBLED, FOLLOWED, RANK_GAP, SAME_RELATION
+from kinematics.robots import ROBOTS, derived
+from oracle import Oracle
+
+PLANE = ("translation along x", "translation along y", "rotation about the platform's z axis")
+
+
+class Expected(NamedTuple):
+    real: str
+    hidden: str | None
+    dof: int
+    mobility: tuple[int, int]
+    """Total and idle."""
+    lost: tuple[str, ...] = ()
+
+
+EXPECTED = {
+    "rrrrr_m1": Expected("R*RRRR*", "PiR*RR*Pi", 2, (2, 0)),
+    "rrrrr_m2": Expected("RR*RR*R", "PiR*RR*Pi", 2, (2, 0)),
+    "rprpr_m1": Expected("R*PRPR*", "R*PRPR*", 2, (2, 0)),
+    "rprpr_m2": Expected("RP*RP*R", "R*PRPR*", 2, (2, 0)),
+    "prrrp_m1": Expected("P*RRRP*", "PR*RR*P", 2, (2, 0)),
+    "prrrp_m2": Expected("PR*RR*P", "PR*RR*P", 2, (2, 0)),
+    "prrrp_parallel": Expected("P*RRRP*", "PR*RR*P", 2, (2, 0), ("translation along y",)),
+    "prrrp_parallel_point": Expected("P*RRRP*", "PR*RR*P", 2, (3, 1), ("translation along y",)),
+    "3rrr_m1": Expected("3-R*RR", "3-PiR*R", 3, (3, 0)),
+    "3rrr_m2": Expected("3-RR*R", "3-PiR*R", 3, (3, 0)),
+    "3rpr_m1": Expected("3-R*PR", "3-R*PR", 3, (3, 0)),
+    "3rpr_m2": Expected("3-RP*R", "3-R*PR", 3, (3, 0)),
+    "3prr_m1": Expected("3-P*RR", "3-PR*R", 3, (3, 0)),
+    "3prr_m2": Expected("3-PR*R", "3-PR*R", 3, (3, 0)),
+    "3prp": Expected("3-P*RP", "3-PR*P", 3, (3, 0), PLANE[:2]),
+    "3rrp": Expected("3-R*RP", "3-PiR*P", 3, (3, 0), PLANE[:2]),
+    "3ppr_m1": Expected("3-P*PR", None, 3, (3, 0), PLANE),
+    "3ppr_m2": Expected("3-PP*R", None, 3, (3, 0), PLANE),
+    "gough_stewart": Expected("6-UP*S", "6-U*PS", 6, (6, 0)),
+    "3upu": Expected("3-UP*U", "3-U*PU", 3, (3, 0)),
+    "3rps": Expected("3-RP*S", "3-R*PS", 3, (3, 0)),
+    "delta": Expected("3-R*-{2-SS}", "3-Pi-{2-U*S}", 3, (9, 6)),
+    "quattro_rigid": Expected("4-R*-{2-SS}", "4-Pi-{2-U*S}", 3, (11, 8)),
+    "quattro": Expected("4-R*-{2-SS}", "4-Pi-{2-U*S}", 4, (12, 8)),
+    "orthoglide": Expected("3-P*-{2-SS}", "3-P-{2-U*S}", 3, (9, 6)),
+    "linear_delta": Expected("3-P*-{2-SS}", "3-P-{2-U*S}", 3, (9, 6)),
+    "uranesx": Expected("3-P*-{2-SS}", "3-P-{2-U*S}", 3, (9, 6), ("translation along z",)),
+    "i4l": Expected("4-P*-{2-SS}", "4-P-{2-U*S}", 3, (12, 8), ("translation along x",)),
+    "3ruu": Expected("3-R*UU", "3-PiU*U", 3, (3, 0)),
+    "3puu": Expected("3-P*UU", "3-PU*U", 3, (3, 0)),
+    "hexa": Expected("6-R*US", "6-PiU*S", 6, (6, 0)),
+    "hexaglide": Expected("6-P*US", "6-PU*S", 6, (6, 0), ("translation along x",)),
+    "6pus": Expected("6-P*US", "6-PU*S", 6, (6, 0)),
+}
+
+
+def certified(derivation: Derivation) -> None:
+    """The certificate passed, with evidence."""
+    certificate = derivation.certificate
+    assert certificate.passed
+    assert certificate.samples == SAMPLES
+    assert certificate.largest_angle < SAME_RELATION
+    assert certificate.residual < FOLLOWED
+    assert certificate.smallest_gap > RANK_GAP
+    assert derivation.verdict.gap > RANK_GAP
+    assert derivation.verdict.rank + len(derivation.verdict.lost) == derivation.dof
+
+
+def emitted(derivation: Derivation) -> None:
+    """The hidden robot is a file that others can load, of the real robot's links where they are kept."""
+    hidden, setting = derivation.hidden, derivation.setting
+    assert hidden is not None
+    text = native.write(hidden)
+    again = native.parse(text)
+    assert again.differences(hidden) == []
+    assert hidden.differences(again) == []
+    twin = Twin(again)
+    assert np.linalg.norm(twin.residual(twin.q0)) < ASSEMBLED
+    assert Oracle(again).error(Oracle(again).zero()) < 1e-11
+
+    model = pin.buildModelFromXML(text)
+    assert model.nv == sum(j.type.freedoms for j in hidden.joints.values() if j.in_tree)
+    tree = yourdfpy.URDF.load(io.BytesIO(text.encode()), load_meshes=False, build_scene_graph=True)
+    assert tree.base_link == hidden.base
+    assert hidden.links.keys() <= tree.link_map.keys()
+    assert len(tree.robot.joints) == len(tree.robot.links) - 1
+    data = model.createData()
+    pin.framesForwardKinematics(model, data, pin.neutral(model))
+    for name, link in hidden.links.items():
+        np.testing.assert_allclose(data.oMf[model.getFrameId(name)].homogeneous, link.pose, atol=1e-9)
+
+    real = setting.mechanism
+    assert hidden.name == f"{setting.robot.name}_hidden"
+    assert (hidden.base, hidden.platform, hidden.reference) == (real.base, real.platform, real.reference)
+    for name in hidden.links.keys() & real.links.keys():
+        np.testing.assert_array_equal(hidden.links[name].pose, real.links[name].pose)
+    assert hidden.platform in real.links
+    actuated = [joint for joint in hidden.joints.values() if joint.actuated]
+    assert actuated
+    assert all(joint.name not in setting.robot.joints for joint in actuated)
+    assert all(joint.name not in real.joints for joint in actuated)
+    assert {joint.type for joint in actuated} <= {JointType.REVOLUTE, JointType.UNIVERSAL}
+    assert [(o.leg, o.link) for o in hidden.observations] == [(o.leg, o.link) for o in setting.observed]
+    assert {o.leg for o in hidden.observations} <= set(setting.anatomy.labels)
+    for mine, theirs in zip(hidden.observations, setting.observed, strict=True):
+        assert isinstance(mine, Direction)
+        assert isinstance(theirs, Direction)
+        assert mine.link in real.links
+        np.testing.assert_array_equal(mine.direction, theirs.direction)
+
+
+def test_every_robot_is_expected() -> None:
+    assert set(EXPECTED) == set(ROBOTS)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_all_legs_observed(robot: str) -> None:
+    derivation, expected = derived(robot), EXPECTED[robot]
+    assert derivation.architecture.ascii == expected.real
+    assert derivation.dof == expected.dof
+    assert (derivation.mobility.total, derivation.mobility.idle) == expected.mobility
+    certified(derivation)
+    lost = len(expected.lost)
+    assert derivation.verdict.verdict == (CONTROLLABLE if not lost else BLIND if lost == expected.dof else PARTIAL)
+    assert tuple(freedom.name for freedom in derivation.verdict.lost) == expected.lost
+    if expected.hidden is None:
+        assert derivation.hidden is None
+        assert derivation.hidden_architecture is None
+        assert derivation.paper is None
+        assert "vanishes" in derivation.certificate.reason
+        return
+    assert derivation.hidden_architecture is not None
+    assert derivation.hidden_architecture.ascii == expected.hidden
+    assert derivation.certificate.reason == ""
+    assert derivation.paper is not None
+    assert derivation.paper.equivalent
+    assert derivation.paper.hidden == derivation.hidden_architecture
+    emitted(derivation)
+
+
+def test_translations_along_the_slides_are_lost() -> None:
+    """Parallel P joints next to the base: no direction changes when all of them move alike (MMT 4.2.3)."""
+    for robot in ("uranesx", "i4l", "hexaglide", "prrrp_parallel", "prrrp_parallel_point"):
+        derivation = derived(robot)
+        rails = [j.axis for j in derivation.setting.mechanism.joints.values() if j.actuated]
+        (lost,) = derivation.verdict.lost
+        assert lost.twist.shape == (6,)
+        np.testing.assert_allclose(lost.twist[3:], 0, atol=1e-12)
+        for axis in rails:
+            assert np.linalg.norm(np.cross(lost.twist[:3], axis)) < 1e-9
+
+
+# --- some of the legs --------------------------------------------------------------------------------------------
+
+def subsets(labels: str, sizes: tuple[int, ...] | None = None) -> list[tuple[str, ...]]:
+    return [each for size in sizes or range(1, len(labels) + 1) for each in combinations(labels, size)]
+
+
+SUBSETS = [*(("quattro", each) for each in subsets("1234", (1, 2, 3))),
+           *(("quattro_rigid", each) for each in subsets("1234", (1, 2, 3))),
+           *(("delta", each) for each in subsets("123", (1, 2))),
+           *(("orthoglide", each) for each in subsets("123", (1, 2)))]
+PODS = [("gough_stewart", each) for each in subsets("123456", (2, 3))]
+PAIRS = ("2-Pi-{2-U*U}", "2-P-{2-U*U}")
+RANKS = {"quattro": (2, 4), "quattro_rigid": (2, 3), "delta": (2, 3), "orthoglide": (2, 3)}
+
+
+def name(case: object) -> str:
+    return "".join(case) if isinstance(case, tuple) else str(case)
+
+
+@pytest.mark.parametrize(("robot", "legs"), SUBSETS, ids=name)
+def test_every_set_of_legs_is_certified(robot: str, legs: tuple[str, ...]) -> None:
+    derivation = derived(robot, legs)
+    certified(derivation)
+    emitted(derivation)
+    one, best = RANKS[robot]
+    halves = {"12": 3, "34": 3} if robot == "quattro" else {}
+    assert derivation.verdict.rank == (one if len(legs) == 1 else halves.get("".join(legs), best))
+    assert derivation.verdict.verdict == (CONTROLLABLE if derivation.verdict.rank == derivation.dof else PARTIAL)
+    assert derivation.paper is not None
+    assert derivation.paper.equivalent or derivation.paper.gains or derivation.paper.loses or derivation.paper.reason
+    hidden = derivation.hidden_architecture
+    assert hidden is not None
+    if len(legs) == 2 and derivation.verdict.verdict == CONTROLLABLE and robot != "quattro_rigid":
+        assert hidden.ascii in PAIRS
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("robot", "legs"), PODS, ids=name)
+def test_pairs_and_triples_of_a_pod_are_certified(robot: str, legs: tuple[str, ...]) -> None:
+    derivation = derived(robot, legs)
+    certified(derivation)
+    emitted(derivation)
+    hidden = derivation.hidden_architecture
+    assert hidden is not None
+    if len(legs) == 3:
+        assert derivation.verdict.verdict == CONTROLLABLE
+        assert hidden.ascii == "3-U*PS"
+        return
+    assert derivation.verdict.verdict == PARTIAL
+    assert derivation.verdict.rank == 4
+    assert f"rotation about the line B{legs[0]} B{legs[1]}" in [each.name for each in derivation.verdict.lost]
+    assert hidden.ascii.startswith("2-U*PS")
+
+
+@pytest.mark.parametrize(("robot", "legs", "hidden"), [
+    ("gough_stewart", ("1", "2", "3"), "3-U*PS"),
+    ("gough_stewart", ("2", "4", "6"), "3-U*PS"),
+    ("quattro", ("1", "4"), "2-Pi-{2-U*U}"),
+    ("quattro", ("2", "3"), "2-Pi-{2-U*U}"),
+    ("delta", ("1", "3"), "2-Pi-{2-U*U}"),
+    ("linear_delta", ("1", "2"), "2-P-{2-U*U}"),
+    ("orthoglide", ("2", "3"), "2-P-{2-U*U}"),
+])
+def test_architectures_of_the_papers(robot: str, legs: tuple[str, ...], hidden: str) -> None:
+    derivation = derived(robot, legs)
+    certified(derivation)
+    assert derivation.hidden_architecture is not None
+    assert derivation.hidden_architecture.ascii == hidden
+    assert derivation.verdict.verdict == CONTROLLABLE
+    assert derivation.paper is not None
+    assert derivation.paper.equivalent
+    removed = set(derivation.setting.anatomy.labels) - set(legs)
+    assert {step.leg for step in derivation.steps if step.rule == "leg removal" and step.accepted} >= removed
+
+
+def test_one_leg_of_a_delta_needs_another() -> None:
+    """The paper's form frees the platform: it may turn; a real leg has to stay."""
+    derivation = derived("delta", ("1",))
+    certified(derivation)
+    emitted(derivation)
+    paper = derivation.paper
+    assert paper is not None
+    assert not paper.equivalent
+    assert paper.hidden.ascii == "Pi-{2-U*U}"
+    assert paper.largest_angle > SAME_RELATION
+    assert len(paper.gains) == 1
+    assert paper.gains[0].name.startswith("rotation about")
+    assert np.linalg.norm(paper.gains[0].twist[3:]) == pytest.approx(1)
+    assert paper.loses == ()
+    assert paper.reason
+    assert derivation.hidden_architecture is not None
+    assert derivation.hidden_architecture.ascii == "Pi-{2-U*U}+R-{2-SS}"
+    assert [step.leg for step in derivation.steps if step.rule == "keep"] == ["3"]
+    kept = derivation.hidden
+    assert kept is not None
+    assert {"arm_3", "rod_3a", "rod_3b"} <= kept.links.keys()
+    assert not {"arm_2", "rod_2a", "rod_2b"} & kept.links.keys()
+
+
+def test_two_legs_of_3upu_need_the_third() -> None:
+    derivation = derived("3upu", ("1", "2"))
+    certified(derivation)
+    emitted(derivation)
+    assert derivation.hidden_architecture is not None
+    assert derivation.hidden_architecture.ascii == "2-U*PU+UPU"
+    paper = derivation.paper
+    assert paper is not None
+    assert not paper.equivalent
+    assert paper.hidden.ascii == "2-U*PU"
+    assert [freedom.name.split(" about ")[0] for freedom in paper.gains] == ["rotation"]
+    assert paper.loses == ()
+    keep = [step for step in derivation.steps if step.rule == "keep"]
+    assert [step.leg for step in keep] == ["3"]
+    refused = [step for step in derivation.steps if step.rule == "leg removal" and not step.accepted]
+    assert refused
+    assert all("refused" in step.reason for step in refused)
+
+
+# --- other segments, other cameras, other forms ------------------------------------------------------------------
+
+@pytest.mark.parametrize(("robot", "observe", "camera"), [
+    ("gough_stewart", ("1", "2", "3"), "platform"),
+    ("delta", None, "platform"),
+    ("delta", None, "arm_1"),
+    ("delta", ("1", "2"), "rod_3a"),
+    ("3rrr_m1", None, "platform"),
+])
+def test_a_camera_on_any_link(robot: str, observe: tuple[str, ...] | None, camera: str) -> None:
+    derivation = derived(robot, observe, camera)
+    certified(derivation)
+    emitted(derivation)
+    assert derivation.hidden is not None
+    assert derivation.hidden.reference == camera
+    assert derivation.to_dict()["camera"] == camera
+
+
+@pytest.mark.parametrize(("robot", "observe"), [
+    ("delta", ("arm_1", "rod_2a")), ("delta", ("rod_1b", "2")), ("delta", ("arm_1", "arm_2", "arm_3")),
+    ("quattro", ("rod_1a", "rod_1b", "4")), ("3rrr_m1", ("1", "2", "3")), ("delta", ("arm_1", "rod_1a", "2"))])
+def test_other_segments(robot: str, observe: tuple[str, ...]) -> None:
+    derivation = derived(robot, observe)
+    certified(derivation)
+    emitted(derivation)
+    links = {o.link for o in derivation.setting.observed}
+    assert {each for each in observe if not each.isdigit()} <= links
+    assert len(links) == len(observe)
+
+
+def test_encoders_made_visible() -> None:
+    """Where the arms of a Delta are observed its hidden robot is the Delta itself: the angles of its motors."""
+    derivation = derived("delta", ("arm_1", "arm_2", "arm_3"))
+    assert derivation.verdict.verdict == CONTROLLABLE
+    assert derivation.hidden_architecture is not None
+    assert derivation.hidden_architecture.ascii == "3-R*-{2-SS}"
+
+
+@pytest.mark.parametrize(("robot", "hidden"), [
+    ("delta", "3-{R-PP}-{2-U*S}"), ("3rrr_m1", "3-{R-PP}-R*R"), ("quattro", "4-{R-PP}-{2-U*S}"), ("3upu", "3-U*PU"),
+    ("orthoglide", "3-P-{2-U*S}")])
+def test_the_general_form(robot: str, hidden: str) -> None:
+    derivation = derived(robot, None, None, "general")
+    certified(derivation)
+    emitted(derivation)
+    assert derivation.form == "general"
+    assert derivation.paper is None
+    assert derivation.hidden_architecture is not None
+    assert derivation.hidden_architecture.ascii == hidden
+
+
+def test_the_general_form_keeps_the_legs_that_are_not_observed() -> None:
+    derivation = derived("quattro", ("1", "4"), None, "general")
+    certified(derivation)
+    assert derivation.hidden_architecture is not None
+    assert derivation.hidden_architecture.ascii == "2-{R-PP}-{2-U*S}+2-R-{2-SS}"
+
+
+def test_the_same_seed_gives_the_same_answer() -> None:
+    one, two = (derive(load("3rrr_m1"), ["1", "2"], seed=4) for _ in range(2))
+    assert one.to_dict() == two.to_dict()
+    assert one.hidden is not None
+    assert two.hidden is not None
+    assert native.write(one.hidden) == native.write(two.hidden)
+
+
+def test_progress_is_told() -> None:
+    told: list[str] = []
+    derive(load("rrrrr_m1"), progress=told.append)
+    assert {"sampling", "certificate", "the paper's form"} <= set(told)
+
+
+@pytest.mark.parametrize(("observe", "camera", "form", "value", "allowed"), [
+    (["9"], None, "simplified", "9", "1, 2, 3"),
+    (["1", "nothing"], None, "simplified", "nothing", "rod_1a"),
+    (["base"], None, "simplified", "base", "arm_1"),
+    (["platform"], None, "simplified", "platform", "arm_1"),
+    (None, "nothing", "simplified", "nothing", "platform"),
+    (None, None, "plain", "plain", "simplified, general"),
+])
+def test_bad_requests(observe: list[str] | None, camera: str | None, form: str, value: str, allowed: str) -> None:
+    with pytest.raises(BadRequest) as caught:
+        derive(load("delta"), observe, camera, form=form)
+    assert caught.value.exit_status == 2
+    assert caught.value.value == value
+    assert allowed in str(caught.value)
+    assert len(caught.value.lines()) == 1
+
+
+def test_the_record() -> None:
+    record = derived("delta", ("1",)).to_dict()
+    assert record["observed"] == [{"leg": "1", "link": "rod_1a"}]
+    assert record["camera"] == "base"
+    assert record["verdict"] == PARTIAL
+    assert record["dof"] == record["rank"] + len(record["lost"])
+    assert record["mobility"]["total"] == 9
+    assert record["mobility"]["idle"] == 6
+    assert record["certificate"]["passed"] is True
+    assert record["notation"]["real_ascii"] == "3-R*-{2-SS}"
+    assert record["paper_form"]["equivalent"] is False
+    assert all(len(freedom["twist"]) == 6 for freedom in record["lost"])
+    assert {step["rule"] for step in record["steps"]} >= {"motors off", "lift", "takeover", "leg removal", "keep"}

@@ -1,0 +1,182 @@
+"""The verdict of every set of observed legs: what the theory says for whole families, and what any verdict obeys."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import combinations
+from math import comb
+
+import numpy as np
+import pytest
+
+from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL, Legs, Verdict, legs
+from hrsynth.description import load
+from hrsynth.errors import BadRequest
+from hrsynth.mechanism.vectors import Array
+from hrsynth.tolerances import RANK_GAP
+from kinematics.robots import setting_of, state_of
+from oracle import Oracle
+
+
+@cache
+def found(robot: str) -> Legs:
+    return legs(load(robot))
+
+
+def table(robot: str) -> dict[tuple[str, ...], Verdict]:
+    return {each.legs: each for each in found(robot).sets}
+
+
+@pytest.mark.parametrize("robot", ["quattro", "quattro_rigid", "delta", "orthoglide", "gough_stewart", "3rrr_m1", "i4l",
+                                   "hexaglide", "3ppr_m1", "prrrp_parallel_point", "3upu"])
+def test_all_sets_obey(robot: str) -> None:
+    """All sets are there, ranks grow with the sets, verdicts follow from ranks, the smallest of the best are listed."""
+    answer, sets = found(robot), table(robot)
+    labels = tuple(each.legs[0] for each in answer.sets if len(each.legs) == 1)
+    assert answer.complete
+    assert len(sets) == 2 ** len(labels) - 1
+    for chosen, verdict in sets.items():
+        assert verdict.dof == answer.dof
+        assert verdict.gap > RANK_GAP
+        assert verdict.rank + len(verdict.lost) == answer.dof
+        assert verdict.verdict == (CONTROLLABLE if verdict.rank == answer.dof else PARTIAL if verdict.rank else BLIND)
+        for fewer in combinations(chosen, len(chosen) - 1):
+            if fewer:
+                assert sets[fewer].rank <= verdict.rank
+        if verdict.lost:
+            twists = np.column_stack([freedom.twist for freedom in verdict.lost])
+            assert np.linalg.matrix_rank(twists) == len(verdict.lost)
+            assert len({freedom.name for freedom in verdict.lost}) == len(verdict.lost)
+    best = max(each.rank for each in answer.sets)
+    size = min(len(each) for each, verdict in sets.items() if verdict.rank == best)
+    assert set(answer.minimal) == {each for each, verdict in sets.items() if verdict.rank == best and len(each) == size}
+
+
+def lost_by_oracle(robot: str, chosen: tuple[str, ...]) -> Array:
+    """The platform twists (metres) that these legs do not see at the zero configuration, by the oracle."""
+    everything = setting_of(robot).everything
+    observations = [o for o in everything.question.observations if o.leg in chosen]
+    oracle = Oracle(everything.twin.mechanism)
+    basis = oracle.relation(state_of(everything.twin, everything.twin.q0), observations, unit_length=1.0)
+    _, values, right = np.linalg.svd(basis[6:])
+    kernel = right[int(np.sum(values > 1e-8)):].T
+    U, values, _ = np.linalg.svd(basis[:6] @ kernel, full_matrices=False)
+    return np.asarray(U[:, values > 1e-8])
+
+
+@pytest.mark.parametrize(("robot", "size"), [("quattro", 1), ("quattro", 2), ("quattro_rigid", 1), ("delta", 1),
+                                             ("gough_stewart", 1), ("gough_stewart", 2), ("3upu", 1)])
+def test_lost_freedoms_are_those_of_the_oracle(robot: str, size: int) -> None:
+    for chosen, verdict in table(robot).items():
+        if len(chosen) != size:
+            continue
+        lost = lost_by_oracle(robot, chosen)
+        assert lost.shape[1] == len(verdict.lost)
+        for freedom in verdict.lost:
+            twist = freedom.twist / np.linalg.norm(freedom.twist)
+            assert np.linalg.norm(twist - lost @ (lost.T @ twist)) < 1e-6, freedom.name
+
+
+def test_quattro() -> None:
+    """One leg on each half sees all four freedoms; two on one half leave the other half free to turn."""
+    answer, sets = found("quattro"), table("quattro")
+    assert answer.architecture == "4-R*-{2-SS}"
+    assert answer.dof == 4
+    assert set(answer.minimal) == {("1", "3"), ("1", "4"), ("2", "3"), ("2", "4")}
+    for pair in (("1", "2"), ("3", "4")):
+        assert sets[pair].rank == 3
+        assert sets[pair].lost[0].name.startswith("rotation about")
+        axis = sets[pair].lost[0].twist[3:]
+        assert abs(axis[2]) == pytest.approx(np.linalg.norm(axis))
+    assert all(sets[each].verdict == CONTROLLABLE for each in combinations("1234", 3))
+    assert all(sets[(each,)].rank == 2 for each in "1234")
+
+
+def test_quattro_rigid() -> None:
+    """A platform that only translates: any two legs whose circles are not in parallel planes."""
+    answer, sets = found("quattro_rigid"), table("quattro_rigid")
+    assert answer.dof == 3
+    assert set(answer.minimal) == set(combinations("1234", 2))
+    for label in "1234":
+        (lost,) = sets[(label,)].lost
+        assert lost.name.startswith("translation along")
+        np.testing.assert_allclose(lost.twist[3:], 0, atol=1e-9)
+
+
+@pytest.mark.parametrize("robot", ["delta", "orthoglide"])
+def test_two_legs_of_a_delta_suffice(robot: str) -> None:
+    answer, sets = found(robot), table(robot)
+    assert set(answer.minimal) == set(combinations("123", 2))
+    for label in "123":
+        (lost,) = sets[(label,)].lost
+        assert sets[(label,)].rank == 2
+        assert lost.name.startswith("translation along")
+
+
+def test_a_leg_of_the_orthoglide_does_not_see_its_own_rail() -> None:
+    sets = table("orthoglide")
+    assert [sets[(each,)].lost[0].name for each in "123"] == [f"translation along {axis}" for axis in "xyz"]
+
+
+def test_a_leg_of_the_delta_does_not_see_its_circle() -> None:
+    """With its rod's direction fixed a leg lets the platform follow the elbow: normal to the arm and to the R axis."""
+    setting, sets = setting_of("delta"), table("delta")
+    for label in "123":
+        shoulder = next(j for n in setting.anatomy.leg(label).joints
+                        if (j := setting.mechanism.joints[n]).predecessor == "base")
+        elbow = np.mean([j.point for j in setting.mechanism.joints_of(shoulder.successor) if j is not shoulder], axis=0)
+        twist = sets[(label,)].lost[0].twist[:3]
+        tangent = np.cross(shoulder.axis, elbow - shoulder.point)
+        assert np.linalg.norm(np.cross(twist, tangent)) < 1e-9 * np.linalg.norm(twist)  + 1e-9
+
+
+def test_gough_stewart() -> None:
+    """Three legs see all six freedoms; two leave the platform free to turn about the line of their ends."""
+    answer, sets = found("gough_stewart"), table("gough_stewart")
+    assert set(answer.minimal) == set(combinations("123456", 3))
+    assert len(answer.minimal) == comb(6, 3) == 20
+    pairs = [each for each in sets if len(each) == 2]
+    assert len(pairs) == 15
+    for a, b in pairs:
+        assert sets[a, b].verdict == PARTIAL
+        assert sets[a, b].rank == 4
+        assert f"rotation about the line B{a} B{b}" in [freedom.name for freedom in sets[a, b].lost]
+    assert all(sets[(each,)].rank == 2 for each in "123456")
+
+
+def test_blind_legs() -> None:
+    answer = found("3ppr_m1")
+    assert {each.verdict for each in answer.sets} == {BLIND}
+    assert {each.rank for each in answer.sets} == {0}
+
+
+def test_the_whole_hexaglide_misses_its_rails() -> None:
+    whole = table("hexaglide")[tuple("123456")]
+    assert whole.verdict == PARTIAL
+    assert [freedom.name for freedom in whole.lost] == ["translation along x"]
+
+
+def test_progress_and_record() -> None:
+    told = []
+    answer = legs(load("3rrr_m1"), progress=lambda: told.append(1))
+    assert len(told) == len(answer.sets) == 7
+    record = answer.to_dict()
+    assert record["robot"] == "3rrr_m1"
+    assert record["architecture_ascii"] == "3-R*RR"
+    assert record["complete"] is True
+    assert [each["legs"] for each in record["sets"]] == [list(each.legs) for each in answer.sets]
+    assert record["minimal"] == [list(each) for each in answer.minimal]
+
+
+@pytest.mark.parametrize("robot", ["delta", "gough_stewart"])
+def test_a_carried_camera_sees_no_less_of_a_rigid_platform(robot: str) -> None:
+    answer = legs(load(robot), camera="platform")
+    assert max(each.rank for each in answer.sets) == answer.dof
+    assert answer.dof == found(robot).dof
+
+
+def test_an_unknown_camera() -> None:
+    with pytest.raises(BadRequest) as caught:
+        legs(load("delta"), camera="moon")
+    assert caught.value.value == "moon"
+    assert "platform" in str(caught.value)

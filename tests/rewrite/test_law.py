@@ -1,0 +1,144 @@
+"""One law over all rules and all robots: no accepted step changes the relation, and the oracle is the judge.
+
+The oracle leads every rewritten mechanism along the poses and observed directions of the real robot, and compares the
+two relations there; the engine that accepted the step has no say in it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+import pytest
+
+from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.kinematics.certificate import Certificate, certify
+from hrsynth.mechanism.model import Mechanism
+from hrsynth.rewrite import strategy
+from hrsynth.rewrite.evidence import Evidence
+from hrsynth.rewrite.strategy import Rewriting
+from hrsynth.tolerances import SAME_RELATION
+from kinematics.robots import ROBOTS, led, seen_by_oracle, setting_of, state_of
+from oracle import Oracle, same_relation
+from strategies import deltas, planar, pods
+
+SUBSETS = {
+    "delta": (("1",), ("1", "2"), ("2", "3"), ("arm_1", "rod_2a")),
+    "quattro": (("1", "4"), ("1", "2"), ("3",), ("1", "2", "3")),
+    "quattro_rigid": (("1", "3"), ("1", "2"), ("2",)),
+    "orthoglide": (("1",), ("1", "3")),
+    "linear_delta": (("2", "3"),),
+    "uranesx": (("1", "2"),),
+    "i4l": (("1", "2"), ("1", "3")),
+    "3ruu": (("1", "2"),),
+    "3puu": (("1",),),
+    "3upu": (("1", "2"), ("3",)),
+    "3rps": (("1", "2"),),
+    "3rrr_m1": (("1", "2"), ("3",)),
+    "gough_stewart": (("1", "2", "3"), ("2", "5")),
+    "rrrrr_m1": (("1",),),
+    "prrrp_parallel_point": (("1",),),
+}
+CASES = [*((robot, None) for robot in ROBOTS), *((robot, legs) for robot, sets in SUBSETS.items() for legs in sets)]
+CAMERAS = [("delta", "platform"), ("delta", "arm_1"), ("gough_stewart", "platform"), ("3rrr_m1", "platform"),
+           ("3upu", "platform"), ("quattro", "platform")]
+
+
+@dataclass
+class Recorder:
+    """A check that keeps every proposal which the certificate passes."""
+
+    setting: Setting
+    passed: list[Mechanism] = field(default_factory=list)
+    refused: list[tuple[Mechanism, Certificate]] = field(default_factory=list)
+
+    def __call__(self, mechanism: Mechanism, bodies: tuple[str, ...]) -> Certificate:
+        found = certify(self.setting.samples, mechanism, count=3, bodies=bodies, complete=False)
+        if found.passed:
+            self.passed.append(mechanism)
+        else:
+            self.refused.append((mechanism, found))
+        return found
+
+
+def rewritten(setting: Setting, form: str = "simplified") -> tuple[Rewriting, Recorder]:
+    recorder = Recorder(setting)
+    run = strategy.simplified if form == "simplified" else strategy.general
+    return run(setting.anatomy, Evidence(setting.anatomy, setting.samples), recorder), recorder
+
+
+def obeys(setting: Setting, form: str = "simplified", thorough: bool = False) -> Rewriting:
+    """The law, for one robot: every step that passed, or (not ``thorough``) at most six of them, last ones included."""
+    result, recorder = rewritten(setting, form)
+    samples = setting.samples
+    question, length = samples.question, samples.twin.length
+    real = Oracle(setting.mechanism)
+    found = recorder.passed
+    if not thorough and len(found) > 6:
+        found = [found[int(k)] for k in np.unique(np.linspace(0, len(found) - 1, 6).round())]
+    for member in samples.members[: 3 if thorough else 1]:
+        state = state_of(samples.twin, member.configuration.q)
+        assert real.error(state) < 1e-9
+        ours = seen_by_oracle(real, state, question, length)
+        for mechanism in found:
+            oracle, reached = led(mechanism, question, member.way)
+            assert same_relation(ours, seen_by_oracle(oracle, reached, question, length)) < SAME_RELATION
+    accepted = [step for step in result.steps if step.accepted]
+    assert accepted[0].rule == "motors off"
+    assert all(step.reason for step in result.steps)
+    assert all(step.largest_angle is None or step.largest_angle < SAME_RELATION for step in accepted)
+    assert all("refused, " in step.reason for step in result.steps
+               if not step.accepted and step.largest_angle is not None and "taken back" not in step.reason)
+    assert len(recorder.passed) >= sum(step.largest_angle is not None for step in accepted)
+    return result
+
+
+def name(case: object) -> str:
+    return "all" if case is None else "-".join(case) if isinstance(case, tuple) else str(case)
+
+
+@pytest.mark.parametrize(("robot", "legs"), CASES, ids=name)
+def test_no_accepted_step_changes_the_relation(robot: str, legs: tuple[str, ...] | None) -> None:
+    obeys(setting_of(robot, legs, None, 3))
+
+
+@pytest.mark.parametrize(("robot", "camera"), CAMERAS)
+def test_no_accepted_step_changes_the_relation_seen_from_a_moving_link(robot: str, camera: str) -> None:
+    obeys(setting_of(robot, None, camera, 3))
+
+
+@pytest.mark.parametrize(("robot", "legs"), [
+    ("delta", None), ("quattro", ("1", "4")), ("3rrr_m1", None), ("gough_stewart", ("1", "2", "3")), ("3upu", ("1",)),
+    ("prrrp_m1", None), ("hexa", ("1",))], ids=name)
+def test_the_general_form_keeps_all_legs(robot: str, legs: tuple[str, ...] | None) -> None:
+    setting = setting_of(robot, legs, None, 3)
+    result = obeys(setting, "general")
+    state = result.state
+    assert state.removed == ()
+    assert tuple(leg.label for leg in state.anatomy().legs) == setting.anatomy.labels
+    assert setting.mechanism.links.keys() <= state.mechanism.links.keys()
+    assert not any(step.rule in ("pi form", "leg removal", "end change") for step in result.steps)
+    if robot in ("delta", "quattro", "3rrr_m1", "hexa"):
+        assert "{R-PP}" in state.architecture().ascii
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("robot", "legs"), CASES, ids=name)
+def test_no_accepted_step_changes_the_relation_anywhere(robot: str, legs: tuple[str, ...] | None) -> None:
+    obeys(setting_of(robot, legs, None, 3), thorough=True)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+@pytest.mark.parametrize("kind", ["planar", "pods", "aligned", "random"])
+def test_the_law_on_random_robots(kind: str, seed: int) -> None:
+    rng = np.random.default_rng([seed, 17])
+    if kind == "planar":
+        robot = planar([str(w) for w in rng.choice(["RRR", "RPR", "PRR", "RRP"], 3)], rng, [{0}, {0}, {0}])
+    elif kind == "pods":
+        robot = pods(["UPS", "RPS", "UPS", "UPS", "UPS"][: int(rng.integers(3, 6))], rng)
+    else:
+        robot = deltas(["R", "R", "P"], [str(w) for w in rng.choice(["2-SS", "US"], 3)], rng, kind == "aligned")
+    labels = tuple(o.leg for o in robot.observations)
+    for legs in (None, labels[: int(rng.integers(1, len(labels)))]):
+        obeys(prepare(robot, legs, samples=3))

@@ -1,0 +1,333 @@
+"""Rules by themselves: wrong ones are caught by the certificate and by the oracle, refusals say why, forms are as stated."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.kinematics.certificate import certify
+from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.model import JointType, Mechanism
+from hrsynth.rewrite import strategy
+from hrsynth.rewrite.evidence import Evidence, far_from, locus
+from hrsynth.rewrite.rule import Proposal, Refusal
+from hrsynth.rewrite.rules import companion, end_change, leg_removal, lift, motors_off, pi_form, takeover
+from hrsynth.rewrite.state import State
+from hrsynth.rewrite.strategy import RULES, Rewriting
+from kinematics.robots import derived, led, seen_by_oracle, setting_of, state_of
+from oracle import NotAssembled, Oracle, Undecided, logarithm, same_relation
+from strategies import deltas, random_direction, random_rotation
+
+DIFFERENT = 1e-4
+
+
+def oracle_angle(setting: Setting, mechanism: Mechanism) -> float:
+    """The largest angle between the relations of the real robot and a rewritten one over the samples, by the oracle;
+    pi/2 where it cannot follow."""
+    samples = setting.samples
+    real, angle = Oracle(setting.mechanism), 0.0
+    for member in samples.members:
+        ours = seen_by_oracle(real, state_of(samples.twin, member.configuration.q), samples.question,
+                              samples.twin.length)
+        try:
+            oracle, state = led(mechanism, samples.question, member.way)
+            theirs = seen_by_oracle(oracle, state, samples.question, samples.twin.length)
+        except (NotAssembled, Undecided):
+            return float(np.pi / 2)
+        angle = max(angle, same_relation(ours, theirs))
+    return angle
+
+
+def is_wrong(setting: Setting, mechanism: Mechanism, bodies: tuple[str, ...] = ()) -> None:
+    """The certificate refuses it, and the oracle sees the difference."""
+    certificate = certify(setting.samples, mechanism, bodies=bodies, complete=False)
+    assert not certificate.passed
+    assert certificate.reason
+    assert oracle_angle(setting, mechanism) > DIFFERENT
+
+
+def is_right(setting: Setting, mechanism: Mechanism) -> None:
+    certificate = certify(setting.samples, mechanism, complete=False)
+    assert certificate.passed, certificate.reason
+    assert oracle_angle(setting, mechanism) < 1e-6
+
+
+def evidence_of(setting: Setting) -> Evidence:
+    return Evidence(setting.anatomy, setting.samples)
+
+
+def simplified(setting: Setting) -> Rewriting:
+    def check(mechanism: Mechanism, bodies: tuple[str, ...]) -> object:
+        return certify(setting.samples, mechanism, bodies=bodies, complete=False)
+
+    return strategy.simplified(setting.anatomy, evidence_of(setting), check)  # type: ignore[arg-type]
+
+
+def proposals(found: Iterable[Proposal | Refusal]) -> tuple[list[Proposal], list[Refusal]]:
+    everything = list(found)
+    return ([p for p in everything if isinstance(p, Proposal)], [r for r in everything if isinstance(r, Refusal)])
+
+
+def lifted(setting: Setting) -> State:
+    """The exact lift of all observed legs, motors off."""
+    evidence = evidence_of(setting)
+    state = State(setting.anatomy, replace(setting.anatomy.mechanism, observations=()))
+    state = proposals(motors_off.RULE.propose(state, evidence, "", False))[0][0].state
+    for leg in dict.fromkeys(o.leg for o in setting.observed):
+        state = proposals(lift.RULE.propose(state, evidence, leg, False))[0][0].state
+    return state
+
+
+def skew(legs: int, rng: np.random.Generator, pods: int = 0) -> Mechanism:
+    """A robot with R-R-S legs whose two R are skew, and further S-P-S legs."""
+    builder = Builder("skew")
+    builder.link("base")
+    height = np.array([0.05, -0.03, 0.9])
+    builder.link("platform", height, random_rotation(rng))
+    for number in range(legs + pods):
+        angle = 2 * np.pi * number / (legs + pods) + rng.uniform(-0.2, 0.2)
+        way = np.array([np.cos(angle), np.sin(angle), 0.0])
+        foot, tip = 0.6 * way, height + 0.25 * way
+        label = str(number + 1)
+        if number >= legs:
+            builder.link(f"barrel_{label}", foot, random_rotation(rng))
+            builder.link(f"rod_{label}", tip, random_rotation(rng))
+            builder.joint(f"ball_{label}", "S", "base", f"barrel_{label}", foot)
+            builder.joint(f"slide_{label}", "P", f"barrel_{label}", f"rod_{label}", foot, axis=tip - foot, motor=True)
+            builder.joint(f"wrist_{label}", "S", f"rod_{label}", "platform", tip, loop=True)
+            builder.observe(label, f"rod_{label}", tip - foot)
+            continue
+        elbow = (foot + tip) / 2 + 0.3 * way + 0.05 * rng.normal(size=3)
+        builder.link(f"arm_{label}", elbow, random_rotation(rng))
+        builder.link(f"rod_{label}", tip, random_rotation(rng))
+        first = np.cross(way, [0, 0, 1]) + 0.3 * random_direction(rng)
+        builder.joint(f"shoulder_{label}", "R", "base", f"arm_{label}", foot, axis=first, motor=True)
+        builder.joint(f"elbow_{label}", "R", f"arm_{label}", f"rod_{label}", elbow,
+                      axis=first + 0.8 * random_direction(rng))
+        builder.joint(f"wrist_{label}", "S", f"rod_{label}", "platform", tip, loop=number > 0)
+        builder.observe(label, f"rod_{label}", tip - elbow)
+    return builder.build(platform="platform")
+
+
+# --- wrong rules -------------------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize(("legs", "pods", "seed"), [(3, 0, 1), (3, 0, 2), (1, 5, 3), (2, 3, 4)])
+def test_takeover_of_a_skew_elbow_is_caught(legs: int, pods: int, seed: int) -> None:
+    """An R that is skew to the base R cannot give way to U: done without its side condition it changes the relation."""
+    setting = prepare(skew(legs, np.random.default_rng(seed), pods), samples=3)
+    state, evidence = lifted(setting), evidence_of(setting)
+    offered, refused = proposals(takeover.RULE.propose(state, evidence, "1", False))
+    assert offered == []
+    assert "cannot turn about its own direction" in refused[0].reason
+    forced, _ = proposals(takeover.RULE.propose(state, evidence, "1", True))
+    is_wrong(setting, forced[0].state.mechanism)
+    is_right(setting, state.mechanism)
+
+
+@pytest.mark.parametrize(("legs", "pods", "seed", "word"), [
+    (3, 0, 1, "3-{RR|Pi-U*R}-S"), (1, 5, 3, "{RR|Pi-U*R}-S"), (2, 3, 4, "2-{RR|Pi-U*R}-S")])
+def test_legs_with_skew_axes_keep_their_joint(legs: int, pods: int, seed: int, word: str) -> None:
+    setting = prepare(skew(legs, np.random.default_rng(seed), pods), samples=3)
+    result = simplified(setting)
+    is_right(setting, result.state.mechanism)
+    assert word in result.state.architecture().ascii.split("+")
+    refused = [s for s in result.steps if s.rule == "takeover" and not s.accepted and int(s.leg or 0) <= legs]
+    assert len(refused) == legs
+    for number in range(1, legs + 1):
+        assert f"elbow_{number}" in result.state.mechanism.joints
+
+
+@pytest.mark.parametrize("observed", [("1", "2"), ("3",)])
+def test_removal_of_a_leg_that_holds_the_platform_is_caught(observed: tuple[str, ...]) -> None:
+    """Each leg of 3-RPS takes one freedom from the platform."""
+    setting = setting_of("3rps", observed, None, 3)
+    result = simplified(setting)
+    assert result.state.removed == ()
+    kept = {step.leg for step in result.steps if step.rule == "keep"}
+    assert kept == set(setting.anatomy.labels) - set(observed)
+    for leg in kept:
+        offered, _ = proposals(leg_removal.RULE.propose(result.state, evidence_of(setting), leg or "", False))
+        is_wrong(setting, offered[0].state.mechanism, offered[0].bodies)
+
+
+def test_the_leg_with_the_camera_is_never_removed() -> None:
+    setting = setting_of("delta", ("1", "2"), "rod_3a", 3)
+    offered, refused = proposals(leg_removal.RULE.propose(lifted(setting), evidence_of(setting), "3", True))
+    assert offered == []
+    assert "camera" in refused[0].reason
+    assert "rod_3a" in simplified(setting).state.mechanism.links
+
+
+def turned_carriers(setting: Setting, mechanism: Mechanism, state: State) -> float:
+    """By how much (rad) the carriers of the virtual actuators turn on the way to the samples, by the oracle."""
+    turns = []
+    for member in setting.samples.members:
+        oracle, reached = led(mechanism, setting.samples.question, member.way)
+        for chain in state.chains:
+            R = oracle.pose(reached, chain.carrier)[:3, :3] @ mechanism.links[chain.carrier].pose[:3, :3].T
+            turns.append(float(np.linalg.norm(logarithm(R))))
+    return max(turns)
+
+
+@pytest.mark.parametrize("robot", ["3rrr_m1", "delta", "3ruu", "quattro_rigid"])
+def test_a_parallelogram_with_a_wrong_offset_is_caught(robot: str) -> None:
+    """One crank's foot 2 % off: the carrier turns with the arm, and the actuator's angle is not the direction's."""
+    setting = setting_of(robot, None, None, 3)
+    before = strategy.general(setting.anatomy, evidence_of(setting),
+                              lambda m, bodies: certify(setting.samples, m, count=1, bodies=bodies, complete=False))
+    offered, _ = proposals(pi_form.RULE.propose(before.state, evidence_of(setting), "1", False))
+    state, right = offered[0].state, offered[0].state.mechanism
+    is_right(setting, right)
+    assert turned_carriers(setting, right, state) < 1e-9
+    joint = right.joints[next(n for n in right.joints if n.startswith("crank_base"))]
+    for direction in np.linalg.svd(joint.axis[None])[2][1:]:
+        wrong = right.changed(joints=[replace(joint, point=joint.point + 0.02 * right.length * direction)])
+        assert turned_carriers(setting, wrong, state) > 1e-4
+        certificate = certify(setting.samples, wrong, complete=False)
+        assert not certificate.passed
+        assert "parametrise" in certificate.reason
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
+    """Where the base R is not parallel to the short side, the companion rod does not stay beside the observed one."""
+    setting = prepare(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), False), samples=3)
+    evidence = evidence_of(setting)
+    trusted = strategy.trusting(setting.anatomy, evidence, change_ends=False)
+    assert len(trusted) == 1
+    assert trusted[0].state.architecture().ascii == "3-Pi-{2-U*S}"
+    is_wrong(setting, trusted[0].state.mechanism)
+    result = simplified(setting)
+    is_right(setting, result.state.mechanism)
+    refused = [step for step in result.steps if step.rule == "companion" and not step.accepted]
+    assert {step.leg for step in refused} == {"1", "2", "3"}
+    assert all("changes its direction" in step.reason for step in refused)
+    assert result.state.architecture().ascii != "3-Pi-{2-U*S}"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_trust_in_aligned_arms_is_justified(seed: int) -> None:
+    setting = prepare(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), True), samples=3)
+    trusted = strategy.trusting(setting.anatomy, evidence_of(setting), change_ends=False)
+    is_right(setting, trusted[0].state.mechanism)
+    result = simplified(setting)
+    assert result.state.architecture() == trusted[0].state.architecture()
+    assert result.state.architecture().ascii == "3-Pi-{2-U*S}"
+
+
+def test_a_ball_made_universal_where_the_rod_spins_otherwise_is_caught() -> None:
+    """Ends of a Gough-Stewart platform may not be changed: each takes a freedom away."""
+    setting = setting_of("gough_stewart", None, None, 3)
+    state = simplified(setting).state
+    offered, _ = proposals(end_change.RULE.propose(state, evidence_of(setting), "", True))
+    assert offered
+    for proposal in offered:
+        is_wrong(setting, proposal.state.mechanism)
+
+
+@pytest.mark.parametrize("robot", ["delta", "3rrr_m1", "gough_stewart"])
+def test_a_second_real_motor_is_not_what_a_lift_does(robot: str) -> None:
+    """The lift has one motor a leg, a virtual one; every real motor is passive, and nothing is constrained."""
+    setting = setting_of(robot, None, None, 3)
+    state = lifted(setting)
+    driven = {n for n, joint in state.mechanism.joints.items() if joint.actuated}
+    assert driven == {chain.actuator for chain in state.chains}
+    assert driven.isdisjoint(setting.mechanism.joints)
+    is_right(setting, state.mechanism)
+
+
+# --- reasons and conditions --------------------------------------------------------------------------------------
+
+@pytest.mark.parametrize("robot", ["3rrr_m1", "3prr_m1", "gough_stewart", "3upu", "delta", "hexaglide", "rprpr_m2"])
+def test_every_rule_gives_a_reason(robot: str) -> None:
+    setting = setting_of(robot, None, None, 3)
+    state, evidence = lifted(setting), evidence_of(setting)
+    for rule in RULES:
+        assert rule.source
+        for leg in setting.anatomy.labels:
+            for found in rule.propose(state, evidence, leg, False):
+                assert len(found.reason) > 10, rule.name
+
+
+def test_a_rule_does_not_touch_the_state_it_is_given() -> None:
+    setting = setting_of("delta", None, None, 3)
+    state, evidence = lifted(setting), evidence_of(setting)
+    before = (dict(state.mechanism.links), dict(state.mechanism.joints), state.chains, dict(state.owners))
+    for rule in RULES:
+        if rule is not lift.RULE:
+            for leg in setting.anatomy.labels:
+                list(rule.propose(state, evidence, leg, False))
+    assert before == (dict(state.mechanism.links), dict(state.mechanism.joints), state.chains, dict(state.owners))
+
+
+def test_sliding_joints_are_never_taken_over() -> None:
+    """PPR and PRP legs: a P before the observed link carries its direction, and stays."""
+    for robot in ("3rpr_m1", "gough_stewart", "3upu", "3rps", "rprpr_m1"):
+        derivation = derived(robot)
+        assert derivation.hidden is not None
+        slides = {n for n, j in derivation.setting.mechanism.joints.items() if j.type is JointType.PRISMATIC}
+        assert slides
+        assert slides <= derivation.hidden.joints.keys()
+
+
+def test_companions_are_the_other_rods() -> None:
+    setting = setting_of("delta", None, None, 3)
+    evidence = evidence_of(setting)
+    assert companion.companions(evidence, "rod_1a") == ("rod_1b",)
+    assert companion.companions(evidence, "rod_1b") == ("rod_1a",)
+    assert companion.companions(evidence, "arm_1") == ()
+    assert companion.companions(evidence_of(setting_of("hexa", None, None, 3)), "rod_1") == ()
+
+
+@pytest.mark.parametrize(("robot", "joints", "dimension", "translates"), [
+    ("3rrr_m1", 1, 2, False), ("3prr_m1", 1, 1, True), ("gough_stewart", 0, 0, True), ("delta", 1, 2, False),
+    ("hexaglide", 1, 1, True), ("3ruu", 1, 2, False)])
+def test_the_part_before_the_observed_link(robot: str, joints: int, dimension: int, translates: bool) -> None:
+    setting = setting_of(robot, None, None, 3)
+    evidence = evidence_of(setting)
+    for chain in lifted(setting).chains:
+        proximal = evidence.proximal(chain.link)
+        assert proximal is not None
+        assert len(proximal.joints) == joints
+        assert proximal.anchor_locus.dimension == dimension
+        assert proximal.translates is translates
+        assert (proximal.single_revolute is not None) is (dimension == 2)
+        if dimension == 2:
+            axis = proximal.joints[0].axis
+            assert proximal.keeps(axis)
+            assert proximal.turning_axis is not None
+            assert abs(proximal.turning_axis @ axis) == pytest.approx(1)
+
+
+@pytest.mark.parametrize("dimension", range(4))
+def test_locus(dimension: int) -> None:
+    rng = np.random.default_rng(dimension)
+    basis = np.linalg.qr(rng.normal(size=(3, 3)))[0]
+    points = rng.normal(size=3) + rng.normal(size=(15, dimension)) @ basis[:dimension]
+    found = locus(points, 1.0)
+    assert found.dimension == dimension
+    np.testing.assert_allclose(found.axes @ found.axes.T, np.eye(3), atol=1e-12)
+    if dimension == 2:
+        assert abs(found.normal @ basis[2]) == pytest.approx(1)
+
+
+def test_a_circle_lies_in_a_plane_and_a_cone_has_an_axis() -> None:
+    angles = np.linspace(0, 1, 9)
+    cone = np.column_stack((np.cos(angles), np.sin(angles), np.full(9, 0.4)))
+    assert locus(cone, 1.0).dimension == 2
+    assert abs(locus(cone, 1.0).normal[2]) == pytest.approx(1)
+
+
+def test_far_from() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(20):
+        u = random_direction(rng)
+        near = [u + 0.1 * random_direction(rng) for _ in range(5)]
+        directions = np.array([v / np.linalg.norm(v) for v in near])
+        e = far_from(directions)
+        assert np.linalg.norm(e) == pytest.approx(1)
+        assert np.max(np.abs(directions @ e)) < 0.3
