@@ -1,3 +1,34 @@
 """hrsynth: hidden robots of parallel robots that are controlled by watching the directions of their legs."""
 
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from .analysis.controllability import legs
+    from .analysis.derive import derive
+    from .description import load, save, shipped
+
 __version__ = "0.1.0"
+__all__ = ["__version__", "derive", "legs", "load", "save", "shipped"]
+
+_HOME = {
+    "derive": ".analysis.derive",
+    "legs": ".analysis.controllability",
+    "load": ".description",
+    "save": ".description",
+    "shipped": ".description",
+}
+
+
+def __getattr__(name: str) -> object:
+    """The public functions, imported when they are first asked for (``import hrsynth`` alone stays light)."""
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    from importlib import import_module
+
+    value: object = getattr(import_module(_HOME[name], __name__), name)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

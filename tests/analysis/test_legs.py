@@ -127,7 +127,7 @@ def test_a_leg_of_the_delta_does_not_see_its_circle() -> None:
         elbow = np.mean([j.point for j in setting.mechanism.joints_of(shoulder.successor) if j is not shoulder], axis=0)
         twist = sets[(label,)].lost[0].twist[:3]
         tangent = np.cross(shoulder.axis, elbow - shoulder.point)
-        assert np.linalg.norm(np.cross(twist, tangent)) < 1e-9 * np.linalg.norm(twist)  + 1e-9
+        assert np.linalg.norm(np.cross(twist, tangent)) < 1e-9 * np.linalg.norm(twist) + 1e-9
 
 
 def test_gough_stewart() -> None:

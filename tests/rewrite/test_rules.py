@@ -1,4 +1,4 @@
-"""Rules by themselves: wrong ones are caught by the certificate and by the oracle, refusals say why, forms are as stated."""
+"""Rules by themselves: the certificate and the oracle catch wrong ones, refusals say why, forms are as stated."""
 
 from __future__ import annotations
 
@@ -230,7 +230,7 @@ def test_a_ball_made_universal_where_the_rod_spins_otherwise_is_caught() -> None
 
 
 @pytest.mark.parametrize("robot", ["delta", "3rrr_m1", "gough_stewart"])
-def test_a_second_real_motor_is_not_what_a_lift_does(robot: str) -> None:
+def test_the_lift_has_virtual_motors_only(robot: str) -> None:
     """The lift has one motor a leg, a virtual one; every real motor is passive, and nothing is constrained."""
     setting = setting_of(robot, None, None, 3)
     state = lifted(setting)

@@ -94,7 +94,7 @@ def _name(direction: Array, anatomy: Anatomy) -> str:
             return _AXES[i]
     along = [j.name for j in anatomy.mechanism.joints.values()
              if j.type is JointType.PRISMATIC and np.linalg.norm(np.cross(j.axis, direction)) < _NEAR]
-    text = "(" + " ".join(f"{value + 0.0:.4g}" for value in direction) + ")"
+    text = "(" + " ".join(f"{round(float(value), 9) + 0.0:.4g}" for value in direction) + ")"
     return f"{text}, the axis of {along[0]}" if along else text
 
 
@@ -146,7 +146,7 @@ def _screw(anatomy: Anatomy, twist: Array) -> str:
     pitch = float(w @ v)
 
     def text(vector: Array) -> str:
-        return "(" + " ".join(f"{value + 0.0:.4g}" for value in vector) + ")"
+        return "(" + " ".join(f"{round(float(value), 9) + 0.0:.4g}" for value in vector) + ")"
 
     kind = "rotation" if abs(pitch) < _NEAR else f"screw motion of pitch {pitch:.4g} m/rad"
     return f"{kind} about the line through {text(point)} along {text(w)}"

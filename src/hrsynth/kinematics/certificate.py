@@ -45,7 +45,8 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
     """Compare ρ of the real robot's samples with ρ of ``hidden`` at the same poses and directions.
 
     ``bodies`` are further links whose twists must agree too. Only the first ``count`` samples are used. The actuators'
-    rates must be functions of the directions' rates, and where the hidden robot is ``complete`` the converse too (a part-way rewriting is led along every second target).
+    rates must be functions of the directions' rates, and where the hidden robot is ``complete`` the converse too (a
+    part-way rewriting is led along every second target).
     """
     members = samples.members[:count]
     question = samples.question

@@ -94,15 +94,19 @@ def point_velocity(V: Array, X: Array, point: Array, length: float) -> Array:
 
 def closed(twin: Twin, q: Array, target: Target | None = None, *, tolerance: float = CLOSED,
            iterations: int = 30) -> tuple[Array, float]:
-    """Damped Gauss-Newton from ``q``: the configuration reached and the residual left (loops and target)."""
+    """Damped Gauss-Newton from ``q``: the configuration reached and the residual left (loops and target).
+
+    The damping is the square of the residual: off closure a redundant or idle direction has singular values of the
+    residual's own size, which must not be followed; near closure the convergence stays fast.
+    """
     identity = np.eye(twin.nv)
-    damping = 1e-10
     error, J = _system(twin, q, target)
     size = float(np.linalg.norm(error))
+    factor = 1.0
     for _ in range(iterations):
-        if size <= tolerance:
+        if size <= tolerance or factor > 1e8:
             break
-        step: Array = np.linalg.solve(J.T @ J + damping * identity, -(J.T @ error))
+        step = np.linalg.solve(J.T @ J + max(factor * size**2, 1e-14) * identity, -(J.T @ error))
         length = float(np.max(np.abs(step), initial=0.0))
         if length > 0.5:
             step *= 0.5 / length
@@ -110,13 +114,10 @@ def closed(twin: Twin, q: Array, target: Target | None = None, *, tolerance: flo
         trial_error, trial_J = _system(twin, trial, target)
         trial_size = float(np.linalg.norm(trial_error))
         if trial_size < size:
-            stalled = trial_size > 0.9 * size
             q, error, J, size = trial, trial_error, trial_J, trial_size
-            damping = max(damping * (1.0 if stalled else 0.1), 1e-12)
+            factor = max(0.1 * factor, 0.1)
         else:
-            damping = max(damping * 100.0, 1e-8)
-            if damping > 1e2:
-                break
+            factor *= 10.0
     return q, size
 
 

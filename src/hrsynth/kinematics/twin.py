@@ -70,7 +70,8 @@ class Twin:
         for parent, child in nx.bfs_edges(tree, mechanism.base):
             ordered.append((tree.edges[parent, child]["joint"], parent))
         if len(ordered) != len(mechanism.links) - 1:
-            missing = sorted(set(mechanism.links) - nx.node_connected_component(tree, mechanism.base))
+            reached = {mechanism.base, *(child.other(parent) for child, parent in ordered)}
+            missing = sorted(set(mechanism.links) - reached)
             raise BadMechanism(f"{mechanism.name}: links that no joint connects to the base", ", ".join(missing))
         used = {joint.name for joint, _ in ordered}
         loops = [j for j in mechanism.joints.values() if j.name not in used and j.type is not JointType.FREE]

@@ -156,7 +156,7 @@ def _braced(text: str, style: Style) -> str:
 
 
 _TOKEN = re.compile(
-    r"\s*(?:(?P<letter>Pi|Π|[RPUSCEF6])(?P<motor>\*|\u0332|_)?|(?P<number>[0-9]+)(?=-)|(?P<sign>[-+{}|]))")
+    r"\s*(?:(?P<number>(?<![^+{\s])[0-9]+)(?=-)|(?P<letter>Pi|Π|[RPUSCEF6])(?P<motor>\*|\u0332|_)?|(?P<sign>[-+{}|]))")
 
 
 def parse(text: str) -> Architecture:

@@ -1,0 +1,71 @@
+"""The README's table of shipped robots; ``python -m hrsynth.present.readme README.md`` writes it between its marks."""
+
+from __future__ import annotations
+
+import re
+import sys
+from collections.abc import Iterable, Sequence
+from pathlib import Path
+
+from ..analysis.controllability import legs
+from ..analysis.derive import derive
+from ..description import load, shipped
+
+START, END = "<!-- generated: robots -->", "<!-- end -->"
+HEADS = ("robot", "architecture", "dof", "hidden robot, all legs watched", "verdict", "lost", "smallest leg sets")
+
+_LONGEST_LIST = 4
+_BLOCK = re.compile(rf"({re.escape(START)}\n).*?({re.escape(END)})", re.DOTALL)
+
+
+def row(name: str) -> str:
+    """One shipped robot's line: no number in it that a rounding error can change."""
+    mechanism = load(shipped()[name])
+    found, sets = derive(mechanism), legs(mechanism)
+    hidden = found.hidden_architecture
+    lost = "; ".join(freedom.name for freedom in found.verdict.lost)
+    smallest = "–" if hidden is None else _smallest(sets.minimal)
+    return _line((f"`{name}`", _cell(str(found.architecture)), str(found.dof), _cell(str(hidden)) if hidden else "none",
+                  found.verdict.verdict, lost or "–", smallest))
+
+
+def table(names: Iterable[str] | None = None) -> str:
+    """The Markdown table of the shipped robots (default: all)."""
+    rule = "|".join(["", *(" --- " for _ in HEADS), ""])
+    return "\n".join([_line(HEADS), rule, *(row(name) for name in (shipped() if names is None else names))]) + "\n"
+
+
+def block(text: str) -> str:
+    """What stands between the marks; raises ``ValueError`` where they are not there."""
+    match = _BLOCK.search(text)
+    if match is None:
+        raise ValueError(f"no {START} … {END}")
+    return match[0].removeprefix(f"{START}\n").removesuffix(END)
+
+
+def replaced(text: str, made: str) -> str:
+    """The text with ``made`` between the marks."""
+    block(text)
+    return _BLOCK.sub(lambda match: match[1] + made + match[2], text)
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
+
+
+def _cell(architecture: str) -> str:
+    return architecture.replace("|", "\\|")
+
+
+def _smallest(sets: Sequence[Sequence[str]]) -> str:
+    """The smallest sets; where there are many, the first and their number."""
+    shown = ["{" + ", ".join(each) + "}" for each in sets[:_LONGEST_LIST]]
+    if len(sets) > _LONGEST_LIST:
+        return f"{shown[0]} and {len(sets) - 1} more"
+    return " ".join(shown)
+
+
+if __name__ == "__main__":
+    for argument in sys.argv[1:]:
+        file = Path(argument)
+        file.write_text(replaced(file.read_text(encoding="utf-8"), table()), encoding="utf-8", newline="\n")
