@@ -13,7 +13,6 @@ from ..kinematics.ranks import Rank
 from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
-from ..mechanism.vectors import Array
 from ..tolerances import RANK_GAP
 from .freedoms import Freedom, name_freedoms
 from .setting import Setting, prepare, selected
@@ -74,20 +73,23 @@ def verdict_of(setting: Setting, legs: Sequence[str], samples: Samples) -> Verdi
     verdict = CONTROLLABLE if rank == dof else BLIND if rank == 0 else PARTIAL
     lost: tuple[Freedom, ...] = ()
     if rank < dof:
-        lost = name_freedoms(_lost_twists(setting, samples, dof - rank), setting.anatomy, tuple(legs))
+        lost = _lost(setting, samples, tuple(legs), dof - rank)
     graph = min(each.unexplained for each in found) == 0
     return Verdict(tuple(legs), verdict, dof, rank, lost, gap, graph)
 
 
-def _lost_twists(setting: Setting, samples: Samples, count: int) -> Array:
-    """The lost twists at the zero configuration where it is generic, else at the first sample; metres, (6, count)."""
+def _lost(setting: Setting, samples: Samples, legs: tuple[str, ...], count: int) -> tuple[Freedom, ...]:
+    """The lost freedoms at the zero configuration where it is generic, else at a sample."""
     start = relation(samples.start, samples.question)
-    found = start.lost if start.lost.shape[1] == count and start.gap >= RANK_GAP else next(
-        member.relation.lost for member in samples.members if member.relation.lost.shape[1] == count)
-    twists = np.zeros((6, found.shape[1]))
+    position = None
+    found = start.lost
+    if found.shape[1] != count or start.gap < RANK_GAP:
+        member = next(member for member in samples.members if member.relation.lost.shape[1] == count)
+        found, position = member.relation.lost, member.configuration.pose(samples.question.platform)[:3, 3]
+    twists = np.zeros((6, count))
     twists[: found.shape[0]] = found
     twists[:3] *= setting.everything.twin.length
-    return twists
+    return name_freedoms(twists, setting.anatomy, legs, position)
 
 
 def legs(robot: Mechanism, camera: str | None = None, *, progress: Callable[[], None] | None = None,

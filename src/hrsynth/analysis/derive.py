@@ -229,12 +229,12 @@ def _exchanged(anatomy: Anatomy, found: Certificate,
     """The platform's freedoms that a wrong hidden robot gains and loses, at the configuration where they differ."""
     if found.mismatch is None or found.mismatch.real.twist_rows != 6:
         return (), ()
-    real, hidden = found.mismatch.real, found.mismatch.hidden
+    real, hidden, position = found.mismatch.real, found.mismatch.hidden, found.mismatch.position
 
     def beyond(inner: Array, outer: Array) -> tuple[Freedom, ...]:
         rest = range_basis(inner - outer @ (outer.T @ inner), 1.0)[0].copy()
         rest[:3] *= length
-        return name_freedoms(rest, anatomy)
+        return name_freedoms(rest, anatomy, position=position)
 
     gains, loses = beyond(hidden.twists, real.twists), beyond(real.twists, hidden.twists)
     if not gains and not loses:

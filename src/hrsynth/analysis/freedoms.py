@@ -27,10 +27,12 @@ class Freedom:
         return {"twist": [round(float(value), 12) + 0.0 for value in self.twist], "name": self.name}
 
 
-def name_freedoms(twists: Array, anatomy: Anatomy, labels: tuple[str, ...] | None = None) -> tuple[Freedom, ...]:
+def name_freedoms(twists: Array, anatomy: Anatomy, labels: tuple[str, ...] | None = None,
+                  position: Array | None = None) -> tuple[Freedom, ...]:
     """Named twists that span the columns of ``twists`` (6, k), metres and radians, at the zero configuration.
 
-    ``labels`` are the legs whose tips are tried as points of rotation axes (default: all).
+    ``labels`` are the legs whose tips are tried as points of rotation axes (default: all). With ``position`` the twists
+    belong to another configuration, with the platform's origin there: lines of the robot are not named then.
     """
     if twists.shape[1] == 0:
         return ()
@@ -41,7 +43,7 @@ def name_freedoms(twists: Array, anatomy: Anatomy, labels: tuple[str, ...] | Non
     for direction in _nice_directions(translations, anatomy):
         twist = np.concatenate([direction, np.zeros(3)])
         found.append(Freedom(twist, f"translation along {_name(direction, anatomy)}"))
-    for point, direction, name in _lines(anatomy, labels):
+    for point, direction, name in _lines(anatomy, labels) if position is None else ():
         if len(found) == twists.shape[1]:
             break
         twist = _rotation(anatomy, point, direction)
@@ -53,8 +55,12 @@ def name_freedoms(twists: Array, anatomy: Anatomy, labels: tuple[str, ...] | Non
         rest = _without(column, found)
         if np.linalg.norm(rest[3:]) > _NEAR and not _spanned(rest, found):
             twist = rest / np.linalg.norm(rest[3:])
-            found.append(Freedom(twist, _screw(anatomy, twist)))
-    return tuple(found)
+            origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3] if position is None else position
+            found.append(Freedom(twist, _screw(origin, twist)))
+    if position is None:
+        return tuple(found)
+    where = f" (with the platform at {_text(position)})"
+    return tuple(Freedom(freedom.twist, freedom.name + where) for freedom in found)
 
 
 def _inside(twist: Array, span: Array) -> bool:
@@ -138,15 +144,14 @@ def _rotation(anatomy: Anatomy, point: Array, direction: Array) -> Array:
     return np.concatenate([np.cross(direction, origin - point), direction])
 
 
-def _screw(anatomy: Anatomy, twist: Array) -> str:
-    """The screw of a twist with unit angular part: its axis and pitch (m/rad)."""
-    origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3]
+def _text(vector: Array) -> str:
+    return "(" + " ".join(f"{0.0 if abs(value) < 1e-9 else value:.4g}" for value in vector) + ")"
+
+
+def _screw(origin: Array, twist: Array) -> str:
+    """The screw of a twist with unit angular part at ``origin``: its axis and pitch (m/rad)."""
     v, w = twist[:3], twist[3:]
     point = origin + np.cross(w, v)
     pitch = float(w @ v)
-
-    def text(vector: Array) -> str:
-        return "(" + " ".join(f"{round(float(value), 9) + 0.0:.4g}" for value in vector) + ")"
-
     kind = "rotation" if abs(pitch) < _NEAR else f"screw motion of pitch {pitch:.4g} m/rad"
-    return f"{kind} about the line through {text(point)} along {text(w)}"
+    return f"{kind} about the line through {_text(point)} along {_text(w)}"

@@ -19,10 +19,11 @@ from .twin import Twin
 
 @dataclass(frozen=True, eq=False)
 class Mismatch:
-    """A configuration at which two relations differ."""
+    """A configuration at which two relations differ; ``position`` is the platform's there (3,)."""
 
     real: Relation
     hidden: Relation
+    position: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,14 +74,15 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
             angle = np.pi / 2
             return verdict(f"cannot follow the real robot: misses by {residual:.2g}")
         at = ClosedConfiguration.of(twin, q, FOLLOWED)
+        here = member.configuration.pose(question.platform)[:3, 3]
         theirs = relation(at, asked, blind=blind)
         ours = member.relation if not bodies else relation(member.configuration, asked)
         gap = min(gap, theirs.gap, ours.gap)
         angle = max(angle, largest_angle(ours.basis, theirs.basis))
         if gap < RANK_GAP:
-            return verdict(f"a rank is not clear: gap {gap:.2g}", Mismatch(ours, theirs))
+            return verdict(f"a rank is not clear: gap {gap:.2g}", Mismatch(ours, theirs, here))
         if not angle <= SAME_RELATION:
-            return verdict(_difference(ours, theirs, angle), Mismatch(ours, theirs))
+            return verdict(_difference(ours, theirs, angle), Mismatch(ours, theirs, here))
         if active and not _parametrise(at, asked, active, blind, complete):
             angle = np.pi / 2
             return verdict("the virtual actuators do not parametrise the observed directions")

@@ -106,7 +106,7 @@ def closed(twin: Twin, q: Array, target: Target | None = None, *, tolerance: flo
     for _ in range(iterations):
         if size <= tolerance or factor > 1e8:
             break
-        step = np.linalg.solve(J.T @ J + max(factor * size**2, 1e-14) * identity, -(J.T @ error))
+        step: Array = np.linalg.solve(J.T @ J + max(factor * size**2, 1e-14) * identity, -(J.T @ error))
         length = float(np.max(np.abs(step), initial=0.0))
         if length > 0.5:
             step *= 0.5 / length

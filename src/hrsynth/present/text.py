@@ -43,7 +43,7 @@ def derivation(found: Derivation, hidden_file: str | None) -> str:
         *([("camera on", reference)] if reference != found.setting.mechanism.base else []),
         ("hidden robot", str(hidden) if hidden else "none: every observed direction is constant"),
         ("verdict", found.verdict.verdict),
-        *[("lost" if i == 0 else "", freedom.name) for i, freedom in enumerate(found.verdict.lost)],
+        *[("lost at zero" if i == 0 else "", freedom.name) for i, freedom in enumerate(found.verdict.lost)],
         *([] if found.verdict.graph else
           [("", "there is no interaction matrix: observed links move while the platform rests")]),
         ("certificate", f"{'passed' if certificate.passed else 'FAILED'} at {certificate.samples} configurations"
@@ -72,7 +72,7 @@ def legs(found: Legs) -> str:
              "; ".join(freedom.name for freedom in each.lost)) for each in found.sets]
     smallest = "  ".join("{" + ", ".join(each) + "}" for each in found.minimal)
     lines = [f"{found.robot}   {found.architecture}   {found.dof} dof", "",
-             table(rows, ("legs", "verdict", "rank", "lost")), "",
+             table(rows, ("legs", "verdict", "rank", "lost (at the zero configuration)")), "",
              f"smallest sets of the best rank: {smallest}"]
     if not found.complete:
         lines.append("not all sets were tried: there are too many legs")
