@@ -143,6 +143,14 @@ def test_a_file_that_cannot_be_written_leaves_nothing(run, tmp_path: Path):
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_device_or_pipe_is_never_replaced(run, tmp_path: Path):
+    pipe = tmp_path / "pipe"
+    os.mkfifo(pipe)
+    assert "not a regular file" in run("convert", "3prp", pipe).refused()[0]
+    assert pipe.is_fifo()
+    assert list(tmp_path.iterdir()) == [pipe]
+
+
 @pytest.mark.skipif(os.geteuid() == 0, reason="root may write everywhere")
 def test_a_folder_without_leave_to_write(run, tmp_path: Path):
     tmp_path.chmod(0o555)
@@ -186,7 +194,8 @@ def test_both_forms_are_certified(run):
     (["--observe", "1,all"], ["'all'"]),
     (["--camera", "moon"], ["camera", "'moon'", "platform"]),
     (["--form", "pretty"], ["'pretty'", "simplified, general"]),
-    (["--seed", "x"], ["seed", "'x'"]),
+    (["--seed", "x"], ["seed", "integer"]),
+    (["--seed", "-1"], ["seed", "0"]),
     (["--nothing"], ["--nothing"]),
     (["more"], ["more"]),
 ])
@@ -270,35 +279,34 @@ def test_no_loop(run, robot):
 
 
 def test_a_loop_that_cannot_be_closed_is_named_with_its_residual(run, robot):
-    file = robot(FOUR_BAR.replace('<origin xyz="2 0 0"/>\n    </successor>', '<origin xyz="2.5 0 0"/>\n    </successor>'))
+    end = '<origin xyz="2 0 0"/>\n    </successor>'
+    file = robot(FOUR_BAR.replace(end, end.replace("2 0 0", "2.5 0 0")))
     (line,) = run("derive", file).refused(3)
     assert line.startswith(f"hrsynth: {file}:25: ")
     assert "'d'" in line
     assert float(re.search(r"residual ([-+.e\d]+),", line)[1]) > 0.1
 
 
-def test_a_label_used_for_two_legs(run, robot):
-    old = '<observe leg="1" link="crank" axis="0 0 1"/>'
+def with_observes(*observes: tuple[str, str]) -> tuple[str, int]:
+    """A shipped robot with these (leg, link) observed, one a line; the line of the last."""
     text = shipped()["delta"].read_text(encoding="utf-8")
-    assert old not in text
-    second = re.search(r'<observe leg="2"', text)
-    assert second is not None
-    file = robot(text.replace('<observe leg="2"', '<observe leg="1"'))
-    number = text.count("\n", 0, second.start()) + 1
-    lines = run("derive", file).refused()
-    assert len(lines) == 1
-    assert lines[0].startswith(f"hrsynth: {file}:{number}: ")
+    place = text.index("<platform")
+    lines = [f'<observe leg="{leg}" link="{link}" axis="0 0 1"/>\n' for leg, link in observes]
+    return text[:place] + "\n" + "".join(lines) + text[place:], text.count("\n", 0, place) + 1 + len(lines)
 
 
-@pytest.mark.parametrize("link", ["base", "platform"])
-def test_observe_of_a_link_in_no_leg(run, robot, link: str):
-    text = shipped()["delta"].read_text(encoding="utf-8")
-    found = re.search(r'<observe leg="3" link="\w+"', text)
-    file = robot(text.replace(found[0], f'<observe leg="3" link="{link}"'))
-    number = text.count("\n", 0, found.start()) + 1
-    lines = run("derive", file).refused()
-    assert len(lines) == 1
-    assert lines[0].startswith(f"hrsynth: {file}:{number}: ")
+@pytest.mark.parametrize("observes", [
+    [("1", "rod_1a"), ("1", "rod_2a")],
+    [("1", "rod_1a"), ("2", "base")],
+    [("1", "rod_1a"), ("2", "platform")],
+])
+def test_observe_elements_that_contradict_the_legs(run, robot, observes: list[tuple[str, str]]):
+    text, number = with_observes(*observes)
+    file = robot(text)
+    for command in ("derive", "legs"):
+        lines = run(command, file).refused()
+        assert len(lines) == 1
+        assert lines[0].startswith(f"hrsynth: {file}:{number}: ")
 
 
 def test_files_that_are_none(run, robot, tmp_path: Path):

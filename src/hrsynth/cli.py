@@ -18,7 +18,7 @@ app = typer.Typer(
 Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file, or the name of a shipped robot.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
 Camera = Annotated[str | None, typer.Option("--camera", metavar="LINK", help="The link that carries the camera.")]
-Seed = Annotated[int, typer.Option("--seed", help="Seed of the random configurations.")]
+Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random configurations.")]
 
 
 def _version(wanted: bool) -> None:

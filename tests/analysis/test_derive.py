@@ -15,13 +15,15 @@ from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.analysis.setting import SAMPLES
 from hrsynth.description import load, native
-from hrsynth.errors import BadRequest
+from hrsynth.errors import BadRequest, NotCertified
+from hrsynth.kinematics.certificate import Certificate
 from hrsynth.kinematics.twin import Twin
 from hrsynth.mechanism.model import JointType
 from hrsynth.mechanism.observation import Direction
 from hrsynth.tolerances import ASSEMBLED, FOLLOWED, RANK_GAP, SAME_RELATION
 from kinematics.robots import ROBOTS, derived
 from oracle import Oracle
+from strategies import deltas
 
 PLANE = ("translation along x", "translation along y", "rotation about the platform's z axis")
 
@@ -284,6 +286,24 @@ def test_two_legs_of_3upu_need_the_third() -> None:
     refused = [step for step in derivation.steps if step.rule == "leg removal" and not step.accepted]
     assert refused
     assert all("refused" in step.reason for step in refused)
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_unobserved_legs_near_a_fold(seed: int) -> None:
+    """A sample at which the robot cannot follow itself, for want of the directions of the other legs, is no sample."""
+    robot = deltas(["R", "R", "P"], ["2-SS"] * 3, np.random.default_rng([seed, 17]), False)
+    derivation = derive(robot, ["1", "2"])
+    assert derivation.hidden is not None
+    certified(derivation)
+
+
+def test_nothing_is_answered_without_a_certificate(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where even the lift is refused no leg is called blind."""
+    refused = Certificate(3, 0, 1.0, 1e9, 0.0, False, "refused")
+    monkeypatch.setattr("hrsynth.analysis.derive.certify", lambda *args, **options: refused)
+    with pytest.raises(NotCertified) as caught:
+        derive(load("3rrr_m1"))
+    assert caught.value.exit_status == 3
 
 
 # --- other segments, other cameras, other forms ------------------------------------------------------------------

@@ -145,6 +145,8 @@ def derive(robot: Mechanism, observe: Sequence[str] | None = None, camera: str |
     else:
         hidden = architecture = None
         certificate = _blind(samples)
+        if not certificate.passed:
+            raise NotCertified(robot.name, certificate.largest_angle, SAME_RELATION)
     return Derivation(robot, setting, form, anatomy.architecture(), hidden, architecture, verdict, result.steps,
                       certificate, paper)
 

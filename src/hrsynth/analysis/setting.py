@@ -93,7 +93,7 @@ def prepare(robot: Mechanism, observe: Sequence[str] | None = None, camera: str 
     extra = tuple(o for o in observed if (o.leg, o.link) not in known)
     question = Question(normal.mechanism.platform, anatomy.point, normal.mechanism.reference,
                         (*defaults.values(), *extra))
-    drawn = draw(Twin(normal.mechanism), question, samples, seed, progress=progress)
+    drawn = draw(Twin(normal.mechanism), question, samples, seed, led_by=observed, progress=progress)
     return Setting(robot, normal, anatomy, observed, drawn, len(defaults))
 
 

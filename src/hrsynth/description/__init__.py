@@ -61,6 +61,8 @@ def save(mechanism: Mechanism, path: str | Path) -> None:
         target = Path(os.path.realpath(path))
         if target.is_dir():
             raise BadRequest("cannot write the file: a directory", str(path))
+        if target.exists() and not target.is_file():
+            raise BadRequest("cannot write the file: not a regular file", str(path))
         draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
         try:
             draft.write_text(text, encoding="utf-8", newline="\n")

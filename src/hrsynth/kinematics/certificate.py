@@ -45,9 +45,9 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
             complete: bool = True, progress: Callable[[], None] | None = None) -> Certificate:
     """Compare ρ of the real robot's samples with ρ of ``hidden`` at the same poses and directions.
 
-    ``bodies`` are further links whose twists must agree too. Only the first ``count`` samples are used. The actuators'
-    rates must be functions of the directions' rates, and where the hidden robot is ``complete`` the converse too (a
-    part-way rewriting is led along every second target).
+    ``bodies`` are further links whose twists must agree too. Only the first ``count`` samples are used. Each actuator
+    must be the angle of one direction, and where the hidden robot is ``complete`` each direction must have its own
+    actuators (a part-way rewriting is led along every second target).
     """
     members = samples.members[:count]
     question = samples.question
@@ -105,13 +105,18 @@ def _difference(ours: Relation, theirs: Relation, angle: float) -> str:
 
 def _parametrise(at: ClosedConfiguration, question: Question, active: list[int], blind: frozenset[str],
                  complete: bool) -> bool:
-    """Whether direction rates determine actuator rates, and (``complete``) the other way round."""
+    """Whether each actuator's rate follows from the rate of one observation alone, and (``complete``) each observation's
+    from those of its own actuators."""
     kernel, _ = at.kernel()
-    rows = question.rows(at, blind=blind)
-    measured: Array = rows[question.twist_rows : question.twist_rows + 3 * len(question.observations)] @ kernel
+    rows = question.rows(at, blind=blind)[question.twist_rows :] @ kernel
     motors = kernel[active]
-    unseen, _ = kernel_basis(measured, 1.0)
-    if np.linalg.norm(motors @ unseen) > SAME_RELATION:
-        return False
-    locked, _ = kernel_basis(motors, 1.0)
-    return not complete or bool(np.linalg.norm(measured @ locked) <= SAME_RELATION)
+    explained = np.zeros(len(active), dtype=bool)
+    for index in range(len(question.observations)):
+        measured = rows[3 * index : 3 * index + 3]
+        unseen, _ = kernel_basis(measured, 1.0)
+        own = np.linalg.norm(motors @ unseen, axis=1) <= SAME_RELATION
+        explained |= own
+        locked, _ = kernel_basis(motors[own], 1.0)
+        if complete and np.linalg.norm(measured @ locked) > SAME_RELATION:
+            return False
+    return bool(explained.all())

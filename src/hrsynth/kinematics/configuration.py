@@ -106,11 +106,11 @@ def closed(twin: Twin, q: Array, target: Target | None = None, *, tolerance: flo
     for _ in range(iterations):
         if size <= tolerance or factor > 1e8:
             break
-        step: Array = np.linalg.solve(J.T @ J + max(factor * size**2, 1e-14) * identity, -(J.T @ error))
+        step = np.linalg.solve(J.T @ J + max(factor * size**2, 1e-14) * identity, -(J.T @ error))
         length = float(np.max(np.abs(step), initial=0.0))
         if length > 0.5:
             step *= 0.5 / length
-        trial = twin.moved(q, step)
+        trial = twin.moved(q, np.asarray(step, dtype=float))
         trial_error, trial_J = _system(twin, trial, target)
         trial_size = float(np.linalg.norm(trial_error))
         if trial_size < size:

@@ -9,11 +9,12 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..errors import NotSampled
+from ..mechanism.observation import Observation
 from ..mechanism.vectors import Array
 from ..tolerances import FOLLOWED, RANK_GAP
 from .configuration import ClosedConfiguration, Target, closed
@@ -57,15 +58,19 @@ class Samples:
         return self.members[0].relation.mobility
 
 
-def draw(twin: Twin, question: Question, count: int, seed: int = 0, *,
+def draw(twin: Twin, question: Question, count: int, seed: int = 0, *, led_by: Sequence[Observation] | None = None,
          progress: Callable[[], None] | None = None) -> Samples:
-    """``count`` random samples; raises ``NotSampled`` where too few can be reached."""
+    """``count`` random samples; raises ``NotSampled`` where too few can be reached.
+
+    The robot must find its way again led by the platform's pose and the observations ``led_by`` (default: all).
+    """
+    leading = {(o.leg, o.link) for o in (question.observations if led_by is None else led_by)}
     rng = np.random.default_rng(seed)
     start = ClosedConfiguration.of(twin, twin.q0)
     members: list[Sample] = []
     discarded = 0
     for _ in range(4 * count):
-        sample = _walk(start, question, rng)
+        sample = _walk(start, question, leading, rng)
         if sample is None:
             discarded += 1
             continue
@@ -111,7 +116,7 @@ def _velocity(at: ClosedConfiguration, question: Question, wish: Array | None,
     return kernel @ np.linalg.lstsq(image, wanted, rcond=1e-9)[0], wanted
 
 
-def _walk(start: ClosedConfiguration, question: Question, rng: np.random.Generator) -> Sample | None:
+def _walk(start: ClosedConfiguration, question: Question, leading: set[tuple[str, str]], rng: np.random.Generator) -> Sample | None:
     twin = start.twin
     here, wish = start, None
     way: list[Target] = []
@@ -137,7 +142,9 @@ def _walk(start: ClosedConfiguration, question: Question, rng: np.random.Generat
             return None
         way.append(question.target(here))
     found = relation(here, question)
-    if found.gap < RANK_GAP or followed(twin, way, iterations=EASY)[1] > FOLLOWED:
+    led = [replace(t, measured=tuple(pair for pair in t.measured if (pair[0].leg, pair[0].link) in leading))
+           for t in way]
+    if found.gap < RANK_GAP or followed(twin, led, iterations=EASY)[1] > FOLLOWED:
         return None
     return Sample(here, tuple(way), found)
 
