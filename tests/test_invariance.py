@@ -1,12 +1,13 @@
-"""What a robot is called, where its base stands, in what order its legs come and where its loops are cut changes nothing."""
+"""Names, the place of the base, the order of the legs and the choice of cut joints change nothing."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
-import strategies
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+
+import strategies
 from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.description import load, shipped
 from hrsynth.mechanism import Mechanism

@@ -105,8 +105,8 @@ def _difference(ours: Relation, theirs: Relation, angle: float) -> str:
 
 def _parametrise(at: ClosedConfiguration, question: Question, active: list[int], blind: frozenset[str],
                  complete: bool) -> bool:
-    """Whether each actuator's rate follows from the rate of one observation alone, and (``complete``) each observation's
-    from those of its own actuators."""
+    """Whether each actuator's rate follows from the rate of one observation alone, and (``complete``) each
+    observation's rate from those of its own actuators."""
     kernel, _ = at.kernel()
     rows = question.rows(at, blind=blind)[question.twist_rows :] @ kernel
     motors = kernel[active]

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..errors import NotSampled
+from ..errors import BadMechanism, NotSampled
 from ..mechanism.observation import Observation
 from ..mechanism.vectors import Array
 from ..tolerances import FOLLOWED, RANK_GAP
@@ -67,6 +67,9 @@ def draw(twin: Twin, question: Question, count: int, seed: int = 0, *, led_by: S
     leading = {(o.leg, o.link) for o in (question.observations if led_by is None else led_by)}
     rng = np.random.default_rng(seed)
     start = ClosedConfiguration.of(twin, twin.q0)
+    if relation(start, question).dimension == 0:
+        raise BadMechanism(f"{twin.mechanism.name}: neither the platform nor a segment of a leg can move", None,
+                           "a mechanism with at least one freedom")
     members: list[Sample] = []
     discarded = 0
     for _ in range(4 * count):
@@ -116,7 +119,8 @@ def _velocity(at: ClosedConfiguration, question: Question, wish: Array | None,
     return kernel @ np.linalg.lstsq(image, wanted, rcond=1e-9)[0], wanted
 
 
-def _walk(start: ClosedConfiguration, question: Question, leading: set[tuple[str, str]], rng: np.random.Generator) -> Sample | None:
+def _walk(start: ClosedConfiguration, question: Question, leading: set[tuple[str, str]],
+          rng: np.random.Generator) -> Sample | None:
     twin = start.twin
     here, wish = start, None
     way: list[Target] = []
