@@ -159,7 +159,7 @@ def test_a_message_is_one_line_with_file_line_value_and_what_is_allowed():
 
 
 @pytest.mark.parametrize(("text", "line", "what"), [
-    ("", None, "an empty file"), (b" \n\n", None, "an empty file"), (b"\0" * 100, 1, "malformed XML"),
+    ("", 1, "an empty file"), (b" \n\n", 1, "an empty file"), (b"\0" * 100, 1, "malformed XML"),
     (FOUR_BAR.replace("crank", "kurbel-ü").encode("latin-1"), 3, "not UTF-8 text, 0xfc"),
     (FOUR_BAR.encode("utf-16"), 1, "not UTF-8 text, 0xff"), ("junk", 1, "malformed XML"),
     ("<robot", 1, "malformed XML"),

@@ -62,7 +62,7 @@ def document(text: bytes | str, file: str) -> Element:
         return BadRobotFile([Defect(file, line, what, value)])
 
     if not data.strip():
-        raise refuse(None, "an empty file")
+        raise refuse(1, "an empty file")
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:

@@ -54,7 +54,7 @@ ROBOTS: tuple[Shipped, ...] = tuple(sorted([
     Shipped("3prp", planar.three_prp, "3-P*RP", 3, _TABLE_1, _FREE),
     Shipped("3rrp", planar.three_rrp, "3-R*RP", 3, _TABLE_1, _FREE),
     Shipped("prrrp_parallel", planar.prrrp_parallel, "P*RRRP*", 2, "MMT 4.3, Fig. 17", _FREE),
-    Shipped("prrrp_parallel_point", partial(planar.prrrp_parallel, point_body=True), "2-P*RR", 2, "MMT 4.3, Fig. 17",
+    Shipped("prrrp_parallel_point", partial(planar.prrrp_parallel, point_body=True), "P*RRRP*", 2, "MMT 4.3, Fig. 17",
             f"{_FREE}; the platform is a point body on the shared end joint"),
     Shipped("gough_stewart", npod.gough_stewart, "6-UP*S", 6, _NPOD, _FREE),
     Shipped("3upu", npod.three_upu, "3-UP*U", 3, _NPOD, _FREE),
