@@ -107,11 +107,3 @@ class NotCertified(HrsynthError):
         super().__init__(
             f"{robot}: no hidden robot passed the certificate, largest angle {angle:.3g}, allowed: {tolerance:.3g}"
         )
-
-
-class MissingExtra(HrsynthError):
-    """An optional package is not installed: the extra that brings it."""
-
-    def __init__(self, package: str, extra: str) -> None:
-        self.package, self.extra = package, extra
-        super().__init__(f"this needs {package}, which is not installed: pip install 'hrsynth[{extra}]'")

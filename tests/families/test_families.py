@@ -59,7 +59,7 @@ EXPECTED = {
 FAR = 0.1
 """Smallest response to a unit platform twist (lengths in characteristic lengths) at the zero configuration."""
 NOT_IN_LEGS = {"quattro": "RRRR", "i4l": "P", "prrrp_parallel_point": "R"}
-"""Joints of articulated platforms, which the architecture does not print, and the end joint that a point body doubles."""
+"""Joints that no architecture prints: those of articulated platforms, the end joint doubled by a point body."""
 
 robots = pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
 

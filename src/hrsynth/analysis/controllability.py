@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from itertools import combinations
 from typing import Any
 
@@ -15,7 +15,7 @@ from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..tolerances import RANK_GAP
 from .freedoms import Freedom, name_freedoms
-from .setting import Setting, prepare, selected
+from .setting import Setting, prepare, restricted
 
 CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncontrollable"
 LARGEST_COMPLETE = 10
@@ -97,14 +97,15 @@ def legs(robot: Mechanism, camera: str | None = None, *, progress: Callable[[], 
     """The verdict of every set of legs at their default segments (theory 3, verdicts)."""
     setting = prepare(robot, None, camera, seed=seed)
     anatomy = setting.anatomy
-    labels = tuple(o.leg for o in setting.everything.question.observations[: setting.defaults])
+    segments = setting.everything.question.observations[: setting.defaults]
+    labels = tuple(o.leg for o in segments)
     sets = []
     complete = len(labels) <= LARGEST_COMPLETE
     for size in range(1, len(labels) + 1):
         if not complete and 3 < size < len(labels):
             continue
         for places in combinations(range(len(labels)), size):
-            samples = _chosen(setting, places)
+            samples = restricted(setting.everything, [segments[i] for i in places])
             sets.append(verdict_of(setting, [labels[i] for i in places], samples))
             if progress is not None:
                 progress()
@@ -112,11 +113,3 @@ def legs(robot: Mechanism, camera: str | None = None, *, progress: Callable[[], 
     smallest = min(len(each.legs) for each in sets if each.rank == best)
     minimal = tuple(each.legs for each in sets if each.rank == best and len(each.legs) == smallest)
     return Legs(robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), complete, minimal)
-
-
-def _chosen(setting: Setting, places: tuple[int, ...]) -> Samples:
-    everything = setting.everything
-    question = replace(everything.question, observations=tuple(everything.question.observations[i] for i in places))
-    members = tuple(replace(m, relation=selected(m.relation, places), way=()) for m in everything.members)
-    return Samples(question, everything.twin, everything.start, members, everything.discarded)
-

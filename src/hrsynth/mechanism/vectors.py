@@ -60,15 +60,6 @@ def rotation_from_rpy(roll: float, pitch: float, yaw: float) -> Array:
     )
 
 
-def rpy_from_rotation(R: Array) -> tuple[float, float, float]:
-    """Roll, pitch, yaw of a rotation (yaw = 0 where pitch = ±90°): the inverse of :func:`rotation_from_rpy`."""
-    cos_pitch = float(np.hypot(R[0, 0], R[1, 0]))
-    pitch = float(np.arctan2(-R[2, 0], cos_pitch))
-    if cos_pitch < 1e-9:
-        return float(np.arctan2(-R[1, 2], R[1, 1])), pitch, 0.0
-    return float(np.arctan2(R[2, 1], R[2, 2])), pitch, float(np.arctan2(R[1, 0], R[0, 0]))
-
-
 def perpendicular(axis: ArrayLike, near: ArrayLike | None = None) -> Array:
     """A unit vector normal to ``axis``: the part of ``near`` normal to it where that is not (nearly) zero."""
     n = unit(axis)

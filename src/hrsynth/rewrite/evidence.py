@@ -105,10 +105,6 @@ class Evidence:
         values = [target.measured[index][1] for member in self.samples.members for target in member.way]
         return np.asarray(values) @ home.T
 
-    def index_of(self, link: str, leg: str) -> int:
-        """The observation of a leg on ``link``."""
-        return next(i for i, o in enumerate(self.samples.question.observations) if (o.link, o.leg) == (link, leg))
-
     def spins(self, link: str, direction: Array) -> bool:
         """Whether a link can turn about its own direction with every other link at rest.
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
-from ..mechanism import Joint, JointType, Mechanism, Observation
+from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Anatomy, Leg
 from ..mechanism.notation import Architecture
 from ..mechanism.vectors import Array
@@ -34,11 +34,6 @@ class Chain:
     taken: bool = False
     spins: bool = False
     """Whether the takeover was of the kind that leaves the actuator's axes free."""
-
-    @property
-    def virtual_links(self) -> tuple[str, ...]:
-        """Links that are in no real robot and still belong to the sliding part."""
-        return self.slider_links
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,8 +109,3 @@ def towards(joint: Joint, before: str) -> Joint:
 def ball_to_universal(joint: Joint, before: str, axes: tuple[Array, Array]) -> Joint:
     """An S made a U whose first axis is fixed in ``before``."""
     return replace(towards(joint, before), type=JointType.UNIVERSAL, axes=axes)
-
-
-def observation_in(mechanism: Mechanism, observation: Observation) -> bool:
-    """Whether the observed link is still there."""
-    return observation.link in mechanism.links

@@ -1,0 +1,136 @@
+"""Legs, platforms and segments are found by structure."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import strategies
+from hrsynth.description import load, shipped
+from hrsynth.errors import BadMechanism, BadRequest, BadRobotFile
+from hrsynth.mechanism import Direction, Mechanism
+from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.legs import Anatomy, default_observation, dissect, observation_of
+from hrsynth.mechanism.normal import normal_form
+
+
+def anatomy(name: str) -> Anatomy:
+    return dissect(normal_form(load(name)).mechanism)
+
+
+@pytest.mark.parametrize(("name", "platform"), [
+    ("quattro", {"platform", "plate_12", "plate_34", "side_bar"}), ("i4l", {"platform", "plate_12"}),
+    ("quattro_rigid", {"platform"}), ("gough_stewart", {"platform"}), ("rrrrr_m1", {"dist_1"})])
+def test_articulated_platforms_are_found(name: str, platform: set[str]) -> None:
+    assert set(anatomy(name).platform) == platform
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_legs_share_no_link_and_end_on_the_platform(name: str) -> None:
+    found = anatomy(name)
+    links = [link for leg in found.legs for link in leg.links]
+    assert len(links) == len(set(links))
+    assert not set(links) & {found.mechanism.base, *found.platform}
+    assert all(leg.attach in found.platform for leg in found.legs)
+    assert set(links) | {found.mechanism.base, *found.platform} == set(found.mechanism.links)
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_default_segments_have_a_direction_from_base_to_platform(name: str) -> None:
+    found = anatomy(name)
+    for leg in found.legs:
+        observation = default_observation(found, leg)
+        assert observation.leg == leg.label
+        assert np.isclose(np.linalg.norm(observation.direction), 1.0)
+        assert found.leg_of(observation.link) == leg
+
+
+def test_the_default_segment_is_the_rod_or_the_sliding_axis() -> None:
+    robot = anatomy("gough_stewart")
+    direction = default_observation(robot, robot.legs[0])
+    slide = robot.mechanism.joints["slide_1"]
+    u = robot.mechanism.links[direction.link].pose[:3, :3] @ direction.direction
+    assert np.allclose(np.cross(u, slide.axis), 0)
+    assert u[2] > 0
+    robot = anatomy("delta")
+    first = default_observation(robot, robot.legs[0])
+    rod = robot.mechanism.joints_of(first.link)
+    along = rod[1].point - rod[0].point
+    u = robot.mechanism.links[first.link].pose[:3, :3] @ first.direction
+    assert first.link == "rod_1a"
+    assert np.allclose(u, along / np.linalg.norm(along))
+
+
+def test_only_the_end_joint_makes_a_point_of_a_platform() -> None:
+    assert anatomy("prrrp_parallel_point").point is not None
+    assert anatomy("prrrp_parallel").point is None
+    assert anatomy("3rrr_m1").point is None
+
+
+def test_a_point_platform_with_its_frame_elsewhere_is_the_same_point() -> None:
+    from dataclasses import replace
+
+    robot = normal_form(load("prrrp_parallel_point")).mechanism
+    frame = robot.links["platform"].pose.copy()
+    frame[:3, 3] += (0.1, 0.05, 0.02)
+    moved = robot.changed(links=[replace(robot.links["platform"], pose=frame)])
+    assert np.allclose(dissect(moved).point, (-0.1, -0.05, 0.0))
+
+
+@pytest.mark.parametrize("name", ["delta", "quattro", "3rrr_m1", "rrrrr_m1"])
+def test_names_do_not_matter(name: str) -> None:
+    robot = load(name)
+    other = strategies.renamed(robot, np.random.default_rng(3))
+    assert dissect(normal_form(other).mechanism).architecture() == anatomy(name).architecture()
+
+
+def watched(*observations: tuple[str, str]) -> Mechanism:
+    from dataclasses import replace
+
+    robot = load("3rrr_m1")
+    return replace(robot, observations=tuple(Direction(leg, link, np.array([1.0, 0, 0])) for leg, link in observations))
+
+
+@pytest.mark.parametrize(("observations", "what"), [
+    ([("1", "base")], "in no leg"), ([("1", "platform")], "in no leg"),
+    ([("1", "dist_1"), ("1", "dist_2")], "two different legs"), ([("1", "dist_1"), ("2", "prox_1")], "is labelled")])
+def test_labels_that_contradict_the_legs_are_refused(observations: list, what: str) -> None:
+    with pytest.raises(BadRobotFile, match=what):
+        dissect(watched(*observations))
+
+
+def test_labels_of_the_file_are_kept() -> None:
+    found = dissect(watched(("left", "dist_2")))
+    assert found.leg("left").links == ("prox_2", "dist_2")
+    assert set(found.labels) == {"1", "left", "3"}
+    with pytest.raises(BadRequest, match="no leg"):
+        found.leg("2")
+
+
+def test_a_segment_without_length_and_a_link_outside_the_legs_are_refused() -> None:
+    b = Builder("short")
+    b.link("base")
+    for i in range(3):
+        b.link(f"rod_{i}", at=(i, i * i, 0))
+        b.joint(f"foot_{i}", "S", "base", f"rod_{i}", at=(i, i * i, 0))
+    b.link("plate")
+    for i in range(3):
+        b.joint(f"tip_{i}", "S", f"rod_{i}", "plate", at=(i, i * i, 0 if i == 0 else 1), loop=i > 0)
+    found = dissect(b.build("plate"))
+    with pytest.raises(BadRequest, match="no length"):
+        default_observation(found, found.legs[0])
+    with pytest.raises(BadRequest, match="no leg"):
+        observation_of(found, "plate")
+
+
+def test_a_platform_that_no_leg_reaches_is_refused() -> None:
+    b = Builder("loose")
+    b.link("base")
+    b.link("crank")
+    b.link("rod", at=(1, 0, 0))
+    b.link("plate", at=(9, 0, 0))
+    b.joint("a", "R", "base", "crank", axis=(0, 0, 1))
+    b.joint("b", "R", "crank", "rod", at=(1, 0, 0), axis=(0, 0, 1))
+    b.joint("c", "R", "rod", "base", at=(1, 1, 0), axis=(0, 0, 1), loop=True)
+    with pytest.raises(BadMechanism, match="no leg"):
+        dissect(b.build("plate"))
