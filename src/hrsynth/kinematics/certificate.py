@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..errors import BadMechanism
 from ..mechanism import Mechanism
 from ..mechanism.vectors import Array
 from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
@@ -53,14 +54,18 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
     question = samples.question
     blind = frozenset(o.link for o in question.observations if o.link not in hidden.links)
     asked = replace(question, bodies=bodies)
-    twin = Twin(hidden, samples.twin.length)
-    active = twin.actuated()
     angle = worst = 0.0
     gap = CLEAN
 
     def verdict(reason: str, mismatch: Mismatch | None = None) -> Certificate:
         return Certificate(len(members), samples.discarded, angle, gap, worst, not reason, reason, mismatch)
 
+    try:
+        twin = Twin(hidden, samples.twin.length)
+    except BadMechanism as error:
+        angle = np.pi / 2
+        return verdict(str(error))
+    active = twin.actuated()
     start = float(np.linalg.norm(twin.residual(twin.q0)))
     if start > FOLLOWED:
         worst = start

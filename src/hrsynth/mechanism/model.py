@@ -229,7 +229,8 @@ class Mechanism:
 
     def changed(self, *, remove_links: Iterable[str] = (), remove_joints: Iterable[str] = (),
                 links: Iterable[Link] = (), joints: Iterable[Joint] = (), **fields: object) -> Mechanism:
-        """A new mechanism: links removed with all their joints, joints removed, links and joints added or replaced."""
+        """A new mechanism: links removed with all their joints and couplings, joints removed, links and joints added or
+        replaced."""
         gone = set(remove_links)
         new_links = {name: link for name, link in self.links.items() if name not in gone}
         new_links.update({link.name: link for link in links})
@@ -237,6 +238,8 @@ class Mechanism:
         new_joints = {name: joint for name, joint in self.joints.items()
                       if name not in dropped and not gone & set(joint.links)}
         new_joints.update({joint.name: joint for joint in joints})
+        kept = tuple(c for c in self.couplings if {c.predecessor, c.successor} <= set(new_links))
+        fields.setdefault("couplings", kept)
         return replace(self, links=new_links, joints=new_joints, **fields)  # type: ignore[arg-type]
 
     def fresh(self, name: str) -> str:
