@@ -284,7 +284,7 @@ def test_a_loop_that_cannot_be_closed_is_named_with_its_residual(run, robot):
     (line,) = run("derive", file).refused(3)
     assert line.startswith(f"hrsynth: {file}:25: ")
     assert "'d'" in line
-    assert float(re.search(r"residual ([-+.e\d]+),", line)[1]) > 0.1
+    assert float(re.search(r"residual ([-+.e\d]+) ", line)[1]) > 0.1
 
 
 def with_observes(*observes: tuple[str, str]) -> tuple[str, int]:

@@ -10,10 +10,13 @@ class HrsynthError(Exception):
     """Base of all errors of this package; ``exit_status`` is what the command line answers with."""
 
     exit_status = 2
+    file: str | None = None
+    """The robot file that the error is about, where its text does not say so itself."""
 
     def lines(self) -> list[str]:
         """One line a defect, without the program's name."""
-        return [str(self)]
+        text = " ".join(str(self).split())
+        return [text if self.file is None else f"{self.file}: {text}"]
 
 
 @dataclass(frozen=True)
@@ -73,7 +76,8 @@ class LoopsNotClosed(HrsynthError):
     def __init__(self, robot: str, residual: float, tolerance: float, loop: str) -> None:
         self.robot, self.residual, self.tolerance, self.loop = robot, residual, tolerance, loop
         super().__init__(
-            f"{robot}: the loop {loop!r} cannot be closed, residual {residual:.3g}, allowed: {tolerance:.3g}"
+            f"{robot}: the loop {loop!r} cannot be closed at the zero configuration, residual {residual:.3g} "
+            f"(characteristic lengths, radians), allowed: {tolerance:.3g}"
         )
 
 
@@ -94,7 +98,8 @@ class NotSampled(HrsynthError):
 
     def __init__(self, robot: str, reached: int, wanted: int) -> None:
         self.robot, self.reached, self.wanted = robot, reached, wanted
-        super().__init__(f"{robot}: only {reached} closed configurations could be reached, needed: {wanted}")
+        super().__init__(f"{robot}: only {reached} closed configurations could be reached away from singularities, "
+                         f"needed: {wanted}; is the zero configuration singular?")
 
 
 class NotCertified(HrsynthError):

@@ -55,7 +55,8 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     "no joint type": ([(19, '<joint name="c">')], [(19, "<joint> without type")]),
     "unknown loop type": ([('<loop name="d" type="revolute">', '<loop name="d" type="screw">')], [
         (25, "unknown loop type, screw, revolute, continuous, prismatic, cylindrical, universal")]),
-    "joint of a missing parent": ([(14, '<parent link="cranc"/>')], [(14, "joint 'b': unknown link, cranc, crank")]),
+    "joint of a missing parent": ([(14, '<parent link="cranc"/>')], [
+        (14, "joint 'b': unknown link, cranc, a name that is there, such as crank")]),
     "joint of a missing child": ([(15, '<child link="zzz"/>')], [
         (4, "second root beside 'base': no joint's child, bar"), (15, "joint 'b': unknown link, zzz"),
     ]),
@@ -88,7 +89,8 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     "no own element": ([(37, ""), (38, ""), (39, ""), (40, "")], [(1, "no <hrsynth> element")]),
     "two own elements": ([(40, "</hrsynth><hrsynth/>")], [(40, "second <hrsynth>")]),
     "two platforms": ([(39, '<platform link="crank"/>')], [(39, "second <platform>")]),
-    "unknown platform": ([(38, '<platform link="bra"/>')], [(38, "platform: unknown link, bra, bar")]),
+    "unknown platform": ([(38, '<platform link="bra"/>')], [
+        (38, "platform: unknown link, bra, a name that is there, such as bar")]),
     "platform without link": ([(38, '<platform/>')], [(38, "<platform> without link")]),
     "platform is the base": ([(38, '<platform link="base"/>')], [(38, "the platform is the base, base")]),
     "platform elsewhere": ([(5, '<link name="rocker"/><link name="moon"/>'), (38, '<platform link="moon"/>')],
@@ -223,3 +225,14 @@ def test_a_damaged_file_is_read_or_refused_but_never_breaks(data: st.DataObject)
         robot = native.parse(text, "x")
         again = native.parse(native.write(robot))
         assert again.platform == robot.platform
+
+
+@pytest.mark.parametrize(("old", "new", "what"), [
+    ("<observe", "<observ", "no meaning inside <hrsynth>, found <observ>"),
+    ("<platform", '<loop name="z"/><platform', "no meaning inside <hrsynth>, found <loop>"),
+    ("</joint>", '<mimic joint="a"/></joint>', "a <mimic> is a gear")])
+def test_what_would_change_the_robot_is_not_passed_over(old: str, new: str, what: str) -> None:
+    text = FOUR_BAR if old in FOUR_BAR else FOUR_BAR.replace("</hrsynth>", '<observe leg="1" link="bar"/></hrsynth>')
+    with pytest.raises(BadRobotFile) as caught:
+        native.parse(text.replace(old, new, 1))
+    assert any(what in line for line in caught.value.lines())

@@ -134,3 +134,20 @@ def test_a_platform_that_no_leg_reaches_is_refused() -> None:
     b.joint("c", "R", "rod", "base", at=(1, 1, 0), axis=(0, 0, 1), loop=True)
     with pytest.raises(BadMechanism, match="no leg"):
         dissect(b.build("plate"))
+
+
+def test_a_tool_on_one_revolute_keeps_its_turn() -> None:
+    from hrsynth.analysis.derive import derive
+
+    robot = load("3rrr_m1")
+    b = Builder("tool")
+    b.link("base")
+    b.link("tool", at=(0, 0, 0.1))
+    b.joint("wrist", "R", "base", "tool", at=(0, 0, 0.1), axis=(1, 0, 1))
+    tool = b.build("tool")
+    wrist = tool.joints["wrist"].relinked("base", "platform")
+    with_tool = robot.changed(links=[tool.links["tool"]], joints=[wrist], platform="tool")
+    found = derive(with_tool)
+    assert (found.dof, found.mobility.total, found.mobility.idle) == (4, 4, 0)
+    assert found.verdict.verdict == "partially controllable"
+    assert [freedom.name for freedom in found.verdict.lost] == ["rotation about the axis of wrist"]

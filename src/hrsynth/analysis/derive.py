@@ -92,6 +92,7 @@ class Derivation:
             "verdict": self.verdict.verdict,
             "lost": [freedom.to_dict() for freedom in self.verdict.lost],
             "rank": self.verdict.rank,
+            "point_platform": self.setting.anatomy.point is not None,
             "interaction_matrix": self.verdict.graph,
             "architecture": {"verdict": None, "exact": False},
             "paper_form": self.paper and self.paper.to_dict(),
@@ -104,7 +105,7 @@ class Derivation:
         }
 
 
-def derive(robot: Mechanism, observe: Sequence[str] | None = None, camera: str | None = None, *,
+def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
            form: str = "simplified", seed: int = 0, progress: Callable[[str], None] | None = None) -> Derivation:
     """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; theory 2 and 3).
 

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-from ..errors import BadRequest, HrsynthError
+from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled
 from ..kinematics.ranks import range_basis
 from ..kinematics.relation import Question, Relation
 from ..kinematics.sampling import Sample, Samples, draw
@@ -74,13 +74,24 @@ class Setting:
         return Mobility(total, total - (self.mobility.total - self.mobility.idle))
 
 
-def prepare(robot: Mechanism, observe: Sequence[str] | None = None, camera: str | None = None, *,
+def prepare(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
             samples: int = SAMPLES, seed: int = 0, progress: Callable[[], None] | None = None) -> Setting:
     """Normal form, legs, observations and samples of a robot.
 
-    ``observe`` holds leg labels or link names; None or ``["all"]`` means all legs at their default segments. ``camera``
-    names the link that carries the camera. Raises ``BadRequest`` for labels and links that there are not.
+    ``observe`` holds leg labels or link names (a string sets them apart by commas); None or ``["all"]`` means all legs
+    at their default segments. ``camera`` names the link that carries the camera. Raises ``BadRequest`` for labels and links that there are not.
     """
+    try:
+        return _prepared(robot, observe, camera, samples, seed, progress)
+    except (BadMechanism, NotSampled) as error:
+        error.file = robot.file
+        raise
+
+
+def _prepared(robot: Mechanism, observe: Sequence[str] | str | None, camera: str | None, samples: int, seed: int,
+              progress: Callable[[], None] | None) -> Setting:
+    if isinstance(observe, str):
+        observe = [name.strip() for name in observe.split(",")]
     if camera is not None:
         if camera not in robot.links:
             raise BadRequest(f"{robot.name} has no link for the camera", camera, sorted(robot.links))
@@ -114,7 +125,9 @@ def _defaults(anatomy: Anatomy) -> dict[str, Observation]:
 
 def _observed(anatomy: Anatomy, normal: NormalForm, defaults: dict[str, Observation],
               observe: Sequence[str] | None) -> tuple[Observation, ...]:
-    if not observe or list(observe) == ["all"]:
+    if observe is not None and not observe:
+        raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
+    if observe is None or list(observe) == ["all"]:
         for leg in anatomy.legs:
             if leg.label not in defaults:
                 default_observation(anatomy, leg)

@@ -43,8 +43,9 @@ def load(robot: str | Path) -> Mechanism:
         if robot in robots:
             return native.read(robots[robot])
         if not os.path.exists(robot):
+            close = difflib.get_close_matches(robot, robots, n=5) or list(robots)
             raise BadRequest("neither a file nor a shipped robot", robot,
-                             difflib.get_close_matches(robot, robots, n=5) or list(robots))
+                             "a file, or a name that `hrsynth robots` lists, such as " + ", ".join(close))
     return native.read(path)
 
 

@@ -31,6 +31,12 @@ _LIMITS = ("lower", "upper", "velocity", "effort")
 _ORIGIN = frozen(np.eye(4))
 
 
+OWN_TAGS = ("platform", "camera", "observe")
+"""What an ``<hrsynth>`` element is read for; other children are kept, unless they look like one of these."""
+ELSEWHERE = ("link", "joint", "loop", "coupling", "transmission")
+"""Elements that belong directly into ``<robot>``."""
+
+
 def parse(text: bytes | str, file: str = "<text>") -> Mechanism:
     """The mechanism that a robot file describes; ``file`` is what defects are reported under.
 
@@ -123,7 +129,7 @@ class _Reader:
             return False
         if link not in table:
             close = difflib.get_close_matches(link, table, n=3) if len(table) < 1000 else []
-            self.defect(line, what, link, ", ".join(close) or None)
+            self.defect(line, what, link, "a name that is there" + (", such as " + ", ".join(close) if close else ""))
         return link in table
 
     # ---- elements
@@ -162,6 +168,9 @@ class _Reader:
         self.links[name] = Link(name, xml=xml.unknown(element, ["name"], []), line=xml.line(element))
 
     def joint(self, element: xml.Element) -> None:
+        for mimic in element.findall("mimic"):
+            self.defect(xml.line(mimic), "a <mimic> is a gear between two joints, which this dialect writes otherwise",
+                        element.get("name"), "a <coupling> with predecessor, successor and ratio")
         X = self.origin(element)
         ends = []
         for tag in ("parent", "child"):
@@ -341,7 +350,12 @@ class _Reader:
                 self.camera = link
         for observe in element.findall("observe"):
             self.observe(observe)
-        rest = xml.unknown(element, ["serial"], ["platform", "camera", "observe"])
+        for child in element:
+            if isinstance(child.tag, str) and child.tag not in OWN_TAGS and (
+                    child.tag in ELSEWHERE or difflib.get_close_matches(child.tag, OWN_TAGS, n=1, cutoff=0.75)):
+                self.defect(xml.line(child), "an element that has no meaning inside <hrsynth>", f"<{child.tag}>",
+                            ", ".join(f"<{tag}>" for tag in OWN_TAGS))
+        rest = xml.unknown(element, ["serial"], OWN_TAGS)
         if rest:
             bare = etree.Element("hrsynth")
             xml.restore(bare, rest)

@@ -71,15 +71,16 @@ class Anatomy:
 
     @cached_property
     def point(self) -> Array | None:
-        """Where the platform is a point body (all its joints are coaxial R, or it has one S, theory 1): that point, in
-        the platform's frame, (3,); on a common axis the foot of the frame's origin. None for any other platform."""
+        """Where the platform is a point body (two or more joints, all coaxial R, or one S): that point, in the
+        platform's frame, (3,); on a common axis the foot of the frame's origin. None for any other platform: what
+        hangs on a single R is a tool, and its turn counts."""
         joints = self.mechanism.joints_of(self.mechanism.platform)
         frame = self.mechanism.links[self.mechanism.platform].pose
         first = joints[0]
         tolerance = SAME_POINT * self.mechanism.length
         if len(joints) == 1 and first.type is JointType.SPHERICAL:
             centre = first.point
-        elif all(j.type is JointType.REVOLUTE and lines.parallel(j.axis, first.axis)
+        elif len(joints) > 1 and all(j.type is JointType.REVOLUTE and lines.parallel(j.axis, first.axis)
                                      and lines.distance(j.point, first.point, first.axis) <= tolerance for j in joints):
             centre = lines.foot(frame[:3, 3], first.point, first.axis)
         else:

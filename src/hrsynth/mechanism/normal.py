@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
+import networkx as nx
 import numpy as np
 
 from ..errors import BadMechanism
@@ -46,41 +47,41 @@ def _protected(mechanism: Mechanism) -> set[str]:
 
 
 def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
-    current = mechanism
-    while True:
-        joint = next((j for j in current.joints.values() if j.type is JointType.FIXED), None)
-        if joint is None:
-            return current
-        rank = [current.base, current.platform, current.reference, *(o.link for o in current.observations)]
-
-        def weight(link: str, rank: list[str] = rank) -> int:
-            return rank.index(link) if link in rank else len(rank)
-
-        kept, gone = sorted(joint.links, key=weight)
-        if gone == current.platform:
-            raise BadMechanism("the platform is fixed to the base", joint.name, "a platform that moves")
-        for name, target in into.items():
-            if target == gone:
-                into[name] = kept
-        observations = tuple(
-            replace(o, link=kept, direction=current.links[kept].pose[:3, :3].T
-                    @ current.links[gone].pose[:3, :3] @ o.direction)
-            if isinstance(o, Direction) and o.link == gone else o
-            for o in current.observations)
-        joints = []
-        for other in current.joints_of(gone):
-            moved = other.relinked(gone, kept)
-            if other.name != joint.name and moved.predecessor != moved.successor:
-                joints.append(moved)
-        link = current.links[kept]
-        order = {name: i for i, name in enumerate(current.joints)}
-        merged = current.changed(
-            remove_links=[gone], links=[replace(link, xml=link.xml + current.links[gone].xml)], joints=joints,
-            observations=observations,
-            couplings=tuple(replace(c, predecessor=into[c.predecessor], successor=into[c.successor])
-                            for c in current.couplings),
-            camera=into[current.reference] if current.camera is not None else None)
-        current = replace(merged, joints={n: merged.joints[n] for n in sorted(merged.joints, key=order.__getitem__)})
+    """Every group of links held together by fixed joints becomes one: the base, the platform, the camera's link or an
+    observed link if the group has one, else the first in the mechanism's order."""
+    fixed = [j for j in mechanism.joints.values() if j.type is JointType.FIXED]
+    if not fixed:
+        return mechanism
+    rank = [mechanism.base, mechanism.platform, mechanism.reference, *(o.link for o in mechanism.observations)]
+    order = {name: i for i, name in enumerate([*dict.fromkeys(rank), *mechanism.links])}
+    bonds = nx.Graph(j.links for j in fixed)
+    gone: set[str] = set()
+    kept_links = []
+    for group in nx.connected_components(bonds):
+        kept = min(group, key=order.__getitem__)
+        if kept == mechanism.base and mechanism.platform in group:
+            raise BadMechanism("the platform is fixed to the base", mechanism.platform, "a platform that moves")
+        members = [name for name in mechanism.links if name in group and name != kept]
+        into.update({name: kept for name in members})
+        gone.update(members)
+        content = mechanism.links[kept].xml + tuple(x for name in members for x in mechanism.links[name].xml)
+        kept_links.append(replace(mechanism.links[kept], xml=content))
+    observations = tuple(
+        replace(o, link=into[o.link], direction=mechanism.links[into[o.link]].pose[:3, :3].T
+                @ mechanism.links[o.link].pose[:3, :3] @ o.direction)
+        if isinstance(o, Direction) and o.link in gone else o
+        for o in mechanism.observations)
+    joints = {}
+    for joint in mechanism.joints.values():
+        moved = replace(joint, predecessor=into[joint.predecessor], successor=into[joint.successor])
+        if moved.predecessor != moved.successor:
+            joints[joint.name] = moved
+    links = {name: link for name, link in mechanism.links.items() if name not in gone}
+    links.update({link.name: link for link in kept_links})
+    couplings = tuple(replace(c, predecessor=into[c.predecessor], successor=into[c.successor])
+                      for c in mechanism.couplings)
+    return replace(mechanism, links=links, joints=joints, observations=observations, couplings=couplings,
+                   camera=None if mechanism.camera is None else into[mechanism.camera])
 
 
 def _next_merge(mechanism: Mechanism) -> tuple[list[str], list[Joint], Joint] | None:

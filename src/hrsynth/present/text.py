@@ -39,6 +39,8 @@ def derivation(found: Derivation, hidden_file: str | None) -> str:
     rows = [
         ("robot", f"{found.robot.name}   {found.architecture}"),
         ("dof", f"{found.dof} (mobility {mobility.total}, of which {mobility.idle} idle)"),
+        *([] if found.setting.anatomy.point is None else
+          [("", "the platform is a point: its velocity is what is controlled, its turn is idle")]),
         ("observed", observed),
         *([("camera on", reference)] if reference != found.setting.mechanism.base else []),
         ("hidden robot", str(hidden) if hidden else "none: every observed direction is constant"),
