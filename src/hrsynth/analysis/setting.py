@@ -79,7 +79,9 @@ def prepare(robot: Mechanism, observe: Sequence[str] | str | None = None, camera
     """Normal form, legs, observations and samples of a robot.
 
     ``observe`` holds leg labels or link names (a string sets them apart by commas); None or ``["all"]`` means all legs
-    at their default segments. ``camera`` names the link that carries the camera. Raises ``BadRequest`` for labels and links that there are not.
+    at their default segments. ``camera`` names the link that carries the camera.
+
+    Raises ``BadRequest`` for labels and links that there are not.
     """
     try:
         return _prepared(robot, observe, camera, samples, seed, progress)
