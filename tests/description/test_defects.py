@@ -236,3 +236,12 @@ def test_what_would_change_the_robot_is_not_passed_over(old: str, new: str, what
     with pytest.raises(BadRobotFile) as caught:
         native.parse(text.replace(old, new, 1))
     assert any(what in line for line in caught.value.lines())
+
+
+@pytest.mark.parametrize("label", ["all", "1,2"])
+def test_a_label_that_no_list_of_legs_could_name_is_refused(label: str) -> None:
+    text = FOUR_BAR
+    if "<observe" not in text:
+        text = text.replace("</hrsynth>", '<observe leg="1" link="bar"/></hrsynth>')
+    with pytest.raises(BadRobotFile, match="no list of legs could name"):
+        native.parse(text.replace('leg="1"', f'leg="{label}"'))

@@ -364,6 +364,9 @@ class _Reader:
     def observe(self, element: xml.Element) -> None:
         leg, link = self.attribute(element, "leg"), self.attribute(element, "link")
         self.known(link, xml.line(element), "observe: unknown link")
+        if leg is not None and (leg == "all" or "," in leg):
+            self.defect(xml.line(element), "observe: a leg's label that no list of legs could name", leg,
+                        "a label without commas, other than all")
         if self.attribute(element, "axis") is None:
             return
         direction = self.direction(element, "axis", (0, 0, 1))

@@ -249,13 +249,14 @@ def _labelled(anatomy: Anatomy) -> Anatomy:
     given: dict[int, str] = {}
     defects: list[Defect] = []
     mechanism = anatomy.mechanism
+    links = ", ".join(n for leg in anatomy.legs for n in leg.links) or "none"
     file = mechanism.file or mechanism.name
     for observation in mechanism.observations:
         line = getattr(observation, "line", None)
         index = next((i for i, leg in enumerate(anatomy.legs) if anatomy.leg_of(observation.link) == leg), None)
         if index is None:
             defects.append(Defect(file, line, "observe of a link that is in no leg", observation.link,
-                                  "links of the legs: " + ", ".join(n for leg in anatomy.legs for n in leg.links)))
+                                  "links of the legs: " + links))
         elif given.setdefault(index, observation.leg) != observation.leg:
             defects.append(Defect(file, line, f"link {observation.link!r} is in the leg labelled {given[index]!r}, "
                                   "but is labelled", observation.leg, given[index]))
