@@ -7,6 +7,12 @@ from their centroid): a length divided by it is a pure number, as an angle is.
 ASSEMBLED = 1e-12
 """Residual (characteristic lengths, radians) below which a shipped or written file counts as assembled at zero."""
 
+SOLVED = 1e-12
+"""Residual (characteristic lengths, radians) at which the solver of closed configurations is content."""
+
+PASSED_BY = 1e-3
+"""Residual at which a configuration on the way to another is near enough to go on from."""
+
 CLOSED = 1e-10
 """Residual (characteristic lengths, radians) below which a configuration counts as closed."""
 

@@ -408,3 +408,16 @@ def test_the_record() -> None:
     assert record["paper_form"]["equivalent"] is False
     assert all(len(freedom["twist"]) == 6 for freedom in record["lost"])
     assert {step["rule"] for step in record["steps"]} >= {"motors off", "lift", "takeover", "leg removal", "keep"}
+
+
+@pytest.mark.parametrize(("form", "expected"), [("general", "{R-PP}-R*RR*-{R-PP}"), ("simplified", "PiR*RR*Pi")])
+def test_a_second_attempt_keeps_to_the_form_that_was_asked_for(monkeypatch: pytest.MonkeyPatch, form: str,
+                                                               expected: str) -> None:
+    from hrsynth.analysis import derive as module
+
+    answers = iter([False])
+    monkeypatch.setattr(module, "_virtual_only", lambda result: next(answers, True))
+    found = module.derive(load("rrrrr_m1"), form=form)
+    assert next(answers, None) is None
+    assert found.hidden_architecture is not None
+    assert found.hidden_architecture.ascii == expected

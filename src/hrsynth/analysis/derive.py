@@ -126,11 +126,8 @@ def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     verdict = verdict_of(setting, tuple(dict.fromkeys(o.leg for o in setting.observed)), samples)
     evidence = Evidence(anatomy, samples)
 
-    def check(mechanism: Mechanism, bodies: tuple[str, ...]) -> Certificate:
-        return certify(samples, mechanism, count=STEP_SAMPLES, bodies=bodies, complete=False)
-
     run = strategy.simplified if form == "simplified" else strategy.general
-    result = run(anatomy, evidence, check, tell)
+    result = run(anatomy, evidence, _check(samples, STEP_SAMPLES), tell)
     paper = None
     if result.state.chains:
         tell("certificate")
@@ -138,7 +135,7 @@ def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
         assert hidden is not None
         certificate = certify(samples, hidden)
         if not (certificate.passed and _virtual_only(result)):
-            result, hidden, certificate = _fallback(setting, evidence, samples, certificate, result)
+            result, hidden, certificate = _fallback(setting, evidence, samples, certificate, run)
         architecture: Architecture | None = result.state.architecture()
         if form == "simplified" and architecture is not None:
             tell("the paper's form")
@@ -167,15 +164,17 @@ def _virtual_only(result: Rewriting) -> bool:
     return lifted and driven == {chain.actuator for chain in state.chains}
 
 
+def _check(samples: Samples, count: int | None) -> strategy.Check:
+    """The check of a single step, at the first ``count`` samples (None: at all)."""
+    return lambda mechanism, bodies: certify(samples, mechanism, count=count, bodies=bodies, complete=False)
+
+
 def _fallback(setting: Setting, evidence: Evidence, samples: Samples, failed: Certificate,
-              result: Rewriting) -> tuple[Rewriting, Mechanism, Certificate]:
-    """Where the certificate at all samples sees what three did not: check every step at all samples."""
-
-    def check(mechanism: Mechanism, bodies: tuple[str, ...]) -> Certificate:
-        return certify(samples, mechanism, bodies=bodies, complete=False)
-
-    for run in (strategy.simplified, strategy.general):
-        again = run(setting.anatomy, evidence, check)
+              asked: Callable[..., Rewriting]) -> tuple[Rewriting, Mechanism, Certificate]:
+    """Where the certificate at all samples sees what three did not: check every step of the form that was asked for at
+    all samples, then of the general form."""
+    for run in dict.fromkeys((asked, strategy.general)):
+        again = run(setting.anatomy, evidence, _check(samples, None))
         hidden = finished(setting, again.state)
         certificate = certify(samples, hidden)
         if certificate.passed and _virtual_only(again):
@@ -223,8 +222,8 @@ def _planar(samples: Samples) -> bool:
     """Whether all platform motions are those of one plane."""
     twists = np.hstack([member.relation.twists for member in samples.members])
     if twists.shape[0] == 3:
-        return range_basis(twists)[1].value <= 2
-    return range_basis(twists[3:])[1].value <= 1 and range_basis(twists[:3])[1].value <= 2
+        return range_basis(twists, 1.0)[1].value <= 2
+    return range_basis(twists[3:], 1.0)[1].value <= 1 and range_basis(twists[:3], 1.0)[1].value <= 2
 
 
 def _exchanged(anatomy: Anatomy, found: Certificate,

@@ -122,5 +122,4 @@ def relation(at: ClosedConfiguration, question: Question, *, blind: frozenset[st
     kernel, constraints = at.kernel()
     basis, rank = range_basis(question.rows(at, blind=blind) @ kernel, 1.0)
     measured = 3 * len(question.observations)
-    result = Relation(basis, question.twist_rows, measured, kernel.shape[1], min(constraints.gap, rank.gap))
-    return result
+    return Relation(basis, question.twist_rows, measured, kernel.shape[1], min(constraints.gap, rank.gap))

@@ -16,7 +16,7 @@ import numpy as np
 from ..errors import BadMechanism, NotSampled
 from ..mechanism.observation import Observation
 from ..mechanism.vectors import Array
-from ..tolerances import FOLLOWED, RANK_GAP
+from ..tolerances import CLOSED, FOLLOWED, PASSED_BY, RANK_GAP, SOLVED
 from .configuration import ClosedConfiguration, Target, closed
 from .ranks import range_basis
 from .relation import Question, Relation, relation
@@ -136,8 +136,8 @@ def _walk(start: ClosedConfiguration, question: Question, leading: set[tuple[str
             if largest > 3 * STEP:
                 step *= 3 * STEP / largest
             predicted = twin.moved(here.q, step)
-            q, residual = closed(twin, predicted, tolerance=1e-12)
-            if residual <= 1e-10 and np.linalg.norm(q - predicted) <= 0.5 * np.linalg.norm(step) + 1e-9:
+            q, residual = closed(twin, predicted, tolerance=SOLVED)
+            if residual <= CLOSED and np.linalg.norm(q - predicted) <= 0.5 * np.linalg.norm(step) + 1e-9:
                 break
         else:
             return None
@@ -158,5 +158,5 @@ def followed(twin: Twin, way: Sequence[Target], iterations: int = 120) -> tuple[
     q, residual = twin.q0, 0.0
     for target in way:
         exact = target is way[-1]
-        q, residual = closed(twin, q, target, tolerance=1e-12 if exact else 1e-3, iterations=iterations)
+        q, residual = closed(twin, q, target, tolerance=SOLVED if exact else PASSED_BY, iterations=iterations)
     return q, residual

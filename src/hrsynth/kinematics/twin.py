@@ -8,15 +8,13 @@ welded to the other link.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import networkx as nx
 import numpy as np
 import pinocchio as pin
 
 from ..errors import BadMechanism
 from ..mechanism import Joint, JointType, Mechanism
-from ..mechanism.vectors import Array
+from ..mechanism.vectors import Array, inverse, pose
 
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
 
@@ -50,7 +48,7 @@ class Twin:
         self.nv: int = self.model.nv
         self.q0: Array = pin.neutral(self.model)
         self._links = {
-            name: (self._body[name], np.linalg.inv(_shift(self._centre[self._body[name]] * self.length)) @ link.pose)
+            name: (self._body[name], inverse(pose(self._centre[self._body[name]] * self.length)) @ link.pose)
             for name, link in mechanism.links.items()}
         self._masks: dict[tuple[str, ...], Array] = {}
         self._q: Array | None = None
@@ -228,14 +226,3 @@ def _cross_rows(omega: Array, arms: Array) -> Array:
     x, y, z = arms[:, 0, None], arms[:, 1, None], arms[:, 2, None]
     wx, wy, wz = omega[:, 0], omega[:, 1], omega[:, 2]
     return np.stack([wy * z - wz * y, wz * x - wx * z, wx * y - wy * x], axis=1)
-
-
-def _shift(point: Array) -> Array:
-    X = np.eye(4)
-    X[:3, 3] = point
-    return X
-
-
-def stacked(parts: Sequence[Array], columns: int) -> Array:
-    """Row blocks on top of each other; an empty list gives (0, columns)."""
-    return np.vstack(parts) if parts else np.zeros((0, columns))

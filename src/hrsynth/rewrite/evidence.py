@@ -17,7 +17,7 @@ from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Anatomy
 from ..mechanism.normal import centre_pair
 from ..mechanism.vectors import Array, unit
-from ..tolerances import LOCUS
+from ..tolerances import LOCUS, SOLVED
 
 
 @dataclass(frozen=True, eq=False)
@@ -186,7 +186,7 @@ def _moved(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequen
         else:
             for _ in range(4):
                 kernel, _ = ClosedConfiguration.of(twin, q).kernel()
-                q, _ = closed(twin, twin.moved(q, 0.12 * kernel @ rng.normal(size=kernel.shape[1])), tolerance=1e-12)
+                q, _ = closed(twin, twin.moved(q, 0.12 * kernel @ rng.normal(size=kernel.shape[1])), tolerance=SOLVED)
         X = twin.pose(q, before)
         rotations.append(X[:3, :3] @ home[:3, :3].T)
         anchors.append(X[:3, :3] @ local + X[:3, 3])
