@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled
 from ..kinematics.ranks import range_basis
 from ..kinematics.relation import Question, Relation
@@ -59,7 +61,7 @@ class Setting:
     def mobility(self) -> Mobility:
         """Mobility of the normal form, with its idle motions."""
         first = self.everything.members[0].relation
-        rows = first.basis[: first.twist_rows + 3 * self.defaults]
+        rows = first.basis[: first.twist_rows + sum(first.sizes[: self.defaults])]
         return Mobility(first.mobility, first.mobility - range_basis(rows, 1.0)[1].value)
 
     @cached_property
@@ -102,8 +104,8 @@ def _prepared(robot: Mechanism, observe: Sequence[str] | str | None, camera: str
     anatomy = dissect(normal.mechanism)
     defaults = _defaults(anatomy)
     observed = _observed(anatomy, normal, defaults, observe)
-    known = {(o.leg, o.link) for o in defaults.values()}
-    extra = tuple(o for o in observed if (o.leg, o.link) not in known)
+    known = {o.key for o in defaults.values()}
+    extra = tuple(o for o in observed if o.key not in known)
     question = Question(normal.mechanism.platform, anatomy.point, normal.mechanism.reference,
                         (*defaults.values(), *extra))
     drawn = draw(Twin(normal.mechanism), question, samples, seed, led_by=observed, progress=progress)
@@ -134,7 +136,7 @@ def _observed(anatomy: Anatomy, normal: NormalForm, defaults: dict[str, Observat
             if leg.label not in defaults:
                 default_observation(anatomy, leg)
         return tuple(defaults.values())
-    chosen: dict[tuple[str, str], Observation] = {}
+    chosen: dict[tuple[str, ...], Observation] = {}
     for name in observe:
         if name in anatomy.labels:
             observation = defaults.get(name) or default_observation(anatomy, anatomy.leg(name))
@@ -148,7 +150,7 @@ def _observed(anatomy: Anatomy, normal: NormalForm, defaults: dict[str, Observat
             raise BadRequest(f"{anatomy.mechanism.name} has no leg or link", name,
                              "legs " + ", ".join(anatomy.labels) + "; links "
                              + ", ".join(n for leg in anatomy.legs for n in leg.links))
-        chosen[(observation.leg, observation.link)] = observation
+        chosen[observation.key] = observation
     return tuple(chosen.values())
 
 
@@ -156,8 +158,8 @@ def restricted(samples: Samples, observations: Iterable[Observation]) -> Samples
     """The same samples for fewer observations (all of them among the samples' own)."""
     wanted = tuple(observations)
     all_of = samples.question.observations
-    keys = [(o.leg, o.link) for o in all_of]
-    places = [keys.index((o.leg, o.link)) for o in wanted]
+    keys = [o.key for o in all_of]
+    places = [keys.index(o.key) for o in wanted]
     question = replace(samples.question, observations=tuple(all_of[i] for i in places))
     members = tuple(
         Sample(m.configuration,
@@ -169,9 +171,6 @@ def restricted(samples: Samples, observations: Iterable[Observation]) -> Samples
 
 def selected(relation: Relation, places: Sequence[int]) -> Relation:
     """ρ for some of the observations: the projection of ρ for all."""
-    rows = list(range(relation.twist_rows))
-    for place in places:
-        start = relation.twist_rows + 3 * place
-        rows += [start, start + 1, start + 2]
-    basis, rank = range_basis(relation.basis[rows], 1.0)
-    return Relation(basis, relation.twist_rows, 3 * len(places), relation.mobility, min(relation.gap, rank.gap))
+    blocks = [relation.twist_part, *(relation.basis[relation.rows_of(place)] for place in places)]
+    basis, rank = range_basis(np.vstack(blocks), 1.0)
+    return Relation(basis, relation.twist_rows, tuple(relation.sizes[i] for i in places), relation.mobility, min(relation.gap, rank.gap))

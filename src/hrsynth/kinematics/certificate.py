@@ -114,10 +114,11 @@ def _parametrise(at: ClosedConfiguration, question: Question, active: list[int],
     observation's rate from those of its own actuators."""
     kernel, _ = at.kernel()
     rows = question.rows(at, blind=blind)[question.twist_rows :] @ kernel
+    ends = np.cumsum(question.sizes)
     motors = kernel[active]
     explained = np.zeros(len(active), dtype=bool)
-    for index in range(len(question.observations)):
-        measured = rows[3 * index : 3 * index + 3]
+    for size, end in zip(question.sizes, ends, strict=True):
+        measured = rows[end - size : end]
         unseen, _ = kernel_basis(measured, 1.0)
         own = np.linalg.norm(motors @ unseen, axis=1) <= SAME_RELATION
         explained |= own

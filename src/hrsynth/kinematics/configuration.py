@@ -6,6 +6,7 @@ with the loops.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -66,7 +67,7 @@ class Target:
     def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
         observations = tuple(o for o, _ in self.measured)
-        frames, velocities = twin.frames(q, (self.link, self.reference, *(o.link for o in observations)))
+        frames, velocities, values, rates = measure(twin, q, self.reference, observations, (self.link,))
         X, V = frames[0], velocities[0]
         if self.point is not None:
             errors = [(X[:3, :3] @ self.point + X[:3, 3] - self.pose[:3, :3] @ self.point - self.pose[:3, 3])
@@ -77,14 +78,29 @@ class Target:
             errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length,
                       0.5 * np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])]
             blocks = [V]
-        for kind in dict.fromkeys(type(o) for o in observations):
-            places = [i for i, o in enumerate(observations) if type(o) is kind]
-            at = [place + 2 for place in places]
-            values, rates = kind.together([observations[i] for i in places], frames[1], frames[at], velocities[1],
-                                          velocities[at])
-            errors.append(values - np.concatenate([self.measured[i][1] for i in places]))
-            blocks.append(rates)
-        return np.concatenate(errors), np.vstack(blocks)
+        errors += [value - wanted for value, (_, wanted) in zip(values, self.measured, strict=True)]
+        return np.concatenate(errors), np.vstack([*blocks, *rates])
+
+
+def measure(twin: Twin, q: Array, reference: str, observations: Sequence[Observation], links: Sequence[str] = ()
+            ) -> tuple[Array, Array, list[Array], list[Array]]:
+    """Poses (k, 4, 4) and velocities (k, 6, nv) of ``links``; the value (size,) and the rates (size, nv) of each
+    observation, seen from ``reference`` where it names no link of its own."""
+    seen = [o.seen_from or reference for o in observations]
+    names = tuple(dict.fromkeys((*links, *seen, *(o.link for o in observations))))
+    X, V = twin.frames(q, names)
+    place = {name: i for i, name in enumerate(names)}
+    values: list[Array] = [np.zeros(0)] * len(observations)
+    rates: list[Array] = [np.zeros((0, twin.nv))] * len(observations)
+    for kind, view in dict.fromkeys((type(o), name) for o, name in zip(observations, seen, strict=True)):
+        members = [i for i, o in enumerate(observations) if (type(o), seen[i]) == (kind, view)]
+        at = [place[observations[i].link] for i in members]
+        found, moving = kind.together([observations[i] for i in members], X[place[view]], X[at], V[place[view]], V[at])
+        for number, i in enumerate(members):
+            rows = slice(number * kind.size, (number + 1) * kind.size)
+            values[i], rates[i] = found[rows], moving[rows]
+    first = [place[name] for name in links]
+    return X[first], V[first], values, rates
 
 
 def point_velocity(V: Array, X: Array, point: Array, length: float) -> Array:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..mechanism.observation import Observation
 from ..mechanism.vectors import Array
-from .configuration import ClosedConfiguration, Target, point_velocity
+from .configuration import ClosedConfiguration, Target, measure, point_velocity
 from .ranks import Rank, kernel_basis, range_basis
 
 
@@ -41,17 +41,17 @@ class Question:
     def rows(self, at: ClosedConfiguration, *, blind: frozenset[str] = frozenset()) -> Array:
         """The map from joint rates to (t, measured rates, twists of ``bodies``), shape (rows, nv); links in ``blind``
         are not in the mechanism, their rates are zero."""
-        V = at.velocity(self.platform)
-        parts = [V if self.point is None else point_velocity(V, at.pose(self.platform), self.point, at.twin.length)]
-        X_reference, V_reference = at.pose(self.reference), at.velocity(self.reference)
-        for observation in self.observations:
-            if observation.link in blind:
-                parts.append(np.zeros((3, at.twin.nv)))
-            else:
-                parts.append(observation.rate(X_reference, at.pose(observation.link), V_reference,
-                                              at.velocity(observation.link)))
-        parts.extend(at.velocity(body) for body in self.bodies)
-        return np.vstack(parts)
+        seen = tuple(o for o in self.observations if o.link not in blind)
+        X, V, _, rates = measure(at.twin, at.q, self.reference, seen, (self.platform, *self.bodies))
+        found = iter(rates)
+        parts = [V[0] if self.point is None else point_velocity(V[0], X[0], self.point, at.twin.length)]
+        parts += [np.zeros((o.size, at.twin.nv)) if o.link in blind else next(found) for o in self.observations]
+        return np.vstack([*parts, *V[1:]])
+
+    @property
+    def sizes(self) -> tuple[int, ...]:
+        """Rows of each observation."""
+        return tuple(o.size for o in self.observations)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,8 @@ class Relation:
 
     basis: Array
     twist_rows: int
-    measured_rows: int
+    sizes: tuple[int, ...]
+    """Rows of each observation's rate."""
     mobility: int
     gap: float
 
@@ -77,7 +78,12 @@ class Relation:
     @property
     def rates(self) -> Array:
         """The rows of the measured rates, shape (measured rows, dim ρ)."""
-        return self.basis[self.twist_rows : self.twist_rows + self.measured_rows]
+        return self.basis[self.twist_rows : self.twist_rows + sum(self.sizes)]
+
+    def rows_of(self, place: int) -> slice:
+        """The rows of one observation's rate in ``basis``."""
+        start = self.twist_rows + sum(self.sizes[:place])
+        return slice(start, start + self.sizes[place])
 
     @cached_property
     def dof(self) -> Rank:
@@ -121,5 +127,4 @@ def relation(at: ClosedConfiguration, question: Question, *, blind: frozenset[st
     """ρ at a closed configuration."""
     kernel, constraints = at.kernel()
     basis, rank = range_basis(question.rows(at, blind=blind) @ kernel, 1.0)
-    measured = 3 * len(question.observations)
-    return Relation(basis, question.twist_rows, measured, kernel.shape[1], min(constraints.gap, rank.gap))
+    return Relation(basis, question.twist_rows, question.sizes, kernel.shape[1], min(constraints.gap, rank.gap))

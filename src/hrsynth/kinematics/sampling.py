@@ -64,7 +64,7 @@ def draw(twin: Twin, question: Question, count: int, seed: int = 0, *, led_by: S
 
     The robot must find its way again led by the platform's pose and the observations ``led_by`` (default: all).
     """
-    leading = {(o.leg, o.link) for o in (question.observations if led_by is None else led_by)}
+    leading = {o.key for o in (question.observations if led_by is None else led_by)}
     rng = np.random.default_rng(seed)
     start = ClosedConfiguration.of(twin, twin.q0)
     if relation(start, question).dimension == 0:
@@ -119,7 +119,7 @@ def _velocity(at: ClosedConfiguration, question: Question, wish: Array | None,
     return kernel @ np.linalg.lstsq(image, wanted, rcond=1e-9)[0], wanted
 
 
-def _walk(start: ClosedConfiguration, question: Question, leading: set[tuple[str, str]],
+def _walk(start: ClosedConfiguration, question: Question, leading: set[tuple[str, ...]],
           rng: np.random.Generator) -> Sample | None:
     twin = start.twin
     here, wish = start, None
@@ -146,7 +146,7 @@ def _walk(start: ClosedConfiguration, question: Question, leading: set[tuple[str
             return None
         way.append(question.target(here))
     found = relation(here, question)
-    led = [replace(t, measured=tuple(pair for pair in t.measured if (pair[0].leg, pair[0].link) in leading))
+    led = [replace(t, measured=tuple(pair for pair in t.measured if pair[0].key in leading))
            for t in way]
     if found.gap < RANK_GAP or followed(twin, led, iterations=EASY)[1] > FOLLOWED:
         return None

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -20,9 +21,19 @@ class Observation:
     frame's origin in base axes.
     """
 
+    size: ClassVar[int]
+    """Rows of the measured value."""
+
     leg: str
     link: str
     line: int | None = field(default=None, kw_only=True)
+    seen_from: str | None = field(default=None, kw_only=True)
+    """The link from which it is measured; None means the mechanism's reference link."""
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        """What tells this measurement from the others of a mechanism."""
+        return (self.leg, self.link)
 
     def value(self, X_reference: Array, X_link: Array) -> Array:
         """The measured value, seen from the reference link."""
@@ -43,7 +54,7 @@ class Observation:
 
     def differences(self, other: Observation, tolerance: float) -> list[str]:
         """What differs from another observation, in words."""
-        same = type(self) is type(other) and (self.leg, self.link) == (other.leg, other.link)
+        same = type(self) is type(other) and self.key == other.key
         return [] if same else [f"observation of leg {self.leg}: {self!r} / {other!r}"]
 
 
@@ -54,6 +65,7 @@ class Direction(Observation):
     ``direction`` is d in the *link's* frame, shape (3,).
     """
 
+    size = 3
     direction: Array
 
     def __post_init__(self) -> None:
