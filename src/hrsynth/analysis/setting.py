@@ -173,4 +173,5 @@ def selected(relation: Relation, places: Sequence[int]) -> Relation:
     """ρ for some of the observations: the projection of ρ for all."""
     blocks = [relation.twist_part, *(relation.basis[relation.rows_of(place)] for place in places)]
     basis, rank = range_basis(np.vstack(blocks), 1.0)
-    return Relation(basis, relation.twist_rows, tuple(relation.sizes[i] for i in places), relation.mobility, min(relation.gap, rank.gap))
+    sizes = tuple(relation.sizes[i] for i in places)
+    return Relation(basis, relation.twist_rows, sizes, relation.mobility, min(relation.gap, rank.gap))

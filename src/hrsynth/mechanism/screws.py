@@ -1,0 +1,92 @@
+"""Screws of joints: the wrenches a joint transmits, and the constraints of a mechanism on the twists of its links.
+
+A twist (v, ω) is that of a body at the *origin of the base frame*, base axes; a wrench (f, m) is the linear form
+f·v + m·ω on it. Numbers may be floats or exact (object arrays): nothing here divides or takes roots.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .model import Joint, JointType
+
+Numbers = NDArray[Any]
+Geometry = Callable[[Joint], tuple[Numbers, Sequence[Numbers]]]
+"""The centre and the axes of a joint, in base axes, at the configuration in question."""
+
+
+def cross(a: Numbers, b: Numbers) -> Numbers:
+    """a × b for numbers of any kind, shape (3,)."""
+    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+
+
+def normals(axis: Numbers) -> tuple[Numbers, Numbers]:
+    """Two independent vectors normal to ``axis`` (not unit vectors)."""
+    smallest = min(range(3), key=lambda i: abs(axis[i]))
+    first = cross(axis, np.array([int(i == smallest) for i in range(3)], dtype=axis.dtype))
+    return first, cross(axis, first)
+
+
+def force(direction: Numbers, point: Numbers) -> Numbers:
+    """The wrench of a pure force through a point, (f, P × f)."""
+    return np.concatenate([direction, cross(point, direction)])
+
+
+def couple(direction: Numbers) -> Numbers:
+    """The wrench of a pure couple, (0, m)."""
+    return np.concatenate([0 * direction, direction])
+
+
+def rotation(axis: Numbers, point: Numbers) -> Numbers:
+    """The twist of a rotation about an axis through a point, (P × a, a)."""
+    return np.concatenate([cross(point, axis), axis])
+
+
+def translation(direction: Numbers) -> Numbers:
+    """The twist of a translation, (d, 0)."""
+    return np.concatenate([direction, 0 * direction])
+
+
+def transmitted(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:
+    """The wrenches that a joint transmits, 6 − freedoms of them: what it allows is reciprocal to all of them."""
+    basis = [np.array([int(i == k) for i in range(3)], dtype=point.dtype) for k in range(3)]
+    forces = [force(e, point) for e in basis]
+    couples = [couple(e) for e in basis]
+    match kind:
+        case JointType.REVOLUTE:
+            return forces + [couple(n) for n in normals(axes[0])]
+        case JointType.PRISMATIC:
+            return [force(n, point) for n in normals(axes[0])] + couples
+        case JointType.UNIVERSAL:
+            return [*forces, couple(cross(axes[0], axes[1]))]
+        case JointType.CYLINDRICAL:
+            return [wrench for n in normals(axes[0]) for wrench in (force(n, point), couple(n))]
+        case JointType.SPHERICAL:
+            return forces
+        case JointType.PLANAR:
+            return [force(axes[0], point), *(couple(n) for n in normals(axes[0]))]
+        case JointType.FIXED:
+            return forces + couples
+        case _:
+            return []
+
+
+def constraints(joints: Sequence[Joint], place: Mapping[str, int], geometry: Geometry, dtype: Any = float) -> Numbers:
+    """The constraint matrix of joints on the stacked twists of links: A ξ = 0, shape (rows, 6 links).
+
+    ``place`` numbers the links whose twists are unknown; a link that is not in it (the base) rests.
+    """
+    rows = []
+    for joint in joints:
+        point, axes = geometry(joint)
+        for wrench in transmitted(joint.type, point, axes):
+            row = np.zeros(6 * len(place), dtype=dtype)
+            for link, sign in ((joint.successor, 1), (joint.predecessor, -1)):
+                if link in place:
+                    row[6 * place[link] : 6 * place[link] + 6] += sign * wrench
+            rows.append(row)
+    return np.array(rows, dtype=dtype) if rows else np.zeros((0, 6 * len(place)), dtype=dtype)
