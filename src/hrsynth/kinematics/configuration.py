@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Protocol
 
 import numpy as np
 
@@ -53,6 +54,13 @@ class ClosedConfiguration:
         return self._kernel
 
 
+class Wanted(Protocol):
+    """What a configuration is to reach besides closed loops."""
+
+    def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+        """Error (reached − wanted) and its Jacobian."""
+
+
 @dataclass(frozen=True, eq=False)
 class Target:
     """What a configuration is to reach besides closed loops: the pose X_BP of ``link`` (only the position of ``point``,
@@ -85,20 +93,23 @@ class Target:
 def measure(twin: Twin, q: Array, reference: str, observations: Sequence[Observation], links: Sequence[str] = ()
             ) -> tuple[Array, Array, list[Array], list[Array]]:
     """Poses (k, 4, 4) and velocities (k, 6, nv) of ``links``; the value (size,) and the rates (size, nv) of each
-    observation, seen from ``reference`` where it names no link of its own."""
+    observation, seen from ``reference`` where it names no link of its own, lengths in characteristic lengths."""
     seen = [o.seen_from or reference for o in observations]
     names = tuple(dict.fromkeys((*links, *seen, *(o.link for o in observations))))
     X, V = twin.frames(q, names)
     place = {name: i for i, name in enumerate(names)}
+    metric = V * np.repeat([twin.length, 1.0], 3)[:, None]
     values: list[Array] = [np.zeros(0)] * len(observations)
     rates: list[Array] = [np.zeros((0, twin.nv))] * len(observations)
     for kind, view in dict.fromkeys((type(o), name) for o, name in zip(observations, seen, strict=True)):
         members = [i for i, o in enumerate(observations) if (type(o), seen[i]) == (kind, view)]
         at = [place[observations[i].link] for i in members]
-        found, moving = kind.together([observations[i] for i in members], X[place[view]], X[at], V[place[view]], V[at])
+        found, moving = kind.together([observations[i] for i in members], X[place[view]], X[at],
+                                      metric[place[view]], metric[at])
+        unit = twin.length**kind.dimension
         for number, i in enumerate(members):
             rows = slice(number * kind.size, (number + 1) * kind.size)
-            values[i], rates[i] = found[rows], moving[rows]
+            values[i], rates[i] = found[rows] / unit, moving[rows] / unit
     first = [place[name] for name in links]
     return X[first], V[first], values, rates
 
@@ -108,7 +119,7 @@ def point_velocity(V: Array, X: Array, point: Array, length: float) -> Array:
     return V[:3] - hat(X[:3, :3] @ point / length) @ V[3:]
 
 
-def closed(twin: Twin, q: Array, target: Target | None = None, *, tolerance: float = CLOSED,
+def closed(twin: Twin, q: Array, target: Wanted | None = None, *, tolerance: float = CLOSED,
            iterations: int = 30) -> tuple[Array, float]:
     """Damped Gauss-Newton from ``q``: the configuration reached and the residual left (loops and target).
 
@@ -137,7 +148,7 @@ def closed(twin: Twin, q: Array, target: Target | None = None, *, tolerance: flo
     return q, size
 
 
-def _system(twin: Twin, q: Array, target: Target | None) -> tuple[Array, Array]:
+def _system(twin: Twin, q: Array, target: Wanted | None) -> tuple[Array, Array]:
     error, J = twin.residual(q), twin.jacobian(q)
     if target is None:
         return error, J

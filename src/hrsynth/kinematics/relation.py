@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -34,9 +34,9 @@ class Question:
 
     def target(self, at: ClosedConfiguration) -> Target:
         """The platform pose and the measured values of a configuration."""
-        X_reference = at.pose(self.reference)
-        return Target(self.platform, at.pose(self.platform), self.point, self.reference,
-                      tuple((o, o.value(X_reference, at.pose(o.link))) for o in self.observations))
+        X, _, values, _ = measure(at.twin, at.q, self.reference, self.observations, (self.platform,))
+        return Target(self.platform, X[0], self.point, self.reference,
+                      tuple(zip(self.observations, values, strict=True)))
 
     def rows(self, at: ClosedConfiguration, *, blind: frozenset[str] = frozenset()) -> Array:
         """The map from joint rates to (t, measured rates, twists of ``bodies``), shape (rows, nv); links in ``blind``
@@ -125,6 +125,17 @@ class Relation:
 
 def relation(at: ClosedConfiguration, question: Question, *, blind: frozenset[str] = frozenset()) -> Relation:
     """ρ at a closed configuration."""
+    return _relation(at, question.rows(at, blind=blind), question.twist_rows, question.sizes)
+
+
+def relation_of(at: ClosedConfiguration, question: Question, rows: Array) -> Relation:
+    """ρ between the platform's twist and what ``rows`` (measured, nv) make of the joint rates, each a measurement of
+    its own: the motors' coordinates, for one."""
+    twist = replace(question, observations=(), bodies=()).rows(at)
+    return _relation(at, np.vstack([twist, rows]), question.twist_rows, (1,) * len(rows))
+
+
+def _relation(at: ClosedConfiguration, rows: Array, twist_rows: int, sizes: tuple[int, ...]) -> Relation:
     kernel, constraints = at.kernel()
-    basis, rank = range_basis(question.rows(at, blind=blind) @ kernel, 1.0)
-    return Relation(basis, question.twist_rows, question.sizes, kernel.shape[1], min(constraints.gap, rank.gap))
+    basis, rank = range_basis(rows @ kernel, 1.0)
+    return Relation(basis, twist_rows, sizes, kernel.shape[1], min(constraints.gap, rank.gap))

@@ -1,4 +1,5 @@
-"""What a camera measures: observations, each with its own measured space."""
+"""What is measured: by a camera (directions and positions of lines) or at a joint (encoders), each with its own
+measured space."""
 
 from __future__ import annotations
 
@@ -18,11 +19,14 @@ class Observation:
 
     A subclass gives the measured value and its rate; nothing else in the project knows what is measured. Poses are
     X_BL (4, 4) in the base frame, Jacobians V (6, n) map joint velocities to (linear, angular) velocities of the link
-    frame's origin in base axes.
+    frame's origin in base axes. All lengths (of poses, velocities, values and rates) are in the same unit: metres.
     """
 
     size: ClassVar[int]
     """Rows of the measured value."""
+    dimension: ClassVar[int] = 0
+    """Power of length in the measured value: 0 for pure numbers and angles, 1 for lengths; who compares values of
+    different observations divides by that power of a characteristic length."""
 
     leg: str
     link: str
@@ -99,3 +103,115 @@ class Direction(Observation):
         if not found and isinstance(other, Direction) and np.max(np.abs(self.direction - other.direction)) > tolerance:
             found.append(f"direction of leg {self.leg}: {self.direction} / {other.direction}")
         return found
+
+
+@dataclass(frozen=True, eq=False)
+class LinePosition(Observation):
+    """The moment h = p × u of an observed line, u its direction and p any of its points: the second vector of the
+    line's Plücker coordinates (MMT 5.3), both seen from the reference link, about its frame's origin.
+
+    ``direction`` is u and ``point`` a point of the line, both in the *link's* frame, shape (3,). Where u is measured
+    too, what h adds does not depend on the origin: about another one, at o, it is h − o × u. The unit normal h / ‖h‖ of
+    the plane through the origin and the line has no such law (and none at all where the line meets the origin), which
+    is why the moment itself is taken.
+    """
+
+    size = 3
+    dimension = 1
+    direction: Array
+    point: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "direction", frozen(unit(self.direction)))
+        object.__setattr__(self, "point", frozen(self.point))
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        return (self.leg, self.link, "line")
+
+    def value(self, X_reference: Array, X_link: Array) -> Array:
+        """h, shape (3,), in the reference link's frame (m)."""
+        u, arm = self._line(X_reference, X_link)
+        return X_reference[:3, :3].T @ np.cross(arm, u)
+
+    def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
+        """ḣ = ṗ × u + p × u̇ as the reference link sees it, shape (3, n)."""
+        u, arm = self._line(X_reference, X_link)
+        turn = V_link[3:] - V_reference[3:]
+        slip = _velocity(V_link, X_link, self._at(X_link)) - _velocity(V_reference, X_reference, self._at(X_link))
+        return X_reference[:3, :3].T @ -(hat(u) @ slip + hat(arm) @ hat(u) @ turn)
+
+    def _at(self, X_link: Array) -> Array:
+        return X_link[:3, :3] @ self.point + X_link[:3, 3]
+
+    def _line(self, X_reference: Array, X_link: Array) -> tuple[Array, Array]:
+        """u, and p seen from the reference link's origin, in base axes."""
+        return X_link[:3, :3] @ self.direction, self._at(X_link) - X_reference[:3, 3]
+
+
+@dataclass(frozen=True, eq=False)
+class Encoder(Observation):
+    """One coordinate of a joint: the motion of ``link`` seen from ``seen_from``, the joint's other link.
+
+    ``axis`` is the joint's axis in the frame of ``seen_from``, shape (3,).
+    """
+
+    size = 1
+    joint: str
+    axis: Array
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        return (self.joint, type(self).__name__, self.link)
+
+
+@dataclass(frozen=True, eq=False)
+class Angle(Encoder):
+    """The angle by which a direction fixed in the link has turned about the axis since the zero configuration.
+
+    ``mark`` is that direction in the link's frame, ``start`` the same at zero in the frame of ``seen_from``, both (3,)
+    and not parallel to the axis: any normal of it for R and C, the other axis for U.
+    """
+
+    mark: Array
+    start: Array
+
+    def value(self, X_reference: Array, X_link: Array) -> Array:
+        """The angle, shape (1,), in (−π, π]."""
+        mark = X_reference[:3, :3].T @ X_link[:3, :3] @ self.mark
+        normal = self.start - (self.axis @ self.start) * self.axis
+        return np.array([np.arctan2(self.axis @ np.cross(normal, mark), normal @ mark)])
+
+    def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
+        """a* · (ω_ℓ − ω_c), shape (1, n); a* = (a − c m) / (1 − c²), c = a · m: dual to the axis a and the mark m."""
+        axis, mark = X_reference[:3, :3] @ self.axis, X_link[:3, :3] @ self.mark
+        cosine = float(axis @ mark)
+        return ((axis - cosine * mark) / (1 - cosine**2))[None] @ (V_link[3:] - V_reference[3:])
+
+
+@dataclass(frozen=True, eq=False)
+class Slide(Encoder):
+    """The length by which the link has slid along the axis since the zero configuration.
+
+    ``point`` is the joint's centre in the link's frame, ``start`` the same at zero in the frame of ``seen_from``, (3,).
+    """
+
+    dimension = 1
+    point: Array
+    start: Array
+
+    def value(self, X_reference: Array, X_link: Array) -> Array:
+        """The length, shape (1,), in metres."""
+        arm = X_link[:3, :3] @ self.point + X_link[:3, 3] - X_reference[:3, 3]
+        return np.array([self.axis @ (X_reference[:3, :3].T @ arm - self.start)])
+
+    def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
+        """a · (velocity of the centre as one link carries it − as the other does), shape (1, n)."""
+        centre = X_link[:3, :3] @ self.point + X_link[:3, 3]
+        slip = _velocity(V_link, X_link, centre) - _velocity(V_reference, X_reference, centre)
+        return (X_reference[:3, :3] @ self.axis)[None] @ slip
+
+
+def _velocity(V: Array, X: Array, point: Array) -> Array:
+    """The velocity (3, n) of the point of a link that is at ``point`` (3,), base axes."""
+    return V[:3] - hat(point - X[:3, 3]) @ V[3:]

@@ -1,0 +1,226 @@
+"""What is missing: the smallest sets of further measurements that make a robot controllable."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations, islice
+from math import comb
+from typing import Any
+
+import numpy as np
+
+from ..errors import RankUndecided
+from ..kinematics.ranks import kernel_basis, largest_angle, range_basis
+from ..kinematics.relation import relation
+from ..kinematics.sampling import Sample, Samples
+from ..mechanism import Mechanism, Observation
+from ..mechanism.vectors import Array
+from ..tolerances import RANK_CUTOFF, SAME_RELATION
+from .candidates import Measurement, candidates
+from .controllability import CONTROLLABLE, Verdict, verdict_of
+from .setting import Setting, prepare, restricted
+
+PROBES = 3
+"""Configurations at which all sets are tried; what sees most there is verified at all samples."""
+LARGEST_SIZE = 4
+"""Measurements of the largest sets that are tried."""
+LARGEST_COUNT = 20000
+"""Sets of one size that are tried."""
+BATCH = 2000
+"""Sets that are tried at once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Cure:
+    """A set of measurements, and the verdict with them at all samples."""
+
+    measurements: tuple[Measurement, ...]
+    verdict: Verdict
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"measurements": [each.to_dict() for each in self.measurements], "verdict": self.verdict.verdict,
+                "rank": self.verdict.rank, "gap": self.verdict.gap}
+
+
+@dataclass(frozen=True, eq=False)
+class Advice:
+    """What is missing. ``now`` is the verdict as it stands; ``sets`` are all the smallest sets of the best rank within
+    reach, empty where nothing is missing or nothing helps."""
+
+    setting: Setting
+    now: Verdict
+    sets: tuple[Cure, ...]
+    tried: int
+    complete: bool
+    """Whether every set of this size and of all smaller ones was tried, and none was left undecided."""
+    undecided: int = 0
+    """Sets that were promising at the probes, but whose rank has no clear gap at the samples."""
+
+    @property
+    def robot(self) -> str:
+        """The robot's name."""
+        return self.setting.robot.name
+
+    @property
+    def nothing_missing(self) -> bool:
+        """Whether the robot is controllable as it is."""
+        return self.now.verdict == CONTROLLABLE
+
+    @property
+    def cured(self) -> bool:
+        """Whether the sets make the robot controllable."""
+        return bool(self.sets) and self.sets[0].verdict.verdict == CONTROLLABLE
+
+    @property
+    def size(self) -> int:
+        """Measurements of each set."""
+        return len(self.sets[0].measurements) if self.sets else 0
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        now = self.now
+        return {"observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
+                "camera": self.setting.mechanism.reference, "verdict": now.verdict, "rank": now.rank, "dof": now.dof,
+                "lost": [freedom.to_dict() for freedom in now.lost], "nothing_missing": self.nothing_missing,
+                "sets": [each.to_dict() for each in self.sets], "size": self.size, "tried": self.tried,
+                "complete": self.complete, "undecided": self.undecided}
+
+
+def advise(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *, seed: int = 0,
+           progress: Callable[[str], None] | None = None) -> Advice:
+    """The smallest sets of further measurements with which u̇ = 0 forces t = 0 (theory 3; MMT 5.3).
+
+    ``observe`` holds leg labels or link names (default: all legs), ``camera`` the link that carries the camera. Added
+    can be the default segment of a further leg, the direction of any other link of a leg, the position of a line whose
+    direction is observed, and an encoder on any joint. Every set that is returned is verified at all samples. Raises
+    ``BadRequest`` for unknown names, ``RankUndecided`` where what is seen now has no clear rank.
+    """
+    tell = progress or (lambda what: None)
+    tell("sampling")
+    setting = prepare(robot, observe, camera, seed=seed)
+    now = verdict_of(setting, tuple(dict.fromkeys(o.leg for o in setting.observed)), setting.samples)
+    if now.verdict == CONTROLLABLE:
+        return Advice(setting, now, (), 0, True)
+    everything = candidates(setting)
+    samples = _watching(setting, (*setting.observed, *(each.observation for each in everything)))
+    search = Search(samples, len(setting.observed), everything)
+    chosen, complete = search.smallest(tell)
+    tell("verification")
+    sets = _verified(setting, samples, [tuple(search.useful[i] for i in places) for places in chosen])
+    undecided = len(chosen) - len(sets)
+    best = max((each.verdict.rank for each in sets), default=now.rank)
+    kept = tuple(each for each in sets if each.verdict.rank == best)
+    return Advice(setting, now, kept, search.tried, complete and not undecided, undecided)
+
+
+def _verified(setting: Setting, samples: Samples, sets: Sequence[tuple[Measurement, ...]]) -> list[Cure]:
+    """Each set with its verdict at all samples; those whose rank has no clear gap are left out."""
+    labels = tuple(dict.fromkeys(o.leg for o in setting.observed))
+    found: list[Cure] = []
+    for added in sets:
+        watched = (*setting.observed, *(each.observation for each in added))
+        try:
+            found.append(Cure(added, verdict_of(setting, labels, restricted(samples, watched))))
+        except RankUndecided:
+            continue
+    return found
+
+
+def _watching(setting: Setting, observations: tuple[Observation, ...]) -> Samples:
+    """The samples' configurations again, with ρ for other observations (and no ways)."""
+    drawn = setting.everything
+    question = replace(drawn.question, observations=observations)
+    members = tuple(Sample(m.configuration, (), relation(m.configuration, question)) for m in drawn.members)
+    return Samples(question, drawn.twin, drawn.start, members, drawn.discarded)
+
+
+class Search:
+    """The sets of candidates, tried on what is not seen yet.
+
+    At each probe, N is a basis of the part of ρ in which no observed value moves. A set of rows C of N sees t there iff
+    ker C ⊂ ker T, T the twist's rows: what stays lost has dimension rank [C; T] − rank C.
+    """
+
+    def __init__(self, samples: Samples, observed: int, everything: Sequence[Measurement]) -> None:
+        self.tried = 0
+        kept: list[int] = list(range(len(everything)))
+        rates: list[list[Array]] = []
+        self._twists: list[Array] = []
+        unseen: list[list[Array]] = []
+        for member in samples.members[:PROBES]:
+            found = member.relation
+            known = found.basis[found.twist_rows : found.rows_of(observed).start]
+            N = kernel_basis(known, 1.0)[0]
+            self._twists.append(found.twist_part @ N)
+            rates.append([found.basis[found.rows_of(observed + i)] for i in kept])
+            unseen.append([block @ N for block in rates[-1]])
+        kept = [i for i in kept if max(float(np.linalg.norm(blocks[i])) for blocks in unseen) > RANK_CUTOFF]
+        kept = _without_twins(kept, everything, rates)
+        self.useful = tuple(everything[i] for i in kept)
+        self._rows = [np.array([_padded(blocks[i]) for i in kept]).reshape(len(kept), 3, twist.shape[1])
+                      for blocks, twist in zip(unseen, self._twists, strict=True)]
+
+    def lost(self, sets: Sequence[Sequence[int]]) -> Array:
+        """How many freedoms stay lost with each set, generically: the least over the probes; shape (sets,)."""
+        places = np.array(sets, dtype=int)
+        found = []
+        for rows, twist in zip(self._rows, self._twists, strict=True):
+            seen = rows[places].reshape(len(places), -1, twist.shape[1])
+            both = np.concatenate([seen, np.broadcast_to(twist, (len(places), *twist.shape))], axis=1)
+            found.append(_ranks(both) - _ranks(seen))
+        return np.min(found, axis=0)
+
+    def smallest(self, tell: Callable[[str], None]) -> tuple[list[tuple[int, ...]], bool]:
+        """All smallest sets that lose as little as all candidates together, and whether all sets up to their size were
+        tried; within the budget the best there are."""
+        count = len(self.useful)
+        if not count:
+            return [], True
+        least, now = (int(self.lost([places])[0]) for places in (range(count), ()))
+        if least == now:
+            return [], True
+        best, chosen, complete = np.inf, list[tuple[int, ...]](), True
+        for size in range(1, min(count, LARGEST_SIZE) + 1):
+            complete = complete and comb(count, size) <= LARGEST_COUNT
+            sets = islice(combinations(range(count), size), LARGEST_COUNT)
+            while batch := list(islice(sets, BATCH)):
+                tell(f"sets of {size}")
+                self.tried += len(batch)
+                left = self.lost(batch)
+                if left.min() < best:
+                    best, chosen = int(left.min()), []
+                if best == left.min() and (not chosen or len(chosen[0]) == size):
+                    chosen += [each for each, rest in zip(batch, left, strict=True) if rest == best]
+            if best == least:
+                return chosen, complete
+        return chosen, False
+
+
+def _without_twins(kept: Sequence[int], everything: Sequence[Measurement], rates: Sequence[Sequence[Array]]
+                   ) -> list[int]:
+    """Leave out a link's direction whose rates tell what a direction before it does (links joined by P joints only)."""
+    spans = {i: [range_basis(blocks[i].T, 1.0)[0] for blocks in rates] for i in kept
+             if everything[i].kind in ("leg", "direction")}
+    left: list[int] = []
+    for i in kept:
+        twins = (j for j in left if j in spans) if everything[i].kind == "direction" else ()
+        if not any(all(largest_angle(a, b) < SAME_RELATION for a, b in zip(spans[i], spans[j], strict=True))
+                   for j in twins):
+            left.append(i)
+    return left
+
+
+def _padded(block: Array) -> Array:
+    """The rows of a candidate, zero rows added up to three."""
+    return np.vstack([block, np.zeros((3 - len(block), block.shape[1]))])
+
+
+def _ranks(matrices: Array) -> Array:
+    """The rank of each matrix (k, rows, columns), zero relative to one or to its largest singular value; shape (k,)."""
+    values = np.linalg.svd(matrices, compute_uv=False)
+    if not values.shape[1]:
+        return np.zeros(len(values), dtype=int)
+    scale = np.maximum(values[:, :1], 1.0)
+    return np.asarray(np.sum(values > RANK_CUTOFF * scale, axis=1))

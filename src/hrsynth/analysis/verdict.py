@@ -1,0 +1,10 @@
+"""The words of a verdict (theory 3, verdicts)."""
+
+from __future__ import annotations
+
+CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncontrollable"
+
+
+def word(rank: int, dof: int) -> str:
+    """The verdict where ``rank`` of the platform's ``dof`` freedoms are seen."""
+    return CONTROLLABLE if rank == dof else PARTIAL if rank else BLIND
