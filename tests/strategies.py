@@ -143,6 +143,26 @@ def planar_robots(draw: st.DrawFn, words: Sequence[str] = PLANAR_WORDS, point: b
     return planar(chosen, draw(_SEEDS), motors, together)
 
 
+# --- spherical robots ----------------------------------------------------------------------------------------------
+
+def spherical(rng: Rng) -> Mechanism:
+    """A platform that turns about a point: three legs RRR, all axes through that point, driven at the base."""
+    centre = rng.normal(scale=0.3, size=3)
+    builder = Builder("spherical")
+    builder.link("base")
+    _add_link(builder, rng, "platform", centre)
+    for number in range(1, 4):
+        links = ["base", f"lower_{number}", f"upper_{number}", "platform"]
+        axes = [random_direction(rng) for _ in range(3)]
+        for name in links[1:3]:
+            _add_link(builder, rng, name, centre)
+        for k, axis in enumerate(axes):
+            builder.joint(f"joint_{number}_{k + 1}", "R", links[k], links[k + 1],
+                          centre + rng.uniform(0.3, 1.0) * axis, axis=axis, motor=k == 0, loop=k == 2 and number > 1)
+        builder.observe(str(number), links[2], random_direction(rng))
+    return builder.build(platform="platform")
+
+
 # --- n-pods ------------------------------------------------------------------------------------------------------
 
 def pods(words: Sequence[str], rng: Rng, square: bool = False) -> Mechanism:

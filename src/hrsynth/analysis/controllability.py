@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
@@ -14,10 +14,14 @@ from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..tolerances import RANK_GAP
+from .exact import ExactVerdict, architecture
 from .freedoms import Freedom, name_freedoms
 from .setting import Setting, prepare, restricted
+from .verdict import BLIND as BLIND
+from .verdict import CONTROLLABLE as CONTROLLABLE
+from .verdict import PARTIAL as PARTIAL
+from .verdict import word
 
-CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncontrollable"
 LARGEST_COMPLETE = 10
 """Number of legs up to which all sets are tried; beyond, sets of up to three legs and the whole."""
 
@@ -49,6 +53,8 @@ class Legs:
     architecture: str
     dof: int
     sets: tuple[Verdict, ...]
+    exact: tuple[ExactVerdict, ...]
+    """What generic geometry of the same architecture sees, for each of ``sets``."""
     complete: bool
     """Whether all sets were tried."""
     minimal: tuple[tuple[str, ...], ...] = field(default=())
@@ -56,7 +62,8 @@ class Legs:
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"robot": self.robot, "architecture_ascii": self.architecture, "dof": self.dof,
-                "sets": [each.to_dict() for each in self.sets], "complete": self.complete,
+                "sets": [{**each.to_dict(), "exact": exact.exact, "architecture": exact.to_dict()}
+                         for each, exact in zip(self.sets, self.exact, strict=True)], "complete": self.complete,
                 "minimal": [list(each) for each in self.minimal]}
 
 
@@ -70,12 +77,11 @@ def verdict_of(setting: Setting, legs: Sequence[str], samples: Samples) -> Verdi
     gap = min(min(each.gap, each.lost_rank.gap) for each in found if each.rank == rank)
     Rank(rank, gap).decided(f"what legs {', '.join(legs)} see")
     dof = setting.dof
-    verdict = CONTROLLABLE if rank == dof else BLIND if rank == 0 else PARTIAL
     lost: tuple[Freedom, ...] = ()
     if rank < dof:
         lost = _lost(setting, samples, tuple(legs), dof - rank)
     graph = min(each.unexplained for each in found) == 0
-    return Verdict(tuple(legs), verdict, dof, rank, lost, gap, graph)
+    return Verdict(tuple(legs), word(rank, dof), dof, rank, lost, gap, graph)
 
 
 def _lost(setting: Setting, samples: Samples, legs: tuple[str, ...], count: int) -> tuple[Freedom, ...]:
@@ -89,7 +95,11 @@ def _lost(setting: Setting, samples: Samples, legs: tuple[str, ...], count: int)
     twists = np.zeros((6, count))
     twists[: found.shape[0]] = found
     twists[:3] *= setting.everything.twin.length
-    return name_freedoms(twists, setting.anatomy, legs, position)
+    named = name_freedoms(twists, setting.anatomy, legs, position)
+    if position is None:
+        return named
+    where = " ".join(f"{0.0 if abs(value) < 1e-9 else value:.4g}" for value in position)
+    return tuple(replace(each, name=f"{each.name} (with the platform at ({where}))") for each in named)
 
 
 def legs(robot: Mechanism, camera: str | None = None, *, progress: Callable[[], None] | None = None,
@@ -99,7 +109,8 @@ def legs(robot: Mechanism, camera: str | None = None, *, progress: Callable[[], 
     anatomy = setting.anatomy
     segments = setting.everything.question.observations[: setting.defaults]
     labels = tuple(o.leg for o in segments)
-    sets = []
+    sets, exact = list[Verdict](), list[ExactVerdict]()
+    generic = architecture(setting)
     complete = len(labels) <= LARGEST_COMPLETE
     for size in range(1, len(labels) + 1):
         if not complete and 3 < size < len(labels):
@@ -107,9 +118,10 @@ def legs(robot: Mechanism, camera: str | None = None, *, progress: Callable[[], 
         for places in combinations(range(len(labels)), size):
             samples = restricted(setting.everything, [segments[i] for i in places])
             sets.append(verdict_of(setting, [labels[i] for i in places], samples))
+            exact.append(generic.verdict(samples.question.observations))
             if progress is not None:
                 progress()
     best = max(each.rank for each in sets)
     smallest = min(len(each.legs) for each in sets if each.rank == best)
     minimal = tuple(each.legs for each in sets if each.rank == best and len(each.legs) == smallest)
-    return Legs(robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), complete, minimal)
+    return Legs(robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), tuple(exact), complete, minimal)

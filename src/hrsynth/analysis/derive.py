@@ -23,6 +23,8 @@ from ..rewrite.state import State
 from ..rewrite.strategy import Rewriting, Step
 from ..tolerances import SAME_RELATION
 from .controllability import Verdict, verdict_of
+from .exact import ExactVerdict
+from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
 from .setting import Mobility, Setting, prepare
 
@@ -60,6 +62,8 @@ class Derivation:
     hidden: Mechanism | None
     hidden_architecture: Architecture | None
     verdict: Verdict
+    exact: ExactVerdict
+    """What generic geometry of the same architecture sees."""
     steps: tuple[Step, ...]
     certificate: Certificate
     paper: PaperForm | None
@@ -94,7 +98,7 @@ class Derivation:
             "rank": self.verdict.rank,
             "point_platform": self.setting.anatomy.point is not None,
             "interaction_matrix": self.verdict.graph,
-            "architecture": {"verdict": None, "exact": False},
+            "architecture": self.exact.to_dict(),
             "paper_form": self.paper and self.paper.to_dict(),
             "steps": [{"rule": s.rule, "leg": s.leg, "accepted": s.accepted, "reason": s.reason,
                        "largest_angle": s.largest_angle} for s in self.steps],
@@ -124,6 +128,7 @@ def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     setting = prepare(robot, observe, camera, seed=seed)
     anatomy, samples = setting.anatomy, setting.samples
     verdict = verdict_of(setting, tuple(dict.fromkeys(o.leg for o in setting.observed)), samples)
+    exact = exact_architecture(setting).verdict(setting.observed)
     evidence = Evidence(anatomy, samples)
 
     run = strategy.simplified if form == "simplified" else strategy.general
@@ -145,7 +150,7 @@ def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
         certificate = _blind(samples)
         if not certificate.passed:
             raise NotCertified(robot.name, certificate.largest_angle, SAME_RELATION)
-    return Derivation(robot, setting, form, anatomy.architecture(), hidden, architecture, verdict, result.steps,
+    return Derivation(robot, setting, form, anatomy.architecture(), hidden, architecture, verdict, exact, result.steps,
                       certificate, paper)
 
 

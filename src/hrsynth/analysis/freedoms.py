@@ -57,10 +57,7 @@ def name_freedoms(twists: Array, anatomy: Anatomy, labels: tuple[str, ...] | Non
             twist = rest / np.linalg.norm(rest[3:])
             origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3] if position is None else position
             found.append(Freedom(twist, _screw(origin, twist)))
-    if position is None:
-        return tuple(found)
-    where = f" (with the platform at {_text(position)})"
-    return tuple(Freedom(freedom.twist, freedom.name + where) for freedom in found)
+    return tuple(found)
 
 
 def _inside(twist: Array, span: Array) -> bool:

@@ -1,0 +1,107 @@
+"""Incidences of joint centres that hold at all configurations: differences of centres that vanish, or that are parallel
+or normal to directions, and equal differences. Lengths here are in characteristic lengths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..tolerances import SAME_POINT
+from .vectors import Array
+
+Indices = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Incidence:
+    """A relation of the vector Σ sign · P: ``zero``; ``parallel`` to a class of directions; ``normal`` to one."""
+
+    terms: tuple[tuple[int, int], ...]
+    """Number of the centre, sign."""
+    kind: Literal["zero", "parallel", "normal"]
+    classes: tuple[int, ...] = ()
+
+
+def held(candidates: Indices, value: Callable[[Indices, slice], Array], tolerance: float) -> Indices:
+    """The candidates (m, k) whose ``value`` (m, configurations, …) vanishes at all configurations: first looked at at
+    the last one, then at all."""
+    for where in (slice(-1, None), slice(None)):
+        if len(candidates):
+            sizes = np.abs(value(candidates, where)).reshape(len(candidates), -1).max(axis=1, initial=0.0)
+            candidates = candidates[sizes < tolerance]
+    return candidates
+
+
+def choices(n: int, k: int) -> Indices:
+    """All sets of k of n numbers, one a row."""
+    return rows(combinations(range(n), k), k)
+
+
+def rows(tuples: Iterable[Sequence[int]], k: int) -> Indices:
+    """Tuples of k numbers, one a row, even if there are none."""
+    return np.array(list(tuples), dtype=np.intp).reshape(-1, k)
+
+
+def triple(a: Array, b: Array, c: Array) -> Array:
+    """a · (b × c) along the last dimension."""
+    return np.asarray(np.sum(a * np.cross(b, c), axis=-1))
+
+
+def incidences(classes: Array, points: Array, together: NDArray[np.bool_], owns: Sequence[set[int]],
+               slides: Sequence[set[int]]) -> list[Incidence]:
+    """All incidences of ``points`` (n, configurations, 3) towards ``classes`` of directions (m, configurations, 3).
+
+    ``together`` (n, n) says which points keep their direction from each other; ``owns`` are the classes of the axes
+    through each point, ``slides`` those along which it may be moved without consequence.
+    """
+    def between(c: Indices, s: slice) -> Array:
+        return np.asarray(points[c[:, 1], s] - points[c[:, 0], s])
+
+    def along(c: Indices, s: slice) -> Array:
+        return np.cross(between(c, s), classes[c[:, 2], s])
+
+    def across(c: Indices, s: slice) -> Array:
+        return np.asarray(np.sum(between(c, s) * classes[c[:, 2], s], axis=-1))
+
+    count = range(len(classes))
+    pairs = choices(len(points), 2)
+    same = held(pairs, between, SAME_POINT).tolist()
+    apart = [(j, k) for j, k in pairs.tolist() if [j, k] not in same]
+    parallel = held(rows(((j, k, c) for j, k in apart for c in count if together[j, k] or c in owns[j] | owns[k]), 3),
+                    along, SAME_POINT).tolist()
+    lined = {(j, k) for j, k, _ in parallel}
+    rest = [(j, k) for j, k in apart if together[j, k] and (j, k) not in lined]
+    normal = held(rows(((j, k, c) for j, k in rest for c in count), 3), across, SAME_POINT).tolist()
+    return [*(Incidence(((k, 1), (j, -1)), "zero") for j, k in same),
+            *(Incidence(((k, 1), (j, -1)), "parallel", (c,)) for j, k, c in parallel),
+            *(Incidence(((k, 1), (j, -1)), "normal", (c,)) for j, k, c in normal),
+            *_parallelograms(classes, points, together, slides)]
+
+
+def _parallelograms(classes: Array, points: Array, together: NDArray[np.bool_], slides: Sequence[set[int]]
+                    ) -> list[Incidence]:
+    """P_i − P_j = P_k − P_m, where ij, km, ik and jm are sides on links; up to a slide along an axis all four share."""
+    def gap(c: Indices, s: slice) -> Array:
+        return np.asarray(points[c[:, 0], s] - points[c[:, 1], s] - points[c[:, 2], s] + points[c[:, 3], s])
+
+    def gap_across(c: Indices, s: slice) -> Array:
+        return np.cross(gap(c, s), classes[c[:, 4], s])
+
+    beside = [set(np.flatnonzero(each).tolist()) - {i} for i, each in enumerate(together)]
+    quads = [(i, j, k, m) for i, near in enumerate(beside) for j, k in combinations(sorted(near), 2)
+             for m in beside[j] & beside[k] if i < min(j, m) and not (together[i, m] and together[j, k])]
+    closed = held(rows(quads, 4), gap, SAME_POINT).tolist()
+    shared = ((*quad, c) for quad in quads for c in set.intersection(*(slides[i] for i in quad)))
+    slid = [each for each in held(rows(shared, 5), gap_across, SAME_POINT).tolist() if each[:4] not in closed]
+
+    def terms(quad: list[int]) -> tuple[tuple[int, int], ...]:
+        return tuple(zip(quad[:4], (1, -1, -1, 1), strict=True))
+
+    return [*(Incidence(terms(quad), "zero") for quad in closed),
+            *(Incidence(terms(quad), "parallel", (quad[4],)) for quad in slid)]

@@ -1,0 +1,433 @@
+"""Exact verdicts: they agree with the numbers and with the oracle, and are not given where they cannot be."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from hrsynth.analysis import instances
+from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL, legs
+from hrsynth.analysis.derive import derive
+from hrsynth.analysis.exact import INSTANCES, ExactArchitecture, ExactVerdict, architecture, architecture_of
+from hrsynth.analysis.instances import Geometry, Instance, NotRecognised, draw, kernel, rank, seen
+from hrsynth.analysis.setting import Setting, prepare, selected
+from hrsynth.errors import HrsynthError
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.relation import Question, relation
+from hrsynth.kinematics.twin import Twin
+from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.model import Coupling
+from hrsynth.mechanism.observation import Direction, Observation
+from hrsynth.mechanism.relations import Relations, Sight
+from hrsynth.mechanism.sensors import encoders
+from hrsynth.mechanism.vectors import Array, frozen, unit
+from hrsynth.present.text import verdicts as text
+from kinematics.robots import ROBOTS, setting_of
+from oracle import Oracle
+from strategies import parallel_robots, planar, random_rotation, spherical, transformed
+
+WORDS = (CONTROLLABLE, PARTIAL, BLIND)
+
+
+def sets(setting: Setting) -> Iterator[tuple[tuple[int, ...], list[Observation]]]:
+    """All sets of default segments: their places and themselves."""
+    segments = setting.everything.question.observations[: setting.defaults]
+    for size in range(1, len(segments) + 1):
+        for places in combinations(range(len(segments)), size):
+            yield places, [segments[i] for i in places]
+
+
+def checked(verdict: ExactVerdict) -> None:
+    """What every exact verdict obeys."""
+    assert verdict.exact == (verdict.rank is not None) == (verdict.verdict in WORDS)
+    assert verdict.reason
+    if verdict.rank is None:
+        assert verdict.verdict is None
+        assert verdict.instances == 0
+        return
+    assert (verdict.verdict == CONTROLLABLE) == (verdict.rank == verdict.dof)
+    assert (verdict.verdict == BLIND) == (verdict.rank == 0)
+    assert verdict.instances == (1 if verdict.rank == verdict.dof else INSTANCES)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_exact_ranks_are_the_numerical_ones(robot: str) -> None:
+    """Every shipped robot, every set of legs."""
+    setting = setting_of(robot)
+    generic = architecture(setting)
+    for places, observed in sets(setting):
+        verdict = generic.verdict(observed)
+        checked(verdict)
+        assert verdict.exact, verdict.reason
+        assert verdict.rank == selected(setting.everything.members[0].relation, places).rank
+
+
+def placed(mechanism: Mechanism, relations: Relations, drawn: Geometry) -> Mechanism:
+    """A mechanism of doubles with the geometry of an instance."""
+    centres = np.array([[float(x.p) / float(x.q) for x in point] for point in drawn.centres])
+    directions = [unit([float(x.p) / float(x.q) for x in d]) for d in drawn.directions]
+    joints = [replace(joint, point=centres[relations.centres[name]] if name in relations.centres else centres[0],
+                      axes=tuple(directions[c] for c in relations.axes[name]))
+              for name, joint in mechanism.joints.items()]
+    found = mechanism.changed(joints=joints)
+    platform = found.links[found.platform]
+    if relations.point is not None:
+        X = np.eye(4)
+        X[:3, 3] = centres[relations.point]
+        found = found.changed(links=[replace(platform, pose=frozen(X))])
+    return found
+
+
+def doubles(vector: object) -> Array:
+    return np.array([float(x.p) / float(x.q) for x in vector])  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_an_instance_is_a_mechanism_of_the_same_kind(robot: str) -> None:
+    """The oracle, given the instance's geometry in doubles, finds the same dimensions as exact arithmetic."""
+    setting = setting_of(robot)
+    generic = architecture(setting)
+    drawn = draw(generic.relations, random.Random(0))
+    exact = generic.instance(0)
+    mechanism = placed(setting.mechanism, generic.relations, drawn)
+    observations = [Direction(o.leg, o.link, mechanism.links[o.link].pose[:3, :3].T @ doubles(seen(sight, drawn)))
+                    for o, sight in zip(generic.observations, generic.relations.sights, strict=True)]
+    oracle = Oracle(mechanism)
+    assert exact.mobility == oracle.mobility(oracle.zero())
+    for size in (1, 2, len(observations)):
+        basis = oracle.relation(oracle.zero(), observations[:size], point_only=generic.relations.point is not None)
+        rows = 6 if generic.relations.point is None else 3
+        values = np.linalg.svd(basis[rows:], compute_uv=False)
+        assert exact.ranks(range(size)) == (basis.shape[1], int(np.sum(values > 1e-9)))
+
+
+def test_an_instance_keeps_all_relations_exactly() -> None:
+    relations = architecture(setting_of("quattro")).relations
+    drawn = draw(relations, random.Random(3))
+    for number, conditions in enumerate(relations.tower):
+        for by in conditions:
+            rows = np.array([drawn.directions[c] for c in (*by, number)])
+            assert rows[0] @ rows[1] == 0 if len(by) == 1 else rank(rows) == 2
+    for incidence in relations.incidences:
+        vector = sum(sign * drawn.centres[i] for i, sign in incidence.terms)
+        by = [drawn.directions[c] for c in incidence.classes]
+        match incidence.kind:
+            case "zero":
+                assert all(x == 0 for x in vector)
+            case "parallel":
+                assert rank(np.array([vector, by[0]])) == 1
+            case _:
+                assert vector @ by[0] == 0
+
+
+def test_directions_that_follow_from_axes_and_centres() -> None:
+    rng = random.Random(5)
+    drawn = Geometry((instances._numbers(3, rng), instances._numbers(3, rng)),
+                     np.array([instances._numbers(3, rng) for _ in range(2)]))
+    a, b = drawn.directions
+    between = drawn.centres[1] - drawn.centres[0]
+    foot = seen(Sight("foot", (0, 1), (0,)), drawn)
+    assert foot @ a == 0
+    assert rank(np.array([foot, between, a])) == rank(np.array([between, a])) == 2
+    normal = seen(Sight("normal", (), (0, 1)), drawn)
+    assert normal @ a == normal @ b == 0
+    assert rank(np.array([seen(Sight("between", (0, 1)), drawn), between])) == 1
+
+
+def test_a_mechanism_without_centres() -> None:
+    """Two slides in series: nothing but directions matters."""
+    builder = Builder("slides")
+    for name in ("base", "one", "two"):
+        builder.link(name)
+    builder.joint("x", "P", "base", "one", axis=(1, 0, 0))
+    builder.joint("y", "P", "one", "two", axis=(0, 1, 0))
+    builder.observe("1", "two", (1, 2, 3))
+    robot = builder.build(platform="two")
+    start = ClosedConfiguration.of(Twin(robot), Twin(robot).q0)
+    question = Question("two", None, "base", robot.observations)
+    verdict = architecture_of(robot, question, [start], relation(start, question)).verdict(robot.observations)
+    assert (verdict.exact, verdict.verdict, verdict.rank) == (True, BLIND, 0)
+
+
+def test_the_largest_rank_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """An instance that is special by chance does not decide."""
+    generic = architecture(setting_of("delta"))
+    real = instances.instance
+    drawn: list[Instance] = []
+
+    def unlucky(*geometry: object) -> Instance:
+        found = real(*geometry)  # type: ignore[arg-type]
+        drawn.append(found)
+        return found if len(drawn) > 1 else replace(found, rates=(found.rates[0], *(0 * r for r in found.rates[1:])))
+
+    monkeypatch.setattr("hrsynth.analysis.exact.instance", unlucky)
+    assert generic.verdict(generic.observations[:2]).rank == 3
+    assert len(drawn) == 2
+    assert generic.verdict(generic.observations[:1]).rank == 2
+    assert len(drawn) == INSTANCES
+
+
+@given(st.lists(st.lists(st.integers(-3, 3), min_size=5, max_size=5), min_size=1, max_size=6))
+def test_kernels_are_exact(rows: list[list[int]]) -> None:
+    matrix = np.array(rows, dtype=object)
+    basis = kernel(matrix)
+    assert all(x == 0 for x in (matrix @ basis).ravel())
+    assert basis.shape[1] == 5 - rank(matrix) == 5 - np.linalg.matrix_rank(np.array(rows, dtype=float))
+    assert basis.shape[1] == (rank(basis) if basis.shape[1] else 0)
+
+
+def check_agreement(mechanism: Mechanism) -> None:
+    """Exact ranks are those of a random robot, or there is a reason."""
+    try:
+        setting = prepare(mechanism, samples=3)
+    except HrsynthError:
+        assume(False)
+    generic = architecture(setting)
+    for places, observed in sets(setting):
+        verdict = generic.verdict(observed)
+        checked(verdict)
+        assert verdict.exact, verdict.reason
+        assert verdict.rank == max(selected(m.relation, places).rank for m in setting.everything.members)
+
+
+@given(parallel_robots(), st.integers(0, 2**32 - 1))
+@settings(max_examples=12, deadline=None)
+def test_random_robots(mechanism: Mechanism, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    check_agreement(transformed(mechanism, random_rotation(rng), rng.normal(size=3)))
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_spherical_robots(seed: int) -> None:
+    """Over-constrained by axes that meet in one point."""
+    check_agreement(spherical(np.random.default_rng(seed)))
+
+
+def spinning() -> Setting:
+    """A robot with rods between balls, the direction seen of the first not along the rod: it moves as the rod spins."""
+    robot = setting_of("delta").mechanism
+    first, *rest = setting_of("delta").everything.question.observations
+    assert isinstance(first, Direction)
+    tilted = replace(first, direction=unit(first.direction + [0.3, -0.5, 0.4]))
+    return prepare(robot.changed(observations=(tilted, *rest)), samples=3)
+
+
+def test_directions_that_move_while_the_platform_rests() -> None:
+    setting = spinning()
+    assert setting.everything.members[0].relation.unexplained == 1
+    generic = architecture(setting)
+    for places, observed in sets(setting):
+        verdict = generic.verdict(observed)
+        assert verdict.exact
+        assert verdict.rank == selected(setting.everything.members[0].relation, places).rank
+
+
+def test_what_some_legs_leave_free_must_be_the_robots_own() -> None:
+    """Where the rates of two legs are exchanged, ρ for all legs has its dimension, for one of them it has not."""
+    generic = architecture(spinning())
+    own = generic.relation
+    order = [*range(6), *range(9, 12), *range(6, 9), *range(12, 15)]
+    other = ExactArchitecture(generic.mechanism, generic.relations, generic.observations,
+                              replace(own, basis=own.basis[order]))
+    assert other.verdict(other.observations).exact
+    verdict = other.verdict(other.observations[:1])
+    checked(verdict)
+    assert "dim ρ of these legs is 3, but 4" in verdict.reason
+
+
+@pytest.mark.slow
+@given(parallel_robots())
+@settings(max_examples=150, deadline=None)
+def test_many_random_robots(mechanism: Mechanism) -> None:
+    check_agreement(mechanism)
+
+
+@pytest.mark.parametrize(("robot", "observe", "camera"), [
+    ("delta", ("arm_1", "rod_2b"), None), ("delta", None, "platform"), ("gough_stewart", ("1", "2", "3"), "platform"),
+    ("quattro", ("arm_2", "rod_3b"), None), ("3rrr_m1", None, "platform"), ("delta", ("1", "2"), "rod_3a")])
+def test_other_segments_and_cameras(robot: str, observe: tuple[str, ...] | None, camera: str | None) -> None:
+    setting = setting_of(robot, observe, camera)
+    verdict = architecture(setting).verdict(setting.observed)
+    checked(verdict)
+    assert verdict.exact, verdict.reason
+    assert verdict.rank == max(member.relation.rank for member in setting.samples.members)
+
+
+# --- what must not be claimed ------------------------------------------------------------------------------------
+
+def check_refused(generic: ExactArchitecture, words: str) -> None:
+    verdict = generic.verdict(generic.observations)
+    checked(verdict)
+    assert not verdict.exact
+    assert words in verdict.reason
+    with pytest.raises(NotRecognised):
+        generic.instance(0)
+
+
+def test_axes_that_are_not_quite_parallel() -> None:
+    """A joint with its axis off by 1e-4 is locked: no planar robot any more, neither in fact nor in its instances."""
+    robot = planar(["RRR"] * 3, np.random.default_rng(1), [{0}] * 3)
+    question = prepare(robot, samples=2).everything.question
+    mobile = relation(ClosedConfiguration.of(Twin(robot), Twin(robot).q0), question)
+    joint = robot.joints["joint_2_2"]
+    bent = robot.changed(joints=[replace(joint, axes=(unit(joint.axis + 1e-4 * np.array([0.3, -0.5, 0.7])),))])
+    twin = Twin(bent)
+    start = ClosedConfiguration.of(twin, twin.q0)
+    check_refused(architecture_of(bent, question, [start], mobile), "mobility is 3, but")
+    found = legs(bent)
+    assert found.dof == 2
+    assert all(each.exact and each.rank == other.rank for each, other in zip(found.exact, found.sets, strict=True))
+
+
+def test_six_rods_that_meet_one_line() -> None:
+    """SS rods that meet one line let the platform turn about it for an instant, and no further (theory 3.4)."""
+    rng = np.random.default_rng(2)
+    builder = Builder("hexapod")
+    builder.link("base")
+    builder.link("platform", at=(0.1, 0.2, 1.0))
+    for number in range(6):
+        meet = np.array([0.0, 0.0, rng.uniform(-1, 2)])
+        along = unit(rng.normal(size=3))
+        A, B = meet + rng.uniform(0.5, 1) * along, meet - rng.uniform(0.5, 1) * along
+        builder.link(f"rod_{number}", at=A)
+        builder.joint(f"foot_{number}", "S", "base", f"rod_{number}", A)
+        builder.joint(f"tip_{number}", "S", f"rod_{number}", "platform", B, loop=number > 0)
+        builder.observe(str(number + 1), f"rod_{number}", along)
+    robot = builder.build(platform="platform")
+    twin = Twin(robot)
+    start = ClosedConfiguration.of(twin, twin.q0)
+    question = Question("platform", None, "base", robot.observations)
+    here = relation(start, question)
+    assert here.dof.value == 1
+    check_refused(architecture_of(robot, question, [start], here), "mobility is 7, but 6")
+
+
+def test_another_dof() -> None:
+    generic = architecture(setting_of("3rrr_m1"))
+    basis = generic.relation.basis.copy()
+    basis[:6] *= 0
+    check_refused(ExactArchitecture(generic.mechanism, generic.relations, generic.observations,
+                                    replace(generic.relation, basis=basis)), "dof is 0, but 3")
+
+
+def test_gears_are_said_to_be_left_out() -> None:
+    generic = architecture(setting_of("3rrr_m1"))
+    geared = replace(generic.mechanism, couplings=(Coupling("gear", "prox_1", "prox_2", 2.0),))
+    check_refused(ExactArchitecture(geared, generic.relations, generic.observations, generic.relation), "gears")
+
+
+def test_relations_that_leave_no_direction() -> None:
+    generic = architecture(setting_of("rrrrr_m1"))
+    crowded = replace(generic.relations, tower=(*generic.relations.tower, (), ((1,),), ((0,), (1,), (2,))))
+    check_refused(ExactArchitecture(generic.mechanism, crowded, generic.observations, generic.relation),
+            "no random direction")
+
+
+def test_what_is_no_direction() -> None:
+    setting = setting_of("delta")
+    joint = next(joint for joint in setting.mechanism.joints.values() if joint.type.value == "R")
+    verdict = architecture(setting).verdict(encoders(setting.mechanism, joint, "1"))
+    checked(verdict)
+    assert not verdict.exact
+    assert "not a direction" in verdict.reason
+
+
+@pytest.mark.parametrize(("robot", "kept"), [("quattro_rigid", "zero"), ("i4l", "parallel")])
+def test_an_over_constrained_robot_needs_its_incidences(robot: str, kept: str) -> None:
+    generic = architecture(setting_of(robot))
+    fewer = tuple(each for each in generic.relations.incidences if each.kind == kept and len(each.terms) == 2)
+    relations = replace(generic.relations, incidences=fewer)
+    check_refused(ExactArchitecture(generic.mechanism, relations, generic.observations, generic.relation), "mobility")
+
+
+def test_a_planar_robot_needs_its_parallel_axes() -> None:
+    generic = architecture(setting_of("3rrr_m1"))
+    axes = {name: (i,) for i, name in enumerate(generic.relations.axes)}
+    relations = replace(generic.relations, axes=axes, tower=((),) * len(axes))
+    check_refused(ExactArchitecture(generic.mechanism, relations, generic.observations, generic.relation),
+            "mobility is 3, but 0")
+
+
+# --- an architecture and a robot ---------------------------------------------------------------------------------
+
+def collinear() -> Mechanism:
+    """A hexapod with three of its tips on one line of the platform."""
+    robot = prepare_robot("gough_stewart")
+    tips = [robot.joints[f"wrist_{i}"] for i in (1, 2, 3)]
+    return robot.changed(joints=[replace(tips[2], point=0.4 * tips[0].point + 0.6 * tips[1].point)])
+
+
+def prepare_robot(name: str) -> Mechanism:
+    return setting_of(name).mechanism
+
+
+def test_a_robot_may_see_less_than_its_architecture() -> None:
+    """Three legs whose tips lie on one line do not see the turn about it; both verdicts are given."""
+    found = derive(collinear(), ["1", "2", "3"])
+    assert (found.verdict.verdict, found.verdict.rank) == (PARTIAL, 5)
+    assert (found.exact.verdict, found.exact.rank) == (CONTROLLABLE, 6)
+    record = found.to_dict()
+    assert record["verdict"] == PARTIAL
+    assert record["architecture"]["verdict"] == CONTROLLABLE
+    assert record["architecture"]["exact"] is True
+    (line,) = [line for line in text.derivation(found, None).splitlines() if line.startswith("architecture")]
+    assert "generic geometry sees 6 of 6" in line
+    assert "this robot 5" in line
+
+
+@pytest.mark.parametrize(("robot", "observe", "verdict", "words"), [
+    ("quattro_rigid", None, CONTROLLABLE, "controllable, proved in exact arithmetic"),
+    ("uranesx", None, PARTIAL, "partially controllable, exact at 5 random instances"),
+    ("3ppr_m1", None, BLIND, "uncontrollable, exact at 5 random instances")])
+def test_the_architecture_in_a_derivation(robot: str, observe: None, verdict: str, words: str) -> None:
+    found = derive(prepare_robot(robot), observe)
+    record = found.to_dict()["architecture"]
+    assert record == {"verdict": verdict, "exact": True, "rank": found.verdict.rank,
+                      "instances": 1 if verdict == CONTROLLABLE else 5, "reason": words.split(", ")[1]}
+    (line,) = [line for line in text.derivation(found, None).splitlines() if line.startswith("architecture")]
+    assert line.split(maxsplit=1)[1] == words
+
+
+def test_the_architecture_in_a_table_of_legs() -> None:
+    found = legs(prepare_robot("quattro"))
+    record = found.to_dict()
+    for each, exact in zip(record["sets"], found.exact, strict=True):
+        assert each["exact"] is True
+        assert each["architecture"]["verdict"] == each["verdict"]
+        assert each["architecture"]["rank"] == each["rank"]
+        assert tuple(each["legs"]) == exact.legs
+    lines = text.legs(found).splitlines()
+    assert "exact" in lines[2].split()
+    assert sum("proved" in line for line in lines) == sum(each.verdict == CONTROLLABLE for each in found.sets) == 9
+    assert sum("5 instances" in line for line in lines) == 6
+
+
+def test_what_is_not_decided_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    def crowded(*_: object) -> Instance:
+        raise NotRecognised("crowded")
+
+    monkeypatch.setattr("hrsynth.analysis.exact.instance", crowded)
+    found = legs(prepare_robot("rrrrr_m1"))
+    assert not any(each.exact for each in found.exact)
+    assert [each["architecture"]["verdict"] for each in found.to_dict()["sets"]] == [None] * 3
+    printed = text.legs(found)
+    assert printed.count("not decided") == 4
+    assert "not decided in exact arithmetic: crowded" in printed
+    line = next(line for line in text.derivation(derive(prepare_robot("rrrrr_m1")), None).splitlines()
+                if line.startswith("architecture"))
+    assert line.endswith("not decided: crowded")
+
+
+def test_the_numbers_drawn_are_many() -> None:
+    """Two that should differ are equal by chance once in a million draws."""
+    rng = random.Random(0)
+    drawn = [instances._numbers(3, rng) for _ in range(200)]
+    assert len({int(x.p) for vector in drawn for x in vector}) == 600
