@@ -102,6 +102,46 @@ class NotSampled(HrsynthError):
                          f"needed: {wanted}; is the zero configuration singular?")
 
 
+class PoseNotReached(HrsynthError):
+    """A pose that the robot does not reach from its zero configuration: the leg that misses it most and by how much
+    (mm, degrees), or None where each leg alone reaches it; how far the robot came (0 to 1), and to which pose."""
+
+    exit_status = 3
+
+    def __init__(self, robot: str, pose: str, came: float, last: str, leg: str | None = None,
+                 millimetres: float = 0.0, degrees: float = 0.0) -> None:
+        self.robot, self.pose, self.came, self.last = robot, pose, came, last
+        self.leg, self.millimetres, self.degrees = leg, millimetres, degrees
+        if leg is None:
+            reason = "each leg alone can close there, but not all of them together in this working mode"
+        else:
+            turn = f" and {degrees:.3g} degrees" if degrees > 1e-6 else ""
+            reason = f"leg {leg} alone misses it by {millimetres:.4g} mm{turn}"
+        super().__init__(f"{robot}: the pose {pose} is not reached: {reason}; from its zero configuration the robot "
+                         f"comes {100 * came:.3g} % of the way, to {last}")
+
+
+class PlaneNotMet(HrsynthError):
+    """A plane of poses of which the robot reaches none: why."""
+
+    exit_status = 3
+
+    def __init__(self, robot: str, plane: str, reason: str) -> None:
+        self.robot, self.plane, self.reason = robot, plane, reason
+        super().__init__(f"{robot}: no pose of the plane {plane} is reached: {reason}")
+
+
+class Disagreement(HrsynthError):
+    """The words, the expression and the rank do not agree about where a robot is singular."""
+
+    exit_status = 3
+
+    def __init__(self, robot: str, poses: int, angle: float) -> None:
+        self.robot, self.poses, self.angle = robot, poses, angle
+        super().__init__(f"{robot}: the condition and the rank disagree at {poses} poses (a leg's wrenches by up to "
+                         f"{angle:.2g} rad); please report this as a defect of hrsynth")
+
+
 class NotCertified(HrsynthError):
     """No hidden robot passed the certificate: the best angle seen."""
 

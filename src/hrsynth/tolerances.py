@@ -10,11 +10,17 @@ ASSEMBLED = 1e-12
 SOLVED = 1e-12
 """Residual (characteristic lengths, radians) at which the solver of closed configurations is content."""
 
+SHARP = 1e-15
+"""Residual that is asked for where a singular pose is wanted as exactly as numbers allow."""
+
 PASSED_BY = 1e-3
 """Residual at which a configuration on the way to another is near enough to go on from."""
 
 CLOSED = 1e-10
 """Residual (characteristic lengths, radians) below which a configuration counts as closed."""
+
+NEAREST = 1e-10
+"""Projected gradient (characteristic lengths, radians) at which a pose counts as the nearest one."""
 
 FOLLOWED = 1e-9
 """Residual below which a hidden robot has reached the pose and the directions of the real one."""
@@ -33,6 +39,9 @@ SAME_POINT = 1e-7
 
 SAME_DIRECTION = 1e-7
 """Sine of the angle below which two directions are parallel, cosine below which they are perpendicular."""
+
+SAME_PLANE = 1e-4
+"""Sine of the angle between two planes below which they count as one when directions are put in order for drawing."""
 
 SAME_GEOMETRY = 1e-9
 """Largest difference (metres, pure numbers) at which two mechanisms count as the same."""

@@ -5,13 +5,13 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
-import shutil
 from importlib import resources
 from pathlib import Path
 
 from ..errors import BadRequest
 from ..mechanism.model import Mechanism
 from . import native
+from .files import write_whole
 from .tree import spanning
 
 __all__ = ["load", "native", "save", "shipped", "spanning"]
@@ -57,21 +57,4 @@ def save(mechanism: Mechanism, path: str | Path) -> None:
     BadRequest
         Where the file cannot be written, or the mechanism not be said in the native dialect.
     """
-    text = native.write(mechanism)
-    try:
-        target = Path(os.path.realpath(path))
-        if target.is_dir():
-            raise BadRequest("cannot write the file: a directory", str(path))
-        if target.exists() and not target.is_file():
-            raise BadRequest("cannot write the file: not a regular file", str(path))
-        draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-        try:
-            draft.write_text(text, encoding="utf-8", newline="\n")
-            if target.exists():
-                shutil.copymode(target, draft)
-            os.replace(draft, target)
-        finally:
-            draft.unlink(missing_ok=True)
-    except (OSError, ValueError) as error:
-        reason = getattr(error, "strerror", None) or str(error)
-        raise BadRequest(f"cannot write the file: {reason}", str(path)) from None
+    write_whole(path, native.write(mechanism).encode())

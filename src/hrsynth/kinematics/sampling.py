@@ -8,7 +8,7 @@ the poses and directions of the way, arrives at the same configuration. What fai
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -24,6 +24,8 @@ from .twin import Twin
 
 STEP = 0.11
 """Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
+SHRINK = (1.0, 0.4, 0.15)
+"""What a step is shortened to where it does not close near its prediction."""
 STEPS = 4
 """Steps from the zero configuration to a sample."""
 EASY = 10
@@ -126,24 +128,10 @@ def _walk(start: ClosedConfiguration, question: Question, leading: set[tuple[str
     way: list[Target] = []
     weakest = WEAKEST * start.kernel()[1].weakest
     for _ in range(STEPS):
-        for shrink in (1.0, 0.4, 0.15):
-            moving = _velocity(here, question, wish, rng)
-            if moving is None:
-                return None
-            velocity, direction = moving
-            step = STEP * shrink * velocity
-            largest = float(np.max(np.abs(step), initial=0.0))
-            if largest > 3 * STEP:
-                step *= 3 * STEP / largest
-            predicted = twin.moved(here.q, step)
-            q, residual = closed(twin, predicted, tolerance=SOLVED)
-            if residual <= CLOSED and np.linalg.norm(q - predicted) <= 0.5 * np.linalg.norm(step) + 1e-9:
-                break
-        else:
+        moved = _step(here, question, wish, weakest, rng)
+        if moved is None:
             return None
-        here, wish = ClosedConfiguration.of(twin, q), direction
-        if here.kernel()[1].weakest < weakest:
-            return None
+        here, wish = moved
         way.append(question.target(here))
     found = relation(here, question)
     led = [replace(t, measured=tuple(pair for pair in t.measured if pair[0].key in leading))
@@ -151,6 +139,59 @@ def _walk(start: ClosedConfiguration, question: Question, leading: set[tuple[str
     if found.gap < RANK_GAP or followed(twin, led, iterations=EASY)[1] > FOLLOWED:
         return None
     return Sample(here, tuple(way), found)
+
+
+def _step(here: ClosedConfiguration, question: Question, wish: Array | None, weakest: float,
+          rng: np.random.Generator) -> tuple[ClosedConfiguration, Array] | None:
+    """The next configuration of a walk and the direction of the step in (t, u̇); None where it jumps or comes too near
+    to a singularity of the loops."""
+    for shrink in SHRINK:
+        moving = _velocity(here, question, wish, rng)
+        if moving is None:
+            return None
+        velocity, direction = moving
+        there = _moved(here, shrink * velocity)
+        if there is not None:
+            return None if there.kernel()[1].weakest < weakest else (there, direction)
+    return None
+
+
+def _moved(here: ClosedConfiguration, velocity: Array) -> ClosedConfiguration | None:
+    """The configuration a step along ``velocity`` leads to; None where it does not close near its prediction."""
+    step = STEP * velocity
+    largest = float(np.max(np.abs(step), initial=0.0))
+    if largest > 3 * STEP:
+        step = step * (3 * STEP / largest)
+    predicted = here.twin.moved(here.q, step)
+    q, residual = closed(here.twin, predicted, tolerance=SOLVED)
+    if residual <= CLOSED and np.linalg.norm(q - predicted) <= 0.5 * np.linalg.norm(step) + 1e-9:
+        return ClosedConfiguration.of(here.twin, q)
+    return None
+
+
+def wander(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40) -> Iterator[ClosedConfiguration]:
+    """``count`` random configurations on the component of ``start``: walks of up to ``steps`` small steps in the
+    mechanism's own freedoms, each checked as those of :func:`draw` are; a walk that ends early is begun again."""
+    rng = np.random.default_rng(seed)
+    weakest = WEAKEST * start.kernel()[1].weakest
+    given = failed = 0
+    while given < count:
+        here, velocity = start, np.zeros(start.twin.nv)
+        for _ in range(steps):
+            kernel, _ = here.kernel()
+            velocity = kernel @ (kernel.T @ velocity + rng.normal(size=kernel.shape[1]) / 2)
+            velocity /= np.linalg.norm(velocity)
+            moved = next((m for shrink in SHRINK if (m := _moved(here, 2 * shrink * velocity)) is not None), None)
+            if moved is None or moved.kernel()[1].weakest < weakest:
+                failed += 1
+                break
+            here = moved
+            yield here
+            given += 1
+            if given == count:
+                return
+        if failed > 10 * (given + 10):
+            raise NotSampled(start.twin.mechanism.name, given, count)
 
 
 def followed(twin: Twin, way: Sequence[Target], iterations: int = 120) -> tuple[Array, float]:

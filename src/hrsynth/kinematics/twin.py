@@ -169,6 +169,12 @@ class Twin:
              if self._pairs else np.zeros((0, self.nv)))
         return np.vstack([J, self._gears]) if len(self._gears) else J
 
+    @property
+    def blocks(self) -> tuple[tuple[str, ...], tuple[int, ...]]:
+        """What the rows of :meth:`jacobian` belong to: names of loops, then of couplings, and rows of each."""
+        gears = tuple(coupling.name for coupling in self.mechanism.couplings)
+        return (*self.loops, *gears), (*(model.residualSize() for model in self._models), *[1] * len(gears))
+
     def worst_loop(self, q: Array) -> tuple[str, float]:
         """The loop that misses most, and by how much."""
         self.at(q)
@@ -215,6 +221,10 @@ class Twin:
     def moved(self, q: Array, step: Array) -> Array:
         """The configuration that ``step`` (nv) leads to from ``q``."""
         return pin.integrate(self.model, q, step)
+
+    def difference(self, q: Array, other: Array) -> Array:
+        """The step (nv) that leads from ``q`` to ``other``."""
+        return pin.difference(self.model, q, other)
 
     def actuated(self) -> list[int]:
         """Velocity indices of the actuated joints' coordinates."""

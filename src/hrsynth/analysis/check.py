@@ -1,0 +1,104 @@
+"""Mobility, ranks, singularities and redundant constraints of a robot at given poses, and over a grid of poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..kinematics.reach import reach, sweep
+from ..mechanism import Mechanism
+from ..mechanism.pose import SCALARS, Grid, Pose
+from .posture import Examiner, Posture
+from .redundancy import Redundancy, listed
+from .setting import Setting, prepare
+
+UNREACHABLE = "unreachable"
+MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degrees_per_degree")
+
+
+@dataclass(frozen=True, eq=False)
+class GridCheck:
+    """The postures over a grid of poses, in its order; None where a pose is not reached."""
+
+    grid: Grid
+    postures: tuple[Posture | None, ...]
+
+    @property
+    def states(self) -> tuple[str, ...]:
+        """The kind of singularity of each cell in one word, or that it is not reached or not decided."""
+        return tuple(UNREACHABLE if each is None else each.hidden.state for each in self.postures)
+
+    def values(self, measure: str) -> tuple[float | None, ...]:
+        """One of ``MEASURES`` at each cell; None where the pose is not reached or the value is infinite."""
+        return tuple(None if each is None else each.distances.to_dict()[measure] for each in self.postures)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line: arrays nested in the order of ``axes``."""
+        shape = self.grid.shape
+        nested = {name: np.array(self.values(name), dtype=object).reshape(shape).tolist() for name in MEASURES}
+        fixed = {name: values[0] for name, values in self.grid.fixed.given.items() if name in SCALARS}
+        rpy = {} if self.grid.fixed.rpy is None else {"rpy": list(self.grid.fixed.rpy)}
+        return {"axes": list(self.grid.names), **{name: values.tolist() for name, values in self.grid.axes},
+                "fixed": {**fixed, **rpy}, "state": np.array(self.states, dtype=object).reshape(shape).tolist(),
+                **nested}
+
+
+@dataclass(frozen=True, eq=False)
+class Check:
+    """What is observed, the postures at the poses asked for, the loop constraints that are always redundant."""
+
+    setting: Setting
+    postures: tuple[Posture, ...]
+    redundant: tuple[Redundancy, ...]
+    grid: GridCheck | None = None
+
+    @property
+    def length(self) -> float:
+        """The characteristic length (m) that makes lengths comparable with angles."""
+        return self.setting.everything.twin.length
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line, without the command's own fields."""
+        return {"characteristic_length": self.length,
+                "observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
+                "camera": self.setting.mechanism.reference,
+                "configurations": [each.to_dict() for each in self.postures],
+                "redundant": [each.to_dict() for each in self.redundant],
+                "grid": self.grid and self.grid.to_dict()}
+
+
+def check(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+          at: Sequence[Pose | str] = (), grid: Grid | str | None = None, seed: int = 0,
+          progress: Callable[[str], None] | None = None) -> Check:
+    """Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six, constraint singularities and redundant constraints
+    (theory 4) at the poses ``at`` (default: the zero configuration) and over ``grid``.
+
+    What is said of the hidden robot is read from the real robot's relation with the observed directions, which is the
+    hidden robot's own (theory 3); the real robot's kinds take its motors' coordinates for what is measured. Generic
+    values are those of random samples. ``observe`` and ``camera`` as for ``derive``.
+
+    Raises ``BadRequest`` for names that there are not and for parts of a pose that the platform cannot change,
+    ``PoseNotReached`` for poses out of reach.
+    """
+    poses = [Pose.parse(each) if isinstance(each, str) else each for each in at]
+    cells = Grid.parse(grid) if isinstance(grid, str) else grid
+
+    def tell(text: str) -> None:
+        if progress is not None:
+            progress(text)
+
+    tell("sampling")
+    setting = prepare(robot, observe, camera, seed=seed)
+    examiner = Examiner(setting)
+    start, question, motion = setting.everything.start, setting.everything.question, examiner.motion
+    configurations = [reach(start, question, pose, motion) for pose in poses] or [start]
+    tell("poses")
+    postures = tuple(map(examiner.examine, configurations))
+    swept = None
+    if cells is not None:
+        found = sweep(start, question, cells, motion, lambda: tell("grid"))
+        swept = GridCheck(cells, tuple(None if each is None else examiner.glance(each) for each in found))
+    return Check(setting, postures, listed(examiner.redundant, generic=True), swept)

@@ -1,0 +1,219 @@
+"""One configuration under examination: ranks, kinds of singularities, distances to them, redundant constraints."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.parts import PlatformMotion
+from ..kinematics.ranks import range_basis
+from ..kinematics.relation import Relation, relation, relation_of
+from ..mechanism.pose import Pose
+from ..mechanism.vectors import Array
+from ..tolerances import PASSED_BY, RANK_GAP
+from .classes import Classes, Counts, gap_of, generic, interaction_matrix
+from .freedoms import Freedom, name_freedoms
+from .redundancy import Redundancy, Rows, listed, redundant_rows, surplus, usual_rows
+from .setting import Mobility, Setting
+
+UNDECIDED, REGULAR, CONSTRAINT = "undecided", "regular", "constraint"
+
+
+@dataclass(frozen=True, eq=False)
+class Kinds:
+    """What one relation says at a configuration: the freedoms that are seen, the gap of all ranks, the six counts (None
+    where the gap is too small for a verdict) and the freedoms that are not seen."""
+
+    rank: int
+    gap: float
+    classes: Classes | None
+    lost: tuple[Freedom, ...] = ()
+
+    @property
+    def state(self) -> str:
+        """The kind of singularity in one word."""
+        found = self.classes
+        if found is None:
+            return UNDECIDED
+        if found.IIM > 0:
+            return CONSTRAINT
+        return "type3" if found.type3 else "type2" if found.type2 else "type1" if found.type1 else REGULAR
+
+    def types(self) -> dict[str, bool | None]:
+        """The three types, each null where it is not decided."""
+        return {name: None if self.classes is None else getattr(self.classes, name)
+                for name in ("type1", "type2", "type3")}
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"rank": self.rank, "gap": self.gap, **self.types(), "classes": self.classes and self.classes.to_dict(),
+                "lost": [freedom.to_dict() for freedom in self.lost]}
+
+
+@dataclass(frozen=True)
+class Distances:
+    """How far a configuration is from each kind (0: there); lengths in characteristic lengths.
+
+    ``type2`` is the smallest singular value of Mᵀ on the feasible twists that are generically seen, ``type1`` one over
+    the largest, ``condition`` the largest over the smallest; None where Mᵀ does not exist even generically.
+    ``constraints`` is the weakest singular value of the loops, as part of the largest. ``millimetres`` and ``degrees``
+    are the platform's motion along its weakest freedom for each degree by which the observed directions are wrong; None
+    where it is infinite or Mᵀ does not exist.
+    """
+
+    type2: float | None
+    type1: float | None
+    constraints: float
+    condition: float | None
+    millimetres: float | None
+    degrees: float | None
+
+    def to_dict(self) -> dict[str, float | None]:
+        """The record of the command line."""
+        return {"type2": self.type2, "type1": self.type1, "constraints": self.constraints, "condition": self.condition,
+                "mm_per_degree": self.millimetres, "degrees_per_degree": self.degrees}
+
+
+@dataclass(frozen=True, eq=False)
+class Posture:
+    """All that is said of one configuration."""
+
+    configuration: ClosedConfiguration
+    pose: Pose
+    mobility: Mobility
+    dof: int
+    hidden: Kinds
+    real: Kinds | None
+    """The real robot with its own motors; None where it has none."""
+    distances: Distances
+    gained: tuple[Freedom, ...] = ()
+    """At a constraint singularity: the freedoms that the platform has here and not in general."""
+    redundant: tuple[Redundancy, ...] = ()
+    """Loop constraints that are redundant only here."""
+
+    @property
+    def gap(self) -> float:
+        """The smallest gap of all ranks."""
+        return self.hidden.gap if self.real is None else min(self.hidden.gap, self.real.gap)
+
+    @property
+    def decided(self) -> bool:
+        """Whether every rank is a verdict."""
+        return self.gap >= RANK_GAP
+
+    @property
+    def constraint_singular(self) -> bool | None:
+        """Whether the loops have lost rank; None where that is not decided."""
+        return None if self.hidden.classes is None else self.hidden.classes.IIM > 0
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        hidden = self.hidden.to_dict()
+        return {"pose": self.pose.to_dict(), "mobility": {"total": self.mobility.total, "idle": self.mobility.idle},
+                "dof": self.dof, "rank_M": hidden.pop("rank"), **hidden, "condition": self.distances.condition,
+                "real": self.real and self.real.to_dict(),
+                "constraint": {"singular": self.constraint_singular,
+                               "rank_lost": None if self.hidden.classes is None else self.hidden.classes.IIM,
+                               "gained": [freedom.to_dict() for freedom in self.gained]},
+                "redundant": [each.to_dict() for each in self.redundant], "distances": self.distances.to_dict()}
+
+
+@dataclass(frozen=True, eq=False)
+class Examiner:
+    """A setting with its generic values, against which single configurations are held."""
+
+    setting: Setting
+
+    @cached_property
+    def motion(self) -> PlatformMotion:
+        """What the platform generically does."""
+        everything = self.setting.everything
+        return PlatformMotion.of((member.configuration for member in everything.members), everything.question)
+
+    @cached_property
+    def usual(self) -> Counts:
+        """The generic counts of the observed directions."""
+        return generic([Counts.of(member.relation) for member in self.setting.samples.members])
+
+    @cached_property
+    def usual_real(self) -> Counts:
+        """The generic counts of the motors."""
+        return generic([Counts.of(self._real(member.configuration)) for member in self.setting.everything.members])
+
+    @cached_property
+    def redundant(self) -> Rows:
+        """The redundant rows of each loop in general."""
+        return usual_rows(member.configuration for member in self.setting.everything.members)
+
+    def _real(self, at: ClosedConfiguration) -> Relation:
+        return relation_of(at, self.setting.samples.question, np.eye(at.twin.nv)[at.twin.actuated()])
+
+    def glance(self, at: ClosedConfiguration) -> Posture:
+        """What can be said without names: no freedoms, no redundant constraints."""
+        setting = self.setting
+        found = relation(at, setting.samples.question)
+        defaults = relation(at, replace(setting.everything.question,
+                                        observations=setting.everything.question.observations[: setting.defaults]))
+        real = self._kinds(self._real(at), self.usual_real) if at.twin.actuated() else None
+        mobility = Mobility(found.mobility, found.mobility - defaults.dimension)
+        return Posture(at, self.motion.pose(at.pose(self.motion.link)), mobility, found.dof.value,
+                       self._kinds(found, self.usual), real, self._distances(at, found))
+
+    def examine(self, at: ClosedConfiguration) -> Posture:
+        """All that can be said of a configuration."""
+        posture = self.glance(at)
+        hidden, real = posture.hidden, posture.real
+        found = relation(at, self.setting.samples.question)
+        hidden = replace(hidden, lost=self._named(at, found.lost) if hidden.classes else ())
+        if real is not None and real.classes:
+            real = replace(real, lost=self._named(at, self._real(at).lost))
+        extra = surplus(redundant_rows(at), self.redundant)
+        gained = self._named(at, self._gained(found)) if posture.constraint_singular else ()
+        return replace(posture, hidden=hidden, real=real, gained=gained, redundant=listed(extra, generic=False))
+
+    @staticmethod
+    def _kinds(found: Relation, usual: Counts) -> Kinds:
+        gap = gap_of(found)
+        return Kinds(found.rank, gap, Classes.of(Counts.of(found), usual) if gap >= RANK_GAP else None)
+
+    def _distances(self, at: ClosedConfiguration, found: Relation) -> Distances:
+        constraints = 0.0 if found.mobility > self.usual.mobility else at.kernel()[1].weakest
+        M = interaction_matrix(found)
+        if M is None or self.usual.unexplained:
+            reached = None if self.usual.unexplained else 0.0
+            return Distances(None, reached, constraints, None, None, None)
+        rank = found.dof.value - self.usual.unseen
+        _, values, right = np.linalg.svd(M, full_matrices=False)
+        largest = float(values[0]) if rank else 0.0
+        if not rank or found.rank < rank:
+            return Distances(0.0, 1 / largest if largest else None, constraints, None, None, None)
+        weakest = float(values[rank - 1])
+        moved = found.twists @ right[rank - 1] / weakest
+        return Distances(weakest, 1 / largest, constraints, largest / weakest,
+                         1e3 * at.twin.length * float(np.linalg.norm(moved[:3])) * float(np.radians(1)),
+                         float(np.linalg.norm(moved[3:])))
+
+    def _gained(self, found: Relation) -> Array:
+        """The platform's twists that it has only here; all of them where the general ones change from pose to pose."""
+        if found.dof.value <= self.usual.dof:
+            return np.zeros((found.twist_rows, 0))
+        usual = self.motion.twists[: found.twist_rows]
+        if usual.shape[1] != self.usual.dof:
+            return found.twists
+        return range_basis(found.twists - usual @ (usual.T @ found.twists), 1.0)[0]
+
+    def _named(self, at: ClosedConfiguration, twists: Array) -> tuple[Freedom, ...]:
+        """Twists (3 or 6, k) in characteristic lengths as named freedoms."""
+        setting = self.setting
+        metric = np.zeros((6, twists.shape[1]))
+        metric[: len(twists)] = twists
+        metric[:3] *= at.twin.length
+        labels = tuple(dict.fromkeys(o.leg for o in setting.observed))
+        start = setting.everything.start
+        at_zero = at.twin is start.twin and np.max(np.abs(at.q - start.q), initial=0.0) < PASSED_BY * PASSED_BY
+        position = None if at_zero else at.pose(self.motion.link)[:3, 3]
+        return name_freedoms(metric, setting.anatomy, labels, position)

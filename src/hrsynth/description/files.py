@@ -1,0 +1,30 @@
+"""Files are written whole or not at all."""
+
+from __future__ import annotations
+
+import os
+import shutil
+from pathlib import Path
+
+from ..errors import BadRequest
+
+
+def write_whole(path: str | Path, content: bytes) -> None:
+    """Write a file under a temporary name, then rename it; raises ``BadRequest`` where it cannot be written."""
+    try:
+        target = Path(os.path.realpath(path))
+        if target.is_dir():
+            raise BadRequest("cannot write the file: a directory", str(path))
+        if target.exists() and not target.is_file():
+            raise BadRequest("cannot write the file: not a regular file", str(path))
+        draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+        try:
+            draft.write_bytes(content)
+            if target.exists():
+                shutil.copymode(target, draft)
+            os.replace(draft, target)
+        finally:
+            draft.unlink(missing_ok=True)
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or str(error)
+        raise BadRequest(f"cannot write the file: {reason}", str(path)) from None

@@ -1,0 +1,119 @@
+"""What a leg still allows its end when what is measured of it is held: the locked twist system T_i (theory 4).
+
+Computed from the screws of the leg's own joints, without the engine's Jacobians: an independent path to the same ranks.
+Lengths in characteristic lengths; twists at the base frame's origin, base axes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..mechanism import Joint, Observation
+from ..mechanism.legs import Leg
+from ..mechanism.screws import constraints
+from ..mechanism.vectors import Array, hat, inverse
+from .configuration import ClosedConfiguration, point_velocity
+from .ranks import kernel_basis, range_basis
+from .relation import Question
+
+
+class _Bodies:
+    """Constraint and velocity matrices on the stacked twists of some links, all at the base frame's origin."""
+
+    def __init__(self, at: ClosedConfiguration, links: Sequence[str], joints: Sequence[Joint]) -> None:
+        self.at = at
+        self.place = {link: i for i, link in enumerate(links)}
+        self.A = constraints(joints, self.place, lambda joint: moved(at, joint))
+
+    def pose(self, link: str) -> Array:
+        """X_BL with the position in characteristic lengths."""
+        X = self.at.pose(link).copy()
+        X[:3, 3] /= self.at.twin.length
+        return X
+
+    def velocity(self, link: str) -> Array:
+        """The map to the twist of a link's frame at its origin, (6, 6 links)."""
+        V = np.zeros((6, 6 * len(self.place)))
+        if link in self.place:
+            start = 6 * self.place[link]
+            V[:, start : start + 6] = np.eye(6)
+            V[:3, start + 3 : start + 6] = -hat(self.pose(link)[:3, 3])
+        elif link != self.at.twin.mechanism.base:
+            raise ValueError(f"the twist of {link} is not among the unknowns")
+        return V
+
+    def rates(self, observations: Sequence[Observation], reference: str) -> Array:
+        """The rates of observations, stacked."""
+        found = [np.zeros((0, self.A.shape[1]))]
+        for each in observations:
+            seen = each.seen_from or reference
+            poses, velocities = map(self.pose, (seen, each.link)), map(self.velocity, (seen, each.link))
+            found.append(each.rate(*poses, *velocities))
+        return np.vstack(found)
+
+
+def leg_twists(at: ClosedConfiguration, leg: Leg, locks: Sequence[Observation], reference: str) -> Array:
+    """An orthonormal basis (6, k) of T_i: the twists of the link on which the leg ends that its joints and held
+    measurements allow. Raises ``ValueError`` where a measurement is seen from a link outside the leg."""
+    mechanism = at.twin.mechanism
+    links = (leg.attach, *(link for link in leg.links if link not in (leg.attach, mechanism.base)))
+    bodies = _Bodies(at, links, [mechanism.joints[name] for name in leg.joints])
+    kernel, _ = kernel_basis(np.vstack([bodies.A, bodies.rates(locks, reference)]))
+    return range_basis(kernel[:6], 1.0)[0]
+
+
+def interaction(at: ClosedConfiguration, question: Question) -> Array:
+    """Mᵀ on an orthonormal basis of the platform's twists, (rows, d), by the screws of all joints: u̇ = Mᵀ x.
+
+    Where observed links move while the platform rests, that part of u̇ is left out of it."""
+    mechanism = at.twin.mechanism
+    links = [link for link in mechanism.links if link != mechanism.base]
+    bodies = _Bodies(at, links, list(mechanism.joints.values()))
+    kernel, _ = kernel_basis(bodies.A)
+    V = bodies.velocity(question.platform)
+    if question.point is not None:
+        V = point_velocity(V, at.pose(question.platform), question.point, at.twin.length)
+    moving, rates = V @ kernel, bodies.rates(question.observations, question.reference) @ kernel
+    still, _ = kernel_basis(moving, 1.0)
+    hidden = range_basis(rates @ still, 1.0)[0] if still.shape[1] else np.zeros((len(rates), 0))
+    basis, _ = range_basis(moving, 1.0)
+    found: Array = rates @ np.linalg.pinv(basis.T @ moving, rcond=1e-9)
+    return found - hidden @ (hidden.T @ found)
+
+
+def moved(at: ClosedConfiguration, joint: Joint) -> tuple[Array, list[Array]]:
+    """Centre (characteristic lengths) and axes of a joint where a configuration has them."""
+    mechanism = at.twin.mechanism
+
+    def displacement(link: str) -> Array:
+        return at.pose(link) @ inverse(mechanism.links[link].pose)
+
+    D = displacement(joint.predecessor)
+    carriers = (joint.predecessor, joint.successor)
+    axes = [displacement(link)[:3, :3] @ axis for link, axis in zip(carriers, joint.axes, strict=False)]
+    return (D[:3, :3] @ joint.point + D[:3, 3]) / at.twin.length, axes
+
+
+@dataclass(frozen=True, eq=False)
+class Split:
+    """A twist system taken apart at a point B: the translations in it, (3, k), the rotations about axes through B in
+    it, (3, m), and whether that is all of it."""
+
+    translations: Array
+    rotations: Array
+    whole: bool
+
+
+def split(twists: Array, point: Array) -> Split:
+    """Take a twist system (6, k) apart at a point (3,)."""
+    at_point = twists.copy()
+    at_point[:3] += -hat(point) @ twists[3:]
+    still, _ = kernel_basis(at_point[3:], 1.0)
+    fixed, _ = kernel_basis(at_point[:3], 1.0)
+    translations = range_basis(at_point[:3] @ still, 1.0)[0]
+    rotations = range_basis(at_point[3:] @ fixed, 1.0)[0]
+    whole = translations.shape[1] + rotations.shape[1] == twists.shape[1]
+    return Split(translations, rotations, whole)

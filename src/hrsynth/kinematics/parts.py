@@ -1,0 +1,201 @@
+"""What a platform generically does, and goals for it: parts of its pose, each with its error and Jacobian.
+
+Lengths in characteristic lengths, so that positions and turns mix; base axes throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import BadRequest
+from ..mechanism.pose import Pose
+from ..mechanism.vectors import Array, hat, rotation_about
+from ..tolerances import RANK_CUTOFF
+from .configuration import ClosedConfiguration, point_velocity
+from .ranks import range_basis
+from .relation import Question, relation
+from .twin import Twin
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """Parts of the pose of ``link`` that are wanted: ``directions`` (k, 3) · position of ``point`` = ``values`` (k,)
+    metres, the turn ``phi`` about ``normal`` since the orientation ``zero``, the whole orientation ``rotation``, or
+    (``axis``) no turn but about that base direction. The point is given in the link's frame."""
+
+    link: str
+    point: Array
+    zero: Array
+    directions: Array
+    values: Array
+    normal: Array
+    phi: float | None = None
+    rotation: Array | None = None
+    axis: Array | None = None
+
+    def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+        """Error (reached − wanted) and its Jacobian, (rows,) and (rows, nv)."""
+        frames, velocities = twin.frames(q, (self.link,))
+        X, V = frames[0], velocities[0]
+        R = X[:3, :3]
+        errors = [(self.directions @ (R @ self.point + X[:3, 3]) - self.values) / twin.length]
+        blocks = [self.directions @ point_velocity(V, X, self.point, twin.length)]
+        if self.phi is not None:
+            angle, row = turn_about(self.normal, R @ self.zero.T)
+            errors.append(np.array([wrapped(angle - self.phi)]))
+            blocks.append(row[None] @ V[3:])
+        if self.rotation is not None:
+            errors.append(rotation_vector(R @ self.rotation.T))
+            blocks.append(V[3:])
+        if self.axis is not None:
+            moved = R @ self.zero.T @ self.axis
+            across = np.linalg.svd(self.axis[None])[2][1:]
+            errors.append(across @ moved)
+            blocks.append(across @ -hat(moved) @ V[3:])
+        return np.concatenate(errors), np.vstack(blocks)
+
+    @property
+    def lengths(self) -> int:
+        """How many of the rows are lengths; they come first."""
+        return len(self.values)
+
+    def towards(self, X: Array, fraction: float) -> Goal:
+        """The goal that lies ``fraction`` of the way from the pose X (4, 4) to this one."""
+        if fraction >= 1:
+            return self
+        R, here = X[:3, :3], X[:3, :3] @ self.point + X[:3, 3]
+        start = self.directions @ here
+        phi, rotation = self.phi, self.rotation
+        if phi is not None:
+            angle = turn_about(self.normal, R @ self.zero.T)[0]
+            phi = angle + fraction * (phi - angle)
+        if rotation is not None:
+            way = rotation_vector(rotation @ R.T)
+            rotation = exponential(fraction * way) @ R
+        return replace(self, values=start + fraction * (self.values - start), phi=phi, rotation=rotation)
+
+
+@dataclass(frozen=True, eq=False)
+class PlatformMotion:
+    """What a platform does at generic configurations, relative to its pose ``home`` (4, 4) at the zero configuration.
+
+    ``shifts`` (3, k) spans the velocities of ``point`` (in the platform's frame), ``spins`` (3, m) the angular
+    velocities that count (none of a point body), ``twists`` (6, n) both together.
+    """
+
+    link: str
+    point: Array
+    body: bool
+    """Whether the platform's turn counts: not that of a point body."""
+    home: Array
+    shifts: Array
+    spins: Array
+    twists: Array
+
+    @classmethod
+    def of(cls, configurations: Iterable[ClosedConfiguration], question: Question) -> PlatformMotion:
+        """The motion that generic configurations show."""
+        asked = replace(question, observations=(), bodies=())
+        point = np.zeros(3) if question.point is None else question.point
+        columns = []
+        for at in configurations:
+            found = np.zeros((6, (basis := relation(at, asked).twists).shape[1]))
+            found[: len(basis)] = basis
+            columns.append(found)
+            twin = at.twin
+        together = np.hstack(columns)
+        spans = [range_basis(part, 1.0)[0] for part in (together[:3], together[3:], together)]
+        return cls(question.platform, point, question.point is None, twin.pose(twin.q0, question.platform), *spans)
+
+    @property
+    def normal(self) -> Array:
+        """The axis of phi: the normal of a planar robot's plane (its largest component positive), else z."""
+        if self.spins.shape[1] != 1:
+            return np.array([0.0, 0.0, 1.0])
+        normal = self.spins[:, 0]
+        if np.linalg.norm(normal @ self.shifts) > RANK_CUTOFF:
+            return np.array([0.0, 0.0, 1.0])
+        return normal * np.sign(normal[np.argmax(np.abs(normal))])
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The parts of a pose that the platform can change."""
+        found = [name for name, row in zip("xyz", self.shifts, strict=True) if np.linalg.norm(row) > RANK_CUTOFF]
+        if np.linalg.norm(self.normal @ self.spins) > RANK_CUTOFF:
+            found.append("phi")
+        return (*found, "rpy") if self.spins.shape[1] else tuple(found)
+
+    def position(self, X: Array) -> Array:
+        """The position of the point at a platform pose X (4, 4), (3,)."""
+        return np.asarray(X[:3, :3] @ self.point + X[:3, 3])
+
+    def pose(self, X: Array) -> Pose:
+        """A platform pose X (4, 4) as a user writes it; of a point body the position alone."""
+        return Pose.of(X, None if self.body else self.point)
+
+    def goal(self, pose: Pose, robot: str = "the robot") -> Goal:
+        """The goal that a pose asks for; raises ``BadRequest`` for parts that the platform cannot change."""
+        for name in pose.given:
+            if name not in self.parts:
+                raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts or "no part")
+        placed = [i for i, name in enumerate("xyz") if name in pose.given]
+        values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)
+        return Goal(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, self.normal, pose.phi,
+                    pose.rotation)
+
+    def at_home(self) -> Goal:
+        """The goal of the whole pose at the zero configuration: what free parts are nearest to."""
+        R = self.home[:3, :3]
+        return Goal(self.link, self.point, R, np.eye(3), self.position(self.home), self.normal,
+                    rotation=R if self.body else None)
+
+    def manner(self) -> Goal:
+        """What the platform never changes: where its point does not move, turns that it does not make (or makes about
+        one axis only)."""
+        fixed = np.linalg.svd(self.shifts.T)[2][self.shifts.shape[1] :] if self.shifts.shape[1] else np.eye(3)
+        R = self.home[:3, :3]
+        goal = Goal(self.link, self.point, R, fixed, fixed @ self.position(self.home), self.normal)
+        if not self.body or self.spins.shape[1] > 1:
+            return goal
+        return replace(goal, axis=self.spins[:, 0]) if self.spins.shape[1] else replace(goal, rotation=R)
+
+
+def rotation_vector(R: Array) -> Array:
+    """The rotation vector (3,) of a rotation by less than π; where it is zero its rate is the angular velocity."""
+    vee = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    sine, cosine = float(np.linalg.norm(vee)), 0.5 * (float(np.trace(R)) - 1)
+    return vee if sine < 1e-12 else vee * (float(np.arctan2(sine, cosine)) / sine)
+
+
+def exponential(vector: Array) -> Array:
+    """The rotation (3, 3) of a rotation vector."""
+    angle = float(np.linalg.norm(vector))
+    return rotation_about(vector, angle) if angle > 0 else np.eye(3)
+
+
+def turn_about(normal: Array, R: Array) -> tuple[float, Array]:
+    """The turn of a rotation about ``normal`` (its twist, the swing left out), in (−π, π], and the row (3,) that makes
+    its rate of the angular velocity."""
+    w, v = _quaternion(R)
+    along = float(normal @ v)
+    row = (w * w * normal + w * (hat(v) @ normal) + along * v) / (w * w + along * along)
+    return wrapped(2 * float(np.arctan2(along, w))), row
+
+
+def wrapped(angle: float) -> float:
+    """An angle modulo 2π, in (−π, π]."""
+    return float(-((np.pi - angle) % (2 * np.pi)) + np.pi)
+
+
+def _quaternion(R: Array) -> tuple[float, Array]:
+    """A unit quaternion (w, v) of a rotation, from the largest of its four components."""
+    products = np.empty((4, 4))
+    products[0, 0] = 1 + np.trace(R)
+    products[0, 1:] = products[1:, 0] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
+    products[1:, 1:] = R + R.T + (1 - np.trace(R)) * np.eye(3)
+    best = int(np.argmax(np.diag(products)))
+    found = products[best] / (2 * np.sqrt(products[best, best]))
+    return float(found[0]), found[1:]

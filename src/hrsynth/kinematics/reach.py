@@ -1,0 +1,87 @@
+"""Closed configurations at wanted poses, reached from the zero configuration by small steps in its working mode."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ..errors import PoseNotReached
+from ..mechanism.pose import Grid, Pose
+from .configuration import ClosedConfiguration
+from .misses import worst_leg
+from .parts import PlatformMotion
+from .relation import Question
+from .sampling import wander
+from .steps import HALVINGS, led, nearest
+
+FIRST = 40
+"""Cells of a grid, nearest first, that are tried from the zero configuration before the grid counts as unreachable."""
+FINER = 4
+"""How often in a sweep, where a pose can be reached from several neighbours."""
+
+
+def generic_motion(start: ClosedConfiguration, question: Question) -> PlatformMotion:
+    """What the platform generically does, from a few random configurations."""
+    return PlatformMotion.of(wander(start, 4, steps=2), question)
+
+
+def reach(start: ClosedConfiguration, question: Question, pose: Pose,
+          motion: PlatformMotion | None = None) -> ClosedConfiguration:
+    """The configuration at ``pose`` that small steps lead to from ``start``; free parts are nearest to their values at
+    the zero configuration (characteristic lengths, radians).
+
+    ``motion`` is what the platform generically does (default: found by a random walk). Raises ``BadRequest`` for parts
+    that it cannot change, ``PoseNotReached`` where the way ends before the pose.
+    """
+    motion = motion or generic_motion(start, question)
+    robot = start.twin.mechanism.name
+    goal = motion.goal(pose, robot)
+    here, came = led(start, motion, goal)
+    if came < 1:
+        leg, lengths, angles = worst_leg(start.twin, motion, goal)
+        last = str(motion.pose(here.pose(motion.link)))
+        raise PoseNotReached(robot, str(pose), came, last, leg, 1e3 * lengths, float(np.degrees(angles)))
+    return nearest(here, goal, motion.at_home())
+
+
+def sweep(start: ClosedConfiguration, question: Question, grid: Grid, motion: PlatformMotion | None = None,
+          progress: Callable[[], None] | None = None) -> tuple[ClosedConfiguration | None, ...]:
+    """Configurations at the poses of a grid, in its order, each reached from a neighbour; None where that fails from
+    every neighbour. The first is the reachable one nearest to ``start``."""
+    motion = motion or generic_motion(start, question)
+    goals = [motion.goal(pose, start.twin.mechanism.name) for pose in grid.poses()]
+    home = motion.at_home()
+    found: dict[int, ClosedConfiguration] = {}
+    queue: deque[tuple[int, int]] = deque()
+
+    def settle(cell: int, origin: ClosedConfiguration, halvings: int) -> None:
+        there, came = led(origin, motion, goals[cell], halvings)
+        if came == 1:
+            found[cell] = nearest(there, goals[cell], home)
+            queue.extend((other, cell) for other in _neighbours(cell, grid.shape) if other not in found)
+            if progress is not None:
+                progress()
+
+    distance = [float(np.linalg.norm(goal.rows(start.twin, start.q)[0])) for goal in goals]
+    for cell in sorted(range(len(goals)), key=lambda i: (round(distance[i], 9), i))[:FIRST]:
+        settle(cell, start, HALVINGS)
+        if found:
+            break
+    while queue:
+        cell, origin = queue.popleft()
+        if cell not in found:
+            settle(cell, found[origin], FINER)
+    return tuple(found.get(cell) for cell in range(len(goals)))
+
+
+def _neighbours(cell: int, shape: tuple[int, ...]) -> Iterator[int]:
+    """The cells next to one, along each axis."""
+    place = np.unravel_index(cell, shape)
+    for axis, size in enumerate(shape):
+        for side in (-1, 1):
+            if 0 <= place[axis] + side < size:
+                beside = [*place]
+                beside[axis] += side
+                yield int(np.ravel_multi_index(beside, shape))

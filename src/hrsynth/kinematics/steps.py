@@ -1,0 +1,180 @@
+"""Small steps from a configuration to a goal for the platform, in one working mode."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ..mechanism.vectors import Array
+from ..tolerances import CLOSED, FOLLOWED, NEAREST, PASSED_BY, RANK_CUTOFF, SOLVED
+from .configuration import ClosedConfiguration, closed
+from .parts import Goal, PlatformMotion
+from .ranks import kernel_basis, range_basis
+from .twin import Twin
+
+STRIDE = 0.1
+"""Longest step along the way to a pose (characteristic lengths, radians)."""
+HALVINGS = 10
+"""How often a step that fails is halved before the way is given up."""
+JUMP = 0.01
+"""Corrections below this are never jumps: on the edge of the workspace even exact steps need them."""
+EASING = 30
+"""Further steps at a goal's own place where the way to it was not straight."""
+EASY_RANK = 1e-3
+"""Singular values below this part of the largest are no directions to go in on such a way."""
+NEAR_FOLD = 1e-5
+"""Singular values of loops and goal below which a fold is looked for."""
+LONGEST = 0.3
+"""Largest change of a coordinate in one step."""
+
+
+def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal,
+        halvings: int = HALVINGS) -> tuple[ClosedConfiguration, float]:
+    """Lead a configuration to a goal by small steps: where it comes to, and the part of the way that it came (1: all of
+    it)."""
+    X = here.pose(motion.link)
+    home = motion.at_home()
+    error, rows = goal.rows(here.twin, here.q)
+    longest = 1 / max(1, int(np.ceil(np.linalg.norm(error) / STRIDE)))
+    if range_basis(rows @ here.kernel()[0], 1.0)[1].value < len(rows):
+        here = _eased(here, goal, X, longest)
+        there = _stepped(here, goal, home)
+        left = float(np.linalg.norm(goal.rows(here.twin, here.q)[0]) / max(float(np.linalg.norm(error)), SOLVED))
+        return (here, max(0.0, 1 - left)) if there is None else (there, 1.0)
+    came, step = 0.0, longest
+    while came < 1:
+        ahead = min(1.0, came + step)
+        ahead = 1.0 if ahead > 1 - SOLVED else ahead
+        there = _stepped(here, goal.towards(X, ahead), home)
+        if there is not None:
+            here, came, step = there, ahead, min(longest, 2 * step)
+        elif step < longest * 0.5**halvings:
+            return here, came
+        else:
+            step /= 2
+    return here, 1.0
+
+
+def _eased(here: ClosedConfiguration, goal: Goal, X: Array, stride: float) -> ClosedConfiguration:
+    """As near as steps with closed loops come to a goal of more parts than the platform has freedoms: the straight way
+    from the pose X need not be one that it can go."""
+    twin = here.twin
+    fractions = [*np.arange(stride, 1, stride), *[1.0] * EASING]
+    for fraction in fractions:
+        kernel, _ = here.kernel()
+        error, rows = goal.towards(X, float(fraction)).rows(twin, here.q)
+        if fraction == 1 and np.linalg.norm(error) <= SOLVED:
+            break
+        step = kernel @ np.linalg.lstsq(rows @ kernel, -error, rcond=EASY_RANK)[0]
+        largest = float(np.max(np.abs(step), initial=0.0))
+        there = _corrected(here, step * min(1.0, 3 * STRIDE / largest) if largest > 0 else step, None)
+        if there is None:
+            break
+        here = there
+    return here
+
+
+def _stepped(here: ClosedConfiguration, goal: Goal, home: Goal) -> ClosedConfiguration | None:
+    """The configuration at a goal nearby, moved towards ``home`` where parts are free; None where it jumps or lies
+    beyond a fold, in another working mode."""
+    twin = here.twin
+    error, rows = _system(twin, here.q, goal)
+    step = np.asarray(np.linalg.lstsq(rows, -error, rcond=RANK_CUTOFF)[0])
+    if np.max(np.abs(step), initial=0.0) > LONGEST:
+        return None
+    there = _corrected(here, step, goal)
+    if there is None or _beyond(rows, _system(twin, there.q, goal)[1]):
+        return None
+    return _drawn_home(there, goal, home, 1)
+
+
+def _beyond(before: Array, after: Array) -> bool:
+    """Whether a fold lies between two configurations, given the Jacobians of loops and goal at both: the determinant of
+    their rows, on the range of the first, has changed its sign. On the fold itself nothing lies beyond it."""
+    span, _ = range_basis(before)
+    if np.linalg.slogdet(span.T @ before @ after.T @ span)[0] >= 0:
+        return False
+    return bool(np.linalg.svd(span.T @ after, compute_uv=False)[-1] > NEAR_FOLD)
+
+
+def _corrected(here: ClosedConfiguration, step: Array, goal: Goal | None) -> ClosedConfiguration | None:
+    """The closed configuration at the goal after a step; None where there is none or the correction is a jump."""
+    twin = here.twin
+    predicted = twin.moved(here.q, step)
+    q, residual = closed(twin, predicted, goal, tolerance=SOLVED, iterations=15)
+    allowed = max(0.5 * float(np.linalg.norm(step)), JUMP)
+    if not residual <= CLOSED or np.linalg.norm(q - predicted) > allowed:
+        return None
+    return ClosedConfiguration.of(twin, q)
+
+
+def nearest(here: ClosedConfiguration, goal: Goal, home: Goal) -> ClosedConfiguration:
+    """The configuration at ``goal`` whose platform pose is nearest to ``home``: the projected gradient vanishes, the
+    loops are closed as well as floating point can."""
+    return polished(_drawn_home(here, goal, home, 100), goal)
+
+
+def _drawn_home(here: ClosedConfiguration, goal: Goal, home: Goal, iterations: int) -> ClosedConfiguration:
+    """Gauss-Newton in the tangent space: minimise |home's error| with the goal held."""
+    twin = here.twin
+    for _ in range(iterations):
+        kernel, _ = kernel_basis(np.vstack([twin.jacobian(here.q), goal.rows(twin, here.q)[1]]))
+        error, rows = home.rows(twin, here.q)
+        free = rows @ kernel
+        if np.linalg.norm(error @ free) <= NEAREST:
+            break
+        step = kernel @ np.linalg.lstsq(free, -error, rcond=RANK_CUTOFF)[0]
+        largest = float(np.max(np.abs(step)))
+        step *= min(1.0, STRIDE / largest) if largest > 0 else 1.0
+        for there in _shrinking(here, step, goal):
+            if np.linalg.norm(home.rows(twin, there.q)[0]) <= np.linalg.norm(error) + SOLVED:
+                here = there
+                break
+        else:
+            break
+    return here
+
+
+def _shrinking(here: ClosedConfiguration, step: Array, goal: Goal) -> Iterator[ClosedConfiguration]:
+    for shrink in (1.0, 0.5, 0.25, 0.1, 0.02):
+        there = _corrected(here, shrink * step, goal)
+        if there is not None:
+            yield there
+
+
+def polished(here: ClosedConfiguration, goal: Goal) -> ClosedConfiguration:
+    """Newton steps of minimum norm until the residual no longer falls: on the edge of the workspace a configuration
+    is only as exact as the square root of its residual."""
+    twin, q = here.twin, here.q
+    error, rows = _system(twin, q, goal)
+    for _ in range(20):
+        step = np.linalg.lstsq(rows, -error, rcond=FOLLOWED)[0]
+        trial = twin.moved(q, np.asarray(step, dtype=float))
+        trial_error, trial_rows = _system(twin, trial, goal)
+        if not np.linalg.norm(trial_error) < 0.9 * np.linalg.norm(error):
+            break
+        q, error, rows = trial, trial_error, trial_rows
+    return ClosedConfiguration.of(twin, _on_fold(twin, q, goal))
+
+
+def _on_fold(twin: Twin, q: Array, goal: Goal) -> Array:
+    """The configuration on a fold of the way (the edge of the workspace) where ``q`` cannot be told from it: where the
+    weak singular value of loops and goal vanishes, if the residual stays within ``SOLVED`` there."""
+    rows = _system(twin, q, goal)[1]
+    left, values, right = np.linalg.svd(rows, full_matrices=False)
+    weak = np.nonzero((values < NEAR_FOLD) & (values > FOLLOWED))[0]
+    if len(weak) != 1:
+        return q
+    across, along, size = left[:, weak[0]], right[weak[0]], float(values[weak[0]])
+    ahead = _system(twin, twin.moved(q, PASSED_BY * along), goal)[1]
+    slope = (float(across @ ahead @ along) - size) / PASSED_BY
+    if abs(slope) * PASSED_BY < size:
+        return q
+    there = twin.moved(q, -size / slope * along)
+    return there if np.linalg.norm(_system(twin, there, goal)[0]) <= SOLVED else q
+
+
+def _system(twin: Twin, q: Array, goal: Goal) -> tuple[Array, Array]:
+    error, rows = goal.rows(twin, q)
+    return np.concatenate([twin.residual(q), error]), np.vstack([twin.jacobian(q), rows])

@@ -1,0 +1,183 @@
+"""Poses of a platform as a user writes them: some parts given, the others free; and grids of poses.
+
+The platform's frame in the base frame, metres and radians.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ..errors import BadRequest
+from .vectors import Array, rotation_from_rpy
+
+SCALARS = ("x", "y", "z", "phi")
+PARTS = (*SCALARS, "rpy")
+EXAMPLE = "x=0.02,y=0.1,z=-0.7, and phi=10deg or rpy=0.1/0/0"
+LARGEST_GRID = 100_000
+"""Cells of a grid beyond which it is taken for a slip."""
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Parts of a platform's pose; None is free. ``phi`` is the turn from the zero configuration about the base frame's
+    z (of a planar robot about the normal of its plane), ``rpy`` URDF's fixed-axis roll, pitch, yaw."""
+
+    x: float | None = None
+    y: float | None = None
+    z: float | None = None
+    phi: float | None = None
+    rpy: tuple[float, float, float] | None = None
+
+    def __post_init__(self) -> None:
+        if self.phi is not None and self.rpy is not None:
+            raise BadRequest("a pose is given both phi and rpy", str(self), "one of them")
+        for name, values in self.given.items():
+            if not all(map(math.isfinite, values)):
+                raise BadRequest(f"pose: {name} is not finite", "/".join(map(str, values)), "a finite number")
+
+    @classmethod
+    def parse(cls, text: str) -> Pose:
+        """The pose that ``x=0.02,y=0.1,z=-0.7,phi=10deg`` says; raises ``BadRequest``."""
+        fields: dict[str, Any] = {}
+        for name, value in _fields(text, "pose"):
+            fields[name] = _triple(value, text) if name == "rpy" else _number(value, name, text)
+        return cls(**fields)
+
+    @classmethod
+    def of(cls, X: Array, point: Array | None = None) -> Pose:
+        """The pose of a homogeneous matrix X_BP (4, 4); of a point body the position of ``point`` (in the platform's
+        frame) alone."""
+        x, y, z = map(float, X[:3, 3] if point is None else X[:3, :3] @ point + X[:3, 3])
+        return cls(x, y, z, rpy=rpy_of(X[:3, :3]) if point is None else None)
+
+    @property
+    def given(self) -> dict[str, tuple[float, ...]]:
+        """The parts that are given, each with its numbers."""
+        parts: dict[str, tuple[float, ...] | None] = {
+            name: None if (value := getattr(self, name)) is None else (value,) for name in SCALARS}
+        return {name: values for name, values in {**parts, "rpy": self.rpy}.items() if values is not None}
+
+    @property
+    def rotation(self) -> Array | None:
+        """R_BP (3, 3) where rpy is given."""
+        return None if self.rpy is None else rotation_from_rpy(*self.rpy)
+
+    def to_dict(self) -> dict[str, Any]:
+        """x, y, z and rpy (null where free), phi where it is given."""
+        record: dict[str, Any] = {"x": self.x, "y": self.y, "z": self.z,
+                                  "rpy": None if self.rpy is None else list(self.rpy)}
+        return record if self.phi is None else {**record, "phi": self.phi}
+
+    def __str__(self) -> str:
+        return ",".join(f"{name}={'/'.join(f'{round(v, 9) + 0.0:.6g}' for v in values)}"
+                        for name, values in self.given.items())
+
+
+@dataclass(frozen=True, eq=False)
+class Grid:
+    """A line, plane or box of poses: the parts that vary with their values, over a pose that holds the rest."""
+
+    axes: tuple[tuple[str, Array], ...]
+    fixed: Pose
+
+    @classmethod
+    def parse(cls, text: str) -> Grid:
+        """The grid that ``x=-0.3:0.3:21,y=0:0.1:5,z=-0.7`` says (from:to:count); raises ``BadRequest``."""
+        axes: list[tuple[str, Array]] = []
+        single: list[str] = []
+        for name, value in _fields(text, "grid"):
+            if ":" not in value:
+                single.append(f"{name}={value}")
+            elif name == "rpy":
+                raise BadRequest("grid: a range of rpy", value, "ranges of " + ", ".join(SCALARS))
+            else:
+                axes.append((name, _range(value, name, text)))
+        if not 1 <= len(axes) <= 3:
+            raise BadRequest("grid: number of ranges", text, "one to three, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7")
+        cells = math.prod(len(values) for _, values in axes)
+        if cells > LARGEST_GRID:
+            raise BadRequest("grid: number of poses", cells, f"at most {LARGEST_GRID}")
+        fixed = Pose.parse(",".join(single)) if single else Pose()
+        if fixed.rpy is not None and "phi" in dict(axes):
+            raise BadRequest("grid: both phi and rpy are given", text, "one of them")
+        return cls(tuple(axes), fixed)
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """Number of values on each axis."""
+        return tuple(len(values) for _, values in self.axes)
+
+    @property
+    def ndim(self) -> int:
+        """1 for a line, 2 for a plane, 3 for a box."""
+        return len(self.axes)
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """The parts that vary, in order."""
+        return tuple(name for name, _ in self.axes)
+
+    def poses(self) -> tuple[Pose, ...]:
+        """The poses of all cells, the last axis running fastest."""
+        fixed = {name: getattr(self.fixed, name) for name in PARTS}
+        return tuple(Pose(**{**fixed, **dict(zip(self.names, map(float, values), strict=True))})
+                     for values in product(*(values for _, values in self.axes)))
+
+
+def rpy_of(R: Array) -> tuple[float, float, float]:
+    """Fixed-axis roll, pitch, yaw of a rotation (3, 3); yaw is zero where the pitch is a right angle."""
+    level = math.hypot(R[0, 0], R[1, 0])
+    pitch = math.atan2(-R[2, 0], level)
+    if level < 1e-12:
+        return math.atan2(-R[1, 2], R[1, 1]), pitch, 0.0
+    return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
+
+
+def _fields(text: str, what: str) -> list[tuple[str, str]]:
+    """Name and value of each part, in order, each name once."""
+    found: list[tuple[str, str]] = []
+    for field in text.split(","):
+        name, equals, value = (piece.strip() for piece in field.partition("="))
+        if not equals:
+            raise BadRequest(f"{what}: not name=value", field.strip(), EXAMPLE)
+        if name not in PARTS:
+            raise BadRequest(f"{what}: unknown part", name, PARTS)
+        if name in dict(found):
+            raise BadRequest(f"{what}: part given twice", name, "once")
+        found.append((name, value))
+    return found
+
+
+def _number(value: str, name: str, text: str) -> float:
+    digits = value.removesuffix("deg").strip() if name in ("phi", "rpy") else value
+    try:
+        number = float(digits)
+    except ValueError:
+        unit = "a number of radians, or of degrees with deg" if name in ("phi", "rpy") else "a number of metres"
+        raise BadRequest(f"pose {text!r}: {name} is not a number", value, unit) from None
+    if not math.isfinite(number):
+        raise BadRequest(f"pose {text!r}: {name} is not finite", value, "a finite number")
+    return number if digits == value else math.radians(number)
+
+
+def _triple(value: str, text: str) -> Sequence[float]:
+    entries = value.split("/")
+    if len(entries) != 3:
+        raise BadRequest(f"pose {text!r}: rpy", value, "three angles, such as rpy=0.1/0/0 or rpy=10deg/0/0")
+    return tuple(_number(entry.strip(), "rpy", text) for entry in entries)
+
+
+def _range(value: str, name: str, text: str) -> Array:
+    entries = [entry.strip() for entry in value.split(":")]
+    if len(entries) != 3 or not entries[2].isdecimal() or not 2 <= int(entries[2]) <= LARGEST_GRID:
+        raise BadRequest(f"grid {text!r}: range of {name}", value, "from:to:count with a count of 2 or more")
+    low, high = (_number(entry, name, text) for entry in entries[:2])
+    if low == high:
+        raise BadRequest(f"grid {text!r}: range of {name} has no extent", value, "two different ends")
+    return np.linspace(low, high, int(entries[2]))
