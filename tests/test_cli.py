@@ -21,6 +21,8 @@ FIELDS = {
     "derive": {"observed", "notation", "dof", "mobility", "verdict", "lost", "paper_form", "steps", "certificate",
                "hidden_file", "architecture"},
     "legs": {"sets", "minimal"},
+    "advise": {"verdict", "rank", "dof", "lost", "nothing_missing", "sets", "size", "tried", "complete"},
+    "check": {"characteristic_length", "observed", "camera", "configurations", "redundant", "grid"},
     "robots": {"robots"},
     "convert": {"file"},
 }
@@ -208,6 +210,148 @@ def test_arguments_that_do_not_fit(run, arguments: list[str], words: list[str]):
 @pytest.mark.parametrize("arguments", [["nothing"], ["derive"], ["convert", "delta"], ["--nothing"], ["robots", "x"]])
 def test_no_such_command_or_too_few_arguments(run, arguments: list[str]):
     assert len(run(*arguments).refused()) == 1
+
+
+# ---- check
+
+
+def test_check_json_is_the_contract(run):
+    data = run("check", "delta", "--observe", "1,2", "--at", "x=0.02,y=0.1,z=-0.62", "--at", "z=-0.65", "--json").data
+    check_record(data, "check", "delta")
+    assert [one["leg"] for one in data["observed"]] == ["1", "2"]
+    first, second = data["configurations"]
+    assert first.keys() == {"pose", "mobility", "dof", "rank_M", "gap", "condition", "type1", "type2", "type3",
+                            "classes", "lost", "real", "constraint", "redundant", "distances"}
+    assert [first["pose"][name] for name in "xyz"] == pytest.approx([0.02, 0.1, -0.62])
+    assert second["pose"]["x"] == pytest.approx(0, abs=1e-8)
+    assert first["pose"]["rpy"] == pytest.approx([0, 0, 0], abs=1e-8)
+    assert first["mobility"] == {"total": 9, "idle": 6}
+    assert (first["dof"], first["rank_M"]) == (3, 3)
+    assert first["type1"] is first["type2"] is first["type3"] is False
+    assert first["classes"] == {"RI": 0, "RO": 0, "II": 0, "IO": 0, "RPM": 0, "IIM": 0}
+    assert first["real"].keys() == {"rank", "gap", "type1", "type2", "type3", "classes", "lost"}
+    assert first["constraint"] == {"singular": False, "rank_lost": 0, "gained": []}
+    assert first["distances"].keys() == {"type2", "type1", "constraints", "condition", "mm_per_degree",
+                                         "degrees_per_degree"}
+    assert data["redundant"] == []
+    assert data["grid"] is None
+    assert run("check", "3rrr_m1", "--json").data["redundant"] == [
+        {"loop": "wrist_2", "rows": 3, "generic": True}, {"loop": "wrist_3", "rows": 3, "generic": True}]
+
+
+def test_check_text_names_the_singularity(run):
+    answer = run("check", "rrrrr_m1", "--at", f"x=0,y={0.16 + 0.03**0.5!r}")
+    assert (answer.status, answer.err) == (0, "")
+    for line in (r"^pose +x=0,y=0.333205,", r"^mobility +2, of which 0 idle; the platform has 2 freedoms$",
+                 r"^hidden robot +the directions show 1 of 2: Type 2 singularity ", r"RI 0  RO 1  II 1  IO 0",
+                 r"^not seen +translation along x\b", r"^real robot +the motors determine 2 of 2: regular ",
+                 r"^redundant +loop elbow_2: 3 of its constraints$"):
+        assert re.search(line, answer.out, re.MULTILINE), answer.out
+
+
+def test_check_writes_a_picture_or_a_table(run, tmp_path: Path):
+    picture, table = tmp_path / "map.png", tmp_path / "map.csv"
+    grid = ["--grid", f"x=-0.4:0.4:3,y=0.25:{2 * (0.16 + 0.03**0.5) - 0.25!r}:3"]
+    data = run("check", "rrrrr_m1", *grid, "-o", picture, "--json").data
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert (data["grid"]["axes"], data["grid"]["x"]) == (["x", "y"], [-0.4, 0, 0.4])
+    assert data["grid"]["state"] == [["unreachable"] * 3, ["regular", "type2", "unreachable"], ["unreachable"] * 3]
+    answer = run("check", "rrrrr_m1", *grid, "-o", table)
+    assert re.search(r"^grid +3 x × 3 y: 1 regular, 1 type2, 7 unreachable$", answer.out, re.MULTILINE)
+    rows = [line.split(",") for line in table.read_text().splitlines()]
+    assert rows[0][:5] == ["x", "y", "state", "type2", "type1"]
+    assert [row[2] for row in rows[1:]] == [state for line in data["grid"]["state"] for state in line]
+    assert float(rows[4][3]) == pytest.approx(data["grid"]["type2"][1][0])
+    assert rows[5][3] == "0.0"
+    assert rows[1][3] == ""
+    for text in ("x=0:0.1:3", "x=0:0.02:2,y=0.2:0.22:2,z=0"):
+        drawn = run("check", "rrrrr_m1" if "z" not in text else "delta", "--grid", text.replace(",z=0", ",z=-0.6"),
+                    "-o", picture)
+        assert (drawn.status, drawn.err) == (0, "")
+    assert run("check", "quattro", "--grid", "x=0:0.02:2,y=0:0.02:2,phi=0:5deg:2", "-o", picture).status == 0
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["map.csv", "map.png"]
+
+
+@pytest.mark.parametrize(("arguments", "status", "words"), [
+    (["--at", "x=abc"], 2, ["x is not a number", "'abc'"]), (["--at", "w=1"], 2, ["unknown part", "x, y, z, phi, rpy"]),
+    (["--at", ""], 2, ["name=value"]), (["--at", "phi=1deg"], 2, ["cannot change phi", "allowed: x, y, z"]),
+    (["--at", "x=9"], 3, ["x=9", "is not reached", "leg ", " mm", "% of the way"]),
+    (["--grid", "x=0"], 2, ["number of ranges"]), (["--grid", "phi=0:1:3"], 2, ["cannot change phi"]),
+    (["-o", "map.png"], 2, ["--grid"]), (["--grid", "x=0:1:3", "-o", "map.pdf"], 2, ["unknown ending", ".png, .csv"]),
+    (["--grid", "x=5:6:2", "-o", "map.png"], 2, ["no pose of the grid is reached"]),
+    (["--observe", "9"], 2, ["legs 1, 2, 3"]), (["--camera", "moon"], 2, ["'moon'"]),
+])
+def test_check_refuses_in_one_line_and_writes_nothing(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                      arguments: list[str], status: int, words: list[str]):
+    monkeypatch.chdir(tmp_path)
+    (line,) = run("check", "delta", *arguments).refused(status)
+    assert all(word in line for word in words), line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_check_without_an_interaction_matrix_draws_nothing(run, tmp_path: Path):
+    (line,) = run("check", "i4l", "--grid", "x=0:0.01:2,y=0,z=-0.6", "-o", tmp_path / "map.png").refused()
+    assert "there is nothing to draw" in line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_check_answers_3_where_a_rank_is_not_clear(run, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("hrsynth.analysis.posture.RANK_GAP", 1e30)
+    asked = run("check", "3rrr_m1", "--at", "x=0.01")
+    assert asked.status == 3
+    assert "not decided (smallest rank gap" in asked.out
+    assert re.fullmatch(r"hrsynth: 3rrr_m1 at x=.*: the singular values leave a gap of .*, needed: .*\n", asked.err)
+    assert run("check", "3rrr_m1", "--grid", "x=0:0.01:2").status == 0
+
+
+# ---- advise
+
+
+def test_advise_json_is_the_contract(run):
+    data = run("advise", "uranesx", "--json").data
+    check_record(data, "advise", "uranesx")
+    assert (data["verdict"], data["rank"], data["dof"]) == ("partially controllable", 2, 3)
+    assert [lost["name"] for lost in data["lost"]] == ["translation along z"]
+    assert (data["nothing_missing"], data["size"], data["complete"]) == (False, 1, True)
+    assert len(data["sets"]) == 6
+    for each in data["sets"]:
+        assert each["verdict"] == "controllable"
+        assert each["gap"] > 1e3
+        (added,) = each["measurements"]
+        assert added["kind"] in ("encoder", "line")
+        assert added["of"] in {"guide_1", "guide_2", "guide_3", "rod_1a", "rod_2a", "rod_3a"}
+
+
+def test_advise_json_where_nothing_is_missing(run):
+    data = run("advise", "quattro", "--observe", "1,4", "--json").data
+    check_record(data, "advise", "quattro")
+    assert (data["verdict"], data["nothing_missing"], data["sets"], data["size"]) == ("controllable", True, [], 0)
+    assert run("advise", "quattro", "--observe", "1,4").out.endswith("\nNothing is missing\n")
+
+
+@pytest.mark.parametrize(("arguments", "lines"), [
+    (["uranesx"], [r"^verdict +partially controllable \(rank 2 of 3\)$", r"^lost at zero +translation along z$",
+                   r"^Controllable \(rank 3 of 3\) with one more measurement, 6 ways",
+                   r"^  position of an observed line: any of rod_1a, rod_2a, rod_3a$",
+                   r"^  encoder on a joint: any of guide_1\*, guide_2\*, guide_3\*$", r"^\* a joint with a motor$"]),
+    (["gough_stewart", "--observe", "1"], [r"with 2 more measurements, 10 ways",
+                                           r"^  leg .*: any 2 of 2, 3, 4, 5, 6$"]),
+    (["3prp"], [r"^  position of an observed line and encoder on a joint:$", r"^    \{dist_1, guide_2\*\}  .* more "]),
+    (["3puu", "--observe", "1", "--camera", "platform"], [r"encoder .*\w \(first\)"]),
+])
+def test_advise_text_groups_the_cures(run, arguments: list[str], lines: list[str]):
+    answer = run("advise", *arguments)
+    assert (answer.status, answer.err) == (0, "")
+    for line in lines:
+        assert re.search(line, answer.out, re.MULTILINE), answer.out
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["--observe", "9"], ["'9'", "legs 1, 2, 3"]), (["--observe", ""], ["empty name"]),
+    (["--camera", "moon"], ["camera", "'moon'"]), (["--seed", "-1"], ["seed", "0"])])
+def test_advise_refuses_what_does_not_fit(run, arguments: list[str], words: list[str]):
+    (line,) = run("advise", "delta", *arguments).refused()
+    assert all(word in line for word in words), line
 
 
 # ---- legs, robots, convert

@@ -3,19 +3,25 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from .analysis.advice import advise
+    from .analysis.check import check
     from .analysis.controllability import legs
     from .analysis.derive import derive
+    from .analysis.singularity.singular import singular
     from .description import load, save, shipped
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "derive", "legs", "load", "save", "shipped"]
+__all__ = ["__version__", "advise", "check", "derive", "legs", "load", "save", "shipped", "singular"]
 
 _HOME = {
+    "advise": ".analysis.advice",
+    "check": ".analysis.check",
     "derive": ".analysis.derive",
     "legs": ".analysis.controllability",
     "load": ".description",
     "save": ".description",
     "shipped": ".description",
+    "singular": ".analysis.singularity.singular",
 }
 
 

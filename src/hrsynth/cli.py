@@ -17,6 +17,7 @@ app = typer.Typer(
 
 Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file, or the name of a shipped robot.")]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
+Observe = Annotated[str, typer.Option("--observe", metavar="LEGS", help="Legs to watch (1,4), links, or all.")]
 Camera = Annotated[str | None, typer.Option("--camera", metavar="LINK", help="The link that carries the camera.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random configurations.")]
 
@@ -42,7 +43,7 @@ def _options(
 @app.command()
 def derive(
     robot: Robot,
-    observe: Annotated[str, typer.Option(metavar="LEGS", help="Legs to watch (1,4), links, or all.")] = "all",
+    observe: Observe = "all",
     camera: Camera = None,
     form: Annotated[str, typer.Option(help="simplified (as in the paper) or general (sliders, all legs kept).")]
     = "simplified",
@@ -54,7 +55,8 @@ def derive(
     """The hidden robot of a robot, how it is derived, its certificate, and what the controller can see."""
     from .analysis.derive import derive as run
     from .description import load, save
-    from .present import records, text
+    from .present import records
+    from .present.text.verdicts import derivation
 
     with Progress() as progress:
         found = run(load(robot), _list(observe), camera, form=form, seed=seed, progress=progress.tell)
@@ -65,7 +67,7 @@ def derive(
     if json:
         typer.echo(records.record("derive", found.robot.name, {**found.to_dict(), "hidden_file": written}))
     else:
-        typer.echo(text.derivation(found, written))
+        typer.echo(derivation(found, written))
     if output is not None and found.hidden is None:
         typer.echo("hrsynth: nothing was written: every leg is blind, there is no hidden robot", err=True)
 
@@ -75,11 +77,103 @@ def legs(robot: Robot, camera: Camera = None, json: Json = False, seed: Seed = 0
     """Every set of observed legs: its verdict, the freedoms it loses, and the smallest sets that see most."""
     from .analysis.controllability import legs as run
     from .description import load
-    from .present import records, text
+    from .present import records
+    from .present.text.verdicts import legs as written
 
     with Progress() as progress:
         found = run(load(robot), camera, seed=seed, progress=progress.tell)
-    typer.echo(records.record("legs", found.robot, found.to_dict()) if json else text.legs(found))
+    typer.echo(records.record("legs", found.robot, found.to_dict()) if json else written(found))
+
+
+@app.command()
+def check(
+    robot: Robot,
+    observe: Observe = "all",
+    camera: Camera = None,
+    at: Annotated[list[str] | None, typer.Option(metavar="POSE", help="A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; "
+                                                 "again for more (default: the zero configuration).")] = None,
+    grid: Annotated[str | None, typer.Option(metavar="GRID", help="A line, plane or box of poses, such as "
+                                             "x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 (from:to:count).")] = None,
+    output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Write the grid: map.png, "
+                                               "map.csv.")] = None,
+    json: Json = False,
+    seed: Seed = 0,
+) -> None:
+    """Mobility, ranks, singularities and redundant constraints at poses, and over a grid of poses."""
+    from .analysis.check import check as run
+    from .description import load
+    from .errors import RankUndecided
+    from .present import maps, records
+    from .present.text.check import check as written
+    from .tolerances import RANK_GAP
+
+    if output is not None:
+        maps.writable(output, grid)
+    with Progress() as progress:
+        found = run(load(robot), _list(observe), camera, at=at or (), grid=grid, seed=seed, progress=progress.tell)
+    if output is not None and found.grid is not None:
+        maps.write(found, output)
+    typer.echo(records.record("check", found.setting.robot.name, found.to_dict()) if json else written(found))
+    for posture in found.postures if at else ():
+        if not posture.decided:
+            raise RankUndecided(f"{found.setting.robot.name} at {posture.pose}", posture.gap, RANK_GAP)
+
+
+@app.command()
+def singular(
+    robot: Robot,
+    observe: Observe = "all",
+    camera: Camera = None,
+    real: Annotated[bool, typer.Option("--real", help="The real robot with its own motors instead of the hidden one.")]
+    = False,
+    plane: Annotated[str | None, typer.Option(metavar="PART=VALUE", help="Plane of poses to draw, as z=-0.7.")] = None,
+    output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Draw the locus (.png).")] = None,
+    points: Annotated[int, typer.Option(min=1, help="Random poses at which the condition is checked.")] = 10_000,
+    steps: Annotated[int, typer.Option(min=5, max=300, help="Poses a side of the drawn plane.")] = 51,
+    json: Json = False,
+    seed: Seed = 0,
+) -> None:
+    """Where a freedom of the platform is lost: the Type 2 condition in words, as an expression and drawn."""
+    from .analysis.singularity.singular import drawn
+    from .analysis.singularity.singular import singular as run
+    from .description import load
+    from .present import loci, records
+    from .present.text.singularity import singularity
+
+    loci.writable(output, plane)
+    mechanism = load(robot)
+    with Progress() as progress:
+        picture = None
+        if output is not None:
+            picture = drawn(mechanism, _list(observe), camera, plane=plane, steps=steps, seed=seed,
+                            progress=progress.tell)
+        found = run(mechanism, _list(observe), camera, real=real, points=points, seed=seed, progress=progress.tell)
+        if picture is not None and output is not None:
+            loci.write(found, picture, output)
+    if json:
+        fields = {**found.to_dict(), "locus": None if picture is None else picture.to_dict(), "file": output}
+        typer.echo(records.record("singular", mechanism.name, fields))
+    else:
+        typer.echo(singularity(found, output))
+
+
+@app.command()
+def advise(
+    robot: Robot,
+    observe: Observe = "all",
+    camera: Camera = None,
+    json: Json = False,
+    seed: Seed = 0,
+) -> None:
+    """What is missing: the smallest sets of further measurements that make a robot controllable."""
+    from .analysis.advice import advise as run
+    from .description import load
+    from .present import records
+    from .present.text.advice import advice
+
+    with Progress() as progress:
+        found = run(load(robot), _list(observe), camera, seed=seed, progress=progress.tell)
+    typer.echo(records.record("advise", found.robot, found.to_dict()) if json else advice(found))
 
 
 @app.command()
@@ -88,7 +182,8 @@ def robots(json: Json = False) -> None:
     from .description import shipped
     from .families.table import ROBOTS
     from .mechanism.notation import parse
-    from .present import records, text
+    from .present import records
+    from .present.text.tables import table
 
     files = shipped()
     rows = [{"name": each.name, "file": str(files.get(each.name, "")), "architecture_ascii": each.architecture,
@@ -96,7 +191,7 @@ def robots(json: Json = False) -> None:
     if json:
         typer.echo(records.record("robots", None, {"robots": rows}))
     else:
-        typer.echo(text.table([(str(r["name"]), str(parse(str(r["architecture_ascii"]))), str(r["dof"]),
+        typer.echo(table([(str(r["name"]), str(parse(str(r["architecture_ascii"]))), str(r["dof"]),
                                 str(r["section"])) for r in rows], ("name", "architecture", "dof", "source")))
 
 

@@ -9,10 +9,14 @@ from pathlib import Path
 
 from ..analysis.controllability import legs
 from ..analysis.derive import derive
+from ..analysis.singularity.singular import singular
 from ..description import load, shipped
 
 START, END = "<!-- generated: robots -->", "<!-- end -->"
-HEADS = ("robot", "architecture", "dof", "hidden robot, all legs watched", "verdict", "lost", "smallest leg sets")
+HEADS = ("robot", "architecture", "dof", "hidden robot, all legs watched", "verdict", "exact", "lost",
+         "smallest leg sets", "Type 2 singularities, all legs watched")
+POINTS = 200
+"""Random poses at which the condition in words is checked before it is printed."""
 
 _LONGEST_LIST = 4
 _BLOCK = re.compile(rf"({re.escape(START)}\n).*?({re.escape(END)})", re.DOTALL)
@@ -25,8 +29,13 @@ def row(name: str) -> str:
     hidden = found.hidden_architecture
     lost = "; ".join(freedom.name for freedom in found.verdict.lost)
     smallest = "–" if hidden is None else _smallest(sets.minimal)
+    exact = "not decided" if not found.exact.exact else (
+        "proved" if found.exact.instances == 1 else f"{found.exact.instances} instances")
+    words = singular(mechanism, points=POINTS).words
+    if words.startswith("always"):
+        words = "always" + "".join(words.partition(", because")[1:])
     return _line((f"`{name}`", _cell(str(found.architecture)), str(found.dof), _cell(str(hidden)) if hidden else "none",
-                  found.verdict.verdict, lost or "–", smallest))
+                  found.verdict.verdict, exact, lost or "–", smallest, _cell(words)))
 
 
 def table(names: Iterable[str] | None = None) -> str:

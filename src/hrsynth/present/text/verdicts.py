@@ -1,29 +1,12 @@
-"""Results → plain text for a terminal."""
+"""Hidden robots and sets of legs, with their verdicts."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
-from ..analysis.controllability import Legs
-from ..analysis.derive import Derivation
-from ..tolerances import RANK_GAP, SAME_RELATION
-
-
-def width(text: str) -> int:
-    """Columns that ``text`` takes (combining low lines take none)."""
-    return sum(1 for character in text if character != "\u0332")
-
-
-def table(rows: Sequence[Sequence[str]], heads: Sequence[str]) -> str:
-    """Columns set apart by two spaces, a rule under the heads; the last column is not padded."""
-    everything = [list(heads), *map(list, rows)]
-    columns = [max(width(row[i]) for row in everything) for i in range(len(heads))]
-
-    def line(row: Sequence[str]) -> str:
-        cells = [cell + " " * (columns[i] - width(cell)) for i, cell in enumerate(row)]
-        return "  ".join(cells).rstrip()
-
-    return "\n".join([line(heads), "  ".join("-" * size for size in columns), *map(line, rows)])
+from ...analysis.controllability import Legs
+from ...analysis.derive import Derivation
+from ...analysis.exact import ExactVerdict
+from ...tolerances import RANK_GAP, SAME_RELATION
+from .tables import listing, table
 
 
 def _angle(angle: float | None) -> str:
@@ -45,6 +28,7 @@ def derivation(found: Derivation, hidden_file: str | None) -> str:
         *([("camera on", reference)] if reference != found.setting.mechanism.base else []),
         ("hidden robot", str(hidden) if hidden else "none: every observed direction is constant"),
         ("verdict", found.verdict.verdict),
+        ("architecture", _exact(found.exact, found.verdict.rank)),
         *[("lost at zero" if i == 0 else "", freedom.name) for i, freedom in enumerate(found.verdict.lost)],
         *([] if found.verdict.graph else
           [("", "there is no interaction matrix: observed links move while the platform rests")]),
@@ -61,21 +45,41 @@ def derivation(found: Derivation, hidden_file: str | None) -> str:
         rows += [("", f"loses {freedom.name}") for freedom in paper.loses]
     if hidden_file is not None:
         rows.append(("written to", hidden_file))
-    head = max(len(name) for name, _ in rows)
-    lines = [f"{name:<{head}}  {value}" for name, value in rows]
     steps = [(step.rule, step.leg or "all", "yes" if step.accepted else "no", _angle(step.largest_angle), step.reason)
              for step in found.steps]
-    return "\n".join([*lines, "", table(steps, ("rule", "leg", "taken", "angle", "why"))])
+    return "\n".join([listing(rows), "", table(steps, ("rule", "leg", "taken", "angle", "why"))])
+
+
+def _exact(exact: ExactVerdict, rank: int) -> str:
+    """The architecture's verdict beside the ``rank`` that the robot itself shows."""
+    if exact.rank is None:
+        return f"not decided: {exact.reason}"
+    text = f"{exact.verdict}, {exact.reason}"
+    if exact.rank == rank:
+        return text
+    return (f"{text}: generic geometry sees {exact.rank} of {exact.dof} freedoms, this robot {rank}, because of its "
+            "dimensions")
+
+
+def _exactly(exact: ExactVerdict, rank: int) -> str:
+    """The same in a cell of a table."""
+    if exact.rank is None:
+        return "not decided"
+    text = "proved" if exact.rank == exact.dof else f"{exact.instances} instances"
+    return text if exact.rank == rank else f"{text}, of generic geometry: {exact.rank} of {exact.dof}"
 
 
 def legs(found: Legs) -> str:
     """One line a set of legs, the smallest sets of the best rank last."""
-    rows = [(", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}",
-             "; ".join(freedom.name for freedom in each.lost)) for each in found.sets]
+    rows = [(", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", _exactly(exact, each.rank),
+             "; ".join(freedom.name for freedom in each.lost))
+            for each, exact in zip(found.sets, found.exact, strict=True)]
     smallest = "  ".join("{" + ", ".join(each) + "}" for each in found.minimal)
     lines = [f"{found.robot}   {found.architecture}   {found.dof} dof", "",
-             table(rows, ("legs", "verdict", "rank", "lost (at the zero configuration)")), "",
+             table(rows, ("legs", "verdict", "rank", "exact", "lost (at the zero configuration)")), "",
              f"smallest sets of the best rank: {smallest}"]
+    lines += [f"not decided in exact arithmetic: {reason}"
+              for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)]
     if not found.complete:
         lines.append("not all sets were tried: there are too many legs")
     return "\n".join(lines)

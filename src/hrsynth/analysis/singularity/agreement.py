@@ -1,0 +1,253 @@
+"""Words, expression and rank side by side: random poses, and poses on the locus constructed from the expression.
+
+The rank is Pinocchio's, of the relation between the platform and what is measured; words and expression know the legs
+by their screws and names alone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ...errors import Disagreement
+from ...kinematics.configuration import ClosedConfiguration, closed
+from ...kinematics.ranks import kernel_basis, range_basis
+from ...kinematics.relation import Question, relation
+from ...kinematics.sampling import WEAKEST, wander
+from ...mechanism.vectors import Array
+from ...tolerances import CLOSED, FOLLOWED, RANK_CUTOFF, RANK_GAP, SHARP
+from .condition import Condition, Named
+from .structure import Scene, Structure
+
+CHUNK = 250
+ON_LOCUS = 10
+"""Poses on the locus that are constructed, where there are so many."""
+TRIES = 4
+"""Starts from which a pose is sought on a locus across which the expression has no sign."""
+SAME_SPOT = 1e-6
+"""Distance of pose matrices below which two singular poses are told once."""
+
+
+@dataclass(frozen=True, eq=False)
+class Agreement:
+    """How many poses were tried, and how far words, expression and rank are apart.
+
+    ``largest_angle`` is the largest angle between what each watched leg lets the platform do by its named vectors and
+    by Pinocchio's relation; ``disagreements`` counts poses at which one sees a singularity and another none.
+    """
+
+    points: int
+    disagreements: int
+    largest_angle: float
+    smallest: float
+    """The smallest singular value of the relation met at the random poses."""
+    sides: tuple[int, int]
+    """Random poses with the expression positive and negative, where it has a sign."""
+    on_locus: tuple[ClosedConfiguration, ...]
+
+    def to_dict(self) -> dict[str, object]:
+        """The record of the command line."""
+        return {"points": self.points, "disagreements": self.disagreements, "largest_angle": self.largest_angle,
+                "smallest_singular_value": self.smallest, "positive": self.sides[0], "negative": self.sides[1],
+                "on_locus": len(self.on_locus)}
+
+
+def agreement(start: ClosedConfiguration, question: Question, structure: Structure, condition: Condition,
+              count: int, *, seed: int = 0, progress: Callable[[], None] | None = None) -> Agreement:
+    """Compare at ``count`` random reachable poses and at poses on the locus.
+
+    Raises ``Disagreement`` where the rank, the rows behind the words and the expression do not agree. Poses near
+    constraint singularities of the loops, where no rank is certain, are left out.
+    """
+    wrong = positive = negative = met = 0
+    angle, smallest = 0.0, np.inf
+    walk: list[ClosedConfiguration] = []
+    signs: list[float] = []
+    low: list[tuple[float, ClosedConfiguration]] = []
+    for chunk in _chunks(wander(start, count, seed)):
+        scene = structure.scene(chunk)
+        ranks, apart = _weakest(scene, question, condition)
+        rows = smallest_of(condition.rows(scene))
+        values = condition.expressed(scene)
+        angle = max(angle, apart)
+        smallest = min(smallest, float(ranks.min()))
+        wrong += int(np.sum(_differ(ranks, rows, np.abs(values))))
+        positive, negative = positive + int(np.sum(values > 0)), negative + int(np.sum(values < 0))
+        met += len(chunk)
+        if condition.signed:
+            walk += chunk
+            signs += list(np.sign(values))
+        low = sorted([*low, *zip(ranks.tolist(), chunk, strict=True)], key=lambda pair: pair[0])[:TRIES]
+        if progress is not None:
+            progress()
+    crossings = (_crossings(walk, signs, structure, condition) if condition.signed
+                 else _descents(low, question, structure, condition))
+    on_locus = []
+    loops = WEAKEST * start.kernel()[1].weakest
+    for at in [] if condition.never else crossings:
+        if at.kernel()[1].weakest < loops:
+            continue
+        sigma = float(_weakest(structure.scene([at]), question, condition)[0][0])
+        if sigma > RANK_CUTOFF:
+            wrong += 1
+        on_locus.append(at)
+        if len(on_locus) == ON_LOCUS:
+            break
+    found = Agreement(met, wrong, angle, smallest, (positive, negative), tuple(on_locus))
+    if wrong or angle > RANK_CUTOFF * RANK_GAP:
+        raise Disagreement(start.twin.mechanism.name, wrong, angle)
+    return found
+
+
+def weakest(at: ClosedConfiguration, question: Question) -> float:
+    """The smallest singular value of Mᵀ on an orthonormal basis of the platform's twists (characteristic lengths)."""
+    return float(_relations([at], question)[0][0])
+
+
+def spectrum(configurations: Sequence[ClosedConfiguration], question: Question) -> tuple[Array, Array]:
+    """The smallest and the largest singular value of Mᵀ at each configuration, (n,) each (characteristic lengths)."""
+    smallest, parts = _relations(configurations, question)
+    return smallest, np.array([part[2] for part in parts])
+
+
+def smallest_of(rows: Array) -> Array:
+    """The smallest singular value of each of many matrices, (n,)."""
+    return np.asarray(np.linalg.svd(rows, compute_uv=False)[:, -1], dtype=float)
+
+
+def _chunks(configurations: Iterator[ClosedConfiguration]) -> Iterator[list[ClosedConfiguration]]:
+    chunk: list[ClosedConfiguration] = []
+    for at in configurations:
+        chunk.append(at)
+        if len(chunk) == CHUNK:
+            yield chunk
+            chunk = []
+    if chunk:
+        yield chunk
+
+
+def _differ(*measures: Array) -> Array:
+    """Where one measure is zero and another is clearly not."""
+    table = np.array(measures)
+    return (table.min(axis=0) < RANK_CUTOFF) & (table.max(axis=0) > RANK_CUTOFF * RANK_GAP)
+
+
+def _relations(chunk: Sequence[ClosedConfiguration], question: Question, bodies: tuple[str, ...] = ()
+               ) -> tuple[Array, list[tuple[Array, Array, float]]]:
+    """Smallest singular value of Mᵀ at each configuration; for each the measured rates and the twists of ``bodies`` for
+    a basis of the platform's motions, (m, k) and (6 bodies, k), and the largest singular value."""
+    sigma, parts = [], []
+    for at in chunk:
+        found = relation(at, replace(question, bodies=bodies))
+        twists, rates = found.twist_part, found.rates
+        _, s, Vt = np.linalg.svd(twists, full_matrices=False)
+        kept = int(np.sum(s > RANK_CUTOFF))
+        back = Vt[:kept].T / s[:kept]
+        M = rates @ back
+        if kept < found.dimension:
+            still, _ = kernel_basis(twists, 1.0)
+            idle, _ = range_basis(rates @ still, 1.0)
+            M = M - idle @ (idle.T @ M)
+        values = np.linalg.svd(M, compute_uv=False) if kept else np.zeros(1)
+        sigma.append(float(values[-1]) if kept <= len(M) else 0.0)
+        parts.append((rates, found.basis[found.twist_rows + len(rates) :], float(values[0])))
+    return np.array(sigma), parts
+
+
+def _weakest(scene: Scene, question: Question, condition: Condition) -> tuple[Array, float]:
+    """Smallest singular values by Pinocchio, and the largest angle by which a watched leg's named vectors miss what
+    Pinocchio says it lets the platform do."""
+    named = isinstance(condition, Named)
+    sigma, parts = _relations(scene.configurations, question, scene.structure.bodies if named else ())
+    labels = np.repeat([o.leg for o in question.observations], question.sizes)
+    angle = 0.0
+    for leg in scene.structure.legs if named else ():
+        for (rates, twists, _), block in zip(parts, scene.allowances(leg), strict=True):
+            held, _ = kernel_basis(rates[labels == leg.label], 1.0)
+            angle = max(angle, float(np.linalg.norm(block @ twists @ held, 2)))
+    return sigma, angle
+
+
+def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], structure: Structure,
+               condition: Condition) -> Iterator[ClosedConfiguration]:
+    """Zeros of the expression between neighbours of a walk at which it has different signs."""
+    from scipy.optimize import brentq
+
+    for (one, a), (two, b) in pairwise(zip(walk, signs, strict=True)):
+        if a * b >= 0:
+            continue
+        twin = one.twin
+        step = twin.difference(one.q, two.q)
+        if np.linalg.norm(step) > 1.0:
+            continue
+
+        def there(fraction: float, one: ClosedConfiguration = one, step: Array = step) -> ClosedConfiguration:
+            q, residual = closed(one.twin, one.twin.moved(one.q, fraction * step), tolerance=SHARP)
+            return ClosedConfiguration(one.twin, q, residual)
+
+        def value(fraction: float, there: Callable[[float], ClosedConfiguration] = there) -> float:
+            return float(condition.expressed(structure.scene([there(fraction)]))[0])
+
+        if value(0.0) * value(1.0) >= 0:
+            continue
+        root = there(float(brentq(value, 0.0, 1.0, xtol=1e-15, rtol=1e-14)))
+        if root.residual <= CLOSED and abs(float(condition.expressed(structure.scene([root]))[0])) <= FOLLOWED:
+            yield ClosedConfiguration.of(twin, root.q)
+
+
+def _descents(low: Sequence[tuple[float, ClosedConfiguration]], question: Question, structure: Structure,
+              condition: Condition) -> Iterator[ClosedConfiguration]:
+    """Zeros of the rows found from the weakest poses: rows(q) x = 0 with |x| = 1."""
+    seen: list[Array] = []
+    for _, start in low:
+        found = descend(start, question, structure, condition)
+        if found is None:
+            continue
+        X = found.pose(question.platform)
+        if all(np.linalg.norm(X - other) > SAME_SPOT for other in seen):
+            seen.append(X)
+            yield found
+
+
+def descend(start: ClosedConfiguration, question: Question, structure: Structure,
+            condition: Condition) -> ClosedConfiguration | None:
+    """A pose on the locus near ``start``: least squares in the platform's motions and the lost one; None where there is
+    none near."""
+    from scipy.optimize import least_squares
+
+    twin = start.twin
+    here = start
+    for _ in range(4):
+        kernel, _ = here.kernel()
+        image = question.rows(here)[: question.twist_rows] @ kernel
+        moves, _ = range_basis(image, 1.0)
+        motion = kernel @ np.linalg.lstsq(image, moves, rcond=1e-9)[0]
+        start_rows = condition.rows(structure.scene([here]))[0]
+        shape, x0 = start_rows.shape, np.linalg.svd(start_rows)[2][-1]
+
+        def reached(s: Array, here: ClosedConfiguration = here, motion: Array = motion) -> ClosedConfiguration:
+            q, residual = closed(twin, twin.moved(here.q, motion @ s), tolerance=SHARP)
+            return ClosedConfiguration(twin, q, residual)
+
+        def residuals(z: Array, count: int = moves.shape[1], shape: tuple[int, ...] = shape,
+                      reached: Callable[[Array], ClosedConfiguration] = reached) -> Array:
+            at = reached(z[:count])
+            x = z[count:]
+            rows = condition.rows(structure.scene([at]))[0]
+            if at.residual > CLOSED or rows.shape[1] != len(x):
+                return np.ones(shape[0] + 1)
+            return np.append(rows @ x, x @ x - 1.0)
+
+        limits = np.concatenate([np.full(moves.shape[1], 0.3), np.full(len(x0), 2.0)])
+        fit = least_squares(residuals, np.concatenate([np.zeros(moves.shape[1]), x0]), bounds=(-limits, limits),
+                            xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
+        there = reached(fit.x[: moves.shape[1]])
+        if there.residual > CLOSED:
+            return None
+        here = ClosedConfiguration.of(twin, there.q)
+        if np.linalg.norm(fit.fun) < FOLLOWED:
+            return here
+    return None

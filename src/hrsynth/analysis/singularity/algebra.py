@@ -1,0 +1,102 @@
+"""Vector algebra in SymPy: symbols stand for vectors; ``dot``, ``cross`` and ``det`` (triple product) for the products.
+
+The expressions are ordinary SymPy trees over these three functions; :func:`evaluate` gives their values for arrays of
+vectors, :func:`components` the polynomial in the vectors' coordinates.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ...mechanism.vectors import Array
+
+
+class Products(NamedTuple):
+    """The three products as SymPy functions."""
+
+    dot: Any
+    cross: Any
+    det: Any
+
+
+@cache
+def products() -> Products:
+    """``dot`` (symmetric), ``cross`` and ``det`` (a·(b × c)), with the signs of permutations taken out."""
+    import sympy
+
+    class dot(sympy.Function):  # noqa: N801
+        nargs = 2
+
+        @classmethod
+        def eval(cls, a: Any, b: Any) -> Any:
+            first, second = sorted((a, b), key=sympy.default_sort_key)
+            return None if (first, second) == (a, b) else cls(first, second)
+
+    class cross(sympy.Function):  # noqa: N801
+        nargs = 2
+
+    class det(sympy.Function):  # noqa: N801
+        nargs = 3
+
+        @classmethod
+        def eval(cls, *vectors: Any) -> Any:
+            order = sorted(range(3), key=lambda i: sympy.default_sort_key(vectors[i]))
+            if order == [0, 1, 2]:
+                return None
+            ordered = cls(*(vectors[i] for i in order))
+            return ordered if order in ([1, 2, 0], [2, 0, 1]) else -ordered
+
+    return Products(dot, cross, det)
+
+
+def vector(name: str) -> Any:
+    """A symbol that stands for a vector."""
+    import sympy
+
+    return sympy.Symbol(name)
+
+
+def evaluate(expression: Any, values: Mapping[str, Array]) -> Array:
+    """Values of an expression for vectors (n, 3), shape (n,)."""
+    import sympy
+
+    names = sorted(values)
+    functions = {
+        "dot": lambda a, b: np.einsum("...i,...i->...", a, b),
+        "cross": np.cross,
+        "det": lambda a, b, c: np.einsum("...i,...i->...", a, np.cross(b, c)),
+    }
+    run = sympy.lambdify([sympy.Symbol(name) for name in names], expression, modules=[functions, "numpy"])
+    size = max((len(values[name]) for name in names), default=1)
+    return np.broadcast_to(np.asarray(run(*(values[name] for name in names)), dtype=float), (size,))
+
+
+def components(expression: Any) -> Any:
+    """The expression as a polynomial in coordinates ``u1_x`` … of its vectors."""
+    import sympy
+
+    dot, cross, det = products()
+
+    def expand(node: Any) -> Any:
+        if isinstance(node, sympy.Symbol):
+            return sympy.Matrix(sympy.symbols([f"{node.name}_{axis}" for axis in "xyz"]))
+        if node.func is dot:
+            return expand(node.args[0]).dot(expand(node.args[1]))
+        if node.func is cross:
+            return expand(node.args[0]).cross(expand(node.args[1]))
+        if node.func is det:
+            a, b, c = map(expand, node.args)
+            return a.dot(b.cross(c))
+        if node.is_Number:
+            return node
+        parts = [expand(argument) for argument in node.args]
+        total = parts[0]
+        for part in parts[1:]:
+            total = total + part if node.is_Add else total**part if node.is_Pow else total * part
+        return total
+
+    return expand(expression)

@@ -1,0 +1,335 @@
+"""The Type 2 condition of a structure: rows that must lose rank, a SymPy expression that must vanish, and words.
+
+Feasible motions of the platform have coordinates x (d of them); held leg i allows those for which its tip's velocity
+J_i x lies along its line: N_i J_i x = 0. A freedom is lost where the stacked rows have a kernel (theory 4).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from ...kinematics.locked import interaction
+from ...kinematics.relation import Question
+from ...mechanism.vectors import Array
+from ...tolerances import SAME_RELATION
+from .algebra import evaluate, products, vector
+from .features import Carried, Feature
+from .structure import HeldLeg, Scene, Structure, forbidden, hats, projectors
+
+Values = Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Condition:
+    """When the controller loses a freedom of the platform: in words and as an expression that vanishes there.
+
+    ``signed`` says that the expression changes its sign across the locus, ``never`` that it cannot vanish; ``factors``
+    are those that were split off: they vanish only where a part of the robot has no length.
+    """
+
+    words: str
+    expression: Any
+    signed: bool = False
+    factors: tuple[str, ...] = ()
+    never: bool = False
+    where: Mapping[str, str] = field(default_factory=dict)
+    """What each symbol means."""
+
+    def rows(self, scene: Scene) -> Array:
+        """The rows (n, rows, d) that have a kernel exactly where a freedom is lost."""
+        raise NotImplementedError
+
+    def expressed(self, scene: Scene) -> Array:
+        """The expression's value, (n,), as a first power of the distance to the locus (the root of a sum of squares).
+
+        Here that of the determinant of a Gram matrix of the rows."""
+        M = self.rows(scene)
+        return np.sqrt(np.abs(np.linalg.det(M.transpose(0, 2, 1) @ M)))
+
+
+@dataclass(frozen=True, eq=False)
+class Named(Condition):
+    """A condition in vectors that have names."""
+
+    structure: Structure = field(kw_only=True)
+
+    def rows(self, scene: Scene) -> Array:
+        return rows(self.structure, scene.values)
+
+    def expressed(self, scene: Scene) -> Array:
+        import sympy
+
+        if isinstance(self.expression, sympy.Determinant):
+            return np.linalg.det(plucker(self.structure, scene.values)) if self.signed else super().expressed(scene)
+        found = evaluate(self.expression, scene.values)
+        return found if self.signed else np.sqrt(np.abs(found))
+
+
+@dataclass(frozen=True, eq=False)
+class General(Condition):
+    """The condition of any mechanism: the interaction matrix by the screws of all joints loses rank."""
+
+    question: Question = field(kw_only=True)
+
+    def rows(self, scene: Scene) -> Array:
+        return np.array([interaction(at, self.question) for at in scene.configurations])
+
+
+def rows(structure: Structure, values: Values) -> Array:
+    """The rows of all legs, and those that keep to a plane."""
+    blocks = []
+    some = values[structure.legs[0].tip.symbol]
+    eye = np.broadcast_to(np.eye(3), (len(some), 3, 3))
+    zero = np.zeros_like(eye)
+    for leg in structure.legs:
+        match structure.motion:
+            case "translations":
+                J = eye
+            case "bodies":
+                moves = float(leg.body in structure.bodies[1:])
+                J = np.concatenate([eye, moves * values[_symbol(structure.slide)][:, :, None]], axis=2)
+            case _:
+                J = np.concatenate([eye, -hats(values[leg.tip.symbol])], axis=2)
+        blocks.append(forbidden(leg, values) @ J)
+    if structure.motion == "planar":
+        n = values[_symbol(structure.plane)]
+        blocks.append(np.concatenate([n[:, None, :], np.zeros((len(n), 1, 3))], axis=2))
+        blocks.append(np.concatenate([zero, projectors(n)], axis=2))
+    return np.concatenate(blocks, axis=1)
+
+
+def plucker(structure: Structure, values: Values) -> Array:
+    """The lines (n_i, B_i × n_i) through the tips along the legs' normals, (n, legs, 6)."""
+    pairs = [(values[_symbol(leg.normal)], values[leg.tip.symbol]) for leg in structure.legs]
+    return np.stack([np.concatenate([n, np.cross(B, n)], axis=-1) for n, B in pairs], axis=1)
+
+
+def condition(structure: Structure, question: Question) -> Condition:
+    """The condition of a structure: by name where its pattern is a known one, else by the screws of all joints."""
+    if structure.motion == "other":
+        return _general(question)
+    if any(leg.fixed for leg in structure.legs) and structure.motion == "translations":
+        return Named("never: a held leg leaves the platform no motion", _number(1), never=True, structure=structure)
+    lines = [leg for leg in structure.legs if leg.line is not None]
+    if structure.motion == "translations":
+        return _translations(structure, lines)
+    normals = [leg for leg in structure.legs if leg.normal is not None]
+    fixed = [leg for leg in structure.legs if leg.fixed]
+    if structure.motion == "spatial" and len(normals) == len(structure.legs) == 6:
+        return _complex(structure, normals)
+    if structure.motion == "planar" and (len(lines), len(fixed)) == (1, 1):
+        return _pivot(structure, lines[0], fixed[0])
+    if len(lines) == len(structure.legs):
+        if structure.motion == "planar" and len(lines) == 3:
+            return _planar(structure, lines)
+        if structure.motion == "spatial" and len(lines) == 3:
+            return _spatial(structure, lines)
+        if structure.motion == "bodies" and len(lines) == 2 and lines[0].body != lines[1].body:
+            return _bodies(structure, lines)
+    return _gram(structure)
+
+
+def _translations(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:
+    dot, cross, det = products()
+    symbols = [vector(_symbol(leg.line)) for leg in lines]
+    normals = [vector(_symbol(leg.normal)) for leg in structure.legs if leg.normal is not None]
+    names = _listed(leg.line for leg in lines)
+    constant = all(isinstance(leg.line, Carried) and leg.line.link == structure.base for leg in lines)
+    signed = False
+    if not lines:
+        expression = sum(det(*triple) ** 2 for triple in combinations(normals, 3))
+        words = f"{_listed(leg.normal for leg in structure.legs)} are parallel to one plane"
+        if len(normals) == 3:
+            expression, signed = det(*normals), True
+    elif not normals and len(lines) == 2 and structure.plane is not None:
+        expression, signed = det(vector(_symbol(structure.plane)), *symbols), True
+        words = f"{names} are parallel"
+    elif not normals:
+        expression = sum(dot(cross(a, b), cross(a, b)) for a, b in combinations(symbols, 2))
+        words = f"{names} are {'all ' if len(lines) > 2 else ''}parallel"
+    else:
+        first = symbols[0]
+        expression = sum(dot(cross(first, b), cross(first, b)) for b in symbols[1:])
+        expression += sum(dot(first, n) ** 2 for n in normals)
+        words = f"{names} are parallel, and so are the planes in which the other tips move"
+    if constant and not normals and len(lines) > 1:
+        several = "all " if len(lines) > 2 else ""
+        never = f"never: {names} are constant and not {several}parallel"
+        return _named(structure, never, expression, False, never=True)
+    return _named(structure, words, expression, signed)
+
+
+def _planar(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:
+    """det of the tips' normals s_i = (n × τ_i; B_i·τ_i) as lines of the plane: s1·(s2 × s3)."""
+    dot, _, det = products()
+    n = vector(_symbol(structure.plane))
+    tau = [vector(_symbol(leg.line)) for leg in lines]
+    tips = [vector(leg.tip.symbol) for leg in lines]
+    expression = sum(dot(tips[i], tau[i]) * det(n, tau[(i + 1) % 3], tau[(i + 2) % 3]) for i in range(3))
+    at = ", ".join(leg.tip.symbol for leg in lines)
+    kinds = _kinds(lines, "normal to")
+    words = f"the lines through {at}, {kinds}, meet in a point or are parallel"
+    return _named(structure, words, expression, True)
+
+
+def _spatial(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:
+    """The tips' speeds along their lines that keep |B_i B_j|: a 3 × 3 determinant."""
+    dot, _, _ = products()
+    line = [vector(_symbol(leg.line)) for leg in lines]
+    tips = [vector(leg.tip.symbol) for leg in lines]
+    sides = [tips[(i + 1) % 3] - tips[i] for i in range(3)]
+    forth = back = _number(1)
+    for i in range(3):
+        forth *= dot(line[i], sides[i])
+        back *= dot(line[(i + 1) % 3], sides[i])
+    names = [leg.tip.symbol for leg in lines]
+    words = (f"the planes through {', '.join(names)} {_kinds(lines, 'normal to')}, and the plane {''.join(names)}, "
+             "meet in a point (which may lie at infinity)")
+    return _named(structure, words, forth - back, True)
+
+
+def _pivot(structure: Structure, line: HeldLeg, fixed: HeldLeg) -> Condition:
+    """One tip rests: the platform turns about it where the other tip's line is the path of that turn."""
+    dot, _, _ = products()
+    one, other, along = fixed.tip.symbol, line.tip.symbol, _symbol(line.line)
+    words = f"the line {one}{other} is normal to {along}"
+    return _named(structure, words, dot(vector(other) - vector(one), vector(along)), True)
+
+
+def _complex(structure: Structure, legs: Sequence[HeldLeg]) -> Condition:
+    """Six forces along lines through the tips: their Plücker coordinates are dependent."""
+    import sympy
+
+    lines = [f"({_symbol(leg.normal)}, {leg.tip.symbol} x {_symbol(leg.normal)})" for leg in legs]
+    words = (f"the lines through {', '.join(leg.tip.symbol for leg in legs)} along "
+             f"{', '.join(_symbol(leg.normal) for leg in legs)} belong to one linear complex")
+    expression = sympy.Determinant(sympy.MatrixSymbol("L", 6, 6))
+    return _named(structure, words, expression, True, matrices={"L": "rows " + ", ".join(lines)})
+
+
+def _bodies(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:
+    _, _, det = products()
+    slide = vector(_symbol(structure.slide))
+    expression = det(*(vector(_symbol(leg.line)) for leg in lines), slide)
+    words = (f"{_listed(leg.line for leg in lines)} and the direction {slide}, in which the platform's halves move on "
+             "each other, are parallel to one plane")
+    return _named(structure, words, expression, True)
+
+
+def _gram(structure: Structure) -> Condition:
+    """det Σ J_iᵀ N_i J_i: more rows than freedoms, they must lose rank together."""
+    import sympy
+
+    size = 4 if structure.motion == "bodies" else 6
+    total = sympy.ZeroMatrix(size, size)
+    matrices = []
+    for leg in structure.legs:
+        label, moving = leg.tip.symbol[1:], leg.line or leg.normal
+        J, N = sympy.MatrixSymbol(f"J{label}", 3, size), sympy.MatrixSymbol(f"N{label}", 3, 3)
+        total += J.T * N * J
+        slides = "[I, e]" if leg.body in structure.bodies[1:] else "[I, 0]"
+        matrices.append((J.name, slides if structure.motion == "bodies" else f"[I, -[{leg.tip.symbol}]x]"))
+        name = "" if moving is None else _symbol(moving)
+        across = "I" if leg.fixed else f"I - {name} {name}^T" if leg.line is not None else f"{name} {name}^T"
+        matrices.append((N.name, across))
+    moves = _moves(structure.legs)
+    if structure.motion == "bodies":
+        words = f"the platform's halves can translate, one along e relative to the other, and move {moves}"
+    else:
+        words = f"some motion of the platform moves {moves}"
+    return _named(structure, words, sympy.Determinant(total), False, matrices=dict(matrices))
+
+
+def _named(structure: Structure, words: str, expression: Any, signed: bool, *, never: bool = False,
+           matrices: Mapping[str, str] | None = None) -> Named:
+    """A condition with the meaning of its symbols and the factors that were split off."""
+    used = {str(symbol) for symbol in expression.free_symbols}
+    named = {f.symbol: f.meaning for f in structure.features if f.symbol in used or matrices}
+    return Named(words.replace("tau", "τ"), expression, signed, tuple(_lengths(structure.legs)), never,
+                 {**(matrices or {}), **dict(sorted(named.items()))}, structure=structure)
+
+
+def _general(question: Question) -> General:
+    import sympy
+
+    size = sympy.Symbol("d", integer=True, positive=True)
+    M = sympy.MatrixSymbol("M", sum(question.sizes), size)
+    where = {"M": "rates of what is observed for a basis of the platform's motions: M = Y K (X K)^+",
+             "K": "basis of the kernel of A, the wrenches that all joints transmit",
+             "X": "twist of the platform", "Y": "rates of what is observed", "d": "freedoms of the platform"}
+    words = "the legs, with their measurements held, transmit no wrench against some motion of the platform"
+    return General(words, sympy.Determinant(M.T * M), where=where, question=question)
+
+
+def always(structure: Structure, lost: Sequence[str]) -> str:
+    """Words for a robot that loses a freedom everywhere."""
+    text = f"always: {'; '.join(lost)} {'is' if len(lost) == 1 else 'are'} never seen"
+    lines = [leg for leg in structure.legs if leg.line is not None]
+    if structure.motion != "planar" and len(lines) == len(structure.legs) > 0:
+        constant = all(isinstance(leg.line, Carried) and leg.line.link == structure.base for leg in lines)
+        parallel = constant and all(_parallel(lines[0].line, leg.line) for leg in lines)
+        if parallel and len(lines) > 1:
+            return f"{text}, because {_listed(leg.line for leg in lines)} are parallel"
+    return text
+
+
+def _parallel(a: Feature | None, b: Feature | None) -> bool:
+    return (isinstance(a, Carried) and isinstance(b, Carried)
+            and bool(np.linalg.norm(np.cross(a.direction, b.direction)) < SAME_RELATION))
+
+
+def _listed(features: Iterable[Feature | None]) -> str:
+    """``the tangents tau1, tau2`` and the like, by what the vectors are."""
+    groups: dict[str, list[str]] = {}
+    for feature in features:
+        symbol = _symbol(feature)
+        groups.setdefault(_KINDS[symbol[0]], []).append(symbol)
+    return " and ".join(f"the {kind} {', '.join(names)}" for kind, names in groups.items())
+
+
+_KINDS = {"u": "watched directions", "p": "P axes", "t": "tangents", "a": "axes", "r": "directions"}
+
+
+def _moves(legs: Sequence[HeldLeg]) -> str:
+    """What all tips do: ``every tip Bi along ui (i = 1, 2, 3)`` where they are alike."""
+    alike = {(leg.tip.symbol[0], _allowed(leg).replace(leg.tip.symbol[1:], "i")) for leg in legs}
+    if len(alike) > 1:
+        return _and([f"{leg.tip.symbol} {_allowed(leg)}" for leg in legs])
+    tip, allowed = next(iter(alike))
+    return f"every tip {tip}i {allowed} (i = {', '.join(leg.tip.symbol[1:] for leg in legs)})"
+
+
+def _allowed(leg: HeldLeg) -> str:
+    if leg.fixed:
+        return "at rest"
+    return f"along {_symbol(leg.line)}" if leg.line is not None else f"normal to {_symbol(leg.normal)}"
+
+
+def _and(parts: Sequence[str]) -> str:
+    return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
+
+
+def _kinds(lines: Sequence[HeldLeg], relation: str) -> str:
+    return f"{relation} {', '.join(_symbol(leg.line) for leg in lines)}"
+
+
+def _lengths(lines: Sequence[HeldLeg]) -> list[str]:
+    """Factors that vanish only where a crank has no length: none for unit vectors that are fixed in a link."""
+    return [f"|{leg.line.meaning.removeprefix('tangent ')}|" for leg in lines
+            if leg.line is not None and not isinstance(leg.line, Carried)]
+
+
+def _symbol(feature: Feature | None) -> str:
+    assert feature is not None
+    return feature.symbol
+
+
+def _number(value: int) -> Any:
+    import sympy
+
+    return sympy.Integer(value)
