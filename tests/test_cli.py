@@ -23,6 +23,9 @@ FIELDS = {
     "legs": {"sets", "minimal"},
     "advise": {"verdict", "rank", "dof", "lost", "nothing_missing", "sets", "size", "tried", "complete"},
     "check": {"characteristic_length", "observed", "camera", "configurations", "redundant", "grid"},
+    "singular": {"measured", "dof", "verdict", "lost", "always", "never", "words", "expression", "where", "factors",
+                 "characteristic_length", "checked", "examples", "locus", "file"},
+    "path": {"verdict", "certified", "path", "margin", "boxes", "start", "goal", "reason", "value", "point"},
     "robots": {"robots"},
     "convert": {"file"},
 }
@@ -352,6 +355,130 @@ def test_advise_text_groups_the_cures(run, arguments: list[str], lines: list[str
 def test_advise_refuses_what_does_not_fit(run, arguments: list[str], words: list[str]):
     (line,) = run("advise", "delta", *arguments).refused()
     assert all(word in line for word in words), line
+
+
+# ---- singular
+
+
+def test_singular_json_is_the_contract(run):
+    data = run("singular", "quattro_rigid", "--observe", "1,3", "--points", "40", "--json").data
+    check_record(data, "singular", "quattro_rigid")
+    assert data["always"] is False
+    assert data["words"] == "the tangents τ1, τ3 are parallel"
+    assert data["expression"] == "det(n, tau1, tau3)"
+    assert data["where"].keys() == {"n", "tau1", "tau3"}
+    assert (data["checked"]["points"], data["checked"]["disagreements"]) == (40, 0)
+    assert data["measured"] == {"kind": "directions", "of": ["rod_1a", "rod_3a"]}
+    assert data["locus"] is data["file"] is None
+
+
+def test_singular_json_has_singular_poses(run):
+    examples = run("singular", "rrrrr_m1", "--points", "100", "--json").data["examples"]
+    assert examples
+    for each in examples:
+        assert each["pose"].keys() >= {"x", "y", "z"}
+        assert each["singular_value"] < 1e-9 < 1e-3 < each["singular_value_nearby"]
+        assert [lost["name"][:12] for lost in each["lost"]] == ["translation "]
+
+
+def test_singular_json_where_a_freedom_is_always_lost(run):
+    data = run("singular", "uranesx", "--json").data
+    check_record(data, "singular", "uranesx")
+    assert data["always"] is True
+    assert data["words"].startswith("always: translation along z is never seen")
+    assert (data["expression"], data["verdict"]) == ("0", "partially controllable")
+    assert data["checked"] == {"points": 0, "disagreements": 0}
+
+
+def test_singular_of_the_real_robot(run):
+    data = run("singular", "rrrrr_m1", "--real", "--points", "30", "--json").data
+    assert data["measured"]["kind"] == "motors"
+    assert data["words"] == "the line B1B2 is normal to τ2"
+
+
+def test_singular_text(run):
+    answer = run("singular", "rrrrr_m1", "--points", "100")
+    assert (answer.status, answer.err) == (0, "")
+    for line in (r"^Type 2 +the tangents τ1, τ2 are parallel$", r"^expression +det\(n, tau1, tau2\) = 0$",
+                 r"^checked +100 random poses and \d+ on the locus, 0 disagreements", r"^singular at +x="):
+        assert re.search(line, answer.out, re.MULTILINE), answer.out
+
+
+def test_singular_draws_the_locus(run, tmp_path: Path):
+    picture = tmp_path / "locus.png"
+    data = run("singular", "rrrrr_m1", "--points", "30", "--steps", "9", "-o", picture, "--json").data
+    assert picture.read_bytes().startswith(b"\x89PNG")
+    assert data["file"] == str(picture)
+    assert data["locus"]["axes"].keys() == {"x", "y"}
+    assert len(data["locus"]["hidden"]["type2"]) == 9
+    assert 0 < data["locus"]["reached"] < 81
+    assert list(tmp_path.iterdir()) == [picture]
+
+
+@pytest.mark.parametrize(("robot", "arguments", "status", "words"), [
+    ("delta", ["-o", "x.txt"], 2, ["unknown ending", "'x.txt'", ".png"]),
+    ("delta", ["--plane", "z=-0.6"], 2, ["--output"]),
+    ("delta", ["--plane", "phi=0", "-o", "x.png"], 2, ["cannot change phi", "x, y, z"]),
+    ("delta", ["--plane", "z=5", "-o", "x.png"], 3, ["no pose of the plane z=5 is reached"]),
+    ("hexaglide", ["-o", "x.png"], 2, ["has no locus"]), ("delta", ["--observe", "9"], 2, ["legs 1, 2, 3"]),
+    ("delta", ["--camera", "moon"], 2, ["'moon'"])])
+def test_singular_refuses_in_one_line_and_writes_nothing(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
+                                                         robot: str, arguments: list[str], status: int,
+                                                         words: list[str]):
+    monkeypatch.chdir(tmp_path)
+    (line,) = run("singular", robot, "--points", "5", *arguments).refused(status)
+    assert all(word in line for word in words), line
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_singular_answers_3_where_condition_and_rank_disagree(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("hrsynth.analysis.singularity.agreement.RANK_CUTOFF", 1e-30)
+    picture = tmp_path / "locus.png"
+    (line,) = run("singular", "rrrrr_m1", "--points", "100", "--steps", "5", "-o", picture).refused(3)
+    assert "the condition and the rank disagree" in line
+    assert not picture.exists()
+
+
+# ---- path
+
+
+@pytest.mark.parametrize(("arguments", "verdict"), [
+    (["rrrrr_m1", "--from", "x=0.05", "--to", "x=-0.01,y=0.03"], "same aspect"),
+    (["3rrr_m1", "--from", "x=0,y=0", "--to", "x=-0.091,y=-0.053,phi=0.1"], "separated"),
+    (["3rps", "--from", "z=0.5", "--to", "z=0.51"], "undecided")])
+def test_path_json_is_the_contract_whatever_the_verdict(run, arguments: list[str], verdict: str):
+    data = run("path", *arguments, "--json").data
+    check_record(data, "path", arguments[0])
+    assert data["verdict"] == verdict
+    assert data["certified"] is (verdict != "undecided")
+    ends = [data["start"], data["goal"]]
+    assert [data["path"][0], data["path"][-1]] == [end["pose"] for end in ends]
+    assert (ends[0]["value"] * ends[1]["value"] > 0) is (verdict != "separated")
+    assert data["reason"]
+    if data["certified"]:
+        assert 0 < data["margin"] <= min(abs(end["value"]) for end in ends)
+        assert data["boxes"] > 0
+    else:
+        assert data["margin"] is None
+
+
+def test_path_text_has_the_verdict_the_path_and_what_is_not_proved(run):
+    answer = run("path", "quattro", "--observe", "1,4", "--from", "x=0.05", "--to", "x=-0.05,phi=20deg")
+    assert (answer.status, answer.err) == (0, "")
+    assert re.search(r"^verdict +same aspect \(certified\)$", answer.out, re.MULTILINE)
+    assert re.search(r"^path +x=0.05,", answer.out, re.MULTILINE)
+    assert re.search(r"^not proved +joint limits", answer.out, re.MULTILINE)
+
+
+@pytest.mark.parametrize(("arguments", "status", "words"), [
+    (["--from", "x=0", "--to", "x=9"], 3, ["x=9", "is not reached"]),
+    (["--from", "x=0", "--to", "w=9"], 2, ["unknown part", "'w'"]),
+    (["--from", "x=0", "--to", "z=0.1"], 2, ["cannot change z"]),
+    (["--from", "x=0", "--to", "x=0.01", "--observe", "7"], 2, ["no leg or link", "'7'"]),
+    (["--from", "x=0"], 2, ["--to"])])
+def test_path_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
+    (line,) = run("path", "3rrr_m1", *arguments).refused(status)
+    assert all(word in line for word in words)
 
 
 # ---- legs, robots, convert

@@ -4,6 +4,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from .analysis.advice import advise
+    from .analysis.aspects.path import path
     from .analysis.check import check
     from .analysis.controllability import legs
     from .analysis.derive import derive
@@ -11,7 +12,7 @@ if TYPE_CHECKING:
     from .description import load, save, shipped
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "advise", "check", "derive", "legs", "load", "save", "shipped", "singular"]
+__all__ = ["__version__", "advise", "check", "derive", "legs", "load", "path", "save", "shipped", "singular"]
 
 _HOME = {
     "advise": ".analysis.advice",
@@ -19,6 +20,7 @@ _HOME = {
     "derive": ".analysis.derive",
     "legs": ".analysis.controllability",
     "load": ".description",
+    "path": ".analysis.aspects.path",
     "save": ".description",
     "shipped": ".description",
     "singular": ".analysis.singularity.singular",

@@ -177,6 +177,27 @@ def advise(
 
 
 @app.command()
+def path(
+    robot: Robot,
+    start: Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")],
+    goal: Annotated[str, typer.Option("--to", metavar="POSE", help="Where it ends.")],
+    observe: Observe = "all",
+    camera: Camera = None,
+    json: Json = False,
+    seed: Seed = 0,
+) -> None:
+    """Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, undecided."""
+    from .analysis.aspects.path import path as run
+    from .description import load
+    from .present import records
+    from .present.text.aspects import path as written
+
+    with Progress() as progress:
+        found = run(load(robot), _list(observe), camera, start=start, goal=goal, seed=seed, progress=progress.tell)
+    typer.echo(records.record("path", found.setting.robot.name, found.to_dict()) if json else written(found))
+
+
+@app.command()
 def robots(json: Json = False) -> None:
     """The shipped robots."""
     from .description import shipped

@@ -142,6 +142,16 @@ class Disagreement(HrsynthError):
                          f"{angle:.2g} rad); please report this as a defect of hrsynth")
 
 
+class NotConfined(HrsynthError):
+    """A robot whose tips, with the directions held, move on something else than points, lines and circles."""
+
+    exit_status = 3
+
+    def __init__(self, robot: str, reason: str) -> None:
+        self.robot, self.reason = robot, reason
+        super().__init__(f"{robot}: its assembly modes cannot be listed: {reason}")
+
+
 class NotCertified(HrsynthError):
     """No hidden robot passed the certificate: the best angle seen."""
 

@@ -48,3 +48,16 @@ SAME_GEOMETRY = 1e-9
 
 LOCUS = 1e-7
 """Singular value, relative to the spread of a locus, below which the locus has no extent in that direction."""
+
+PARALLEL = 1e-13
+"""Sine of the angle below which two directions of given curves are taken for exactly parallel, as an angle rounded from
+one that is: it decides how many solutions lie at infinity."""
+
+VANISHES = 1e-9
+"""Distance of a tip from its curve (sizes of the mechanism) at which a pose matches an observation more than is needed."""
+
+NEAR_MODE = 1e-2
+"""Distance of tips from their curves (sizes of the mechanism) up to which a pose that matches almost is reported."""
+
+NEARLY_DOUBLE = 1e-6
+"""Distance between two solutions, in their parameters, below which the pose counts as singular."""

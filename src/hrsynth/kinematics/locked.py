@@ -7,11 +7,11 @@ Lengths in characteristic lengths; twists at the base frame's origin, base axes.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mechanism import Joint, Observation
+from ..mechanism import Joint, Mechanism, Observation
 from ..mechanism.legs import Leg
 from ..mechanism.screws import constraints
 from ..mechanism.vectors import Array, hat, inverse
@@ -95,6 +95,17 @@ def moved(at: ClosedConfiguration, joint: Joint) -> tuple[Array, list[Array]]:
     carriers = (joint.predecessor, joint.successor)
     axes = [displacement(link)[:3, :3] @ axis for link, axis in zip(carriers, joint.axes, strict=False)]
     return (D[:3, :3] @ joint.point + D[:3, 3]) / at.twin.length, axes
+
+
+def rezeroed(at: ClosedConfiguration) -> Mechanism:
+    """The same mechanism with ``at`` as its zero configuration."""
+    mechanism, length = at.twin.mechanism, at.twin.length
+    joints = []
+    for joint in mechanism.joints.values():
+        point, axes = moved(at, joint)
+        joints.append(replace(joint, point=point * length, axes=tuple(axes)))
+    links = [replace(link, pose=at.pose(name)) for name, link in mechanism.links.items()]
+    return mechanism.changed(links=links, joints=joints)
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,7 @@ from ...kinematics.ranks import kernel_basis, range_basis
 from ...kinematics.relation import Question, relation
 from ...kinematics.sampling import WEAKEST, wander
 from ...mechanism.vectors import Array
-from ...tolerances import CLOSED, FOLLOWED, RANK_CUTOFF, RANK_GAP, SHARP
+from ...tolerances import CLOSED, FOLLOWED, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SHARP
 from .condition import Condition, Named
 from .structure import Scene, Structure
 
@@ -27,6 +27,8 @@ ON_LOCUS = 10
 """Poses on the locus that are constructed, where there are so many."""
 TRIES = 4
 """Starts from which a pose is sought on a locus across which the expression has no sign."""
+NUDGE = 1e-6
+"""Step (characteristic lengths, radians) over which a slope is taken."""
 SAME_SPOT = 1e-6
 """Distance of pose matrices below which two singular poses are told once."""
 
@@ -60,18 +62,20 @@ def agreement(start: ClosedConfiguration, question: Question, structure: Structu
     """Compare at ``count`` random reachable poses and at poses on the locus.
 
     Raises ``Disagreement`` where the rank, the rows behind the words and the expression do not agree. Poses near
-    constraint singularities of the loops, where no rank is certain, are left out.
+    constraint singularities of the loops, where no rank is certain, and those at which a leg keeps the platform from
+    moving at all in one of its freedoms are left out.
     """
     wrong = positive = negative = met = 0
     angle, smallest = 0.0, np.inf
     walk: list[ClosedConfiguration] = []
     signs: list[float] = []
+    sizes: list[tuple[float, float]] = []
     low: list[tuple[float, ClosedConfiguration]] = []
     for chunk in _chunks(wander(start, count, seed)):
         scene = structure.scene(chunk)
         ranks, apart = _weakest(scene, question, condition)
-        rows = smallest_of(condition.rows(scene))
-        values = condition.expressed(scene)
+        matrices = condition.rows(scene)
+        rows, values = smallest_of(matrices), condition.expressed(scene)
         angle = max(angle, apart)
         smallest = min(smallest, float(ranks.min()))
         wrong += int(np.sum(_differ(ranks, rows, np.abs(values))))
@@ -80,15 +84,18 @@ def agreement(start: ClosedConfiguration, question: Question, structure: Structu
         if condition.signed:
             walk += chunk
             signs += list(np.sign(values))
+            sizes += zip(np.abs(values), _volumes(matrices), strict=True)
         low = sorted([*low, *zip(ranks.tolist(), chunk, strict=True)], key=lambda pair: pair[0])[:TRIES]
         if progress is not None:
             progress()
     crossings = (_crossings(walk, signs, structure, condition) if condition.signed
                  else _descents(low, question, structure, condition))
     on_locus = []
+    wrong += _out_of_proportion(np.array(sizes))
     loops = WEAKEST * start.kernel()[1].weakest
+    freedoms = max(relation(at, question).dof.value for at in [start, *(at for _, at in low)])
     for at in [] if condition.never else crossings:
-        if at.kernel()[1].weakest < loops:
+        if at.kernel()[1].weakest < loops or relation(at, question).dof.value < freedoms:
             continue
         sigma = float(_weakest(structure.scene([at]), question, condition)[0][0])
         if sigma > RANK_CUTOFF:
@@ -111,6 +118,20 @@ def spectrum(configurations: Sequence[ClosedConfiguration], question: Question) 
     """The smallest and the largest singular value of Mᵀ at each configuration, (n,) each (characteristic lengths)."""
     smallest, parts = _relations(configurations, question)
     return smallest, np.array([part[2] for part in parts])
+
+
+def _volumes(matrices: Array) -> Array:
+    """The products of all singular values of many matrices, (n,)."""
+    return np.asarray(np.linalg.svd(matrices, compute_uv=False).prod(axis=1))
+
+
+def _out_of_proportion(sizes: Array) -> int:
+    """At how many poses an expression with a sign is not the same multiple of the rows' volume as elsewhere."""
+    if len(sizes) == 0:
+        return 0
+    values, volumes = sizes.T
+    factor = float(values.sum() / volumes.sum()) if volumes.sum() > 0 else 0.0
+    return int(np.sum(np.abs(values - factor * volumes) > SAME_RELATION * values.max()))
 
 
 def smallest_of(rows: Array) -> Array:
@@ -194,8 +215,27 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], stru
         if value(0.0) * value(1.0) >= 0:
             continue
         root = there(float(brentq(value, 0.0, 1.0, xtol=1e-15, rtol=1e-14)))
-        if root.residual <= CLOSED and abs(float(condition.expressed(structure.scene([root]))[0])) <= FOLLOWED:
-            yield ClosedConfiguration.of(twin, root.q)
+        if root.residual <= CLOSED:
+            found = _sharpened(ClosedConfiguration.of(twin, root.q), step, structure, condition)
+            if abs(float(condition.expressed(structure.scene([found]))[0])) <= FOLLOWED:
+                yield found
+
+
+def _sharpened(at: ClosedConfiguration, step: Array, structure: Structure, condition: Condition
+               ) -> ClosedConfiguration:
+    """A last Newton step along the mechanism's own motion, too short to need closing again."""
+    kernel, _ = at.kernel()
+    motion = kernel @ (kernel.T @ step)
+    motion /= np.linalg.norm(motion)
+
+    def value(size: float) -> float:
+        q = at.twin.moved(at.q, size * motion)
+        return float(condition.expressed(structure.scene([ClosedConfiguration(at.twin, q, at.residual)]))[0])
+
+    here, slope = value(0.0), (value(NUDGE) - value(-NUDGE)) / (2 * NUDGE)
+    if slope == 0.0 or abs(here / slope) > NUDGE:
+        return at
+    return ClosedConfiguration.of(at.twin, at.twin.moved(at.q, -here / slope * motion))
 
 
 def _descents(low: Sequence[tuple[float, ClosedConfiguration]], question: Question, structure: Structure,

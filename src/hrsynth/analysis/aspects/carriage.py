@@ -1,0 +1,127 @@
+"""The poses that a path runs through: which point of the platform, whether its turn counts, and what follows from them.
+
+Lengths in characteristic lengths, base axes. A *pose* is (p, R): the position of the point and the platform's rotation
+(the identity where the turn does not count).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.parts import PlatformMotion, exponential, rotation_vector
+from ...kinematics.relation import Question, relation
+from ...mechanism.legs import Anatomy
+from ...mechanism.vectors import Array, inverse
+from ...tolerances import FOLLOWED, RANK_CUTOFF
+from .balls import Field, widened
+
+
+@dataclass(frozen=True, eq=False)
+class Carriage:
+    """The coordinates of a platform: the position of a point, along ``motion.shifts``, and its turn, by
+    ``motion.spins``, where ``turning``; together as many as the robot has freedoms."""
+
+    motion: PlatformMotion
+    turning: bool
+    length: float
+
+    def of(self, configurations: Sequence[ClosedConfiguration]) -> tuple[Array, Array]:
+        """The poses (n, 3) and (n, 3, 3) at configurations."""
+        frames = np.array([at.pose(self.motion.link) for at in configurations])
+        p = frames[:, :3, :3] @ self.motion.point + frames[:, :3, 3]
+        R = frames[:, :3, :3] if self.turning else np.broadcast_to(np.eye(3), (len(p), 3, 3))
+        return p / self.length, R
+
+    def frame(self, p: Array, R: Array) -> Array:
+        """X_BP (4, 4), metres, of a pose whose turn counts."""
+        X = np.eye(4)
+        X[:3, :3], X[:3, 3] = R, self.length * p - R @ self.motion.point
+        return X
+
+
+def carriages(anatomy: Anatomy, question: Question, dof: int, configurations: Sequence[ClosedConfiguration]
+              ) -> Iterator[Carriage]:
+    """The whole pose of the platform where its parts are independent, then the positions of joint centres on it that
+    have all of the robot's freedoms."""
+    mechanism = anatomy.mechanism
+    X_PB = inverse(mechanism.links[mechanism.platform].pose)
+    centres = [(X_PB @ np.append(joint.point, 1.0))[:3] for joint in mechanism.joints_of(mechanism.platform)]
+    for point in (question.point, *centres):
+        asked = replace(question, point=point, observations=())
+        if any(relation(at, asked).dof.value != dof for at in configurations):
+            continue
+        motion = PlatformMotion.of(configurations, asked)
+        shifts, spins = motion.shifts.shape[1], motion.spins.shape[1]
+        if motion.twists.shape[1] == shifts + spins == dof and spins in (0, 1, 3):
+            yield Carriage(motion, motion.body, configurations[0].twin.length)
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A way between two poses: the point on a straight line, the platform about one axis; λ from 0 to 1."""
+
+    p: Array
+    R: Array
+    shift: Array
+    turn: Array
+
+    @classmethod
+    def between(cls, one: tuple[Array, Array], two: tuple[Array, Array]) -> Stretch:
+        """The way from a pose (3,), (3, 3) to another; turns by less than π."""
+        return cls(*one, two[0] - one[0], rotation_vector(two[1] @ one[1].T))
+
+    def at(self, fractions: Field) -> tuple[Field, Field]:
+        """Poses (n, 3), (n, 3, 3) at fractions (n,); of balls, with all poses nearer than ``FOLLOWED``."""
+        p = self.p + fractions[:, None] * self.shift
+        angle = float(np.linalg.norm(self.turn))
+        R: Field = np.broadcast_to(self.R, (len(fractions), 3, 3))
+        if angle > 0:
+            K = self.turn / angle
+            K = np.array([[0, -K[2], K[1]], [K[2], 0, -K[0]], [-K[1], K[0], 0]])
+            sines, cosines = np.sin(fractions * angle), np.cos(fractions * angle)
+            R = self.R + sines[:, None, None] * (K @ self.R) + (1 - cosines)[:, None, None] * (K @ K @ self.R)
+        if p.dtype == object:
+            R = R.astype(object)
+        return widened(p, FOLLOWED), widened(R, FOLLOWED)
+
+    @property
+    def size(self) -> float:
+        """Its length (characteristic lengths, radians)."""
+        return float(np.hypot(np.linalg.norm(self.shift), np.linalg.norm(self.turn)))
+
+    @property
+    def end(self) -> tuple[Array, Array]:
+        """The pose at λ = 1."""
+        return self.p + self.shift, exponential(self.turn) @ self.R
+
+
+@dataclass(frozen=True, eq=False)
+class Rigid:
+    """A vector that the pose alone decides: ``follows`` p + R ``turned`` + ``constant``."""
+
+    follows: bool
+    turned: Array
+    constant: Array
+
+    def value(self, p: Field, R: Field) -> Field:
+        """The vectors (n, 3) at poses (n, 3), (n, 3, 3)."""
+        found = (p if self.follows else 0 * p) + self.constant
+        return np.asarray(found + R @ self.turned if np.any(self.turned) else found)
+
+
+def rigid(values: Array, p: Array, R: Array) -> Rigid | None:
+    """The rule that vectors (n, 3) follow at poses (n, 3), (n, 3, 3), by least squares; None where there is none."""
+    if np.max(np.abs(values - values[0])) < FOLLOWED:
+        return Rigid(False, np.zeros(3), values[0])
+    rows = np.concatenate([R, np.broadcast_to(np.eye(3), R.shape)], axis=2).reshape(-1, 6)
+    for follows in (False, True):
+        wanted = (values - p if follows else values).reshape(-1)
+        found = np.linalg.lstsq(rows, wanted, rcond=RANK_CUTOFF)[0]
+        if np.max(np.abs(rows @ found - wanted)) < FOLLOWED:
+            turned, constant = np.where(np.abs(found) < FOLLOWED, 0.0, found).reshape(2, 3)
+            return Rigid(follows, turned, constant)
+    return None

@@ -1,0 +1,159 @@
+"""Proofs along a way: in every interval of it all legs reach, and the condition's value is enclosed away from zero."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mechanism.vectors import Array
+from ..singularity.condition import Named, rows
+from .balls import Field, above_zero, balls, below, centred, cross, det, dot, finite, jets
+from .carriage import Stretch
+from .chart import Chart
+from .crossing import Crossing
+
+Way = Stretch | Crossing
+Leading = tuple[int, Field] | None
+
+FIRST = 4
+"""Intervals that a way is first cut into."""
+FINEST = 2.0**-16
+"""Length of an interval (of its way) below which a proof is given up."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """The value of the condition at poses: of a signed condition its expression, else the smallest singular value of
+    its rows (of balls, a lower bound of it)."""
+
+    condition: Named
+    chart: Chart
+
+    @property
+    def signed(self) -> bool:
+        """Whether the value has a sign."""
+        return sign_of(self.condition)
+
+    @cached_property
+    def _run(self) -> tuple[list[str], Callable[..., Any]]:
+        import sympy
+
+        names = sorted(str(symbol) for symbol in self.condition.expression.free_symbols)
+        products = {"dot": dot, "cross": cross, "det": det}
+        return names, sympy.lambdify([sympy.Symbol(name) for name in names], self.condition.expression,
+                                     modules=[products])
+
+    def raw(self, p: Field, R: Field, leading: Leading = None) -> tuple[Field, Field]:
+        """Reserves (n, limbs) and the expression (n,) of a condition with a sign, for numbers, balls or jets."""
+        found = self.chart.at(p, R, leading)
+        names, run = self._run
+        return found.reserves, run(*(found.values[name] for name in names))
+
+    def at(self, p: Field, R: Field, leading: Leading = None) -> tuple[NDArray[np.bool_], Field]:
+        """Whether all legs reach, (n,), and the value, (n,), at poses (n, 3), (n, 3, 3); NaN or no number where they
+        do not; ``leading`` as for :meth:`Chart.at`."""
+        if self.signed:
+            reserves, value = self.raw(p, R, leading)
+            return np.asarray(above_zero(reserves).all(axis=1)), value
+        found = self.chart.at(p, R, leading)
+        reached = np.asarray(above_zero(found.reserves).all(axis=1))
+        if p.dtype == object:
+            return reached, np.array([_weakest({name: value[i : i + 1] for name, value in found.values.items()},
+                                               self.condition) if reached[i] else 0.0 for i in range(len(p))])
+        values = np.full(len(p), np.nan)
+        blocks = rows(self.condition.structure, found.values)
+        values[reached] = np.linalg.svd(blocks[reached], compute_uv=False)[:, -1]
+        return reached, values
+
+    def bounds(self, way: Way, low: Array, high: Array) -> Array:
+        """Lower bounds of |value| on intervals of a way, (n,); 0 where reach or value is not proved. Where a value
+        holds zero its mean value form is tried, which is sharper on short intervals."""
+        boxes = balls(low, high)
+        sure, value = self.at(*way.at(boxes))
+        found = np.where(sure, below(value), 0.0)
+        weak = sure & (found == 0) & finite(value)
+        if not self.signed or not weak.any():
+            return found
+        middle = (low[weak] + high[weak]) / 2
+        middles, moving = self.raw(*way.at(balls(middle, middle))), self.raw(*way.at(jets(boxes[weak])))
+        found[weak] = below(centred(middles[1], moving[1], boxes[weak] - middle))
+        return found
+
+
+def sign_of(condition: Named) -> bool:
+    """Whether a condition's expression is one in vectors and changes its sign across the locus."""
+    import sympy
+
+    return condition.signed and not isinstance(condition.expression, sympy.Determinant)
+
+
+@dataclass(frozen=True)
+class Proof:
+    """Whether a way is proved free, the smallest enclosed |value| on it (0 where it is not), and intervals used."""
+
+    proved: bool
+    margin: float
+    boxes: int
+
+
+def prove(reading: Reading, way: Way, budget: int) -> Proof:
+    """Enclose reach and value along a way by bisection with at most ``budget`` intervals.
+
+    Given up as soon as a midpoint is out of reach or lies on the other side, or an interval is too short.
+    """
+    ends = np.linspace(0, 1, FIRST + 1)
+    low, high = ends[:-1], ends[1:]
+    side, margin, boxes = 0.0, np.inf, 0
+    while len(low):
+        middle = (low + high) / 2
+        reached, values = reading.at(*way.at(middle))
+        sides = np.sign(values)
+        side = side or float(sides[0])
+        if not reached.all() or np.any(sides != side) or side == 0 or boxes + len(low) > budget:
+            return Proof(False, 0.0, boxes)
+        boxes += len(low)
+        bounds = reading.bounds(way, low, high)
+        done = bounds > 0
+        margin = min(margin, float(np.min(bounds[done], initial=np.inf)))
+        low, high, middle = low[~done], high[~done], middle[~done]
+        if len(low) and high[0] - low[0] < FINEST:
+            return Proof(False, 0.0, boxes)
+        low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
+    return Proof(True, margin, boxes)
+
+
+def enclosed(reading: Reading, p: Array, R: Array) -> tuple[bool, float]:
+    """Whether all poses within ``tolerances.FOLLOWED`` of one reach, and a bound of the value with its sign: the point
+    of their values that is nearest to zero (0 where zero is among them)."""
+    here = Stretch(p, R, np.zeros(3), np.zeros(3))
+    reached, values = reading.at(*here.at(balls([0.0], [0.0])))
+    _, middle = reading.at(*here.at(np.zeros(1)))
+    return bool(reached[0]), float(np.sign(middle[0]) * below(values)[0])
+
+
+def _weakest(values: dict[str, Field], condition: Named) -> float:
+    """A lower bound of the smallest singular value of rows A of balls, (d columns): with B a pseudo-inverse of their
+    midpoints, σ ≥ (1 − |I − B A|) / |B|."""
+    from flint import arb_mat
+
+    A = rows(condition.structure, values)[0]
+    count, size = A.shape
+    middle = np.array([float(getattr(x, "mid", lambda x=x: x)()) for x in A.flat]).reshape(A.shape)
+    if not np.all(np.isfinite(middle)):
+        return 0.0
+    B = np.linalg.pinv(middle)
+    inverse = arb_mat(size, count, B.ravel().tolist())
+    product = inverse * arb_mat(count, size, A.ravel().tolist())
+    bound = (1 - _frobenius(product - arb_mat(size, size, np.eye(size).ravel().tolist()))) / _frobenius(inverse)
+    return float(np.nextafter(float(bound.lower()), 0.0)) if bound > 0 else 0.0
+
+
+def _frobenius(matrix: Any) -> Any:
+    """An enclosure of the largest Frobenius norm of the matrices in one of balls."""
+    entries = [x.abs_upper() for x in matrix.entries()]
+    return sum((x * x for x in entries[1:]), start=entries[0] * entries[0]).sqrt()

@@ -1,0 +1,140 @@
+"""Elimination: one integer polynomial whose roots are the solutions of two or three polynomials of degree two.
+
+A *table* f, shape (3, 3), is the polynomial Σ f[i, j] xⁱ yʲ. The resultant of two quadratics in y is
+
+    (a₂b₀ − a₀b₂)² − (a₂b₁ − a₁b₂)(a₁b₀ − a₀b₁),   and their common root   y = −(a₂b₀ − a₀b₂) / (a₂b₁ − a₁b₂),
+
+so that every root x at which the denominators do not vanish carries exactly one solution, real if x is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from flint import fmpz, fmpz_poly
+
+Table = Any
+"""An object array of shape (3, 3): coefficients of xⁱ yʲ, integers (exact) or balls."""
+
+
+@dataclass(frozen=True, eq=False)
+class Eliminant:
+    """The polynomial in the kept unknown, and the other unknowns at a root.
+
+    ``bound`` is the degree that it has when no solution lies at infinity. ``others`` gives, for a ball about a root,
+    the balls of the other unknowns; where a denominator cannot be told from zero these are not finite.
+    """
+
+    polynomial: fmpz_poly
+    bound: int
+    others: Callable[[Any], tuple[Any, ...]]
+
+
+def univariate(f: Sequence[int]) -> Eliminant:
+    """f(x) = 0: nothing to eliminate."""
+    from flint import fmpz_poly
+
+    return Eliminant(fmpz_poly([int(c) for c in f]), 2, lambda x: ())
+
+
+def pair(f: Table, g: Table) -> Eliminant:
+    """f(x, y) = g(x, y) = 0 with y eliminated: degree 8, or 4 where one of them is free of x."""
+    a, b = _in_second(f), _in_second(g)
+    top, low, mixed = a[2] * b[1] - a[1] * b[2], a[2] * b[0] - a[0] * b[2], a[1] * b[0] - a[0] * b[1]
+
+    def others(x: Any) -> tuple[Any, ...]:
+        return (_divided(-low(x), top(x)),)
+
+    bound = 2 * sum(max((p.degree() for p in each), default=0) for each in (a, b))
+    return Eliminant(low * low - top * mixed, bound, others)
+
+
+def cycle(f: Table, g: Table, h: Table) -> Eliminant:
+    """f(x, y) = g(y, z) = h(z, x) = 0 with y and z eliminated: degree 16.
+
+    y is eliminated from f and g, which leaves degree four in z; h = a z² + b z + c brings that down to R₁ z + R₀,
+    and the product of its values at the two roots of h is the eliminant.
+    """
+    a, b = _in_second(f), _in_second(g.T)
+    c0, c1, c2 = _in_second(h.T)
+    quartic = _resultant_in_third(a, b)
+    R0, R1, leading = _reduced(quartic, (c0, c1, c2))
+    norm = R1 * R1 * c0 - R1 * R0 * c1 + R0 * R0 * c2
+    polynomial = norm if not norm else _exact(norm, leading)
+
+    def others(x: Any) -> tuple[Any, ...]:
+        z = _divided(-R0(x), R1(x))
+        ax, bz = [p(x) for p in a], [p(z) for p in b]
+        y = _divided(ax[0] * bz[2] - ax[2] * bz[0], ax[2] * bz[1] - ax[1] * bz[2])
+        return y, z
+
+    return Eliminant(polynomial, 16, others)
+
+
+def without(polynomial: fmpz_poly, factor: fmpz_poly) -> tuple[fmpz_poly, int]:
+    """The polynomial divided by a factor as often as that divides it, and how often."""
+    times = 0
+    while polynomial and polynomial.degree() >= factor.degree():
+        quotient, rest = divmod(polynomial, factor)
+        if rest:
+            break
+        polynomial, times = quotient, times + 1
+    return polynomial, times
+
+
+def primitive(polynomial: fmpz_poly) -> fmpz_poly:
+    """The polynomial without its content."""
+    from flint import fmpz_poly
+
+    return polynomial // fmpz_poly([polynomial.content()]) if polynomial else polynomial
+
+
+def height(polynomial: fmpz_poly) -> fmpz:
+    """The largest absolute value of a coefficient."""
+    from flint import fmpz
+
+    return max((abs(c) for c in polynomial.coeffs()), default=fmpz(0))
+
+
+def _in_second(table: Table) -> list[fmpz_poly]:
+    """The coefficients of y⁰, y¹, y², as polynomials in x."""
+    from flint import fmpz_poly
+
+    return [fmpz_poly([int(c) for c in column]) for column in table.T]
+
+
+def _resultant_in_third(a: Sequence[fmpz_poly], b: Sequence[fmpz_poly]) -> list[fmpz_poly]:
+    """The resultant in y of Σ aₖ(x) yᵏ and Σ bₖ(z) yᵏ: coefficients of z⁰ … z⁴, as polynomials in x."""
+    from flint import fmpz_poly
+
+    terms = [(a[2] * a[2], b[0] * b[0]), (a[0] * a[0], b[2] * b[2]), (-a[1] * a[2], b[0] * b[1]),
+             (-a[0] * a[1], b[1] * b[2]), (a[0] * a[2], b[1] * b[1] - 2 * b[0] * b[2]), (a[1] * a[1], b[0] * b[2])]
+    return [sum((p * q[k] for p, q in terms), fmpz_poly()) for k in range(5)]
+
+
+def _reduced(quartic: Sequence[fmpz_poly], c: Sequence[fmpz_poly]) -> tuple[fmpz_poly, fmpz_poly, fmpz_poly]:
+    """R₀, R₁ with c₂³ Σ hₖ zᵏ ≡ R₁ z + R₀ modulo c₂ z² + c₁ z + c₀, and what the norm of that is too large by: c₂³."""
+    from flint import fmpz_poly
+
+    powers = [(fmpz_poly([1]), fmpz_poly()), (fmpz_poly(), fmpz_poly([1]))]
+    for _ in range(3):
+        low, high = powers[-1]
+        powers.append((-high * c[0], c[2] * low - high * c[1]))
+    scale = [c[2] ** 3, c[2] ** 3, c[2] ** 2, c[2], fmpz_poly([1])]
+    R0 = sum((h * s * low for h, s, (low, _) in zip(quartic, scale, powers, strict=True)), fmpz_poly())
+    R1 = sum((h * s * high for h, s, (_, high) in zip(quartic, scale, powers, strict=True)), fmpz_poly())
+    return R0, R1, c[2] ** 3
+
+
+def _exact(norm: fmpz_poly, divisor: fmpz_poly) -> fmpz_poly:
+    quotient, rest = divmod(norm, divisor)
+    assert not rest, "a norm is divisible by the power of the leading coefficient that scaled it"
+    return quotient
+
+
+def _divided(numerator: Any, denominator: Any) -> Any:
+    """The quotient of two balls; not finite where the denominator may be zero."""
+    return numerator / (denominator if not denominator.contains(0) else denominator * 0)

@@ -1,0 +1,151 @@
+"""What the tip of an observed leg can reach while its direction is held: a point, a line or a circle.
+
+Lengths in metres, angles in radians, all coordinates in one frame that the caller chooses (the base frame).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...errors import BadRequest
+from ...mechanism.vectors import Array, frozen, perpendicular
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """The tip rests at ``centre``, shape (3,)."""
+
+    centre: Array
+    freedoms = 0
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", _vector(self.centre))
+
+    def at(self, parameter: float = 0.0) -> Array:
+        """The tip; shape (3,)."""
+        return self.centre
+
+    def miss(self, tip: Array) -> Array:
+        """What separates ``tip`` from the curve; shape (3,), metres."""
+        return tip - self.centre
+
+
+@dataclass(frozen=True, eq=False)
+class Line:
+    """The tip is centre + s d, with d the unit vector along ``direction`` and s in metres."""
+
+    centre: Array
+    direction: Array
+    freedoms = 1
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", _vector(self.centre))
+        object.__setattr__(self, "direction", _unit(self.direction))
+
+    def at(self, parameter: float) -> Array:
+        """The tip at s = ``parameter``; shape (3,)."""
+        return self.centre + parameter * self.direction
+
+    def miss(self, tip: Array) -> Array:
+        """The part of tip − centre that is normal to the line; shape (3,), metres."""
+        v = tip - self.centre
+        return v - self.direction * float(self.direction @ v)
+
+
+@dataclass(frozen=True, eq=False)
+class Circle:
+    """The tip is centre + ρ (cos θ e₁ + sin θ e₂), with e₁ the part of ``start`` normal to ``axis`` and e₂ = n × e₁."""
+
+    centre: Array
+    axis: Array
+    radius: float
+    start: Array | None = None
+    freedoms = 1
+
+    def __post_init__(self) -> None:
+        axis = _unit(self.axis)
+        radius = float(self.radius)
+        if not (radius > 0 and np.isfinite(radius)):
+            raise BadRequest("a circle without a radius", radius, "a positive length in metres")
+        object.__setattr__(self, "centre", _vector(self.centre))
+        object.__setattr__(self, "axis", axis)
+        object.__setattr__(self, "radius", radius)
+        object.__setattr__(self, "start", frozen(perpendicular(axis, self.start)))
+
+    def at(self, parameter: float) -> Array:
+        """The tip at θ = ``parameter``; shape (3,)."""
+        assert self.start is not None
+        return self.centre + self.radius * (np.cos(parameter) * self.start + np.sin(parameter) * self.across)
+
+    @cached_property
+    def across(self) -> Array:
+        """e₂ = n × e₁; shape (3,)."""
+        assert self.start is not None
+        return cross(self.axis, self.start)
+
+    def miss(self, tip: Array) -> Array:
+        """From the nearest point of the circle to ``tip``; shape (3,), metres."""
+        v = tip - self.centre
+        along = self.axis * float(self.axis @ v)
+        spoke = v - along
+        reach = length(spoke)
+        if reach == 0.0:
+            assert self.start is not None
+            return along - self.radius * self.start
+        return along + spoke * (1.0 - self.radius / reach)
+
+
+Curve = Point | Line | Circle
+
+
+def shifted(curve: Curve, by: ArrayLike) -> Curve:
+    """The curve moved by ``by`` (3,), with the same parameter at each of its points."""
+    centre = curve.centre + np.asarray(by, dtype=float)
+    if isinstance(curve, Point):
+        return Point(centre)
+    if isinstance(curve, Line):
+        return Line(centre, curve.direction)
+    return Circle(centre, curve.axis, curve.radius, curve.start)
+
+
+def cross(a: Array, b: Array) -> Array:
+    """a × b for vectors of three numbers, many times faster than for arrays of any shape."""
+    (x, y, z), (u, v, w) = a.tolist(), b.tolist()
+    return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
+
+
+def length(v: Array) -> float:
+    """|v|."""
+    return math.hypot(*v.tolist())
+
+
+def extent(curves: Sequence[Curve], tips: Array) -> float:
+    """The size that residuals are divided by: the largest spread of centres, radius, or spread of tips (m)."""
+    spreads = []
+    for points in ([curve.centre for curve in curves], list(tips)):
+        middle = sum(points) / len(points)
+        spreads += [length(point - middle) for point in points]
+    radii = [curve.radius for curve in curves if isinstance(curve, Circle)]
+    size = max([*spreads, *radii])
+    return size if size > 0 else 1.0
+
+
+def _vector(values: ArrayLike) -> Array:
+    array = frozen(values)
+    if array.shape != (3,) or not np.isfinite(array).all():
+        raise BadRequest("a curve's vector", np.asarray(values).tolist(), "three finite numbers")
+    return array
+
+
+def _unit(values: ArrayLike) -> Array:
+    array = _vector(values)
+    size = length(array)
+    if not size > 0:
+        raise BadRequest("a curve's direction", array.tolist(), "a vector that is not zero")
+    return array if abs(size - 1.0) < 1e-15 else frozen(array / size)

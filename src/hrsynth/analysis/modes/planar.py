@@ -1,0 +1,137 @@
+"""A platform that moves in a plane."""
+
+from __future__ import annotations
+
+import cmath
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from ...errors import BadRequest
+from ...mechanism.vectors import Array
+from ...tolerances import SAME_DIRECTION, SAME_POINT
+from .certify import Equation
+from .conics import Conic, Frame, Numbers, direction, planar_frame
+from .curves import Circle, Curve, Line, Point, cross, extent, length
+from .squares import Square, distance, on_sphere, single
+from .systems import alike
+
+
+@dataclass(frozen=True, eq=False)
+class Planar:
+    """A platform that moves in the plane of ``X_plane`` (4, 4), whose z axis is the normal: q = (x, y, φ).
+
+    ``tips`` are their coordinates in the platform's frame, shape (n, 2); X_platform = X_plane · (turn φ, shift (x, y)).
+    """
+
+    curves: tuple[Curve, ...]
+    tips: Array
+    X_plane: Array
+
+    def __post_init__(self) -> None:
+        alike(self.curves, self.tips, 2)
+        n = self.X_plane[:3, 2]
+        for curve in self.curves:
+            off = (length(cross(n, curve.axis)) if isinstance(curve, Circle) else
+                   abs(float(n @ curve.direction)) if isinstance(curve, Line) else 0.0)
+            if off > SAME_DIRECTION:
+                raise BadRequest("a curve outside the plane of motion, sine", off, f"at most {SAME_DIRECTION}")
+
+    @cached_property
+    def size(self) -> float:
+        """What residuals are divided by (m)."""
+        return extent(self.curves, self.tips)
+
+    @property
+    def missing(self) -> int:
+        """Freedoms that too few legs leave."""
+        return max(0, 3 - sum(2 - curve.freedoms for curve in self.curves))
+
+    def pose(self, q: Array) -> Array:
+        """The platform\'s frame in the base frame; shape (4, 4)."""
+        c, s = math.cos(q[2]), math.sin(q[2])
+        return np.asarray(self.X_plane @ np.array([[c, -s, 0, q[0]], [s, c, 0, q[1]], [0, 0, 1, 0], [0, 0, 0, 1]]))
+
+    def misses(self, q: Array) -> Array:
+        """What separates each tip from its curve; shape (legs, 3), metres."""
+        X, n = self.pose(q), self.X_plane[:3, 2]
+        found = []
+        for curve, tip in zip(self.curves, self.tips, strict=True):
+            at = X[:3, 3] + X[:3, :2] @ tip
+            found.append(curve.miss(at - n * float(n @ (at - curve.centre))))
+        return np.array(found)
+
+    def squares(self) -> Iterator[Square]:
+        """A pivot and a curve, or three curves in each order that two tips apart allow."""
+        points = [k for k, curve in enumerate(self.curves) if isinstance(curve, Point)]
+        moving = [k for k in range(len(self.curves)) if k not in points]
+        apart = SAME_POINT * self.size
+        for i, j in ((i, j) for i in points for j in moving):
+            if length(self.tips[i] - self.tips[j]) > apart:
+                yield self._square((i, j), len(self.curves) == 2)
+        for legs in combinations(moving, 3):
+            for i, j, k in (legs, (legs[1], legs[2], legs[0]), (legs[2], legs[0], legs[1])):
+                if length(self.tips[i] - self.tips[j]) > apart:
+                    yield self._square((i, j, k), len(self.curves) == 3)
+
+    def _square(self, legs: tuple[int, ...], whole: bool) -> Square:
+        curves = tuple(self.curves[k] for k in legs)
+        b = self.tips[list(legs)]
+        frame = planar_frame(curves, self.X_plane, extent(curves, b))
+
+        def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
+            tips = [numbers.vector(tip / frame.size) for tip in b]
+            arm = tips[1] - tips[0]
+            if len(legs) == 2:
+                held = numbers.vector(frame.point(curves[0].centre))
+                return [single(on_sphere(conics[0], held, arm @ arm))]
+            f = distance(conics[0], conics[1], arm @ arm)
+            return [Equation(f, 0, 1), Equation(_third(conics, tips, curves[2], frame, numbers), 0, 1)]
+
+        def place(parameters: Sequence[float]) -> Array:
+            free = iter(parameters)
+            two = np.array([curve.centre if isinstance(curve, Point) else curve.at(next(free)) for curve in curves[:2]])
+            flat = (two - self.X_plane[:3, 3]) @ self.X_plane[:3, :2]
+            turn = complex(*(flat[1] - flat[0])) / complex(*(b[1] - b[0]))
+            at = flat[0] - _turned(turn / abs(turn), b[0])
+            return np.array([*at, cmath.phase(turn)])
+
+        unknowns = tuple(curve for curve in curves[:2] if not isinstance(curve, Point))
+        return Square(legs, unknowns, frame, build, place, whole)
+
+
+def _third(conics: Sequence[Conic], tips: Sequence[Any], curve: Curve, frame: Frame, numbers: Numbers) -> Any:
+    """The table of *tip₃ on its curve*, with γ tip₃ = α tip₁ + β tip₂ in complex numbers: α = b₂ − b₃, β = b₃ − b₁."""
+    alpha, beta, gamma = (_complex(v) for v in (tips[1] - tips[2], tips[2] - tips[0], tips[1] - tips[0]))
+    one, other = conics
+    scale = (gamma.T @ gamma)[0, 0]
+    centre = numbers.vector(frame.point(curve.centre))
+    if isinstance(curve, Line):
+        d = direction(curve.direction, frame, numbers)
+        normal = np.array([-d[1], d[0]])
+        first, second = alpha.T @ gamma @ normal, beta.T @ gamma @ normal
+        return (np.outer(one.N @ first, other.w) + np.outer(one.w, other.N @ second)
+                - scale * (normal @ centre) * np.outer(one.w, other.w))
+    assert isinstance(curve, Circle)
+    rho = numbers.vector(np.array([curve.radius / frame.size]))[0]
+    first, second = alpha.T @ gamma @ centre, beta.T @ gamma @ centre
+    return (np.outer((alpha.T @ alpha)[0, 0] * one.Q - 2 * (one.N @ first), other.w)
+            + np.outer(one.w, (beta.T @ beta)[0, 0] * other.Q - 2 * (other.N @ second))
+            + 2 * (one.N @ (alpha.T @ beta) @ other.N.T)
+            + scale * (centre @ centre - rho * rho) * np.outer(one.w, other.w))
+
+
+def _turned(turn: complex, v: Array) -> tuple[float, float]:
+    """A vector of the plane multiplied by a complex number."""
+    product = turn * complex(*v)
+    return product.real, product.imag
+
+
+def _complex(v: Any) -> Any:
+    """Multiplication by the complex number v, as a matrix; shape (2, 2)."""
+    return np.array([[v[0], -v[1]], [v[1], v[0]]], dtype=object)

@@ -1,0 +1,413 @@
+"""Aspects: a certified path is free of singularities and out-of-reach legs; opposite signs are never joined."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from itertools import pairwise
+
+import flint
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hrsynth.analysis.aspects.answer import SAME, SEPARATED, UNDECIDED, PathAnswer
+from hrsynth.analysis.aspects.balls import balls, below, centred, cross, det, dot, jets
+from hrsynth.analysis.aspects.carriage import Stretch
+from hrsynth.analysis.aspects.crossing import Crossing, crossing
+from hrsynth.analysis.aspects.path import BUDGET, Aspects, path
+from hrsynth.analysis.aspects.pattern import Pattern
+from hrsynth.analysis.aspects.plan import Region, plan
+from hrsynth.analysis.aspects.proof import Reading, enclosed, prove
+from hrsynth.analysis.singularity.agreement import smallest_of, weakest
+from hrsynth.analysis.singularity.condition import Condition
+from hrsynth.analysis.singularity.features import unit_rows
+from hrsynth.description import load
+from hrsynth.errors import BadRequest, PoseNotReached
+from hrsynth.kinematics.configuration import ClosedConfiguration, Target, closed, measure
+from hrsynth.kinematics.sampling import wander
+from hrsynth.tolerances import CLOSED, RANK_CUTOFF
+from strategies import planar
+
+# Robots whose legs can be closed by hand: planar, five bars, translating, with six freedoms, with two halves.
+SIGNED = [("3rrr_m1", None), ("3rpr_m1", None), ("3prr_m1", None), ("rrrrr_m1", None), ("rprpr_m1", None),
+          ("gough_stewart", "1,2,3"), ("quattro", "1,4"), ("quattro_rigid", "1,3")]
+UNSIGNED = [("quattro_rigid", None), ("delta", None), ("quattro", None), ("hexa", None),
+            ("gough_stewart", None), ("prrrp_m1", None)]
+KNOWN = SIGNED + UNSIGNED
+
+
+@cache
+def aspects_of(robot: str, observe: str | None = None) -> Aspects:
+    return Aspects.of(load(robot), observe)
+
+
+@cache
+def walk(robot: str, observe: str | None, count: int = 24, seed: int = 0) -> tuple[ClosedConfiguration, ...]:
+    """Random configurations in the working mode of the first of them."""
+    aspects = aspects_of(robot, observe)
+    found = tuple(wander(aspects.setting.samples.start, count, seed))
+    modes = aspects.reading(found[0]).chart.modes
+    return tuple(at for at in found if aspects.reading(at).chart.modes == modes)
+
+
+def pairs(robot: str, observe: str | None, count: int, seed: int = 0) -> list[tuple[ClosedConfiguration, ...]]:
+    rng = np.random.default_rng(seed)
+    places = walk(robot, observe, 4 * count, seed)
+    return [tuple(places[i] for i in rng.choice(len(places), 2, replace=False)) for _ in range(count)]
+
+
+def signs(aspects: Aspects, *configurations: ClosedConfiguration) -> np.ndarray:
+    return np.sign(aspects.condition.expressed(aspects.structure.scene(configurations)))
+
+
+def followed(aspects: Aspects, answer: PathAnswer, points: int) -> list[ClosedConfiguration]:
+    """The real robot's configurations along a path, found by closing its loops, small step after small step; where a
+    leg crosses its limit, with the direction of its rod."""
+    assert answer.carriage is not None
+    carriage, question = answer.carriage, aspects.setting.samples.question
+    here, found = answer.start.configuration, []
+    for way in answer.ways:
+        fractions = np.linspace(0, 1, points // len(answer.ways) + 1)
+        p, R = way.at(fractions)[:2]
+        held = [() for _ in fractions]
+        if isinstance(way, Crossing):
+            (seen,) = [o for o in question.observations if o.leg == way.leg]
+            values = measure(here.twin, here.q, question.reference, [seen])[2]
+            rods = unit_rows(way.rod.at(fractions))
+            assert np.linalg.norm(np.cross(values[0], rods[0])) < 1e-7, "the rod is what is watched"
+            held = [((seen, np.sign(values[0] @ rods[0]) * rod),) for rod in rods]
+        for place, turn, measured in zip(p, R, held, strict=True):
+            X = np.eye(4)
+            X[:3, 3] = carriage.length * place - carriage.motion.point
+            point = None if carriage.turning else carriage.motion.point
+            target = Target(carriage.motion.link, carriage.frame(place, turn) if carriage.turning else X, point,
+                            question.reference, measured)
+            q, residual = closed(here.twin, here.q, target, tolerance=1e-12)
+            assert residual <= CLOSED, "a leg does not reach"
+            here = ClosedConfiguration.of(here.twin, q)
+            found.append(here)
+    return found
+
+
+def check_certified(aspects: Aspects, answer: PathAnswer, points: int) -> None:
+    """Dense points of the path: all legs close, they lead to the goal, the condition's value keeps its side and stays
+    above the margin."""
+    assert answer.certified
+    assert answer.margin is not None
+    assert answer.margin > 0
+    way = followed(aspects, answer, points)
+    end = way[-1].pose(aspects.setting.mechanism.platform) - answer.goal.configuration.pose(
+        aspects.setting.mechanism.platform)
+    assert np.max(np.abs(end)) < 1e-7
+    scene = aspects.structure.scene(way)
+    condition: Condition = aspects.condition
+    values = condition.expressed(scene) if answer.signed else smallest_of(condition.rows(scene))
+    assert np.all(np.sign(values) == np.sign(answer.start.value))
+    assert np.min(np.abs(values)) >= answer.margin - 1e-9
+    ranks = [weakest(at, aspects.setting.samples.question) for at in way[:: max(1, len(way) // 20)]]
+    assert min(ranks) > RANK_CUTOFF
+
+
+# ---- the certificate is never wrong
+
+
+@pytest.mark.parametrize(("robot", "observe"), KNOWN)
+def test_a_certified_path_is_free_of_singularities_and_within_reach(robot: str, observe: str | None):
+    aspects = aspects_of(robot, observe)
+    answers = [aspects.join(*pair) for pair in pairs(robot, observe, 4)]
+    certified = [answer for answer in answers if answer.verdict == SAME]
+    assert certified
+    for answer in certified[:1]:
+        check_certified(aspects, answer, 60)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("robot", "observe"), KNOWN)
+def test_a_thousand_points_of_each_certified_path(robot: str, observe: str | None):
+    aspects = aspects_of(robot, observe)
+    joined = [answer for pair in pairs(robot, observe, 10, seed=1)
+              if (answer := aspects.join(*pair)).verdict == SAME]
+    assert joined
+    for answer in joined:
+        check_certified(aspects, answer, 1000)
+
+
+@pytest.mark.parametrize(("robot", "observe"), KNOWN)
+def test_enclosures_hold_the_values_of_all_poses_in_them(robot: str, observe: str | None):
+    aspects, rng = aspects_of(robot, observe), np.random.default_rng(0)
+    assert isinstance(aspects.pattern, Pattern)
+    for start, goal in pairs(robot, observe, 3):
+        reading = aspects.reading(start)
+        p, R = aspects.pattern.carriage.of([start, goal])
+        way = Stretch.between((p[0], R[0]), (p[1], R[1]))
+        low = rng.uniform(0, 1)
+        high = min(1.0, low + 10 ** rng.uniform(-5, -2))
+        sure, value = reading.at(*way.at(balls([low], [high])))
+        bound = reading.bounds(way, np.array([low]), np.array([high]))[0]
+        inside, exact = reading.at(*way.at(rng.uniform(low, high, 50)))
+        assert inside.all() or bound == 0
+        assert np.all(np.abs(exact[inside]) >= bound - 1e-12)
+        if sure[0]:
+            assert inside.all()
+            assert np.all(np.abs(exact) >= below(value)[0] - 1e-12)
+            if reading.signed:
+                assert all(value[0].overlaps(value[0] * 0 + float(each)) for each in exact)
+
+
+@pytest.mark.parametrize(("robot", "observe"), KNOWN)
+def test_poses_decide_the_values_that_configurations_have(robot: str, observe: str | None):
+    aspects = aspects_of(robot, observe)
+    assert isinstance(aspects.pattern, Pattern)
+    for at in walk(robot, observe)[:6]:
+        reached, value = aspects.reading(at).at(*aspects.pattern.carriage.of([at]))
+        scene = aspects.structure.scene([at])
+        exact = aspects.condition.expressed(scene) if aspects.condition.signed else smallest_of(
+            aspects.condition.rows(scene))
+        assert reached.all()
+        assert value == pytest.approx(exact, abs=1e-8)
+
+
+# ---- sides of a locus
+
+
+@pytest.mark.parametrize(("robot", "observe"), SIGNED)
+def test_opposite_signs_are_separated_and_equal_signs_never(robot: str, observe: str | None):
+    aspects = aspects_of(robot, observe)
+    for pair in pairs(robot, observe, 8, seed=2):
+        answer, sides = aspects.join(*pair), signs(aspects, *pair)
+        assert (answer.verdict == SEPARATED) is bool(sides[0] != sides[1])
+        assert answer.certified or answer.verdict == UNDECIDED
+
+
+def test_nine_of_ten_pairs_on_one_side_are_joined():
+    aspects = aspects_of("3rrr_m1")
+    verdicts = [aspects.join(*pair).verdict for pair in pairs("3rrr_m1", None, 30, seed=3)]
+    assert SEPARATED in verdicts
+    assert verdicts.count(SAME) >= 0.9 * (len(verdicts) - verdicts.count(SEPARATED))
+
+
+@pytest.mark.parametrize(("robot", "observe"), [
+    ("3rrr_m1", None), ("3rpr_m1", None), ("rrrrr_m1", None), ("gough_stewart", "1,2,3"), ("quattro", "1,4"),
+    ("quattro_rigid", None)])
+def test_poses_anywhere_on_one_side_are_joined(robot: str, observe: str | None):
+    aspects, rng = aspects_of(robot, observe), np.random.default_rng(1)
+    assert isinstance(aspects.pattern, Pattern)
+    carriage, reading = aspects.pattern.carriage, aspects.reading(aspects.setting.samples.start)
+    p, R = carriage.of(aspects.members)
+    near = Region.around(carriage, p, R)
+    P, Q = replace(near, shift=2.5 * near.shift, turn=np.minimum(3 * near.turn, np.pi)).draw(rng, 2000)
+    reached, values = reading.at(P, Q)
+    proved = []
+    for side in (1, -1) if reading.signed else (1,):
+        for i, j in rng.choice(np.flatnonzero(reached & (np.sign(values) == side)), (6, 2)):
+            region = Region.around(carriage, np.concatenate([P[[i, j]], p]), np.concatenate([Q[[i, j]], R]))
+            found = plan(reading, region, (P[i], Q[i]), (P[j], Q[j]), seed=0, budget=BUDGET)
+            proved.append(found.proved)
+            for way, after in pairwise(found.ways):
+                assert np.max(np.abs(way.end[0] - after.p)) < 1e-12
+                assert np.max(np.abs(way.end[1] - after.R)) < 1e-12
+    assert np.mean(proved) >= 0.9
+
+
+def test_a_way_across_the_locus_is_never_proved():
+    aspects = aspects_of("3rrr_m1")
+    assert isinstance(aspects.pattern, Pattern)
+    crossed = 0
+    for start, goal in pairs("3rrr_m1", None, 60, seed=4):
+        if signs(aspects, start, goal).prod() < 0:
+            p, R = aspects.pattern.carriage.of([start, goal])
+            crossed += 1
+            assert not prove(aspects.reading(start), Stretch.between((p[0], R[0]), (p[1], R[1])), 10_000).proved
+    assert crossed >= 5
+
+
+def test_a_way_that_crosses_the_locus_twice_is_led_around_it():
+    aspects = aspects_of("gough_stewart", "1,2,3")
+    around = 0
+    for pair in pairs("gough_stewart", "1,2,3", 16, seed=6):
+        answer = aspects.join(*pair)
+        if answer.verdict == SAME and len(answer.ways) > 1:
+            p, R = answer.carriage.of(pair)
+            straight = Stretch.between((p[0], R[0]), (p[1], R[1]))
+            reached, values = aspects.reading(pair[0]).at(*straight.at(np.linspace(0, 1, 2001)))
+            around += int(not reached.all() or np.min(values * values[0]) < 0)
+            check_certified(aspects, answer, 60)
+    assert around
+
+
+@pytest.mark.parametrize(("robot", "observe"), [
+    ("rrrrr_m1", None), ("3prr_m1", None), ("quattro_rigid", "1,3"), ("prrrp_m1", None), ("delta", None)])
+def test_a_way_that_leaves_the_workspace_is_never_proved(robot: str, observe: str | None):
+    aspects, rng = aspects_of(robot, observe), np.random.default_rng(0)
+    assert isinstance(aspects.pattern, Pattern)
+    reading = aspects.reading(aspects.setting.samples.start)
+    p, R = aspects.pattern.carriage.of(aspects.members)
+    region = Region.around(aspects.pattern.carriage, p, R)
+    places = replace(region, shift=6 * region.shift).draw(rng, 4000)
+    inside = reading.at(*places)[0]
+    left = 0
+    for i, j in zip(rng.choice(np.flatnonzero(inside), 40), rng.choice(np.flatnonzero(~inside), 40), strict=True):
+        way = Stretch.between((places[0][i], places[1][i]), (places[0][j], places[1][j]))
+        beyond = replace(way, shift=2 * way.shift, turn=2 * way.turn)
+        for each in (way, beyond):
+            left += 1
+            bounds = reading.bounds(each, np.array([0.0, 0.49]), np.array([1.0, 0.51 if each is beyond else 1.0]))
+            assert np.all(bounds == 0)
+            assert not prove(reading, each, 10_000).proved
+    assert left
+
+
+@pytest.mark.parametrize("robot", ["3puu", "3ruu"])
+def test_a_path_crosses_the_limit_of_a_leg_into_its_other_working_mode(robot: str):
+    aspects = aspects_of(robot)
+    places = list(wander(aspects.setting.samples.start, 150, 0))
+    modes = [aspects.reading(at).chart.modes for at in places]
+    others = [at for at, mode in zip(places, modes, strict=True) if mode != modes[0]]
+    assert others
+    for at in others[:: max(1, len(others) // 3)][:3]:
+        answer = aspects.join(places[0], at)
+        assert answer.verdict == SAME
+        apart = sum(a != b for a, b in zip(modes[0], aspects.reading(at).chart.modes, strict=True))
+        assert len(answer.crossings) == apart
+        assert isinstance(answer.ways[0], Stretch)
+        assert isinstance(answer.ways[-1], Stretch)
+        assert prove(aspects.reading(places[0]), answer.ways[0], 10_000).margin >= answer.margin
+        assert prove(aspects.reading(at), answer.ways[-1], 10_000).margin >= answer.margin
+        check_certified(aspects, answer, 200)
+
+
+def test_a_crossing_leads_from_one_working_mode_to_the_other():
+    aspects = aspects_of("3rrr_m1")
+    assert isinstance(aspects.pattern, Pattern)
+    carriage, fractions = aspects.pattern.carriage, np.linspace(0, 1, 11)
+    for at in walk("3rrr_m1", None)[:5]:
+        chart, (p, R) = aspects.reading(at).chart, carriage.of([at])
+        for number, limb in enumerate(chart.limbs):
+            found = crossing(carriage, limb, number, (p[0], R[0]))
+            assert found is not None
+            places, turns, (_, ends) = found.at(fractions)
+            tips = limb.tip.value(places, turns)
+            assert np.allclose(np.linalg.norm(tips - ends, axis=1), limb.rod, atol=1e-12)
+            assert np.allclose(np.linalg.norm(ends - limb.centre, axis=1), limb.crank, atol=1e-12)
+            assert np.allclose(places[[0, -1]], p[0], atol=1e-12)
+            for branch, end in ((limb.branch, ends[0]), (-limb.branch, ends[-1])):
+                assert np.allclose(limb.solve(tips[:1], branch)[1][0], end, atol=1e-9)
+            with np.errstate(invalid="ignore"):
+                reserves = limb.solve(tips, 1.0)[0]
+            assert np.argmin(np.abs(reserves)) == 5
+
+
+# ---- random planar robots
+
+
+@settings(max_examples=5, deadline=None)
+@given(words=st.lists(st.sampled_from(["RRR", "RPR", "PRR"]), min_size=3, max_size=3), seed=st.integers(0, 10**6))
+def test_random_planar_robots(words: list[str], seed: int):
+    aspects = Aspects.of(planar(words, np.random.default_rng(seed), [{0}] * 3))
+    assert isinstance(aspects.pattern, Pattern)
+    places = list(wander(aspects.setting.samples.start, 4, seed))
+    for start, goal in pairwise(places):
+        answer, sides = aspects.join(start, goal), signs(aspects, start, goal)
+        same = aspects.reading(start).chart.modes == aspects.reading(goal).chart.modes
+        if sides[0] != sides[1]:
+            assert answer.verdict in (SEPARATED, UNDECIDED)
+        else:
+            assert answer.verdict in (SAME, UNDECIDED)
+            assert answer.verdict == UNDECIDED or same is (not answer.crossings)
+        if answer.verdict == SAME:
+            check_certified(aspects, answer, 40)
+
+
+# ---- balls
+
+
+_DYADIC = st.integers(-640, 640).map(lambda numerator: Fraction(numerator, 64))
+
+
+@settings(max_examples=40)
+@given(st.lists(_DYADIC, min_size=9, max_size=9), st.integers(0, 8))
+def test_products_of_balls_hold_the_products_of_numbers(entries: list[Fraction], width: int):
+    exact = np.array(entries, dtype=object).reshape(3, 3)
+    a, b, c = (balls([x - Fraction(width, 64) for x in v], [x + Fraction(width, 64) for x in v]) for v in exact)
+    numbers = [dot(*exact[:2]).item(), det(*exact).item(), *cross(*exact[:2])]
+    for ball, number in zip([dot(a, b).item(), det(a, b, c).item(), *cross(a, b)], numbers, strict=True):
+        assert ball.contains(flint.fmpq(number.numerator, number.denominator))
+        assert below(np.array([ball]))[0] <= abs(number)
+
+
+@given(st.floats(0.5, 2), st.floats(1e-6, 0.3))
+def test_the_mean_value_form_holds_all_values_and_is_sharper_on_short_intervals(middle: float, half: float):
+    def value(x: np.ndarray) -> np.ndarray:
+        return np.sqrt(x) * np.sin(x) - x * x / 2
+
+    box = balls([middle - half], [middle + half])
+    point = balls([middle], [middle])
+    form = centred(value(point), value(jets(box)), box - middle)[0]
+    for number in value(np.linspace(middle - half, middle + half, 30)):
+        assert float(form.lower()) - 1e-12 <= number <= float(form.upper()) + 1e-12
+    assert half > 0.01 or form.rad() < value(box)[0].rad()
+
+
+# ---- answers that are no path
+
+
+def test_reasons_why_nothing_is_decided():
+    lost = aspects_of("prrrp_parallel")
+    places = list(wander(lost.setting.samples.start, 2))
+    answer = lost.join(*places)
+    assert (answer.verdict, answer.certified) == (UNDECIDED, False)
+    assert "never seen: translation along y" in answer.reason
+
+    parasitic = aspects_of("3rps")
+    verdicts = set()
+    places = list(wander(parasitic.setting.samples.start, 30))
+    for start, goal in pairwise(places):
+        answer = parasitic.join(start, goal)
+        assert not answer.certified
+        verdicts.add(answer.verdict)
+        assert (answer.verdict == SEPARATED) is bool(signs(parasitic, start, goal).prod() < 0)
+        assert "depend on each other" in answer.reason
+    assert UNDECIDED in verdicts
+
+
+def test_a_pose_on_the_locus_is_undecided():
+    from scipy.optimize import brentq
+
+    aspects = aspects_of("3rrr_m1")
+    assert isinstance(aspects.pattern, Pattern)
+    start, goal = next(pair for pair in pairs("3rrr_m1", None, 60, seed=4) if signs(aspects, *pair).prod() < 0)
+    reading: Reading = aspects.reading(start)
+    p, R = aspects.pattern.carriage.of([start, goal])
+    way = Stretch.between((p[0], R[0]), (p[1], R[1]))
+    root = brentq(lambda x: float(reading.at(*way.at(np.array([x])))[1][0]), 0, 1, xtol=1e-14)
+    place = way.at(np.array([root]))
+    assert enclosed(reading, place[0][0], place[1][0]) == (True, 0.0)
+    on = str(aspects.motion.pose(aspects.pattern.carriage.frame(place[0][0], place[1][0]))).replace("z=0,", "")
+    answer = path(load("3rrr_m1"), start="x=0,y=0", goal=on)
+    assert answer.verdict == UNDECIDED
+    assert "locus" in answer.reason
+
+
+def test_a_budget_that_is_used_up_is_said():
+    aspects = aspects_of("gough_stewart", "1,2,3")
+    answers = [aspects.join(*pair, budget=6) for pair in pairs("gough_stewart", "1,2,3", 16, seed=6)]
+    left = [answer for answer in answers if answer.verdict == UNDECIDED]
+    assert left
+    assert all("used up" in answer.reason and not answer.certified and answer.ways for answer in left)
+
+
+def test_the_same_request_has_the_same_answer():
+    aspects = aspects_of("gough_stewart", "1,2,3")
+    pair = next(pair for pair in pairs("gough_stewart", "1,2,3", 16, seed=6) if len(aspects.join(*pair).ways) > 1)
+    assert aspects.join(*pair).to_dict() == aspects.join(*pair).to_dict()
+
+
+def test_poses_that_there_are_not():
+    robot = load("3rrr_m1")
+    with pytest.raises(PoseNotReached):
+        path(robot, start="x=0", goal="x=9")
+    with pytest.raises(BadRequest):
+        path(robot, start="x=0", goal="z=0.1")

@@ -1,0 +1,303 @@
+"""All modes: the counts of every family, the goal among them, the geometry they satisfy, and independent paths."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import sympy
+
+from analysis.modes.draws import FAMILIES, Draw, articulated, planar, spatial, translating
+from analysis.modes.newton import pose_of, real_ones, solutions
+from hrsynth.analysis.modes.articulated import Articulated
+from hrsynth.analysis.modes.curves import Circle, Curve, Line, shifted
+from hrsynth.analysis.modes.planar import Planar
+from hrsynth.analysis.modes.solve import Modes, solve
+from hrsynth.analysis.modes.spatial import Spatial
+from hrsynth.analysis.modes.systems import System
+from hrsynth.analysis.modes.translating import Translating
+from hrsynth.mechanism.vectors import Array, pose, rotation_about, unit
+from strategies import random_rotation
+
+ALL = sorted(FAMILIES)
+MOST = {"planar, three circles": (47, 6), "spatial, three lines": (259, 8), "two bodies, circles": (2197, 8),
+        "spatial, three circles": (1130, 12)}
+"""Seeds at which many modes are real, and how many."""
+
+
+def draw(name: str, seed: int) -> Draw:
+    return FAMILIES[name].draw(np.random.default_rng(seed))
+
+
+def among(goal: Array, modes: Modes) -> float:
+    """How far the nearest mode is from a pose."""
+    return min((float(np.abs(mode.pose - goal).max()) for mode in modes.modes), default=np.inf)
+
+
+def check_member(name: str, seed: int) -> None:
+    system, goal = draw(name, seed)
+    modes = solve(system)
+    assert modes.complex == FAMILIES[name].count, f"seed {seed}: {modes.proof}"
+    assert modes.complete, f"seed {seed}: {modes.proof}"
+    assert (modes.complex - len(modes.modes)) % 2 == 0, f"seed {seed}: complex ones come in pairs"
+    tolerance = max(1e-10, 100 * max((mode.radius for mode in modes.modes), default=0.0))
+    assert among(goal, modes) < tolerance, f"seed {seed}: the goal is not among the modes"
+    for mode in modes.modes:
+        assert mode.residual < 1e-12, f"seed {seed}: a tip is off its curve by {mode.residual:.1e}"
+        assert np.abs(mode.pose[:3, :3].T @ mode.pose[:3, :3] - np.eye(3)).max() < 1e-12
+        assert np.linalg.det(mode.pose[:3, :3]) > 0
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_each_family_has_its_number_of_modes_and_the_goal_is_one(name: str):
+    for seed in range(12):
+        check_member(name, seed)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ALL)
+def test_each_family_has_its_number_of_modes_at_many_instances(name: str):
+    for seed in range(10_000):
+        check_member(name, seed)
+
+
+@pytest.mark.parametrize("name", MOST)
+def test_many_modes_can_be_real(name: str):
+    seed, count = MOST[name]
+    modes = solve(draw(name, seed).system)
+    assert len(modes.modes) == count
+    apart = [np.abs(a.pose - b.pose).max() for i, a in enumerate(modes.modes) for b in modes.modes[:i]]
+    assert min(apart) > 1e-3
+
+
+@pytest.mark.parametrize("name", ALL)
+def test_enclosures_are_small(name: str):
+    radii = [mode.radius for seed in range(20) for mode in solve(draw(name, seed).system).modes]
+    assert np.median(radii) < 2e-12
+    assert max(radii) < 1e-8
+
+
+def check_by_newton(name: str, seed: int, starts: int) -> None:
+    system = draw(name, seed).system
+    modes = solve(system)
+    rng = np.random.default_rng(seed)
+    assert len(solutions(system, starts, rng)) == modes.complex
+    found = real_ones(solutions(system, starts, rng, real=True))
+    assert len(found) > 0
+    for v in found:
+        assert among(pose_of(system, v), modes) < 1e-6, "a pose that Newton's method finds is missing"
+    assert len(found) <= len(modes.modes)
+
+
+@pytest.mark.parametrize("name", ["planar, three circles", "spatial, three lines", "two bodies, circles"])
+def test_newton_on_the_pose_finds_the_same_solutions(name: str):
+    check_by_newton(name, 5, 400)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ALL)
+def test_newton_on_the_pose_finds_the_same_solutions_everywhere(name: str):
+    for seed in range(100, 110):
+        check_by_newton(name, seed, 2500)
+
+
+def planar_by_sympy(centres: list[tuple[int, int]], radii: list[int], tips: list[tuple[int, int]]) -> sympy.Poly:
+    """Three circles, by the pose: x and y from differences of equations, then a polynomial in T = tan(φ/2)."""
+    x, y, T = sympy.symbols("x y T")
+    c, s = (1 - T ** 2) / (1 + T ** 2), 2 * T / (1 + T ** 2)
+    f = [sympy.expand((x + c * b - s * d - u) ** 2 + (y + s * b + c * d - v) ** 2 - r ** 2)
+         for (u, v), r, (b, d) in zip(centres, radii, tips, strict=True)]
+    at = sympy.solve([sympy.expand(f[1] - f[0]), sympy.expand(f[2] - f[0])], [x, y], dict=True)[0]
+    numerator = sympy.numer(sympy.together(f[0].subs(at)))
+    polynomial = sympy.Poly(numerator, T)
+    while polynomial.rem(sympy.Poly(1 + T ** 2, T)).is_zero:
+        polynomial = polynomial.quo(sympy.Poly(1 + T ** 2, T))
+    return polynomial
+
+
+@pytest.mark.parametrize(("centres", "radii", "tips"), [
+    ([(0, 0), (5, 1), (2, 6)], [2, 3, 2], [(0, 0), (3, 0), (1, 2)]),
+    ([(0, 0), (4, 0), (1, 5)], [3, 2, 3], [(0, 1), (2, 0), (0, 3)]),
+    ([(0, 0), (9, 1), (2, 8)], [1, 2, 1], [(0, 0), (2, 0), (1, 2)]),
+])
+def test_an_elimination_in_the_pose_by_sympy_agrees(centres, radii, tips):
+    polynomial = planar_by_sympy(centres, radii, tips)
+    curves = tuple(Circle((*c, 0), (0, 0, 1), r) for c, r in zip(centres, radii, strict=True))
+    modes = solve(Planar(curves, np.array(tips, dtype=float), np.eye(4)))
+    assert modes.complete
+    assert modes.complex == polynomial.degree() == 6
+    roots = sorted(float(root) for root in polynomial.nroots(n=30) if abs(sympy.im(root)) < 1e-20)
+    assert np.allclose(sorted(np.tan(mode.q[2] / 2) for mode in modes.modes), roots, atol=1e-9)
+
+
+def carried(curve: Curve, X: Array) -> Curve:
+    """A curve moved by a rigid displacement X (4, 4)."""
+    R, c = X[:3, :3], X[:3, :3] @ curve.centre + X[:3, 3]
+    if isinstance(curve, Line):
+        return Line(c, R @ curve.direction)
+    assert isinstance(curve, Circle)
+    return Circle(c, R @ curve.axis, curve.radius, R @ curve.start)
+
+
+@pytest.mark.parametrize("name", ["spatial, three circles", "two bodies, second circle and slide parallel"])
+def test_modes_move_with_the_base(name: str):
+    for seed in range(5):
+        rng = np.random.default_rng(1000 + seed)
+        system, _ = draw(name, seed)
+        X = pose(rng.normal(size=3), random_rotation(rng))
+        curves = tuple(carried(curve, X) for curve in system.curves)
+        if isinstance(system, Articulated):
+            R = X[:3, :3]
+            slide = carried(system.slide, pose((0, 0, 0), R))
+            moved: System = Articulated(curves, system.tips @ R.T, system.bodies, slide)
+            places = [pose(X[:3, :3] @ mode.pose[:3, 3] + X[:3, 3]) for mode in solve(system).modes]
+        else:
+            moved = Spatial(curves, system.tips)
+            places = [X @ mode.pose for mode in solve(system).modes]
+        after = solve(moved)
+        assert after.complete
+        assert after.complex == FAMILIES[name].count
+        assert len(after.modes) == len(places)
+        assert all(among(place, after) < 1e-8 for place in places)
+
+
+def test_enclosures_hold_for_inputs_that_differ_in_the_last_bit():
+    rng = np.random.default_rng(3)
+    for seed in range(10):
+        system, _ = spatial(np.random.default_rng(seed), "LLL")
+        moved = Spatial(tuple(Line(np.nextafter(line.centre, line.centre + rng.choice([-1, 1], 3)), line.direction)
+                              for line in system.curves), system.tips)
+        one, other = solve(system).modes, solve(moved).modes
+        assert len(one) == len(other)
+        pairs = zip(*(sorted(each, key=lambda m: m.parameters) for each in (one, other)), strict=True)
+        for a, b in pairs:
+            apart = np.abs(np.subtract(a.parameters, b.parameters)).max() / system.size
+            assert apart <= 4 * (a.radius + b.radius)
+
+
+@pytest.mark.parametrize("kinds", ["CCCC", "CLLL", "PCC", "LLLLL"])
+def test_more_legs_than_needed_leave_the_goal_in_the_plane(kinds: str):
+    system, goal = planar(np.random.default_rng(8), kinds)
+    modes = solve(system)
+    assert len(modes.modes) == modes.complex == 1
+    assert among(goal, modes) < 1e-10
+
+
+@pytest.mark.parametrize("kinds", ["CCCC", "LLLL", "PLC", "PLCL"])
+def test_more_legs_than_needed_leave_the_goal_in_space(kinds: str):
+    system, goal = spatial(np.random.default_rng(8), kinds)
+    modes = solve(system)
+    assert len(modes.modes) == 1
+    assert among(goal, modes) < 1e-10
+
+
+@pytest.mark.parametrize("kinds", ["CC", "CL", "LC", "LL", "PC", "CCCC"])
+def test_two_paths_in_space_meet_at_the_goal_alone(kinds: str):
+    for seed in range(5):
+        system, goal = translating(np.random.default_rng(seed), kinds)
+        modes = solve(system)
+        assert len(modes.modes) == modes.complex == 1
+        assert among(goal, modes) < 1e-10
+
+
+def test_circles_with_centres_at_equal_height_meet_twice():
+    """Two circles with horizontal axes, and centres and meeting points in one plane of symmetry: as the legs next to
+    each other of a translating platform."""
+    tips = np.zeros((2, 3))
+    curves = (Circle((1, 0, 0), (0, 1, 0), np.sqrt(2)), Circle((0, 1, 0), (1, 0, 0), np.sqrt(2)))
+    modes = solve(Translating(curves, tips))
+    assert modes.complex == 2
+    assert sorted(round(mode.pose[2, 3], 12) for mode in modes.modes) == [-1.0, 1.0]
+
+
+def test_what_matches_almost_is_near_and_stationary():
+    system, goal = planar(np.random.default_rng(2), "CCCC")
+    curves = (system.curves[0], shifted(system.curves[1], 1e-3 * system.X_plane[:3, 0]), *system.curves[2:])
+    modes = solve(Planar(curves, system.tips, system.X_plane))
+    assert modes.modes == ()
+    assert modes.complex == 0
+    assert min(np.abs(each.pose - goal).max() for each in modes.near) < 0.1
+    bent = Planar(curves, system.tips, system.X_plane)
+    for each in modes.near:
+        assert 1e-9 < each.residual <= 1e-2
+        sums = [[np.sum(bent.misses(each.q + s * e) ** 2) for s in (-1e-5, 1e-5)] for e in np.eye(3)]
+        slopes = [abs(up - down) / 2e-5 for down, up in sums]
+        assert max(slopes) < 1e-6
+
+
+def test_directions_that_no_pose_matches_leave_no_mode():
+    curves = tuple(Circle((x, 0, 0), (0, 0, 1), 0.1) for x in (0, 10, 20))
+    modes = solve(Planar(curves, np.array([[0, 0], [1, 0], [0, 1.0]]), np.eye(4)))
+    assert modes.complete
+    assert modes.complex == 6
+    assert modes.modes == ()
+
+
+def in_tilted_plane(rng: np.random.Generator) -> tuple[Array, Array, Array]:
+    """A plane's frame, three tips, and where the tips are at some pose."""
+    X = pose(rng.normal(size=3), random_rotation(rng))
+    tips = rng.normal(size=(3, 2))
+    goal = X @ pose((0.3, 0.2, 0), rotation_about((0, 0, 1), 0.5))
+    return X, tips, goal[:3, 3] + tips @ goal[:3, :2].T
+
+
+@pytest.mark.parametrize("kind", ["equal arms", "parallel lines", "one centre"])
+def test_a_continuum_is_said_and_not_listed(kind: str):
+    for seed in range(4):
+        X, tips, at = in_tilted_plane(np.random.default_rng(seed))
+        n, e = X[:3, 2], unit(X[:3, 0] + 0.3 * X[:3, 1])
+        centre = at.mean(axis=0)
+        curves: dict[str, list[Curve]] = {
+            "equal arms": [Circle(point + 0.7 * e, n, 0.7) for point in at],
+            "parallel lines": [Line(point, e) for point in at],
+            "one centre": [Circle(centre, n, float(np.linalg.norm(point - centre))) for point in at]}
+        modes = solve(Planar(tuple(curves[kind]), tips, X))
+        assert (modes.continuum, modes.complete, modes.modes) == (1, False, ())
+        assert "continuum of dimension 1" in str(modes.degenerate)
+
+
+def test_other_continua():
+    rng = np.random.default_rng(0)
+    d, tips, X = unit(rng.normal(size=3)), rng.normal(size=(3, 3)), pose(rng.normal(size=3), random_rotation(rng))
+    lines = tuple(Line(X[:3, 3] + X[:3, :3] @ tip, d) for tip in tips)
+    assert solve(Spatial(lines, tips)).continuum == 1
+    for seed in range(3):
+        assert solve(articulated(np.random.default_rng(seed), "CC", (0, 1, 2)).system).continuum == 1
+    assert solve(planar(rng, "CC").system).continuum == 1
+    assert solve(spatial(rng, "LL").system).continuum == 2
+    assert solve(translating(rng, "C").system).continuum == 1
+
+
+def test_tips_on_one_line_are_refused_in_words():
+    tips = np.array([[0, 0, 0], [1, 1, 1], [2, 2, 2.0]])
+    modes = solve(Spatial(tuple(Line(tip, (0.1 * k, 1, k)) for k, tip in enumerate(tips)), tips))
+    assert not modes.complete
+    assert "on one line" in str(modes.degenerate)
+
+
+@pytest.mark.parametrize("kind", ["L", "C"])
+def test_a_singular_pose_is_said(kind: str):
+    """Normals of three curves that meet in one point: a double solution, real or not as rounding has it."""
+    for seed in range(8):
+        modes = singular(kind, np.random.default_rng(seed))
+        assert "singular" in str(modes.degenerate)
+        assert modes.complex == (2 if kind == "L" else 6)
+        assert among(np.eye(4), modes) < 1e-6, modes.proof
+
+
+def singular(kind: str, rng: np.random.Generator) -> Modes:
+    """The modes of a platform at the origin whose curves' normals meet in one point."""
+    tips, centre = rng.normal(size=(3, 2)), np.array([0.3, -0.4])
+    curves: list[Curve] = []
+    for tip in tips:
+        n = np.array([*unit(centre - tip), 0.0])
+        at = np.array([*tip, 0.0])
+        curves.append(Line(at, np.cross(n, (0, 0, 1))) if kind == "L" else
+                      Circle(at - n * (r := rng.uniform(0.4, 1.4)), (0, 0, 1), r))
+    return solve(Planar(tuple(curves), tips, np.eye(4)))
+
+
+def test_modes_are_plain_numbers_as_a_record():
+    record = solve(draw("planar, three circles", 0).system).to_dict()
+    assert record["complex"] == 6
+    assert len(record["modes"]) in (2, 4, 6)
+    assert np.shape(record["modes"][0]["pose"]) == (4, 4)

@@ -1,0 +1,172 @@
+"""Words, expression and rank agree on every robot, and a wrong condition is told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import sympy
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import strategies
+from analysis.singularity.found import found
+from analysis.singularity.test_conditions import CASES, HEAVY
+from hrsynth.analysis.singularity.agreement import Agreement, agreement
+from hrsynth.analysis.singularity.condition import Condition, condition
+from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.analysis.singularity.structure import HeldLeg, Structure
+from hrsynth.description import load, shipped
+from hrsynth.errors import BadRequest, Disagreement
+from hrsynth.mechanism import Mechanism
+from hrsynth.tolerances import RANK_CUTOFF
+
+ANGLE = 1e-8
+
+
+def check(answer: Singularity, points: int) -> None:
+    checked = answer.checked
+    assert (checked is None) is answer.always
+    assert answer.always is (answer.verdict.rank < answer.verdict.dof)
+    if checked is None:
+        return
+    assert (checked.points, checked.disagreements) == (points, 0)
+    assert checked.largest_angle < ANGLE
+    assert checked.smallest > 0
+    if answer.condition.signed:
+        assert sum(checked.sides) == points
+    if answer.condition.never:
+        assert checked.on_locus == ()
+    for each in answer.examples:
+        assert each.sigma < RANK_CUTOFF < each.nearby
+        assert each.lost
+
+
+@pytest.mark.parametrize(("robot", "legs", "real"), [
+    pytest.param(*case, marks=pytest.mark.slow if case[0] in HEAVY and case[1:] == (None, False) else ())
+    for case in CASES])
+def test_shipped_robots(robot: str, legs: str | None, real: bool) -> None:
+    check(found(robot, legs, real=real), 100)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", shipped())
+def test_shipped_robots_at_ten_thousand_poses(robot: str) -> None:
+    check(singular(load(robot)), 10_000)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", shipped())
+def test_shipped_robots_with_their_own_motors(robot: str) -> None:
+    check(singular(load(robot), real=True, points=1000), 1000)
+
+
+def test_a_zero_of_the_expression_where_the_platform_has_fewer_freedoms_is_no_disagreement() -> None:
+    """det(p1, p2, p3) also vanishes where the platform itself has two freedoms: nothing is lost to the motors there."""
+    check(singular(load("3upu"), real=True, points=40), 40)
+
+
+@pytest.mark.parametrize(("robot", "legs", "real"), [
+    ("3rrr_m1", None, False), ("rrrrr_m1", None, False), ("gough_stewart", "1,2,3", False), ("quattro", "1,4", False),
+    ("3rrr_m2", None, True), ("rrrrr_m1", None, True)])
+def test_a_condition_whose_sign_changes_has_poses_on_its_locus(robot: str, legs: str | None, real: bool) -> None:
+    answer = found(robot, legs, real=real)
+    assert answer.condition.signed
+    assert min(answer.checked.sides) > 0
+    assert len(answer.examples) > 0
+
+
+@given(robot=st.one_of(strategies.planar_robots(point=None), strategies.delta_like()), seed=st.integers(0, 2**31),
+       real=st.booleans())
+@settings(max_examples=3, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+def test_random_robots(robot: Mechanism, seed: int, real: bool) -> None:
+    check_random_robot(robot, seed, real, 12)
+
+
+@pytest.mark.slow
+@given(robot=strategies.parallel_robots(), seed=st.integers(0, 2**31), real=st.booleans())
+@settings(max_examples=120, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+def test_many_random_robots(robot: Mechanism, seed: int, real: bool) -> None:
+    check_random_robot(robot, seed, real, 100)
+
+
+def check_random_robot(robot: Mechanism, seed: int, real: bool, points: int) -> None:
+    """Words, expression and rank agree, and turning the whole robot changes neither words nor expression."""
+    one = singular(robot, real=real, points=points)
+    check(one, points)
+    rng = np.random.default_rng(seed)
+    turned = strategies.transformed(robot, strategies.random_rotation(rng), rng.normal(size=3))
+    two = singular(turned, real=real, points=points)
+    check(two, points)
+    assert one.structure.motion == two.structure.motion
+    assert one.to_dict()["expression"] == two.to_dict()["expression"]
+    if one.condition is not None:
+        assert one.words == two.words
+
+
+# ---- what is wrong is told
+
+
+def again(answer: Singularity, structure: Structure, wrong: Condition, points: int = 60) -> Agreement:
+    return agreement(answer.setting.samples.start, answer.question, structure, wrong, points)
+
+
+def with_leg(structure: Structure, leg: HeldLeg) -> Structure:
+    return replace(structure, legs=(leg, *structure.legs[1:]))
+
+
+def elsewhere(answer: Singularity) -> HeldLeg:
+    """The first leg with its tip a hand's breadth off."""
+    leg = answer.structure.legs[0]
+    return replace(leg, tip=replace(leg.tip, place=leg.tip.place + [0.1, 0.2, 0.0]))
+
+
+def of_another(answer: Singularity) -> HeldLeg:
+    """The first leg with the line of the second."""
+    first, second = answer.structure.legs[:2]
+    return replace(first, line=replace(second.line, symbol=first.line.symbol))
+
+
+@pytest.mark.parametrize("robot", [("3rrr_m1",), ("3rpr_m1",), ("gough_stewart", "1,2,3"), ("hexa", "1,2,3")])
+def test_another_tip_is_told(robot: Sequence[str]) -> None:
+    answer = found(*robot)
+    wrong = with_leg(answer.structure, elsewhere(answer))
+    with pytest.raises(Disagreement) as caught:
+        again(answer, wrong, condition(wrong, answer.question))
+    assert caught.value.angle > 1e-3
+    assert answer.setting.mechanism.name in str(caught.value)
+
+
+@pytest.mark.parametrize("robot", [("3rrr_m1",), ("delta",), ("orthoglide",), ("gough_stewart", "1,2,3"),
+                                   ("quattro", "1,4"), ("rrrrr_m1",)])
+def test_another_line_is_told(robot: Sequence[str]) -> None:
+    answer = found(*robot)
+    wrong = with_leg(answer.structure, of_another(answer))
+    with pytest.raises(Disagreement) as caught:
+        again(answer, wrong, condition(wrong, answer.question))
+    assert caught.value.angle > 1e-3
+
+
+@pytest.mark.parametrize("robot", [("3rrr_m1",), ("gough_stewart", "1,2,3"), ("quattro", "1,4")])
+def test_another_expression_is_told(robot: Sequence[str]) -> None:
+    """The legs are right, the expression is not: at the poses where it vanishes the rank is full."""
+    answer = found(*robot)
+    wrong = replace(answer.condition, expression=answer.condition.expression + sympy.Rational(1, 20))
+    with pytest.raises(Disagreement) as caught:
+        again(answer, answer.structure, wrong, 150)
+    assert caught.value.poses > 0
+    assert caught.value.angle < ANGLE
+
+
+def test_the_right_condition_passes_again() -> None:
+    answer = found("3rrr_m1")
+    assert again(answer, answer.structure, answer.condition).disagreements == 0
+
+
+def test_a_robot_without_motors_has_no_real_condition() -> None:
+    robot = load("3rrr_m1")
+    still = replace(robot, joints={name: replace(joint, motor=None) for name, joint in robot.joints.items()})
+    with pytest.raises(BadRequest, match="has no motor"):
+        singular(still, real=True, points=1)

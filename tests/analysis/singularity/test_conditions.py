@@ -1,0 +1,155 @@
+"""Words and expressions of every shipped robot, and of the leg choices that the theory treats by name."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.singularity.found import found
+from hrsynth.analysis.singularity.algebra import products, vector
+from hrsynth.description import load, shipped
+from hrsynth.mechanism.vectors import inverse
+
+
+def planar(kind: str) -> tuple[str, str, str]:
+    names = [f"{kind}{i}" for i in "123"]
+    a, b, c = ("tau" + name[1:] if kind == "τ" else name for name in names)
+    return ("planar", f"the lines through B1, B2, B3, normal to {', '.join(names)}, meet in a point or are parallel",
+            f"det(n, {a}, {b})*dot(B3, {c}) - det(n, {a}, {c})*dot(B2, {b}) + det(n, {b}, {c})*dot(B1, {a})")
+
+
+def spatial(kind: str, tip: str = "B") -> tuple[str, str, str]:
+    names = [f"{kind}{i}" for i in "123"]
+    a, b, c = ("tau" + name[1:] if kind == "τ" else name for name in names)
+    P, Q, R = (f"{tip}{i}" for i in "123")
+    forth = f"dot({a}, -{P} + {Q})*dot({b}, -{Q} + {R})*dot({c}, {P} - {R})"
+    back = f"dot({a}, {P} - {R})*dot({b}, -{P} + {Q})*dot({c}, -{Q} + {R})"
+    words = (f"the planes through {P}, {Q}, {R} normal to {', '.join(names)}, and the plane {P}{Q}{R}, "
+             "meet in a point (which may lie at infinity)")
+    return "spatial", words, f"{forth} - {back}"
+
+
+def parallel(kind: str, legs: str, words: str) -> tuple[str, str, str]:
+    names = [("tau" if kind == "τ" else kind) + i for i in legs]
+    pairs = [f"cross({a}, {b})" for i, a in enumerate(names) for b in names[i + 1:]]
+    return "translations", words, " + ".join(f"dot({pair}, {pair})" for pair in pairs)
+
+
+def lines(kind: str, legs: str) -> str:
+    return ", ".join(kind + i for i in legs)
+
+
+def always(motion: str, freedoms: str, because: str = "") -> tuple[str, str, str]:
+    several = "are" if ";" in freedoms else "is"
+    reason = f", because the P axes {because} are parallel" if because else ""
+    return motion, f"always: {freedoms} {several} never seen{reason}", "0"
+
+
+def gram(motion: str, words: str, legs: str) -> tuple[str, str, str]:
+    return motion, words, f"Determinant({' + '.join(f'J{i}.T*N{i}*J{i}' for i in legs)})"
+
+
+def flat(kind: str, noun: str) -> tuple[str, str, str]:
+    symbol = "tau" if kind == "τ" else kind
+    return "translations", f"the {noun} {kind}1, {kind}2 are parallel", f"det(n, {symbol}1, {symbol}2)"
+
+
+BLIND = always("other", "translation along x; translation along y; rotation about the platform's z axis")
+PLANE = always("translations", "translation along x; translation along y")
+RAILS = parallel("p", "123", "never: the P axes p1, p2, p3 are constant and not all parallel")
+TWO_RAILS = ("translations", "never: the P axes p1, p2 are constant and not parallel", "det(n, p1, p2)")
+TANGENTS = parallel("τ", "123", "the tangents τ1, τ2, τ3 are all parallel")
+SIX = "some motion of the platform moves every tip Bi along {}i (i = 1, 2, 3, 4, 5, 6)"
+HALVES = "the platform's halves can translate, one along e relative to the other, and move every tip Bi along τi"
+
+WHOLE = {
+    "3ppr_m1": BLIND, "3ppr_m2": BLIND, "3prp": PLANE, "3rrp": PLANE,
+    "3prr_m1": planar("p"), "3prr_m2": planar("p"), "3rpr_m1": planar("u"), "3rpr_m2": planar("u"),
+    "3rrr_m1": planar("τ"), "3rrr_m2": planar("τ"),
+    "3puu": RAILS, "linear_delta": RAILS, "orthoglide": RAILS, "delta": TANGENTS, "3ruu": TANGENTS,
+    "3upu": parallel("u", "123", "the watched directions u1, u2, u3 are all parallel"),
+    "3rps": spatial("u"),
+    "6pus": gram("spatial", SIX.format("p"), "123456"), "hexa": gram("spatial", SIX.format("τ"), "123456"),
+    "gough_stewart": gram("spatial", SIX.format("u"), "123456"),
+    "hexaglide": always("spatial", "translation along x", lines("p", "123456")),
+    "i4l": always("other", "translation along x", lines("p", "1234")),
+    "uranesx": always("translations", "translation along z", lines("p", "123")),
+    "prrrp_parallel": always("translations", "translation along y", lines("p", "12")),
+    "prrrp_parallel_point": always("translations", "translation along y", lines("p", "12")),
+    "prrrp_m1": TWO_RAILS, "prrrp_m2": TWO_RAILS,
+    "quattro": gram("bodies", f"{HALVES} (i = 1, 2, 3, 4)", "1234"),
+    "quattro_rigid": parallel("τ", "1234", "the tangents τ1, τ2, τ3, τ4 are all parallel"),
+    "rprpr_m1": flat("u", "watched directions"), "rprpr_m2": flat("u", "watched directions"),
+    "rrrrr_m1": flat("τ", "tangents"), "rrrrr_m2": flat("τ", "tangents"),
+}
+
+
+def split_platform(i: str, j: str) -> tuple[str, str, str]:
+    words = (f"the tangents τ{i}, τ{j} and the direction e, in which the platform's halves move on each other, are "
+             "parallel to one plane")
+    return "bodies", words, f"det(e, tau{i}, tau{j})"
+
+
+SOME = {
+    ("gough_stewart", "1,2,3"): spatial("u"), ("hexa", "1,2,3"): spatial("τ"), ("6pus", "1,2,3"): spatial("p"),
+    ("hexaglide", "1,2,3"): always("spatial", "translation along x", lines("p", "123")),
+    ("delta", "1,2"): parallel("τ", "12", "the tangents τ1, τ2 are parallel"),
+    ("quattro", "1,4"): split_platform("1", "4"), ("quattro", "1,3"): split_platform("1", "3"),
+    **{("quattro_rigid", f"{i},{j}"): parallel("τ", i + j, f"the tangents τ{i}, τ{j} are parallel")
+       for i, j in ("12", "14", "23", "34")},
+    **{("quattro_rigid", f"{i},{j}"): ("translations", f"the tangents τ{i}, τ{j} are parallel",
+                                       f"det(n, tau{i}, tau{j})") for i, j in ("13", "24")},
+}
+
+REAL = {
+    "3rrr_m1": planar("τ"), "3rrr_m2": planar("τ"), "3rps": spatial("τ"),
+    "delta": ("translations", "the directions r1, r2, r3 are parallel to one plane", "det(r1, r2, r3)"),
+    "rrrrr_m1": ("planar", "the line B1B2 is normal to τ2", "dot(tau2, -B1 + B2)"),
+    "gough_stewart": ("spatial", f"the lines through {lines('B', '123456')} along {lines('p', '123456')} belong "
+                      "to one linear complex", "Determinant(L)"),
+}
+
+CASES = {**{(name, None, False): each for name, each in WHOLE.items()},
+         **{(name, legs, False): each for (name, legs), each in SOME.items()},
+         **{(name, None, True): each for name, each in REAL.items()}}
+HEAVY = {"6pus", "hexa", "gough_stewart"}
+"""Six watched legs on a free platform: seconds of search for a singular pose."""
+
+
+def test_the_table_has_every_shipped_robot() -> None:
+    assert set(WHOLE) == set(shipped())
+
+
+@pytest.mark.parametrize(("robot", "legs", "real"), [
+    pytest.param(*case, marks=pytest.mark.slow if case[0] in HEAVY and case[1:] == (None, False) else ())
+    for case in CASES])
+def test_words_and_expression(robot: str, legs: str | None, real: bool) -> None:
+    motion, words, expression = CASES[robot, legs, real]
+    answer = found(robot, legs, real=real)
+    record = answer.to_dict()
+    assert answer.structure.motion == motion
+    assert answer.words == words
+    assert record["expression"] == expression
+    assert record["always"] is words.startswith("always") is (answer.checked is None)
+    assert record["never"] is words.startswith("never")
+    assert (answer.verdict.rank < answer.verdict.dof) is record["always"]
+    if answer.condition is not None:
+        assert {str(symbol) for symbol in answer.condition.expression.free_symbols} <= set(record["where"])
+
+
+def test_with_the_camera_on_the_platform_the_tips_are_the_lower_joints() -> None:
+    """Theory 4: the planes go through A_i, and A1A2A3 is the fourth."""
+    answer = found("gough_stewart", "1,2,3", camera="platform")
+    assert (answer.structure.motion, answer.words, str(answer.condition.expression)) == spatial("u", "A")
+    mechanism = load("gough_stewart")
+    for leg in answer.structure.legs:
+        foot = next(joint for joint in mechanism.joints_of(mechanism.base) if joint.name.endswith(leg.label))
+        place = inverse(mechanism.links[leg.tip.link].pose) @ np.append(foot.point, 1)
+        np.testing.assert_allclose(leg.tip.place * mechanism.length, place[:3], atol=1e-12)
+
+
+def test_signs_come_with_the_order_of_a_triple_product() -> None:
+    _, cross, det = products()
+    a, b, c = map(vector, "abc")
+    assert det(a, b, c) == det(b, c, a) == det(c, a, b) == -det(b, a, c) == -det(a, c, b) == -det(c, b, a)
+    assert cross(a, b) != cross(b, a)

@@ -1,0 +1,120 @@
+"""Loci over planes of poses: values as at each pose, unreached cells empty, bad planes refused."""
+
+from __future__ import annotations
+
+import io
+from functools import cache
+
+import numpy as np
+import pytest
+
+from analysis.singularity.found import found
+from analysis.singularity.test_figures import centre
+from hrsynth.analysis.singularity.locus import Locus
+from hrsynth.analysis.singularity.singular import drawn
+from hrsynth.description import load
+from hrsynth.errors import BadRequest, PlaneNotMet
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.parts import PlatformMotion
+from hrsynth.kinematics.reach import reach
+from hrsynth.mechanism.pose import Pose
+from hrsynth.mechanism.vectors import unit
+from hrsynth.present.loci import locus_map
+
+STEPS = 15
+
+
+@cache
+def planar() -> Locus:
+    return drawn(load("3rrr_m1"), steps=STEPS)
+
+
+def posed(x: float, y: float) -> ClosedConfiguration:
+    samples = found("3rrr_m1").setting.samples
+    configurations = [samples.start, *(member.configuration for member in samples.members)]
+    motion = PlatformMotion.of(configurations, samples.question)
+    return reach(samples.start, samples.question, Pose(x=x, y=y, phi=0.0), motion)
+
+
+def lines(at: ClosedConfiguration, begin: str, end: str) -> float:
+    """The determinant of three lines through the tips along begin-end (characteristic lengths), for a normal +z."""
+    tips = [centre(at, f"wrist_{i}")[:2] / at.twin.length for i in "123"]
+    along = [unit(centre(at, f"{end}_{i}") - centre(at, f"{begin}_{i}"))[:2] for i in "123"]
+    return float(np.linalg.det([[*d, tip[0] * d[1] - tip[1] * d[0]] for d, tip in zip(along, tips, strict=True)]))
+
+
+def test_values_are_those_of_the_geometry_at_each_pose() -> None:
+    """Hidden: lines along the cranks; real (motors at the base): lines along the links next to the platform."""
+    locus = planar()
+    (_, xs), (_, ys) = locus.grid.axes
+    cells = [(i, j) for i in range(4, 11, 3) for j in range(5, 11, 2)]
+    for i, j in cells:
+        at = posed(xs[i], ys[j])
+        np.testing.assert_allclose(at.pose("platform")[:2, 3], [xs[i], ys[j]], atol=1e-8)
+        assert abs(locus.hidden.value[i, j]) == pytest.approx(abs(lines(at, "shoulder", "elbow")), abs=1e-6)
+        assert abs(locus.real.value[i, j]) == pytest.approx(abs(lines(at, "elbow", "wrist")), abs=1e-6)
+
+
+def test_hidden_and_real_locus_differ() -> None:
+    locus = planar()
+    assert locus.hidden.signed
+    assert locus.real.signed
+    for field in (locus.hidden, locus.real):
+        assert np.nanmin(field.value) < 0 < np.nanmax(field.value)
+    products = np.sign(locus.hidden.value * locus.real.value)
+    assert np.any(products > 0)
+    assert np.any(products < 0)
+
+
+def test_what_is_not_reached_is_empty() -> None:
+    locus = planar()
+    assert locus.grid.names == ("x", "y")
+    assert locus.grid.shape == (STEPS, STEPS) == locus.hidden.value.shape
+    empty = np.isnan(locus.hidden.type2)
+    assert 0 < np.sum(~empty) == locus.reached < STEPS**2
+    assert empty[0, 0]
+    assert empty[-1, -1]
+    for field in (locus.hidden, locus.real):
+        for table in (field.value, field.type2, field.type1):
+            np.testing.assert_array_equal(np.isnan(table), empty)
+        assert np.nanmin(field.type2) >= 0
+    record = locus.to_dict()
+    assert record["hidden"]["type2"][0][0] is None
+    assert record["axes"].keys() == {"x", "y"}
+    assert sum(value is not None for row in record["real"]["expression"] for value in row) == locus.reached
+
+
+def test_the_picture_shows_the_loci() -> None:
+    import matplotlib.image
+
+    data = locus_map(found("3rrr_m1"), planar())
+    assert data.startswith(b"\x89PNG\r\n\x1a\n")
+    pixels = matplotlib.image.imread(io.BytesIO(data))[..., :3]
+    assert min(pixels.shape[:2]) > 300
+    for colour in ((0.86, 0.08, 0.24), (0.25, 0.41, 0.88)):
+        assert np.sum(np.all(np.abs(pixels - colour) < 0.06, axis=2)) > 100
+
+
+@pytest.mark.slow
+def test_isolated_singular_poses_are_spots_of_a_plane() -> None:
+    locus = drawn(load("quattro_rigid"), plane="y=0", steps=9)
+    assert locus.grid.names == ("x", "z")
+    assert not locus.hidden.signed
+    assert np.min(np.abs(locus.hidden.spots[:, 0])) < 1e-7
+
+
+def test_a_plane_that_is_not_reached() -> None:
+    with pytest.raises(PlaneNotMet) as caught:
+        drawn(load("delta"), plane="z=5", steps=5)
+    assert caught.value.exit_status == 3
+    assert "no pose of the plane z=5 is reached" in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(("robot", "plane", "words"), [
+    ("delta", "phi=0.1", "cannot change phi"), ("delta", "x=0,y=0", "leaves two parts free"),
+    ("3rrr_m1", "x=0,y=0", "leaves two parts free"), ("delta", "z=abc", "z is not a number"),
+    ("hexaglide", None, "has no locus"), ("3prp", None, "has no locus"), ("3ppr_m1", None, "has no locus")])
+def test_planes_that_are_none(robot: str, plane: str | None, words: str) -> None:
+    with pytest.raises(BadRequest, match=words):
+        drawn(load(robot), plane=plane, steps=5)

@@ -1,0 +1,140 @@
+"""Held legs by screws: the interaction matrix as Pinocchio has it, twist systems as the oracle has them, and walks."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.locked import interaction, leg_twists, split
+from hrsynth.kinematics.ranks import kernel_basis, range_basis
+from hrsynth.kinematics.relation import Question, relation
+from hrsynth.kinematics.sampling import WEAKEST, wander
+from hrsynth.mechanism.legs import Leg
+from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.vectors import Array, hat, unit
+from hrsynth.tolerances import CLOSED
+from kinematics.robots import ROBOTS, setting_of, state_of
+from oracle import Oracle, Rows, rows_of
+
+
+def by_pinocchio(at: ClosedConfiguration, question: Question) -> Array:
+    """Singular values of Mᵀ from the relation: the pairs (t, u̇) solved for u̇, what moves with t = 0 left out."""
+    found = relation(at, question)
+    still, _ = kernel_basis(found.twist_part, 1.0)
+    hidden, _ = range_basis(found.rates @ still, 1.0)
+    M = found.rates @ np.linalg.pinv(found.twist_part, rcond=1e-9) @ found.twists
+    return np.linalg.svd(M - hidden @ (hidden.T @ M), compute_uv=False)
+
+
+@pytest.mark.parametrize("carried", [False, True])
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_the_interaction_matrix_is_that_of_the_engine(robot: str, carried: bool) -> None:
+    platform = setting_of(robot).mechanism.platform
+    samples = setting_of(robot, None, platform if carried else None).samples
+    assert samples.question.reference == (platform if carried else setting_of(robot).mechanism.base)
+    for member in samples.members:
+        M = interaction(member.configuration, samples.question)
+        assert M.shape == (sum(samples.question.sizes), member.relation.dof.value)
+        wanted = by_pinocchio(member.configuration, samples.question)
+        np.testing.assert_allclose(np.linalg.svd(M, compute_uv=False), wanted, atol=1e-8)
+
+
+def by_oracle(at: ClosedConfiguration, leg: Leg, locks: list[Direction]) -> Array:
+    """A basis of the leg's twists in maximal coordinates: its joints' constraints alone, directions held."""
+    mechanism, oracle = at.twin.mechanism, Oracle(at.twin.mechanism)
+    state, rows = state_of(at.twin, at.q), Rows()
+    for name in leg.joints:
+        joint = mechanism.joints[name]
+        i, j = (oracle.index[link] for link in joint.links)
+        rows += rows_of(joint, i, j, mechanism.links[joint.predecessor].pose, mechanism.links[joint.successor].pose)
+    links = [link for link in dict.fromkeys((*leg.links, leg.attach)) if link != mechanism.base]
+    numbers = [oracle.index[link] for link in links]
+    J = rows.evaluate(state)[1][:, numbers].reshape(len(rows), 6 * len(numbers))
+    held = [J]
+    for lock in locks:
+        block = np.zeros((3, J.shape[1]))
+        start = 6 * links.index(lock.link)
+        block[:, start + 3 : start + 6] = hat(at.pose(lock.link)[:3, :3] @ lock.direction)
+        held.append(block)
+    units = np.tile([at.twin.length] * 3 + [1.0] * 3, len(links))
+    _, values, right = np.linalg.svd(np.vstack(held) * units)
+    kernel = right[int(np.sum(values > 1e-9 * values[0])):].T
+    end = kernel[6 * links.index(leg.attach):][:6].copy()
+    end[:3] += hat(at.pose(leg.attach)[:3, 3] / at.twin.length) @ end[3:]
+    U, sizes, _ = np.linalg.svd(end)
+    return np.asarray(U[:, : int(np.sum(sizes > 1e-8))])
+
+
+@pytest.mark.parametrize("robot", ["3rrr_m1", "3prr_m1", "delta", "orthoglide", "3upu", "3rps", "gough_stewart", "hexa",
+                                   "quattro", "quattro_rigid", "3ruu"])
+def test_a_held_leg_allows_what_the_oracle_says(robot: str) -> None:
+    setting = setting_of(robot)
+    samples = setting.samples
+    for member in samples.members:
+        for leg in setting.anatomy.legs:
+            for held in (True, False):
+                locks = [o for o in samples.question.observations if held and o.leg == leg.label]
+                T = leg_twists(member.configuration, leg, locks, samples.question.reference)
+                wanted = by_oracle(member.configuration, leg, locks)
+                assert T.shape == wanted.shape
+                assert np.linalg.norm(T - wanted @ (wanted.T @ T)) < 1e-7
+
+
+def test_what_is_seen_from_outside_a_leg_cannot_be_held_in_it() -> None:
+    setting = setting_of("delta")
+    leg, (at, *_) = setting.anatomy.legs[0], [member.configuration for member in setting.samples.members]
+    locks = [setting.samples.question.observations[0]]
+    with pytest.raises(ValueError, match=setting.anatomy.legs[1].links[0]):
+        leg_twists(at, leg, locks, setting.anatomy.legs[1].links[0])
+
+
+def system(point: Array, translations: list[Array], rotations: list[Array], screws: list[Array]) -> Array:
+    """An orthonormal basis of a twist system given at a point, moved to the origin and mixed."""
+    columns = [np.concatenate([v, np.zeros(3)]) for v in translations]
+    columns += [np.concatenate([np.cross(point, w), w]) for w in rotations]
+    columns += [np.concatenate([np.cross(point, w) + 0.7 * w, w]) for w in screws]
+    return range_basis(np.column_stack(columns), 1.0)[0]
+
+
+@pytest.mark.parametrize(("translations", "rotations", "screws"), [
+    (1, 3, 0), (2, 1, 0), (0, 2, 0), (1, 0, 0), (3, 3, 0), (0, 3, 0), (0, 0, 1), (1, 1, 1), (0, 1, 1)])
+def test_split(translations: int, rotations: int, screws: int) -> None:
+    rng = np.random.default_rng(translations + 4 * rotations + 16 * screws)
+    point = rng.normal(size=3)
+    V, W, S = (list(rng.normal(size=(n, 3))) for n in (translations, rotations, screws))
+    T = system(point, V, W, S)
+    parts = split(T, point)
+    assert parts.translations.shape == (3, translations)
+    assert parts.rotations.shape == (3, rotations)
+    assert parts.whole is (screws == 0)
+    for basis, vectors in ((parts.translations, V), (parts.rotations, W)):
+        np.testing.assert_allclose(basis.T @ basis, np.eye(basis.shape[1]), atol=1e-12)
+        for vector in vectors:
+            assert np.linalg.norm(unit(vector) - basis @ (basis.T @ unit(vector))) < 1e-9
+    if rotations and not translations:
+        assert not split(T, point + rng.normal(size=3)).whole
+
+
+@pytest.mark.parametrize("robot", ["3rrr_m1", "delta", "quattro", "gough_stewart", "prrrp_parallel_point"])
+def test_wander(robot: str) -> None:
+    """Closed, off the start, in small steps, on the branch; the same for a seed, another for another."""
+    samples = setting_of(robot).samples
+    met = list(wander(samples.start, 30, seed=3))
+    assert len(met) == 30
+    twin, generic = samples.twin, samples.mobility
+    weakest = WEAKEST * samples.start.kernel()[1].weakest
+    for at in met:
+        assert at.residual <= CLOSED
+        assert at.kernel()[0].shape[1] == generic
+        assert at.kernel()[1].weakest >= weakest
+    steps = [np.linalg.norm(twin.difference(a.q, b.q)) for a, b in pairwise([samples.start, *met])]
+    assert min(steps) > 1e-3
+    assert np.median(steps) < 0.5
+    platform = [at.pose(twin.mechanism.platform) for at in met]
+    assert max(np.linalg.norm(X - samples.start.pose(twin.mechanism.platform)) for X in platform) > 0.1 * twin.length
+    again = [at.q for at in wander(samples.start, 30, seed=3)]
+    assert all(np.array_equal(a.q, q) for a, q in zip(met, again, strict=True))
+    assert not np.array_equal(met[0].q, next(wander(samples.start, 1, seed=4)).q)
