@@ -248,7 +248,7 @@ def test_check_text_names_the_singularity(run):
     for line in (r"^pose +x=0,y=0.333205,", r"^mobility +2, of which 0 idle; the platform has 2 freedoms$",
                  r"^hidden robot +the directions show 1 of 2: Type 2 singularity ", r"RI 0  RO 1  II 1  IO 0",
                  r"^not seen +translation along x\b", r"^real robot +the motors determine 2 of 2: regular ",
-                 r"^redundant +loop elbow_2: 3 of its constraints$"):
+                 r"^redundant +the loop cut at elbow_2: 3 of its constraints$"):
         assert re.search(line, answer.out, re.MULTILINE), answer.out
 
 

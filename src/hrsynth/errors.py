@@ -113,7 +113,8 @@ class PoseNotReached(HrsynthError):
         self.robot, self.pose, self.came, self.last = robot, pose, came, last
         self.leg, self.millimetres, self.degrees = leg, millimetres, degrees
         if leg is None:
-            reason = "each leg alone can close there, but not all of them together in this working mode"
+            reason = ("each leg alone can close there, but the straight way to it is blocked (a leg at its limit, "
+                      "another working mode)")
         else:
             turn = f" and {degrees:.3g} degrees" if degrees > 1e-6 else ""
             reason = f"leg {leg} alone misses it by {millimetres:.4g} mm{turn}"

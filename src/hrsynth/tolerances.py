@@ -13,6 +13,9 @@ SOLVED = 1e-12
 SHARP = 1e-15
 """Residual that is asked for where a singular pose is wanted as exactly as numbers allow."""
 
+AS_PRINTED = 1e-5
+"""Difference (metres, radians) at which a part of a pose that never changes is taken as its printed value."""
+
 PASSED_BY = 1e-3
 """Residual at which a configuration on the way to another is near enough to go on from."""
 
@@ -54,7 +57,7 @@ PARALLEL = 1e-13
 one that is: it decides how many solutions lie at infinity."""
 
 VANISHES = 1e-9
-"""Distance of a tip from its curve (sizes of the mechanism) at which a pose matches an observation more than is needed."""
+"""Distance of a tip from its curve (sizes of the mechanism) at which a pose matches one observation too many."""
 
 NEAR_MODE = 1e-2
 """Distance of tips from their curves (sizes of the mechanism) up to which a pose that matches almost is reported."""

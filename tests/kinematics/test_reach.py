@@ -74,10 +74,24 @@ def test_what_a_platform_can_change(robot: str, parts: tuple[str, ...]) -> None:
     everything = setting.everything
     assert motion_of(setting).parts == generic_motion(everything.start, everything.question).parts == parts
     for name in {"x", "y", "z", "phi", "rpy"} - set(parts):
-        pose = Pose(rpy=(0, 0, 0)) if name == "rpy" else Pose(**{name: 0.0})
+        pose = Pose(rpy=(0.1, 0, 0)) if name == "rpy" else Pose(**{name: 0.123})
         with pytest.raises(BadRequest, match=f"cannot change {name}") as caught:
             reach(everything.start, everything.question, pose)
         assert caught.value.allowed == ", ".join(parts)
+
+
+def test_a_part_that_never_changes_may_be_given_as_it_is() -> None:
+    """What is printed can be given back: z of a planar robot, the orientation of one that only translates."""
+    for robot, text in (("3rrr_m1", "x=0.01,y=0.02,z=0,rpy=0/0/0.05"), ("delta", "x=0.05,y=0,z=-0.6,rpy=0/0/0")):
+        everything = setting_of(robot).everything
+        wanted = Pose.parse(text)
+        at = reach(everything.start, everything.question, wanted)
+        X = at.pose(everything.question.platform)
+        assert np.allclose(X[:3, 3], [wanted.x, wanted.y, wanted.z], atol=1e-9)
+        assert np.allclose(X[:3, :3], wanted.rotation, atol=1e-9)
+    everything = setting_of("3rrr_m1").everything
+    with pytest.raises(BadRequest, match="one axis only"):
+        reach(everything.start, everything.question, Pose.parse("rpy=0.1/0/0"))
 
 
 @pytest.mark.parametrize(("robot", "text"), [

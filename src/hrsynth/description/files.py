@@ -9,6 +9,13 @@ from pathlib import Path
 from ..errors import BadRequest
 
 
+def require_folder(path: str | Path) -> None:
+    """Raise ``BadRequest`` where there is no folder to write a file in: before long work, not after it."""
+    folder = Path(os.path.realpath(path)).parent
+    if not folder.is_dir():
+        raise BadRequest("cannot write the file: no such folder", str(folder))
+
+
 def write_whole(path: str | Path, content: bytes) -> None:
     """Write a file under a temporary name, then rename it; raises ``BadRequest`` where it cannot be written."""
     try:

@@ -13,7 +13,7 @@ import numpy as np
 from ..errors import BadRequest
 from ..mechanism.pose import Pose
 from ..mechanism.vectors import Array, hat, rotation_about
-from ..tolerances import RANK_CUTOFF
+from ..tolerances import AS_PRINTED, RANK_CUTOFF
 from .configuration import ClosedConfiguration, point_velocity
 from .ranks import range_basis
 from .relation import Question, relation
@@ -94,6 +94,8 @@ class PlatformMotion:
     shifts: Array
     spins: Array
     twists: Array
+    dof: int
+    """Freedoms at a generic configuration; ``twists`` spans more where they change from pose to pose."""
 
     @classmethod
     def of(cls, configurations: Iterable[ClosedConfiguration], question: Question) -> PlatformMotion:
@@ -107,8 +109,9 @@ class PlatformMotion:
             columns.append(found)
             twin = at.twin
         together = np.hstack(columns)
-        spans = [range_basis(part, 1.0)[0] for part in (together[:3], together[3:], together)]
-        return cls(question.platform, point, question.point is None, twin.pose(twin.q0, question.platform), *spans)
+        shifts, spins, twists = (range_basis(part, 1.0)[0] for part in (together[:3], together[3:], together))
+        home, dof = twin.pose(twin.q0, question.platform), max(column.shape[1] for column in columns)
+        return cls(question.platform, point, question.point is None, home, shifts, spins, twists, dof)
 
     @property
     def normal(self) -> Array:
@@ -119,6 +122,11 @@ class PlatformMotion:
         if np.linalg.norm(normal @ self.shifts) > RANK_CUTOFF:
             return np.array([0.0, 0.0, 1.0])
         return normal * np.sign(normal[np.argmax(np.abs(normal))])
+
+    @property
+    def planar(self) -> bool:
+        """Whether it is free in a plane: two translations and the turn about their normal."""
+        return (self.shifts.shape[1], self.spins.shape[1], self.dof) == (2, 1, 3)
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -138,13 +146,27 @@ class PlatformMotion:
 
     def goal(self, pose: Pose, robot: str = "the robot") -> Goal:
         """The goal that a pose asks for; raises ``BadRequest`` for parts that the platform cannot change."""
-        for name in pose.given:
-            if name not in self.parts:
+        constant = [name for name in pose.given if name not in self.parts]
+        for name in constant:
+            if not self._as_at_home(pose, name):
                 raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts or "no part")
+        pose = replace(pose, **dict.fromkeys(constant))
+        if pose.rotation is not None and self.spins.shape[1] == 1:
+            turn = pose.rotation @ self.home[:3, :3].T
+            if np.linalg.norm(turn @ self.spins[:, 0] - self.spins[:, 0]) > AS_PRINTED:
+                raise BadRequest(f"{robot}: the platform turns about one axis only, rpy is no such turn", str(pose),
+                                 "phi, or a turn about " + " ".join(f"{x:.4g}" for x in self.spins[:, 0]))
         placed = [i for i, name in enumerate("xyz") if name in pose.given]
         values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)
         return Goal(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, self.normal, pose.phi,
                     pose.rotation)
+
+    def _as_at_home(self, pose: Pose, name: str) -> bool:
+        """Whether a part that never changes is given as it is at the zero configuration, to the digits printed."""
+        if name in "xyz":
+            here = self.position(self.home)["xyz".index(name)]
+            return abs(float(getattr(pose, name)) - float(here)) <= AS_PRINTED
+        return pose.rotation is not None and float(np.linalg.norm(pose.rotation - self.home[:3, :3])) <= AS_PRINTED
 
     def at_home(self) -> Goal:
         """The goal of the whole pose at the zero configuration: what free parts are nearest to."""

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..analysis.singularity.locus import Field, Locus
 from ..analysis.singularity.singular import Singularity
-from ..description.files import write_whole
+from ..description.files import require_folder, write_whole
 from ..errors import BadRequest
 from ..mechanism.vectors import Array
 from .plots import axis_label, cell_edges, panels, png, tick_values
@@ -56,6 +56,8 @@ def writable(path: str | None, plane: str | None) -> None:
         raise BadRequest("a plane of poses is drawn", plane, "--plane together with --output FILE.png")
     if path is not None and Path(path).suffix.lower() != ".png":
         raise BadRequest("cannot draw the locus: unknown ending", path, ".png")
+    if path is not None:
+        require_folder(path)
 
 
 def write(found: Singularity, drawn: Locus, path: str) -> None:

@@ -7,7 +7,7 @@ import io
 from pathlib import Path
 
 from ..analysis.check import MEASURES, Check, GridCheck
-from ..description.files import write_whole
+from ..description.files import require_folder, write_whole
 from ..errors import BadRequest
 from ..mechanism.pose import PARTS
 from .plots import distance_map
@@ -21,6 +21,7 @@ def writable(path: str, grid: str | None) -> None:
         raise BadRequest("only a grid of poses is written", path, "--output together with --grid")
     if Path(path).suffix.lower() not in FORMATS:
         raise BadRequest("cannot write the grid: unknown ending", path, FORMATS)
+    require_folder(path)
 
 
 def write(found: Check, path: str) -> None:

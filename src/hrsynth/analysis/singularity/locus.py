@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -15,8 +16,8 @@ from ...kinematics.reach import reach, sweep
 from ...kinematics.relation import Question
 from ...mechanism.pose import Grid, Pose
 from ...mechanism.vectors import Array
-from ...tolerances import SAME_GEOMETRY
-from .agreement import descend, spectrum
+from ...tolerances import SAME_GEOMETRY, SAME_RELATION
+from .agreement import descend, spectrum, weakest
 from .condition import Condition
 from .structure import Structure
 
@@ -27,7 +28,8 @@ COARSE = 25
 """Poses a side of the grid that finds how far a plane is reached."""
 WIDE = (2.5, 5.0)
 """Half the side of that grid (characteristic lengths), and where the robot reaches its border, of a second one."""
-STARTS = 4
+STARTS = 8
+"""Valleys of the smallest singular value from which an isolated singular pose is sought."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,7 +96,7 @@ def locus(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
             table[places] = column
             tables.append(table.reshape(grid.shape))
         spots = np.zeros((0, 2)) if condition.signed or condition.never else _spots(
-            grid, motion, [here[i] for i in np.argsort(smallest)[:STARTS]], asked, structure, condition)
+            grid, motion, [here[places.index(i)] for i in _valleys(tables[1])], asked, structure, condition)
         return Field(tables[0], condition.signed, tables[1], tables[2], spots)
 
     return Locus(grid, field(*hidden), None if real is None else field(*real))
@@ -135,21 +137,48 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
     unknown = [part for part in fixed if part not in motion.parts]
     if unknown:
         raise BadRequest(f"{name}: the platform cannot change {unknown[0]}", str(plane), motion.parts)
-    free = [part for part in parts if part not in fixed]
-    if len(free) > 2 and "phi" in free and motion.spins.shape[1] == 1 and not fixed:
-        plane, free = replace(plane, phi=0.0), [part for part in free if part != "phi"]
-    if len(free) > 2:
-        free = [part for part in free if part != "phi"]
-    if len(free) == 3 and not fixed & set("xyz"):
-        plane, free = replace(plane, z=round(_coordinates(motion, start, ("z",))[0], 9)), free[:2]
-    if len(free) != 2:
-        raise BadRequest(f"{name}: a plane of poses leaves two parts free", str(plane) or "none", parts)
-    return plane, tuple(free)
+    if not fixed and motion.planar:
+        plane, turned = replace(plane, phi=0.0), True
+    places = [part for part in parts if part in "xyz" and part not in fixed]
+    count = motion.shifts.shape[1] - len(fixed & set("xyz"))
+    if count == 3:
+        plane, places, count = replace(plane, z=round(_coordinates(motion, start, ("z",))[0], 9)), places[:2], 2
+    if count == 2:
+        return plane, max(combinations(places, 2), key=lambda pair: _spread(motion, pair))
+    if count == 1 and "phi" in parts and not turned:
+        return plane, (places[0], "phi")
+    raise BadRequest(f"{name}: a plane of poses leaves two parts free", str(plane) or "none", parts)
+
+
+def _spread(motion: PlatformMotion, pair: tuple[str, str]) -> float:
+    """How freely two coordinates of the position vary: the volume of their rows."""
+    rows = motion.shifts[["xyz".index(name) for name in pair]]
+    return round(float(np.linalg.svd(rows, compute_uv=False).prod()), 9)
 
 
 def _coordinates(motion: PlatformMotion, at: ClosedConfiguration, names: Sequence[str]) -> list[float]:
     position = motion.position(at.pose(motion.link))
     return [0.0 if name == "phi" else float(position["xyz".index(name)]) for name in names]
+
+
+def _valleys(table: Array) -> list[int]:
+    """The deepest cells that are lower than all their neighbours, by their flat index."""
+    filled = np.where(np.isfinite(table), table, np.inf)
+    padded = np.pad(filled, 1, constant_values=np.inf)
+    nx, ny = table.shape
+    around = [padded[i : i + nx, j : j + ny] for i in range(3) for j in range(3) if (i, j) != (1, 1)]
+    cells = np.flatnonzero((filled < np.inf) & (filled <= np.min(around, axis=0)))
+    return sorted(map(int, cells), key=lambda cell: float(filled.flat[cell]))[:STARTS]
+
+
+def _same_mode(start: ClosedConfiguration, at: ClosedConfiguration, question: Question,
+               motion: PlatformMotion) -> bool:
+    """Whether the pose of ``at`` is singular in the working mode of ``start``, too."""
+    try:
+        there = reach(start, question, motion.pose(at.pose(motion.link)), motion)
+    except PoseNotReached:
+        return False
+    return weakest(there, question) < SAME_RELATION
 
 
 def _spots(grid: Grid, motion: PlatformMotion, starts: Sequence[ClosedConfiguration], question: Question,
@@ -160,10 +189,9 @@ def _spots(grid: Grid, motion: PlatformMotion, starts: Sequence[ClosedConfigurat
         at = descend(start, question, structure, condition)
         if at is None:
             continue
-        X = at.pose(motion.link)
         error, _ = motion.goal(grid.fixed).rows(at.twin, at.q)
         place = _coordinates(motion, at, grid.names)
         new = all(np.linalg.norm(np.subtract(place, other)) > 1e-6 for other in found)
-        if new and np.all(np.isfinite(X)) and np.linalg.norm(error) < SAME_GEOMETRY ** 0.5:
+        if new and np.linalg.norm(error) < SAME_GEOMETRY ** 0.5 and _same_mode(start, at, question, motion):
             found.append(place)
     return np.array(found).reshape(-1, 2)

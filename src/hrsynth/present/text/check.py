@@ -24,7 +24,8 @@ def check(found: Check) -> str:
         rows.insert(2, ("camera on", found.setting.mechanism.reference))
     for posture in found.postures:
         rows += [("", ""), ("pose", str(posture.pose)), *_posture(posture)]
-    redundant = [f"loop {each.loop}: {each.rows} of its constraints" for each in found.redundant] or ["no constraint"]
+    redundant = [f"the loop cut at {each.loop}: {each.rows} of its constraints" for each in found.redundant]
+    redundant = redundant or ["no constraint"]
     rows += [("", ""), *[("redundant" if i == 0 else "", text) for i, text in enumerate(redundant)]]
     if found.grid is not None:
         counts = Counter(found.grid.states)
@@ -40,8 +41,8 @@ def _posture(posture: Posture) -> list[tuple[str, str]]:
             *_kinds("hidden robot", f"the directions show {posture.hidden.rank} of {posture.dof}", posture.hidden)]
     if far.condition is not None and far.type2 is not None and far.type1 is not None:
         rows += [("", f"singular values of Mᵀ {far.type2:.3g} to {1 / far.type1:.3g}, condition {far.condition:.3g}"),
-                 ("", f"one degree of error in the directions: {_small(far.millimetres)} mm and {_small(far.degrees)} "
-                      "degrees along the weakest freedom that they show")]
+                 ("", f"one degree of error in the directions, to first order: {_small(far.millimetres)} mm and "
+                      f"{_small(far.degrees)} degrees along the weakest freedom that they show")]
     elif far.type2 is None:
         rows.append(("", "there is no interaction matrix: observed links move while the platform rests"))
     if posture.real is None:
@@ -50,7 +51,8 @@ def _posture(posture: Posture) -> list[tuple[str, str]]:
         rows += _kinds("real robot", f"the motors determine {posture.real.rank} of {posture.dof}", posture.real)
     if posture.constraint_singular:
         rows += [("loops", "lose rank here, the platform has"), *[("", freedom.name) for freedom in posture.gained]]
-    rows += [("redundant here", f"loop {each.loop}: {each.rows} more of its constraints") for each in posture.redundant]
+    rows += [("redundant here", f"the loop cut at {each.loop}: {each.rows} more of its constraints")
+             for each in posture.redundant]
     return [*rows, ("loops' margin", f"{far.constraints:.3g} (weakest singular value, as part of the largest)")]
 
 
