@@ -91,7 +91,8 @@ def agreement(start: ClosedConfiguration, question: Question, structure: Structu
     crossings = (_crossings(walk, signs, structure, condition) if condition.signed
                  else _descents(low, question, structure, condition))
     on_locus = []
-    wrong += _out_of_proportion(np.array(sizes))
+    if all(leg.tip.link == leg.body for leg in structure.legs):
+        wrong += _out_of_proportion(np.array(sizes))
     loops = WEAKEST * start.kernel()[1].weakest
     freedoms = max(relation(at, question).dof.value for at in [start, *(at for _, at in low)])
     for at in [] if condition.never else crossings:
@@ -126,7 +127,8 @@ def _volumes(matrices: Array) -> Array:
 
 
 def _out_of_proportion(sizes: Array) -> int:
-    """At how many poses an expression with a sign is not the same multiple of the rows' volume as elsewhere."""
+    """At how many poses an expression with a sign is not the same multiple of the rows' volume as elsewhere; a law of
+    tips that keep their place in the platform."""
     if len(sizes) == 0:
         return 0
     values, volumes = sizes.T
