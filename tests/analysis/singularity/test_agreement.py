@@ -87,7 +87,7 @@ def test_random_robots(robot: Mechanism, seed: int, real: bool) -> None:
 
 @pytest.mark.slow
 @given(robot=strategies.parallel_robots(), seed=st.integers(0, 2**31), real=st.booleans())
-@settings(max_examples=30, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+@settings(max_examples=10, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 def test_many_random_robots(robot: Mechanism, seed: int, real: bool) -> None:
     check_random_robot(robot, seed, real, 100)
 
