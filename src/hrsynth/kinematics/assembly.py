@@ -24,8 +24,8 @@ STARTS = 24
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """What became of a robot at a pose: the configuration, or None and the legs that do not close (``open``); joints that
-    are outside their limits there (``beyond``); the poses (4, 4) of the platform's links."""
+    """What became of a robot at a pose: the configuration, or None and the legs that do not close (``open``); joints
+    that are outside their limits there (``beyond``); the poses (4, 4) of the platform's links."""
 
     configuration: ClosedConfiguration | None
     open: tuple[str, ...] = ()
@@ -40,7 +40,7 @@ class Assembly:
 
 @dataclass(frozen=True, eq=False)
 class Assembler:
-    """A robot whose legs are closed one at a time between the base and bodies of the platform that are at given poses."""
+    """A robot whose legs are closed one at a time between the base and bodies of the platform at given poses."""
 
     anatomy: Anatomy
     length: float
@@ -57,7 +57,8 @@ class Assembler:
         kept = {mechanism.base, *self.anatomy.platform}
         floats = Joint(mechanism.fresh("floating"), JointType.FREE, mechanism.base, body,
                        mechanism.links[body].pose[:3, 3])
-        outside = [name for name, joint in mechanism.joints.items() if not set(joint.links) <= set(self.anatomy.platform)]
+        inside = set(self.anatomy.platform)
+        outside = [name for name, joint in mechanism.joints.items() if not set(joint.links) <= inside]
         return mechanism.changed(remove_links=set(mechanism.links) - kept, remove_joints=outside, joints=[floats],
                                  observations=(), camera=None)
 
