@@ -10,9 +10,10 @@ if TYPE_CHECKING:
     from .analysis.derive import derive
     from .analysis.singularity.singular import singular
     from .description import load, save, shipped
+    from .servo.servo import servo
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "advise", "check", "derive", "legs", "load", "path", "save", "shipped", "singular"]
+__all__ = ["__version__", "advise", "check", "derive", "legs", "load", "path", "save", "servo", "shipped", "singular"]
 
 _HOME = {
     "advise": ".analysis.advice",
@@ -22,6 +23,7 @@ _HOME = {
     "load": ".description",
     "path": ".analysis.aspects.path",
     "save": ".description",
+    "servo": ".servo.servo",
     "shipped": ".description",
     "singular": ".analysis.singularity.singular",
 }
