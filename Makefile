@@ -23,7 +23,7 @@ demo: setup  ## derive the hidden robot of a Quattro of which legs 1 and 4 are o
 test: setup-dev  ## the tests, without the slow ones
 	@$(PYTEST) -m "not slow and not browser" tests
 
-test-all: setup-dev  ## all tests
+test-all: setup-all  ## all tests
 	@$(PYTEST) tests
 
 bounds: setup-dev  ## 10,000 random instances of every family of assembly modes (INSTANCES=10000; half an hour)
