@@ -8,12 +8,14 @@ if TYPE_CHECKING:
     from .analysis.check import check
     from .analysis.controllability import legs
     from .analysis.derive import derive
+    from .analysis.modes.modes import modes
     from .analysis.singularity.singular import singular
     from .description import load, save, shipped
     from .servo.servo import servo
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "advise", "check", "derive", "legs", "load", "path", "save", "servo", "shipped", "singular"]
+__all__ = ["__version__", "advise", "check", "derive", "legs", "load", "modes", "path", "save", "servo", "shipped",
+           "singular"]
 
 _HOME = {
     "advise": ".analysis.advice",
@@ -21,6 +23,7 @@ _HOME = {
     "derive": ".analysis.derive",
     "legs": ".analysis.controllability",
     "load": ".description",
+    "modes": ".analysis.modes.modes",
     "path": ".analysis.aspects.path",
     "save": ".description",
     "servo": ".servo.servo",

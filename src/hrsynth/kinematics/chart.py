@@ -1,4 +1,4 @@
-"""Coordinates on the closed configurations around one of them, in which an integrator can work: no drift by construction.
+"""Coordinates on the closed configurations around one of them, in which an integrator works without drift.
 
 A configuration q near q₀ has the coordinates y = Bᵀ (q ⊖ q₀), B an orthonormal basis of the tangent space at q₀ without
 its idle motions. Going back, the loops are solved together with these n equations.

@@ -10,7 +10,7 @@ import numpy as np
 from ..description.files import require_folder, write_whole
 from ..errors import BadRequest
 from ..mechanism.vectors import Array
-from ..servo.servo import Servo
+from ..servo.result import Servo
 from .plots import panels, png
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

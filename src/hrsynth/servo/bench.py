@@ -1,7 +1,7 @@
 """The physics bench: the same controller drives a mock-up in MuJoCo (the papers' virtual mock-up, MMT 5.1.1).
 
-The directions are read from the simulated bodies, the motors' coordinates from their encoders. At each sample the model of
-the robot takes the motors' coordinates, and the speeds that the law commands are held until the next.
+The directions are read from the simulated bodies, the motors' coordinates from their encoders. At each sample the
+model of the robot takes the motors' coordinates, and the speeds that the law commands are held until the next.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A pinhole camera that sees the legs as cylinders: their two edges, and the directions rebuilt from them (MMT 2.1-2.2).
+"""A pinhole camera that sees legs as cylinders: their edges, and the directions rebuilt from them (MMT 2.1-2.2).
 
-In the camera's frame x points right, y down and z ahead. An axis through P with direction u has the unit normal h of its
-interpretation plane and the distance h from the camera: h h = P × u.
+In the camera's frame x points right, y down and z ahead. An axis through P with direction u has the unit normal h of
+its interpretation plane and the distance h from the camera: h h = P × u.
 """
 
 from __future__ import annotations
@@ -40,8 +40,8 @@ class Rod:
 
 @dataclass(frozen=True, eq=False)
 class Camera:
-    """Intrinsics (focal length, width and height in pixels, the centre in the middle) and the pose (4, 4) of the camera in
-    the frame of the link that carries it."""
+    """Intrinsics (focal length, width and height in pixels, the centre in the middle) and the pose (4, 4) of the
+    camera in the frame of the link that carries it."""
 
     place: Array
     focal: float = 800.0
@@ -101,8 +101,8 @@ def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tupl
 
 @dataclass(frozen=True, eq=False)
 class Edges:
-    """Directions rebuilt from the edges of the legs in the picture, each edge known by two points in it that are wrong by
-    up to ``pixels`` across the edge."""
+    """Directions rebuilt from the edges of the legs in the picture, each edge known by two points in it that are wrong
+    by up to ``pixels`` across the edge."""
 
     camera: Camera
     reference: str
@@ -123,7 +123,7 @@ class Edges:
 
 
 def _moved(normal: Array, ends: Array, shift: Array) -> Array:
-    """The normal of an edge whose image is moved across itself by ``shift`` (its first two numbers) at the rod's ends."""
+    """The normal of an edge whose image is moved across itself by ``shift`` (two numbers) at the rod's ends."""
     across = unit(np.array([normal[0], normal[1], 0.0]))
     points = []
     for end, by in zip(ends, shift, strict=False):
@@ -156,8 +156,8 @@ def placed(rods: Sequence[Rod], reference: str, poses: Sequence[Poses], blank: C
 
 
 def sensitivity(ends: Array, radius: float) -> float:
-    """How far (rad) the rebuilt direction of a rod turns for each radian by which the ends of its two edges are wrong, all
-    at their worst; infinite where the camera is inside the rod."""
+    """How far (rad) the rebuilt direction of a rod turns for each radian by which the ends of its two edges are wrong,
+    all at their worst; infinite where the camera is inside the rod."""
     try:
         normals = edges(ends, radius)
     except BadRequest:

@@ -1,13 +1,13 @@
-"""Where a run ended, in the words of the theory (6): goal, another assembly mode, antipodal, a local minimum, a boundary."""
+"""Where a run ended, in the words of the theory (6): goal, mode, antipodal, local minimum, boundary, time."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ..analysis.modes.modes import AssemblyModes
 from ..analysis.posture import Posture
 from ..errors import HrsynthError
 from ..kinematics.configuration import ClosedConfiguration
@@ -15,9 +15,6 @@ from ..mechanism.vectors import Array
 from ..tolerances import DAMPED, SAME_RELATION
 from .law import Command
 from .run import AWAY, LIMIT, OPEN, REST, SERVED_AT, Run, margins
-
-if TYPE_CHECKING:
-    from ..analysis.modes.modes import AssemblyModes
 
 GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME = "goal", "mode", "antipodal", "local minimum", "boundary", "time"
 ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME)
@@ -91,21 +88,22 @@ class Referee:
         far = posture.distances
         if weak and far.type2 is not None and far.type2 < DAMPED:
             return Ending(MINIMUM, f"{where} at a Type 2 singularity of the hidden robot")
-        if far.type1 is not None and far.type1 < DAMPED or far.type2 is None:
+        if (far.type1 is not None and far.type1 < DAMPED) or far.type2 is None:
             return Ending(MINIMUM, f"{where} at a Type 1 singularity of the hidden robot")
         if weak:
-            return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: a direction is perpendicular to "
-                                   "the desired one")
-        return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: more is watched than the robot has "
-                               "freedoms")
+            return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: a direction is perpendicular "
+                                   "to the desired one")
+        return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: more is watched than the robot "
+                               "has freedoms")
 
     def same_pose(self, at: ClosedConfiguration, X: Array) -> bool:
         """Whether the platform of a configuration is at X (4, 4), to ``SAME_RELATION``."""
         return self._alike(at.pose(self.platform), X, self.point)
 
     def _alike(self, X: Array, other: Array, point: Array | None) -> bool:
+        near = SAME_RELATION * self.goal.twin.length
         if point is not None:
-            return bool(np.max(np.abs((X - other)[:3] @ np.append(point, 1.0))) <= SAME_RELATION * self.goal.twin.length)
-        return bool(np.max(np.abs(X[:3, 3] - other[:3, 3])) <= SAME_RELATION * self.goal.twin.length
+            return bool(np.max(np.abs((X - other)[:3] @ np.append(point, 1.0))) <= near)
+        return bool(np.max(np.abs(X[:3, 3] - other[:3, 3])) <= near
                     and np.max(np.abs(X[:3, :3] - other[:3, :3])) <= SAME_RELATION)
 

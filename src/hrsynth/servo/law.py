@@ -1,9 +1,9 @@
 """The control law that servoes leg directions (MMT 2.3.2, eqs. 9-12), for any robot and any observed legs.
 
 e_i = u_i × u_di, L_iᵀ = −[u_di]ₓ M_iᵀ, τ = −λ L^{T+} e and q̇ = J_inv τ are solved at once on the tangent space of the
-closed loops: with B a basis of it and U B the rates of the directions, q̇ = −λ B (L U B)⁺ e, where L stacks −[u_di]ₓ. Where
-the robot sees all of its platform's twist this is the same velocity of least norm; and it stays finite where Mᵀ does not
-exist because a watched leg is stretched (Type 1), as the motion through such a pose is.
+closed loops: with B a basis of it and U B the rates of the directions, q̇ = −λ B (L U B)⁺ e, where L stacks −[u_di]ₓ.
+Where the robot sees all of its platform's twist this is the same velocity of least norm; and it stays finite where Mᵀ
+does not exist because a watched leg is stretched (Type 1), as the motion through such a pose is.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ Sense = Callable[[float, Poses, Array], Array]
 
 @dataclass(frozen=True, eq=False)
 class Command:
-    """What the law commands at a configuration: joint velocities (nv,), the true error and directions and the measured
-    directions (k, 3), and the singular values of the rows that it inverts, as many as the platform has freedoms, largest
-    first."""
+    """What the law commands at a configuration: joint velocities (nv,), the true error and directions, the measured
+    directions (k, 3), and the singular values of the rows that it inverts, as many as the platform has freedoms,
+    largest first."""
 
     velocity: Array
     error: Array
@@ -53,7 +53,7 @@ class Command:
 
 @dataclass(frozen=True, eq=False)
 class Law:
-    """The law of one robot: ``question`` holds what is observed, ``dof`` the freedoms of its platform, ``gain`` is λ."""
+    """The law of one robot: ``question`` holds what is observed, ``dof`` its platform's freedoms, ``gain`` is λ."""
 
     question: Question
     dof: int

@@ -1,8 +1,8 @@
 """A robot as a physical mock-up: MJCF text with rods, masses and velocity servos on the robot's own motors.
 
-Every body's frame is the base frame at the zero configuration, so that joint centres and axes are written as they are and
-a simulated body's pose is the displacement of its link. The loops are cut at their loosest joints; a cut joint is hung on
-one link as a light body that is welded to the other.
+Every body's frame is the base frame at the zero configuration, so that joint centres and axes are written as they are
+and a simulated body's pose is the displacement of its link. The loops are cut at their loosest joints; a cut joint is
+hung on one link as a light body that is welded to the other.
 """
 
 from __future__ import annotations
@@ -52,8 +52,8 @@ class Mockup:
 
 
 def mockup(mechanism: Mechanism, gravity: float = 9.81) -> str:
-    """The MJCF of a mechanism that is to move from its zero configuration under gravity along −z (m/s²); motors are named as
-    their joints. Raises ``BadMechanism`` for a joint that leaves all six freedoms."""
+    """The MJCF of a mechanism that is to move from its zero configuration under gravity along −z (m/s²); motors are
+    named as their joints. Raises ``BadMechanism`` for a joint that leaves all six freedoms."""
     made = Mockup(mechanism)
     root = made.root
     root.set("model", mechanism.name)
@@ -128,15 +128,17 @@ def _joints(made: Mockup, body: Xml.Element, joint: Joint, extra: float = 0.0) -
 
 
 def _loop(made: Mockup, bodies: Mapping[str, Xml.Element], equality: Xml.Element, joint: Joint) -> None:
-    """Close a loop: a ball by its centre, any other joint by a light body that is hung on one link and welded to the other."""
+    """Close a loop: a ball by its centre, any other joint by a light body on one link that is welded to the other."""
     a, b = joint.links
     if joint.type is JointType.SPHERICAL:
-        Xml.SubElement(equality, "connect", body1=_name(made, a), body2=_name(made, b), anchor=_text(joint.point), **STIFF)
+        Xml.SubElement(equality, "connect", STIFF, body1=_name(made, a), body2=_name(made, b),
+                       anchor=_text(joint.point))
         return
     half = _body(bodies[a], f"{joint.name}__cut")
     _joints(made, half, joint, CUT)
     Xml.SubElement(half, "geom", type="sphere", size=_text([made.radius / 2]), pos=_text(joint.point), group="3")
-    Xml.SubElement(equality, "weld", body1=f"{joint.name}__cut", body2=_name(made, b), anchor=_text(joint.point), **STIFF)
+    Xml.SubElement(equality, "weld", STIFF, body1=f"{joint.name}__cut", body2=_name(made, b),
+                   anchor=_text(joint.point))
 
 
 def _drive(made: Mockup, actuator: Xml.Element, tree: list[Joint]) -> None:
@@ -150,7 +152,8 @@ def _gears(mechanism: Mechanism, equality: Xml.Element, tree: list[Joint]) -> No
     for coupling in mechanism.couplings:
         names = [next(j.name for j in tree if j.successor == link and j.in_tree and j.type.freedoms == 1)
                  for link in (coupling.successor, coupling.predecessor)]
-        Xml.SubElement(equality, "joint", joint1=names[0], joint2=names[1], polycoef=f"0 {coupling.ratio} 0 0 0", **STIFF)
+        Xml.SubElement(equality, "joint", STIFF, joint1=names[0], joint2=names[1],
+                       polycoef=f"0 {coupling.ratio} 0 0 0")
 
 
 def _body(parent: Xml.Element, name: str) -> Xml.Element:

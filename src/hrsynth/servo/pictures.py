@@ -68,7 +68,8 @@ class Stage:
         for link in self._links:
             body = Xml.SubElement(world, "body", name=link, mocap="true")
             X = inverse(self.mechanism.links[link].pose)
-            drawn = [(ends @ X[:3, :3].T + X[:3, 3], GREY * np.ones(3)) for ends in map(np.array, rods(self.mechanism, link))]
+            drawn = [(ends @ X[:3, :3].T + X[:3, 3], GREY * np.ones(3))
+                     for ends in map(np.array, rods(self.mechanism, link))]
             watched = [(rod.ends, COLOURS[i % len(COLOURS)]) for i, rod in enumerate(self.rods) if rod.link == link]
             for ends, colour in watched or drawn:
                 Xml.SubElement(body, "geom", type="cylinder", size=f"{radius}", contype="0", conaffinity="0",
@@ -110,8 +111,8 @@ class Pictures:
     _held: dict[int, Array] = field(default_factory=dict)
 
     def __call__(self, time: float, poses: Poses, directions: Array) -> Array:
-        """The measured directions (k, 3) in the reference link's frame; a leg of which too little is seen keeps its true
-        one."""
+        """The measured directions (k, 3) in the reference link's frame; a leg of which too little is seen keeps its
+        true one."""
         sample = int(time / PERIOD + 1e-9)
         if sample not in self._held:
             self._held[sample] = self._measured(poses, directions) - directions
@@ -138,9 +139,9 @@ def shade(picture: Array, colour: Array) -> Array:
 
 
 def outlines(cover: Array, light: Array, camera: Camera) -> tuple[Array, Array] | None:
-    """The unit normals of the planes of a leg's two edges, the leg on their negative side, from what it covers and how light
-    all is; None where too little of it is in the picture. Only edges beside black count: others may be those of a link
-    before it."""
+    """The unit normals of the planes of a leg's two edges, the leg on their negative side, from what it covers and how
+    light all is; None where too little of it is in the picture. Only edges beside black count: others may be those of
+    a link before it."""
     cv2 = vision()
     grey = np.clip(cover, 0, 255).astype(np.uint8)
     rows, columns = np.nonzero(grey > 127)
@@ -162,14 +163,14 @@ def outlines(cover: Array, light: Array, camera: Camera) -> tuple[Array, Array] 
             return None
         vx, vy, x, y = cv2.fitLine(points.astype(np.float32), cv2.DIST_HUBER, 0, 0.001, 0.001).ravel()
         ends = [camera.ray(np.array([x + t * vx + 0.5, y + t * vy + 0.5])) for t in (-longest, longest)]
-        normal = unit(np.cross(*ends))
+        normal = unit(np.cross(ends[0], ends[1]))
         normals.append(normal if normal @ centre < 0 else -normal)
     return normals[0], normals[1]
 
 
 def _placed(cover: Array, light: Array, points: Array, outwards: Array) -> Array:
-    """Edge points (n, 2) moved along the outward normal to where half of a pixel is covered; those without such a place, or
-    with something else beside it, are left out."""
+    """Edge points (n, 2) moved along the outward normal to where half of a pixel is covered; those without such a
+    place, or with something else beside it, are left out."""
     cv2 = vision()
     steps = np.arange(-REACH, REACH + 0.25, 0.25)
     places = points[:, None, :] + steps[None, :, None] * outwards

@@ -113,7 +113,8 @@ class _Stretch:
             return [], [], stopped
         until = horizon if start >= loop.steady else min(horizon, loop.steady)
         tolerances = {"rtol": TOLERANCE, "atol": TOLERANCE * scale}
-        times, states = [], []
+        times: list[float] = []
+        states: list[tuple[ClosedConfiguration, Command]] = []
         try:
             y = np.zeros(self.chart.basis.shape[1])
             solver = (LSODA(self.rate, start, y, until, **tolerances) if loop.sensed is None
@@ -131,7 +132,7 @@ class _Stretch:
                     return times, states, LIMIT
                 if settling and (stopped := self._over(state[1])):
                     return times, states, stopped
-                if np.linalg.norm(solver.y) > WIDE or settling and state[1].size < CLOSER * scale:
+                if np.linalg.norm(solver.y) > WIDE or (settling and state[1].size < CLOSER * scale):
                     return times, states, None
         except LoopsNotClosed:
             return times, states, OPEN

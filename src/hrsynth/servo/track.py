@@ -2,7 +2,8 @@
 
 Side by side along the run, the rates of the directions and the twists of the platform are determinants on one tangent
 space. Where the first alone changes its sign the run crossed a Type 2 singularity of the hidden robot, where the second
-alone does a watched leg passed its limit (Type 1) into another working mode, where both do a leg that is not watched did.
+alone does a watched leg passed its limit (Type 1) into another working mode, where both do a leg that is not watched
+did.
 """
 
 from __future__ import annotations

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ...servo.servo import Servo
+from ...servo.result import Servo
 from ...servo.track import LIMIT, TYPE_1, TYPE_2
 from .tables import listing
 
@@ -32,8 +32,9 @@ def servo(found: Servo, file: str | None = None) -> str:
                  for i, mode in enumerate(listed.modes)]
     if found.spread is not None:
         s = found.spread
-        rows.append(("noise", f"keeps it within {1e3 * s.metres:.3g} mm and {math.degrees(s.radians):.2g} degrees of there, "
-                              f"{1e3 * s.rms_metres:.2g} mm and {math.degrees(s.rms_radians):.2g} degrees root mean square"))
+        rows.append(("noise", f"keeps it within {1e3 * s.metres:.3g} mm and {math.degrees(s.radians):.2g} degrees of "
+                              f"there, root mean square {1e3 * s.rms_metres:.2g} mm and "
+                              f"{math.degrees(s.rms_radians):.2g} degrees"))
     rows += [("", line) for line in found.notes]
     least = track.to_dict(run.times.tolist())
     if least["smallest"] is not None:
