@@ -17,7 +17,9 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Colours that colour-blind readers tell apart."""
 STYLES = ("solid", "dashed", "dashdot", "dotted", "solid", "dashed")
 FLAT = 1e-9
-"""Metres below which the platform has not moved along an axis."""
+"""Metres, radians below which the platform has not moved along an axis, or not turned."""
+SHOWN = 1e-3
+"""Part of the largest error below which the rest of a run is not drawn."""
 
 
 def writable(output: str | None) -> None:
@@ -49,7 +51,7 @@ def picture(found: Servo) -> bytes:
         places.plot(times, path[:, i] - goal[i], color=COLOURS[i], linestyle=STYLES[i], label="xyz"[i])
     places.set(ylabel="position minus that of the goal (m)")
     places.legend(frameon=False)
-    if found.setting.motion.spins.shape[1]:
+    if found.turns.max() > FLAT:
         turns.plot(times, np.degrees(found.turns), color=COLOURS[0])
         turns.set(ylabel="turn away from the goal (degrees)", ylim=(0, max(1.0, 1.1 * np.degrees(found.turns.max()))))
     else:
@@ -57,7 +59,7 @@ def picture(found: Servo) -> bytes:
         turns.set(ylabel="smallest singular value of $M^T$", ylim=(0, None))
     for place in (errors, places, turns):
         place.axhline(0, color="0.6", linewidth=0.8)
-        place.set(xlabel="time (s)", xlim=(0, times[-1] or 1.0))
+        place.set(xlabel="time (s)", xlim=(0, _until(found) or 1.0))
     _drawn(way, found, path, goal)
     legs = ", ".join(found.setting.labels)
     figure.suptitle(f"{found.setting.robot.name}, legs {legs} observed: ended at {_ENDS[found.ended]}\n"
@@ -67,6 +69,13 @@ def picture(found: Servo) -> bytes:
 
 _ENDS = {"goal": "the goal", "mode": "another assembly mode", "antipodal": "an antipodal pose",
          "local minimum": "a local minimum", "boundary": "a boundary of the workspace", "time": "the end of its time"}
+
+
+def _until(found: Servo) -> float:
+    """The time (s) after which nothing is left to be seen."""
+    sizes = found.errors.max(axis=1)
+    late = np.nonzero(sizes > SHOWN * sizes.max())[0]
+    return float(found.run.times[min(late[-1] + 1, len(sizes) - 1)]) if len(late) else float(found.run.times[-1])
 
 
 def _drawn(way: Any, found: Servo, path: Array, goal: Array) -> None:

@@ -6,7 +6,6 @@ model of the robot takes the motors' coordinates, and the speeds that the law co
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -37,7 +36,6 @@ STEADY = 1e-3
 
 def simulator(what: str) -> Any:
     """The module mujoco; raises ``MissingExtra`` where it is not installed."""
-    os.environ.setdefault("MUJOCO_GL", "egl")
     try:
         import mujoco
     except ImportError:

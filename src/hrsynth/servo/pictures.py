@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
@@ -9,7 +10,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
-from ..errors import MissingExtra
+from ..errors import MissingExtra, NotRendered
 from ..mechanism import Mechanism
 from ..mechanism.vectors import Array, inverse, unit
 from .bench import simulator
@@ -38,6 +39,12 @@ def vision() -> Any:
     except ImportError:
         raise MissingExtra("finding edges in pictures", "bench") from None
     return cv2
+
+
+def drawing() -> Any:
+    """The module mujoco, ready to draw without a screen; raises ``MissingExtra`` where it is not installed."""
+    os.environ.setdefault("MUJOCO_GL", "egl")
+    return simulator("rendering pictures")
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,16 +83,20 @@ class Stage:
                                fromto=_text(ends), rgba=_text([*colour, 1]))
         Xml.SubElement(Xml.SubElement(world, "body", name="camera__", mocap="true"), "camera", name="camera__",
                        fovy=str(fov))
-        return simulator("rendering pictures").MjModel.from_xml_string(Xml.tostring(root, encoding="unicode"))
+        return drawing().MjModel.from_xml_string(Xml.tostring(root, encoding="unicode"))
 
     @cached_property
     def _renderer(self) -> Any:
-        mujoco = simulator("rendering pictures")
-        return mujoco.MjData(self._model), mujoco.Renderer(self._model, self.camera.height, self.camera.width)
+        mujoco = drawing()
+        try:
+            renderer = mujoco.Renderer(self._model, self.camera.height, self.camera.width)
+        except (mujoco.FatalError, RuntimeError, AttributeError) as error:
+            raise NotRendered(str(error)) from None
+        return mujoco.MjData(self._model), renderer
 
     def picture(self, poses: Poses) -> Array:
-        """The picture (height, width, 3), 0 to 255, with the links at their poses."""
-        mujoco = simulator("rendering pictures")
+        """The picture (height, width, 3), 0 to 255, with the links at their poses; raises ``NotRendered``."""
+        mujoco = drawing()
         data, renderer = self._renderer
         for link in self._links:
             self._put(data, link, poses(link))
@@ -97,7 +108,7 @@ class Stage:
         return np.asarray(renderer.render(), dtype=float)
 
     def _put(self, data: Any, name: str, X: Array) -> None:
-        mujoco = simulator("rendering pictures")
+        mujoco = drawing()
         body = self._model.body(name).mocapid[0]
         data.mocap_pos[body] = X[:3, 3]
         mujoco.mju_mat2Quat(data.mocap_quat[body], np.ascontiguousarray(X[:3, :3]).ravel())

@@ -25,7 +25,7 @@ from .desired import Step, Trajectory, straight, whole
 from .ending import Referee
 from .law import Law, Sense, directions
 from .noise import Amount, Cones, Shocks
-from .pictures import Pictures, Stage, vision
+from .pictures import Pictures, Stage, drawing, vision
 from .result import Servo, Spread
 from .run import Loop, Run
 from .track import tracked
@@ -110,6 +110,7 @@ class Scene:
         if kind == EDGES:
             shocks = Shocks.drawn(2 * len(rods), horizon, seed)
             return Edges(eye, question.reference, rods, 0.0 if amount is None else amount.value, shocks)
+        drawing()
         vision()
         return Pictures(Stage(mechanism, eye, question.reference, rods))
 

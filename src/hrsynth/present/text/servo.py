@@ -6,6 +6,7 @@ import math
 
 from ...servo.result import Servo
 from ...servo.track import LIMIT, TYPE_1, TYPE_2
+from ...tolerances import DAMPED
 from .tables import listing
 
 _PASSED = {TYPE_2: "crosses a Type 2 singularity of the hidden robot",
@@ -25,16 +26,16 @@ def servo(found: Servo, file: str | None = None) -> str:
              ("at", str(found.pose))]
     off = found.from_goal
     if found.ended != "goal":
-        rows.append(("", f"{1e3 * off[0]:.4g} mm and {math.degrees(off[1]):.3g} degrees from the goal"))
+        rows.append(("", f"{1e3 * off[0]:.4g} mm and {_degrees(off[1])} degrees from the goal"))
     listed = found.ending.modes
     if listed is not None:
         rows += [("modes" if i == 0 else "", f"{i + 1}: {mode.pose}" + ("   (the goal)" if mode.goal else ""))
                  for i, mode in enumerate(listed.modes)]
     if found.spread is not None:
         s = found.spread
-        rows.append(("noise", f"keeps it within {1e3 * s.metres:.3g} mm and {math.degrees(s.radians):.2g} degrees of "
+        rows.append(("noise", f"keeps it within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} degrees of "
                               f"there, root mean square {1e3 * s.rms_metres:.2g} mm and "
-                              f"{math.degrees(s.rms_radians):.2g} degrees"))
+                              f"{_degrees(s.rms_radians)} degrees"))
     rows += [("", line) for line in found.notes]
     least = track.to_dict(run.times.tolist())
     if least["smallest"] is not None:
@@ -42,7 +43,13 @@ def servo(found: Servo, file: str | None = None) -> str:
     rows += [("", f"{_PASSED[each.kind]} before {run.times[each.place]:.3g} s, at "
                   f"{found.pose_of(run.configurations[each.place])}") for each in track.passages or ()]
     if track.passages == ():
-        rows.append(("", "no singularity crossed"))
+        met = least["smallest"] is not None and least["smallest"] < DAMPED
+        rows.append(("", "a Type 2 singularity met and left again on the same side" if met
+                     else "no singularity crossed"))
     if file is not None:
         rows.append(("picture", file))
     return listing(rows)
+
+
+def _degrees(angle: float) -> str:
+    return f"{round(math.degrees(angle), 6):.2g}"
