@@ -38,8 +38,7 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    value: object = getattr(import_module(_HOME[name], __name__), name)
-    globals()[name] = value
+    value: object = globals().setdefault(name, getattr(import_module(_HOME[name], __name__), name))
     return value
 
 

@@ -6,7 +6,6 @@ from os import environ
 
 import numpy as np
 import pytest
-from servo.scenes import CONTROLLABLE, regular, setting
 
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadMechanism, BadRequest, MissingExtra
@@ -17,6 +16,7 @@ from hrsynth.servo.law import Law, directions
 from hrsynth.servo.mockup import mockup
 from hrsynth.servo.run import Loop
 from hrsynth.servo.servo import servo
+from servo.scenes import CONTROLLABLE, regular, setting
 
 environ.setdefault("MUJOCO_GL", "egl")
 mujoco = pytest.importorskip("mujoco")

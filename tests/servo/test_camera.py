@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
-from servo.scenes import home
 
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, MissingExtra, NotRendered
@@ -19,6 +18,7 @@ from hrsynth.servo.camera import Camera, Edges, cylinders, edges, placed, rebuil
 from hrsynth.servo.law import directions
 from hrsynth.servo.noise import PERIOD, Amount, Cones, Shocks
 from hrsynth.servo.servo import servo
+from servo.scenes import home
 
 NUMBERS = st.floats(-1, 1, allow_nan=False)
 POINTS = st.tuples(NUMBERS, NUMBERS, st.floats(1, 3)).map(np.array)

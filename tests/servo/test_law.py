@@ -6,7 +6,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo.scenes import CONTROLLABLE, home, regular, setting
 
 from hrsynth.kinematics.configuration import ClosedConfiguration, closed
 from hrsynth.kinematics.locked import interaction
@@ -14,6 +13,7 @@ from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism.vectors import Array, hat
 from hrsynth.servo.law import Law, directions, inverted
 from hrsynth.tolerances import DAMPED, SOLVED
+from servo.scenes import CONTROLLABLE, home, regular, setting
 
 
 def pair(name: str) -> tuple[ClosedConfiguration, ClosedConfiguration]:
@@ -42,8 +42,8 @@ def test_the_platform_moves_as_equation_11_says(name: str):
     basis = relation(start, law.question).twists
     assert np.linalg.norm(moved - basis @ (basis.T @ moved)) < 1e-9 * max(1, np.linalg.norm(moved))
     assert np.linalg.norm(moved) == pytest.approx(np.linalg.norm(wanted), rel=1e-6)
-    assert M @ wanted == pytest.approx(np.concatenate([r @ command.velocity for r in directions(start, law.question)[1]]),
-                                       abs=1e-7 * max(1, np.linalg.norm(moved)))
+    rates = np.concatenate([r @ command.velocity for r in directions(start, law.question)[1]])
+    assert M @ wanted == pytest.approx(rates, abs=1e-7 * max(1, np.linalg.norm(moved)))
 
 
 @pytest.mark.parametrize("name", ["3rrr_m1", "delta", "gough_stewart", "quattro"])

@@ -7,7 +7,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from servo.scenes import BLIND, CONTROLLABLE, far_pairs, regular, setting
 
 from hrsynth.analysis.aspects.path import Aspects
 from hrsynth.analysis.modes.modes import modes
@@ -27,6 +26,7 @@ from hrsynth.servo.result import Servo
 from hrsynth.servo.run import FAR
 from hrsynth.servo.scene import EXACT, Scene
 from hrsynth.servo.servo import servo
+from servo.scenes import BLIND, CONTROLLABLE, far_pairs, regular, setting
 
 FEW = ["3rrr_m1", "delta", "gough_stewart", "quattro", "quattro_rigid"]
 REST = [name for name in CONTROLLABLE if name not in FEW]
@@ -106,9 +106,10 @@ def check_true(found: Servo) -> None:
 
 def check_sides(found: Servo, aspects: Aspects) -> None:
     """Where the condition is an expression with a sign, the sign at the end is that of the start times −1 for each
-    crossing of a Type 2 singularity; said of runs in which no leg passes its limit."""
+    crossing of a Type 2 or constraint singularity (its wrenches are those of constraints as well); said of runs in
+    which no leg passes its limit."""
     track = found.track
-    if not aspects.condition.signed or track.passages is None or len(track.passages) != len(track.crossings("type2")):
+    if not aspects.condition.signed or track.passages is None or track.crossings("type1") or track.crossings("limit"):
         return
     answer = aspects.join(found.run.configurations[0], found.run.last, budget=1)
     ends = answer.start.value, answer.goal.value
@@ -187,8 +188,8 @@ def test_a_joint_limit_is_a_boundary():
     found = servo(kept, start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.1,z=-0.65")
     assert found.ended == BOUNDARY
     assert joint.name in found.ending.reason
-    last = found.run.last
-    assert last.twin.difference(last.twin.q0, last.q)[last.twin.coordinates[joint.name][0]] == pytest.approx(half, abs=1e-8)
+    last, twin = found.run.last, found.run.last.twin
+    assert twin.difference(twin.q0, last.q)[twin.coordinates[joint.name][0]] == pytest.approx(half, abs=1e-8)
 
 
 # ---- what is refused

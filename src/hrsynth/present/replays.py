@@ -22,7 +22,7 @@ ALIKE = 1.5
 @cache
 def computed(replay: Replay) -> Servo:
     """The run."""
-    return servo(load(shipped()[replay.robot]), replay.legs, start=replay.start, goal=replay.goal, gain=replay.gain,
+    return servo(load(shipped()[replay.robot]), replay.legs, start=replay.way[0], goal=replay.way[1], gain=replay.gain,
                  noise=replay.noise, physics=replay.physics,
                  time=BENCH_LASTS / replay.gain if replay.physics else None)
 

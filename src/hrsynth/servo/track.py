@@ -3,7 +3,7 @@
 Side by side along the run, the rates of the directions and the twists of the platform are determinants on one tangent
 space. Where the first alone changes its sign the run crossed a Type 2 singularity of the hidden robot, where the second
 alone does a watched leg passed its limit (Type 1) into another working mode, where both do a leg that is not watched
-did.
+did. Where the loops' own constraints change their sign the run crossed a constraint singularity.
 """
 
 from __future__ import annotations
@@ -16,11 +16,12 @@ import numpy as np
 
 from ..kinematics.chart import Chart
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.ranks import range_basis
 from ..kinematics.relation import Question
 from ..mechanism.vectors import Array
 from ..tolerances import DAMPED, INVERTED
 
-TYPE_2, TYPE_1, LIMIT = "type2", "type1", "limit"
+TYPE_2, TYPE_1, LIMIT, CONSTRAINT = "type2", "type1", "limit", "constraint"
 
 
 @dataclass(frozen=True)
@@ -55,16 +56,21 @@ class Track:
 
 @dataclass(frozen=True, eq=False)
 class _Mark:
-    """A tangent space (nv, n), and on it the rates of directions (rows, n) and the twists (rows, n)."""
+    """A tangent space (nv, n), and on it the rates of directions (rows, n) and the twists (rows, n); the rows of the
+    loops (rows, nv) with a basis of their range, and their weakest singular value as part of the largest."""
 
     basis: Array
     rates: Array
     twists: Array
+    loops: Array
+    span: Array
+    weakest: float
 
     @property
     def clear(self) -> bool:
-        """Whether neither map is singular, so that sides can be told."""
-        return all(float(np.linalg.svd(part, compute_uv=False)[-1]) > DAMPED for part in (self.rates, self.twists))
+        """Whether no map is singular, so that sides can be told."""
+        parts = (self.rates, self.twists)
+        return self.weakest > DAMPED and all(np.linalg.svd(each, compute_uv=False)[-1] > DAMPED for each in parts)
 
     def smallest(self, dof: int) -> float:
         """The smallest singular value of Mᵀ."""
@@ -81,13 +87,17 @@ def tracked(configurations: Sequence[ClosedConfiguration], question: Question, m
     smallest = np.array([mark.smallest(dof) for mark in marks])
     if any(mark.basis.shape[1] != dof for mark in marks):
         return Track(smallest, None)
-    passages, before = [], np.array([1.0, 1.0])
+    passages: list[Passage] = []
+    before = np.ones(3)
     here = before.copy()
     for place in range(1, len(marks)):
         here = here * _turned(marks[place - 1], marks[place])
         if marks[place].clear and np.any(here != before):
-            rates, twists = here != before
-            passages.append(Passage(LIMIT if rates and twists else TYPE_2 if rates else TYPE_1, place))
+            rates, twists, loops = here != before
+            if loops:
+                passages.append(Passage(CONSTRAINT, place))
+            if rates or twists:
+                passages.append(Passage(LIMIT if rates and twists else TYPE_2 if rates else TYPE_1, place))
             before = here.copy()
     return Track(smallest, tuple(passages))
 
@@ -95,11 +105,14 @@ def tracked(configurations: Sequence[ClosedConfiguration], question: Question, m
 def _mark(at: ClosedConfiguration, question: Question, moving: Question) -> _Mark:
     basis = Chart.around(at, moving).basis
     rows = question.rows(at) @ basis
-    return _Mark(basis, rows[question.twist_rows :], rows[: question.twist_rows])
+    loops = at.twin.jacobian(at.q)
+    return _Mark(basis, rows[question.twist_rows :], rows[: question.twist_rows], loops, range_basis(loops)[0],
+                 at.kernel()[1].weakest)
 
 
 def _turned(a: _Mark, b: _Mark) -> Array:
-    """−1 for each of the two maps whose orientation changes between two configurations, else 1."""
+    """−1 for each of the three maps whose orientation changes between two configurations, else 1."""
     between = b.basis.T @ a.basis
-    return np.array([np.sign(np.linalg.det(x.T @ y @ between)) or 1.0
-                     for x, y in ((a.rates, b.rates), (a.twists, b.twists))])
+    overlaps = [a.rates.T @ b.rates @ between, a.twists.T @ b.twists @ between,
+                a.span.T @ a.loops @ b.loops.T @ a.span]
+    return np.array([np.linalg.slogdet(each)[0] or 1.0 for each in overlaps])

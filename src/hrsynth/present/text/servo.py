@@ -5,13 +5,14 @@ from __future__ import annotations
 import math
 
 from ...servo.result import Servo
-from ...servo.track import LIMIT, TYPE_1, TYPE_2
+from ...servo.track import CONSTRAINT, LIMIT, TYPE_1, TYPE_2
 from ...tolerances import DAMPED
 from .tables import listing
 
 _PASSED = {TYPE_2: "crosses a Type 2 singularity of the hidden robot",
            TYPE_1: "a watched leg passes its limit (Type 1) into another working mode",
-           LIMIT: "a leg that is not watched passes its limit"}
+           LIMIT: "a leg that is not watched passes its limit",
+           CONSTRAINT: "crosses a constraint singularity of the loops"}
 
 
 def servo(found: Servo, file: str | None = None) -> str:
