@@ -42,6 +42,6 @@ def test_the_names_survive_the_import_of_their_modules():
 
 def test_the_folder_named_as_its_function_is_called_like_it():
     for first in ("", "import hrsynth.servo.law; "):
-        code = first + "import hrsynth; from hrsynth import servo; assert servo is hrsynth.servo; print(callable(servo))"
+        code = first + "import hrsynth; from hrsynth import servo; print(servo is hrsynth.servo and callable(servo))"
         run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         assert run.stdout.split() == ["True"]

@@ -33,6 +33,7 @@ _DOWN = ("x=0.05,y=0.05,z=-0.8,phi=0", "x=0.03,y=0.03,z=-0.65,phi=0")
 _RIGID = ("x=0.1,y=0.04,z=-0.93", "x=0,y=-0.25,z=-0.7")
 _RIGID_2 = ("x=0.1,y=0.04,z=-0.93", "x=0,y=-0.3,z=-0.85")
 _TURNS = "in position; in orientation it is"
+_HELD = "no mode, but this noise holds the run there; without noise it goes on to the goal"
 _NEAR_MODE = "(0.03, 0.03, −0.65) is no mode: two of its directions are 0.5° off"
 
 
@@ -77,7 +78,7 @@ NOISY = (
 MEASURED = (
     _bench("MMT Table 2", ("1", "4"), _HIGH, "mode", "0.10 m, 2.15 rad"),
     _bench("MMT Table 3", ("2", "3"), _HIGH, "goal", "0.10 m, 0.90 rad"),
-    _bench("MMT Table 4", _ALL, _LOW, "mode", "0.07 m, 0.05 rad", remark=_NEAR_MODE),
+    _bench("MMT Table 4", _ALL, _LOW, "mode", "0.07 m, 0.05 rad", _HELD),
     _bench("MMT Table 5", ("2", "3"), _ACROSS, "goal", "0.11 m, 0.06 rad", place=1),
     _bench("MMT Table 5", ("2", "4"), _ACROSS, "goal", "0.23 m, 0.68 rad", place=2),
     _bench("MMT Table 6", ("1", "4"), _DOWN, "goal", "0.11 m, 0.39 rad", place=3),

@@ -41,6 +41,8 @@ def row(replay: Replay) -> str:
         s = found.spread
         here += f" ± {1e3 * s.rms_metres:.2g} mm, {s.rms_radians:.1g} rad" if found.setting.motion.spins.shape[1] else (
             f" ± {1e3 * s.rms_metres:.2g} mm")
+        if s.aside:
+            here += f", about {_place(Pose(*s.mean))}"
     else:
         here += f" {_place(found.pose)}"
     noise = "–" if replay.noise is None else replay.noise if "deg" in replay.noise else f"{replay.noise} rad, bench"

@@ -18,6 +18,9 @@ from .noise import Amount
 from .run import Run
 from .track import Track
 
+ASIDE = 0.9
+"""Part of the root mean square distance that a constant one makes up where noise holds a platform aside."""
+
 
 @dataclass(frozen=True)
 class Spread:
@@ -28,11 +31,21 @@ class Spread:
     radians: float
     rms_metres: float
     rms_radians: float
+    mean: tuple[float, float, float]
+    """Where the platform was on average."""
+    offset: float
+    """How far that is from the pose at which it settled (m): where noise does not average out."""
 
-    def to_dict(self) -> dict[str, float]:
+    @property
+    def aside(self) -> bool:
+        """Whether noise holds the platform aside rather than moving it about."""
+        return self.offset > ASIDE * self.rms_metres
+
+    def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"position_mm": 1e3 * self.metres, "orientation_deg": math.degrees(self.radians),
-                "rms_position_mm": 1e3 * self.rms_metres, "rms_orientation_deg": math.degrees(self.rms_radians)}
+                "rms_position_mm": 1e3 * self.rms_metres, "rms_orientation_deg": math.degrees(self.rms_radians),
+                "offset_mm": 1e3 * self.offset, "mean": list(self.mean)}
 
 
 @dataclass(frozen=True, eq=False)

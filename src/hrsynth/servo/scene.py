@@ -147,11 +147,13 @@ class Scene:
         X = settled.pose(motion.link)
         late = [at.pose(motion.link) for time, at in zip(run.times, run.configurations, strict=True)
                 if time >= SETTLED * run.times[-1]]
-        lengths = np.array([np.linalg.norm(motion.position(each) - motion.position(X)) for each in late])
+        moved = np.array([motion.position(each) for each in late]) - motion.position(X)
+        lengths, middle = np.linalg.norm(moved, axis=1), moved.mean(axis=0)
+        x, y, z = map(float, motion.position(X) + middle)
         turns = np.array([np.linalg.norm(rotation_vector(each[:3, :3] @ X[:3, :3].T)) if motion.body else 0.0
                           for each in late])
         return Spread(float(lengths.max()), float(turns.max()), float(np.sqrt(np.mean(lengths**2))),
-                      float(np.sqrt(np.mean(turns**2))))
+                      float(np.sqrt(np.mean(turns**2))), (x, y, z), float(np.linalg.norm(middle)))
 
 
 def _sees(setting: Setting) -> None:

@@ -37,6 +37,9 @@ def servo(found: Servo, file: str | None = None) -> str:
         rows.append(("noise", f"keeps it within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} degrees of "
                               f"there, root mean square {1e3 * s.rms_metres:.2g} mm and "
                               f"{_degrees(s.rms_radians)} degrees"))
+        if s.aside:
+            rows.append(("", f"holds it aside: on average {1e3 * s.offset:.3g} mm from there, at "
+                             f"({' '.join(f'{value:.4g}' for value in s.mean)})"))
     rows += [("", line) for line in found.notes]
     least = track.to_dict(run.times.tolist())
     if least["smallest"] is not None:
