@@ -7,6 +7,8 @@ from functools import cache
 from itertools import islice
 
 import numpy as np
+import pytest
+from _pytest.mark import ParameterSet
 
 from hrsynth.analysis.posture import REGULAR, Examiner
 from hrsynth.analysis.setting import Setting, prepare
@@ -22,7 +24,14 @@ CONTROLLABLE = [
     "gough_stewart", "hexa", "linear_delta", "orthoglide", "prrrp_m1", "prrrp_m2", "quattro", "quattro_rigid",
     "rprpr_m1", "rprpr_m2", "rrrrr_m1", "rrrrr_m2"]
 """With all legs watched."""
+FEW = ["3rpr_m1", "3rps", "delta", "gough_stewart", "quattro", "quattro_rigid", "rrrrr_m1"]
+"""Of all kinds: the others are left to the slow tests."""
 BLIND = sorted(set(shipped()) - set(CONTROLLABLE))
+
+
+def few_first(names: list[str]) -> list[ParameterSet]:
+    """The names as parameters of a test, all but a few of them slow."""
+    return [pytest.param(name, marks=[] if name in FEW else pytest.mark.slow) for name in names]
 
 
 @cache

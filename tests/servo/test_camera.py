@@ -49,7 +49,7 @@ def test_a_pixel_and_its_ray_are_one(x: float, y: float):
     assert 2 * camera.ray(camera.pixels(point[None])[0]) == pytest.approx(point, abs=1e-12)
 
 
-@pytest.mark.parametrize("name", ["delta", "3rrr_m1", "gough_stewart", "quattro"])
+@pytest.mark.parametrize("name", ["3rpr_m1", "quattro"])
 def test_the_camera_sees_all_rods_and_exact_edges_give_exact_directions(name: str):
     scene = home(name)
     mechanism, question = scene.setting.mechanism, scene.law.question
@@ -83,7 +83,7 @@ def test_the_noise_of_rebuilt_directions_grows_with_that_of_pixels_and_is_bounde
 
     def wrong(pixels: float) -> Array:
         sense = Edges(camera, question.reference, rods, pixels, Shocks.drawn(2 * len(rods), 4, 0))
-        return np.array([np.linalg.norm(sense(t, scene.start.pose, u) - u, axis=1) for t in np.arange(0, 4, 0.02)])
+        return np.array([np.linalg.norm(sense(t, scene.start.pose, u) - u, axis=1) for t in np.arange(0, 4, 0.04)])
 
     assert wrong(0.02).max() == pytest.approx(2 * wrong(0.01).max(), rel=0.05)
     for number, rod in enumerate(rods):
@@ -128,7 +128,7 @@ def test_without_opencv_pictures_are_refused_in_one_line(monkeypatch: pytest.Mon
 
 
 @pytest.mark.skipif(find_spec("mujoco") is None, reason="needs the extra bench")
-@pytest.mark.parametrize("name", ["delta", "quattro"])
+@pytest.mark.parametrize("name", ["delta", pytest.param("quattro", marks=pytest.mark.slow)])
 def test_directions_from_rendered_pictures(name: str):
     pytest.importorskip("cv2")
     pictures.drawing()

@@ -13,7 +13,7 @@ from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism.vectors import Array, hat
 from hrsynth.servo.law import Law, directions, inverted
 from hrsynth.tolerances import DAMPED, SOLVED
-from servo.scenes import CONTROLLABLE, home, regular, setting
+from servo.scenes import CONTROLLABLE, few_first, home, regular, setting
 
 
 def pair(name: str) -> tuple[ClosedConfiguration, ClosedConfiguration]:
@@ -29,7 +29,7 @@ def seen(at: ClosedConfiguration, law: Law) -> Array:
     return directions(at, law.question)[0]
 
 
-@pytest.mark.parametrize("name", CONTROLLABLE)
+@pytest.mark.parametrize("name", few_first(CONTROLLABLE))
 def test_the_platform_moves_as_equation_11_says(name: str):
     start, goal = pair(name)
     law = law_of(name)
@@ -46,7 +46,7 @@ def test_the_platform_moves_as_equation_11_says(name: str):
     assert M @ wanted == pytest.approx(rates, abs=1e-7 * max(1, np.linalg.norm(moved)))
 
 
-@pytest.mark.parametrize("name", ["3rrr_m1", "delta", "gough_stewart", "quattro"])
+@pytest.mark.parametrize("name", ["3rpr_m1", "delta", "gough_stewart", "quattro"])
 def test_the_error_falls_as_its_projection_says(name: str):
     start, goal = pair(name)
     law = law_of(name)
@@ -66,7 +66,7 @@ def test_the_error_falls_as_its_projection_says(name: str):
     assert e @ rate < 0
 
 
-@pytest.mark.parametrize("name", ["3rrr_m1", "delta", "gough_stewart"])
+@pytest.mark.parametrize("name", ["3rpr_m1", "delta", "gough_stewart"])
 def test_moving_desired_directions_are_fed_forward(name: str):
     law, (start, _) = law_of(name), pair(name)
     twin = start.twin
