@@ -198,6 +198,10 @@ def modes(
     pictures.writable(output)
     with Progress() as progress:
         found = run(load(robot), _list(observe), camera, at=at, real=real, seed=seed, progress=progress.tell)
+    why = pictures.nothing(found)
+    if output is not None and why is not None:
+        typer.echo(f"hrsynth: {output} is not drawn: {why}", err=True)
+        output = None
     if output is not None:
         pictures.write(found, output)
     if json:
