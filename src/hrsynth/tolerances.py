@@ -43,6 +43,13 @@ SAME_POINT = 1e-7
 SAME_DIRECTION = 1e-7
 """Sine of the angle below which two directions are parallel, cosine below which they are perpendicular."""
 
+NOISE = 1e-4
+"""Deviation (characteristic lengths, radians) up to which a relation in a foreign file (axes parallel or perpendicular,
+points that coincide, equal rods) counts as meant and is made exact: printed digits and CAD stay below."""
+
+EXACT = 1e-11
+"""Deviation (characteristic lengths, radians) below which such a relation holds as well as numbers allow."""
+
 SAME_PLANE = 1e-4
 """Sine of the angle between two planes below which they count as one when directions are put in order for drawing."""
 

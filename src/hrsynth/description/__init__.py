@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
+from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 
@@ -12,6 +13,8 @@ from ..errors import BadRequest
 from ..mechanism.model import Mechanism
 from . import native
 from .files import write_whole
+from .foreign.given import Given, names
+from .foreign.reading import read
 from .tree import spanning
 
 __all__ = ["load", "native", "save", "shipped", "spanning"]
@@ -24,29 +27,40 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.urdf"), key=lambda path: path.stem)}
 
 
-def load(robot: str | Path) -> Mechanism:
-    """The mechanism of a robot file, or of a shipped robot given by its name.
+def load(robot: str | Path, *, base: str | None = None, platform: str | None = None,
+         motors: Iterable[str] | str | None = None, observe: Iterable[str] | str | None = None,
+         close: Iterable[str] | str = (), freeze: Iterable[str] | str = ()) -> Mechanism:
+    """The mechanism of a robot file in any dialect, or of a shipped robot given by its name.
+
+    What a file does not say may be given: the ``platform`` link, the joints of the ``motors``, the links to
+    ``observe`` at their default segments, closures ``A:B[:type]`` that make the frames of two links meet, joints to
+    ``freeze``. With ``base`` only what lies between base and platform remains. Lists may be texts with commas. What was
+    guessed or solved is told in the mechanism's ``notes``.
 
     Raises
     ------
     BadRequest
-        For a name that is neither; with the shipped names closest to it.
-    BadRobotFile, LoopsNotClosed
-        For a file that is no assembled robot.
+        For a name that is neither; with the shipped names closest to it. For what has to be given, and for names given
+        that the file does not have.
+    BadRobotFile
+        With every defect of the file and its line.
+    LoopsNotClosed, RankUndecided
+        For a file whose loops stay open, or in which rounded numbers leave no gap between free and held.
     """
+    wishes = Given(base, platform, names(motors), names(close) or (), names(freeze) or (), names(observe))
     path = Path(robot)
     if isinstance(robot, str) and not path.suffix and len(path.parts) == 1:
+        robots = shipped()
         with contextlib.suppress(OSError, ValueError):
             if path.is_file():
-                return native.read(path)
-        robots = shipped()
+                return read(path, wishes)
         if robot in robots:
-            return native.read(robots[robot])
+            return read(robots[robot], wishes)
         if not os.path.exists(robot):
-            close = difflib.get_close_matches(robot, robots, n=5) or list(robots)
+            close_names = difflib.get_close_matches(robot, robots, n=5) or list(robots)
             raise BadRequest("neither a file nor a shipped robot", robot,
-                             "a file, or a name that `hrsynth robots` lists, such as " + ", ".join(close))
-    return native.read(path)
+                             "a file, or a name that `hrsynth robots` lists, such as " + ", ".join(close_names))
+    return read(path, wishes)
 
 
 def save(mechanism: Mechanism, path: str | Path) -> None:

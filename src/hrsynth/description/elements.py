@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import difflib
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -56,16 +55,6 @@ class Elements:
         for extra in found[1:]:
             self.defect(xml.line(extra), f"second <{tag}> in <{element.tag}>", element.get("name"))
         return found[0] if found else None
-
-    def known(self, link: str | None, line: int | None, what: str, names: Mapping[str, object] | None = None) -> bool:
-        """Whether a link (or another of ``names``) exists; None was reported before."""
-        table = self.links if names is None else names
-        if link is None:
-            return False
-        if link not in table:
-            close = difflib.get_close_matches(link, table, n=3) if len(table) < 1000 else []
-            self.defect(line, what, link, "a name that is there" + (", such as " + ", ".join(close) if close else ""))
-        return link in table
 
     def origin(self, element: xml.Element) -> Array:
         origin = self.only(element, "origin")

@@ -34,7 +34,12 @@ def parse(text: bytes | str, file: str = "<text>") -> Mechanism:
     LoopsNotClosed
         Where a loop is open at the zero configuration.
     """
-    return _Reader(file, xml.document(text, file)).mechanism()
+    return native(xml.document(text, file), file)
+
+
+def native(root: xml.Element, file: str) -> Mechanism:
+    """The same for a document that has been parsed."""
+    return _Reader(file, root).mechanism()
 
 
 @dataclass

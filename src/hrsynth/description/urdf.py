@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -34,6 +35,16 @@ class Urdf(Elements):
     loops: dict[str, Edge] = field(default_factory=dict)
     motors: dict[str, Motor] = field(default_factory=dict)
     couplings: list[Coupling] = field(default_factory=list)
+
+    def known(self, link: str | None, line: int | None, what: str, names: Mapping[str, object] | None = None) -> bool:
+        """Whether a link (or another of ``names``) exists; None was reported before."""
+        table = self.links if names is None else names
+        if link is None:
+            return False
+        if link not in table:
+            close = difflib.get_close_matches(link, table, n=3) if len(table) < 1000 else []
+            self.defect(line, what, link, "a name that is there" + (", such as " + ", ".join(close) if close else ""))
+        return link in table
 
     def link(self, element: xml.Element) -> None:
         name = self.attribute(element, "name")

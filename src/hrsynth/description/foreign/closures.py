@@ -1,0 +1,115 @@
+"""Closures read as the joints that they stand for: points on one axis, points in a plane, chains that a writer cut."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import replace
+
+import networkx as nx
+import numpy as np
+
+from ...mechanism import lines
+from ...mechanism.model import Joint, JointType, Mechanism, Note
+from ...mechanism.vectors import Array, frozen, inverse, perpendicular, pose, unit
+from ...tolerances import NOISE
+from ..draft import Edge, End
+from .graph import Graph
+
+CUT = "__cut"
+"""End of the name of a link that carries one half of a cut joint; the other half is a closure in all six directions."""
+
+
+def points_together(graph: Graph) -> None:
+    """Two points in which the same two links are held together are a revolute joint through both; three are rigid."""
+    table: dict[frozenset[str], list[Edge]] = defaultdict(list)
+    for edge in graph.edges.values():
+        if edge.type is JointType.SPHERICAL and not edge.in_tree:
+            table[frozenset(edge.links)].append(edge)
+    for edges in table.values():
+        merged = _merged(edges) if len(edges) > 1 else None
+        if merged is None:
+            continue
+        for edge in edges:
+            del graph.edges[edge.name]
+        graph.edges[merged.name] = merged
+        what = "revolute joint" if merged.type is JointType.REVOLUTE else "rigid joint"
+        graph.note("merged", f"the points {', '.join(repr(edge.name) for edge in edges)} hold the same two links "
+                             f"together and are read as one {what}")
+
+
+def _merged(edges: list[Edge]) -> Edge | None:
+    first = edges[0]
+    places = np.array([[edge.ends[edge.links.index(link)].X[:3, 3] for edge in edges] for link in first.links])
+    arms = places[:, 1:] - places[:, :1]
+    sizes = np.linalg.norm(arms, axis=2)
+    size = float(np.max(sizes))
+    if size <= 0 or np.max(np.abs(sizes[0] - sizes[1])) > NOISE * size:
+        return None
+    k = int(np.argmax(sizes[0]))
+    far = [np.linalg.norm(np.cross(arm, arm[k]), axis=1).max() / size**2 for arm in arms]
+    if max(far) <= NOISE:
+        frames = [_frame(arm[k]) for arm in arms]
+        kind = JointType.REVOLUTE
+    else:
+        m = int(np.argmax(np.linalg.norm(np.cross(arms[0], arms[0][k]), axis=1)))
+        frames = [_frame(arm[k], arm[m]) for arm in arms]
+        kind = JointType.FIXED
+    one, two = (End(end.link, pose(place[0], R), end.line)
+                for end, place, R in zip(first.ends, places, frames, strict=True))
+    return replace(first, type=kind, ends=(one, two), axes=(np.array([0.0, 0.0, 1.0]),) * kind.axes)
+
+
+def _frame(z: Array, near: Array | None = None) -> Array:
+    x = perpendicular(z, near)
+    return np.column_stack((x, np.cross(unit(z), x), unit(z)))
+
+
+def points_in_planes(mechanism: Mechanism) -> Mechanism:
+    """A point closure between two links that can only move in a plane is a revolute joint normal to it."""
+    joints, notes = dict(mechanism.joints), list(mechanism.notes)
+    for joint in [j for j in joints.values() if j.type is JointType.SPHERICAL and not j.in_tree]:
+        normal = _plane_of(joint, list(joints.values()))
+        if normal is not None:
+            joints[joint.name] = replace(joint, type=JointType.REVOLUTE, axes=(normal,))
+            notes.append(Note("merged", f"the point {joint.name!r} closes a planar loop: read as a revolute joint"))
+    return replace(mechanism, joints=joints, notes=tuple(notes))
+
+
+def _plane_of(joint: Joint, joints: list[Joint]) -> Array | None:
+    """The normal of the plane in which the joint's two links move relative to each other, or None."""
+    turning = [j for j in joints if j.type is JointType.REVOLUTE and set(j.links) & set(joint.links)]
+    for candidate in turning:
+        normal = candidate.axis
+        flat: nx.Graph[str] = nx.Graph()
+        flat.add_nodes_from(joint.links)
+        flat.add_edges_from(j.links for j in joints if j.name != joint.name and _flat(j, normal))
+        if nx.has_path(flat, *joint.links):
+            return normal
+    return None
+
+
+def _flat(joint: Joint, normal: Array) -> bool:
+    match joint.type:
+        case JointType.REVOLUTE | JointType.PLANAR:
+            return lines.parallel(joint.axis, normal)
+        case JointType.PRISMATIC:
+            return lines.perpendicular(joint.axis, normal)
+    return joint.type is JointType.FIXED
+
+
+def halves_joined(graph: Graph) -> None:
+    """A link of our own making that carries one half of a cut joint goes; the joint closes the loop itself."""
+    for name in [link for link in graph.links if link.endswith(CUT)]:
+        own = [edge for edge in graph.edges.values() if name in edge.links]
+        welds = [edge for edge in own if edge.type is JointType.FIXED and not edge.in_tree]
+        if len(own) != 2 or len(welds) != 1:
+            continue
+        half = next(edge for edge in own if edge is not welds[0])
+        if half.links[1] != name:
+            continue
+        weld = welds[0]
+        here = weld.links.index(name)
+        X = weld.ends[1 - here].X @ inverse(weld.ends[here].X) @ half.ends[1].X
+        end = End(weld.ends[1 - here].link, frozen(X), weld.line)
+        del graph.edges[weld.name], graph.links[name]
+        graph.edges[half.name] = replace(half, ends=(half.ends[0], end), in_tree=False)
