@@ -10,12 +10,16 @@ from importlib import resources
 from pathlib import Path
 
 from ..errors import BadRequest
-from ..mechanism.model import Mechanism
+from ..mechanism.model import Mechanism, Note
 from . import native
 from .files import write_whole
 from .foreign.given import Given, names
 from .foreign.reading import read
 from .tree import spanning
+from .writers import gepetto, mjcf, sdf
+
+DIALECTS = ("native", "gepetto", "mjcf", "sdf")
+ENDINGS = {".xml": "mjcf", ".mjcf": "mjcf", ".sdf": "sdf", ".yaml": "gepetto", ".yml": "gepetto"}
 
 __all__ = ["load", "native", "save", "shipped", "spanning"]
 
@@ -63,12 +67,29 @@ def load(robot: str | Path, *, base: str | None = None, platform: str | None = N
     return read(path, wishes)
 
 
-def save(mechanism: Mechanism, path: str | Path) -> None:
-    """Write a robot file, whole or not at all.
+def save(mechanism: Mechanism, path: str | Path, dialect: str | None = None) -> tuple[Note, ...]:
+    """Write a robot file, whole or not at all; what the dialect cannot say is returned as warnings.
+
+    ``dialect`` is one of ``DIALECTS``; without it the file's ending decides: ``.xml`` and ``.mjcf`` MJCF, ``.sdf``
+    SDFormat, ``.yaml`` Gepetto (with a ``.urdf`` of the same name beside it), anything else the native dialect.
 
     Raises
     ------
     BadRequest
-        Where the file cannot be written, or the mechanism not be said in the native dialect.
+        For an unknown dialect; where the file cannot be written, or the mechanism not be said in the dialect.
     """
-    write_whole(path, native.write(mechanism).encode())
+    target = Path(path)
+    kind = dialect or ENDINGS.get(target.suffix.lower(), "native")
+    if kind == "native":
+        write_whole(path, native.write(mechanism).encode())
+        return ()
+    if kind == "gepetto":
+        tree, closures, lost = gepetto.write(mechanism)
+        write_whole(target.with_suffix(".urdf"), tree.encode())
+        write_whole(target.with_suffix(".yaml"), closures.encode())
+        return lost
+    if kind not in DIALECTS:
+        raise BadRequest("unknown dialect", kind, DIALECTS)
+    text, lost = (mjcf if kind == "mjcf" else sdf).write(mechanism)
+    write_whole(path, text.encode())
+    return lost

@@ -4,19 +4,21 @@ from __future__ import annotations
 
 from collections import defaultdict
 from dataclasses import replace
+from itertools import pairwise
 
 import networkx as nx
 import numpy as np
 
 from ...mechanism import lines
-from ...mechanism.model import Joint, JointType, Mechanism, Note
+from ...mechanism.model import Joint, JointType, Mechanism, Motor, Note
 from ...mechanism.vectors import Array, frozen, inverse, perpendicular, pose, unit
 from ...tolerances import NOISE
 from ..draft import Edge, End
 from .graph import Graph
 
-CUT = "__cut"
-"""End of the name of a link that carries one half of a cut joint; the other half is a closure in all six directions."""
+CUT, WELD, END, SECOND = "__cut", "__weld", "__end", "__second"
+"""Ends of the names of what our writers add for a loop N: the link that one half of the cut joint carries, the closure
+in all six directions, the frame on the other link, the second point of a revolute joint."""
 
 
 def points_together(graph: Graph) -> None:
@@ -32,6 +34,8 @@ def points_together(graph: Graph) -> None:
         for edge in edges:
             del graph.edges[edge.name]
         graph.edges[merged.name] = merged
+        if edges[1].name == merged.name + SECOND:
+            continue
         what = "revolute joint" if merged.type is JointType.REVOLUTE else "rigid joint"
         graph.note("merged", f"the points {', '.join(repr(edge.name) for edge in edges)} hold the same two links "
                              f"together and are read as one {what}")
@@ -98,18 +102,59 @@ def _flat(joint: Joint, normal: Array) -> bool:
 
 
 def halves_joined(graph: Graph) -> None:
-    """A link of our own making that carries one half of a cut joint goes; the joint closes the loop itself."""
-    for name in [link for link in graph.links if link.endswith(CUT)]:
+    """What our writers cut is whole again: frames of closures go, and the joint before a rigid closure closes the loop
+    itself."""
+    for name in [link for link in graph.links if link.endswith((CUT, END))]:
         own = [edge for edge in graph.edges.values() if name in edge.links]
-        welds = [edge for edge in own if edge.type is JointType.FIXED and not edge.in_tree]
-        if len(own) != 2 or len(welds) != 1:
-            continue
-        half = next(edge for edge in own if edge is not welds[0])
-        if half.links[1] != name:
-            continue
-        weld = welds[0]
-        here = weld.links.index(name)
-        X = weld.ends[1 - here].X @ inverse(weld.ends[here].X) @ half.ends[1].X
-        end = End(weld.ends[1 - here].link, frozen(X), weld.line)
-        del graph.edges[weld.name], graph.links[name]
-        graph.edges[half.name] = replace(half, ends=(half.ends[0], end), in_tree=False)
+        if len(own) == 2 and sum(not edge.in_tree for edge in own) == 1:
+            carrier, closure = sorted(own, key=lambda edge: not edge.in_tree)
+            if carrier.type is JointType.FIXED and carrier.links[1] == name:
+                del graph.edges[carrier.name], graph.links[name]
+                here = closure.links.index(name)
+                X = carrier.ends[0].X @ inverse(carrier.ends[1].X) @ closure.ends[here].X
+                graph.edges[closure.name] = _with_end(closure, here, End(carrier.links[0], frozen(X), closure.line))
+    for name in [link for link in graph.links if link.endswith(CUT)]:
+        _joined(graph, name)
+
+
+def _joined(graph: Graph, name: str) -> None:
+    """Let the joint that carries a cut half take the place of the rigid closure."""
+    own = [edge for edge in graph.edges.values() if name in edge.links]
+    welds = [edge for edge in own if edge.type is JointType.FIXED and not edge.in_tree]
+    stem = name.removesuffix(CUT)
+    chain = [graph.edges[key] for key in (stem, *(f"{stem}__{k}" for k in (1, 2, 3))) if key in graph.edges]
+    chain = [edge for edge in chain if edge not in welds]
+    if len(own) != 2 or len(welds) != 1 or not chain or chain[-1].links[1] != name:
+        return
+    whole = _whole(stem, chain)
+    if whole is None:
+        return
+    weld = welds[0]
+    here = weld.links.index(name)
+    X = weld.ends[1 - here].X @ inverse(weld.ends[here].X) @ chain[-1].ends[1].X
+    for edge in (*chain, weld):
+        del graph.edges[edge.name]
+    for link in (name, *(edge.links[1] for edge in chain[:-1])):
+        del graph.links[link]
+    end = End(weld.ends[1 - here].link, frozen(X), weld.line)
+    graph.edges[stem] = replace(_with_end(whole, 1, end), in_tree=False)
+
+
+def _whole(name: str, chain: list[Edge]) -> Edge | None:
+    """The joint that a chain of joints at one place is."""
+    if len(chain) == 1:
+        return chain[0]
+    word = "".join(str(edge.type) for edge in chain)
+    kind = {"RR": JointType.UNIVERSAL, "RRR": JointType.SPHERICAL, "PR": JointType.CYLINDRICAL,
+            "PPR": JointType.PLANAR}.get(word)
+    if kind is None or any(a.links[1] != b.links[0] for a, b in pairwise(chain)):
+        return None
+    axes = tuple(edge.axes[0] for edge in chain)
+    axes = axes if kind is JointType.UNIVERSAL else axes[-1:] if kind.axes else ()
+    motor = chain[0].motor and Motor(chain[0].motor.name.removesuffix("__1"))
+    return replace(chain[0], name=name, type=kind, axes=axes, motor=motor)
+
+
+def _with_end(edge: Edge, place: int, end: End) -> Edge:
+    ends = (end, edge.ends[1]) if place == 0 else (edge.ends[0], end)
+    return replace(edge, ends=ends)

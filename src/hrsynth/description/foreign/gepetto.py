@@ -14,6 +14,7 @@ from ...mechanism.vectors import Array
 from .. import xml
 from ..draft import ORIGIN, Edge, End
 from . import urdf
+from .closures import CUT, END, WELD
 from .graph import Graph
 
 LARGEST = 1_000_000
@@ -104,7 +105,9 @@ class _Sayings:
             if links[0] == links[1]:
                 raise _refused(self.path, f"closed_loop: {pair[0]!r} and {pair[1]!r} are one link", "two links")
             point = number < len(kinds) and str(kinds[number]).lower() == "3d"
-            name = self.graph.fresh(f"loop_{number + 1}")
+            stems = [str(frame).removesuffix(suffix) for frame, suffix in zip(pair, (CUT, END), strict=True)]
+            name = self.graph.fresh(f"loop_{number + 1}" if stems[0] != stems[1] else stems[0] if point or
+                                    stems[0] not in self.graph.edges else stems[0] + WELD)
             kind = JointType.SPHERICAL if point else JointType.FIXED
             self.graph.edges[name] = Edge(name, kind, (End(links[0], ORIGIN), End(links[1], ORIGIN)), in_tree=False)
 

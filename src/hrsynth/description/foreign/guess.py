@@ -17,7 +17,7 @@ LARGEST = 150
 
 def base(graph: Graph) -> str:
     """The link that no joint carries, or the first of them in the file."""
-    carried = {edge.links[1] for edge in graph.edges.values()}
+    carried = {edge.links[1] for edge in graph.edges.values() if edge.in_tree}
     free = [link for link in graph.links if link not in carried] or list(graph.links)
     if len(free) > 1:
         graph.note("guess", f"the base is link {free[0]!r}, the first of {len(free)} that no joint carries "

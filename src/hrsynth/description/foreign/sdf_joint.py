@@ -107,7 +107,7 @@ def add(reader: Elements, graph: Graph, element: xml.Element, links: tuple[str, 
                                     line=xml.line(element)))
     else:
         type_ = JointType(kind)
-        graph.edges[name] = Edge(name, type_, ends, tuple(axes), _limits(element, kind), (), line, None, in_tree)
+        graph.edges[name] = Edge(name, type_, ends, tuple(axes), _limits(element), (), line, None, in_tree)
 
 
 def _axis(reader: Elements, graph: Graph, joint: xml.Element, tag: str, places: Places, version: tuple[int, int],
@@ -136,10 +136,10 @@ def _axis(reader: Elements, graph: Graph, joint: xml.Element, tag: str, places: 
     return vector
 
 
-def _limits(joint: xml.Element, kind: str) -> Limits | None:
+def _limits(joint: xml.Element) -> Limits | None:
     limit = joint.find("axis/limit")
     values: dict[str, float] = {}
-    for tag in ("lower", "upper", "velocity", "effort") if limit is not None and kind in "RP" else ():
+    for tag in ("lower", "upper", "velocity", "effort") if limit is not None else ():
         try:
             value = float(numerals.parsed(text(limit, tag) or "", 1)[0])  # type: ignore[arg-type]
         except ValueError:

@@ -91,16 +91,19 @@ class Reader(Urdf):
         """Limits that are numbers in order; anything else is no limit."""
         limit = element.find("limit")
         values: dict[str, float] = {}
+        free = "" if limit is None else limit.get("free", "")
         for key in _LIMITS if limit is not None else ():
             try:
                 value = float(numerals.parsed(limit.get(key, ""), 1)[0])  # type: ignore[union-attr]
             except ValueError:
                 continue
+            if key in free.split():
+                continue
             if key in ("lower", "upper") or value >= 0:
                 values[key] = value
         bounds = values.get("lower"), values.get("upper")
         both = bounds[0] is not None and bounds[1] is not None
-        if kind not in ("revolute", "prismatic") or (both and not bounds[0] < bounds[1]):  # type: ignore[operator]
+        if kind == "continuous" or (both and not bounds[0] < bounds[1]):  # type: ignore[operator]
             values.pop("lower", None)
             values.pop("upper", None)
         return Limits(**values) if values else None
