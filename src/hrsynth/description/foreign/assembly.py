@@ -23,6 +23,15 @@ FAINT = 1e-3
 """Part of the largest singular value below which a direction counts as resisted by rounding alone."""
 STRIDE = 0.4
 """Largest change of a coordinate in one step."""
+NEARLY = 5e-3
+"""Weakest singular value, as part of the largest, below which a pose counts as nearly singular."""
+FIRM = 3e-2
+"""Such a value at which a pose is firm enough."""
+BETTER = 2.0
+"""Factor by which another pose must be firmer to take the place of a nearly singular one."""
+TRIES = 24
+LARGEST = 300
+"""Coordinates above which no random pushes are tried."""
 State = dict[str, Array]
 
 
@@ -203,7 +212,7 @@ def solve(assembly: Assembly, seed: int = 0, tries: int = 24) -> Solution:
     best = Solution(state, residual)
     rng = np.random.default_rng(seed)
     for number in range(tries):
-        if best.residual <= NOISE or assembly.size > 300:
+        if best.residual <= NOISE or assembly.size > LARGEST:
             break
         amplitude = (0.1, 0.3, 0.6, 1.0)[min(3, number // 6)]
         start = assembly.stepped(assembly.zero(), amplitude * rng.normal(size=assembly.size))
@@ -214,27 +223,26 @@ def solve(assembly: Assembly, seed: int = 0, tries: int = 24) -> Solution:
 
 
 def unlocked(assembly: Assembly, state: State, seed: int = 0) -> State | None:
-    """A nearby closed state with fewer freedoms, where ``state`` is singular; None where it is not."""
+    """A closed state near ``state`` with fewer freedoms, or with loops that resist much more firmly, where ``state`` is
+    singular or nearly so; None where it is neither, or nothing better is found."""
     here = assembly.freedom(state)
-    if here.value == 0 or assembly.size > 300:
+    if here.value == 0 or assembly.size > LARGEST:
         return None
-    rng, best, found = np.random.default_rng(seed), here, None
-    kernel = assembly.kernel(state)
-    for number in range(12):
+    rng = np.random.default_rng(seed)
+    best, found, origin = replace(here, weakest=BETTER * here.weakest), None, state
+    for number in range(TRIES):
+        if best.weakest > FIRM or (number >= 3 and found is None and here.weakest > NEARLY):
+            break
+        kernel = assembly.kernel(origin)
         step = kernel @ rng.normal(size=kernel.shape[1])
         step *= (0.3, 0.15, 0.5)[number % 3] / float(np.max(np.abs(step), initial=1e-12))
-        there, residual = assembly.closed(assembly.stepped(state, step))
-        if residual > 1e-10:
-            continue
+        there, residual = assembly.closed(assembly.stepped(origin, step))
         freedom = assembly.freedom(there)
-        if freedom.gap < RANK_GAP:
+        if residual > 10 * CLOSED or freedom.gap < RANK_GAP:
             continue
-        if (freedom.value, -freedom.weakest) < (best.value, -best.weakest if found is not None else 0.0):
-            if freedom.value == here.value:
-                continue
-            best, found = freedom, there
-        elif number >= 3 and found is None:
-            return None
+        firmer = freedom.weakest > best.weakest and (found is not None or here.weakest <= NEARLY)
+        if freedom.value < best.value or (freedom.value == best.value and firmer):
+            best, found, origin = freedom, there, there
     return found
 
 

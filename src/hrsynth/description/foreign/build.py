@@ -183,8 +183,9 @@ def _away_from_singular(mechanism: Mechanism) -> Mechanism:
     if there is None:
         return mechanism
     here, after = assembly.freedom(start), assembly.freedom(there)
-    note = Note("solved", f"the zero pose is singular (its loops have {here.value} freedoms there, {after.value} "
-                          f"nearby): moved to {_moves(assembly, there)}")
+    why = (f"singular (its loops have {here.value} freedoms there, {after.value} nearby)" if after.value < here.value
+           else f"nearly singular (weakest singular value {here.weakest:.1e}, {after.weakest:.1e} nearby)")
+    note = Note("solved", f"the zero pose is {why}: moved to {_moves(assembly, there)}")
     moved = moved_to(mechanism, assembly, there)
     return replace(moved, notes=(*mechanism.notes, note))
 

@@ -32,6 +32,8 @@ def platform(graph: Graph, base: str) -> str:
     """
     bodies = _Bodies(graph, base)
     body, why, rivals = bodies.platform()
+    if len(bodies.members) == 1:
+        raise BadRequest(f"{graph.file}: no link moves relative to the base", base, "a joint that is not fixed")
     if body is None:
         names = [bodies.title(each) for each in rivals]
         raise BadRequest(f"{graph.file}: the file does not say which link is the platform, and several could be",

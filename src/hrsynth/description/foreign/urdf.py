@@ -149,7 +149,7 @@ class Reader(Urdf):
                 graph.gears.append(Gear(coupling.name, str(ends[0]), str(ends[1]), coupling.ratio, 0.0, coupling.line))
         for driver, driven, ratio, offset, line in self.gears:
             if driver not in graph.edges:
-                self.defect(line, f"mimic of joint {driven!r}: unknown joint", driver)
+                graph.note("ignored", f"the mimic of joint {driven!r}: there is no joint {driver!r}")
             elif all(_single(graph.edges[name]) for name in (driver, driven)):
                 graph.gears.append(Gear(graph.fresh(f"mimic_{driven}"), driver, driven, ratio, offset, line))
 
