@@ -21,6 +21,8 @@ from .motion import displacement, kind_of, moved, opening, screws, zero
 CLOSED = 1e-12
 FAINT = 1e-3
 """Part of the largest singular value below which a direction counts as resisted by rounding alone."""
+SHORT = 1e4
+"""Length of a step, as a multiple of the residual that it removes, beyond which it follows rounded numbers."""
 STRIDE = 0.4
 """Largest change of a coordinate in one step."""
 NEARLY = 5e-3
@@ -157,7 +159,21 @@ class Assembly:
                     break
             else:
                 factor *= 10.0
-        return state, size
+        return self._polished(state, error, J, size) if CLOSED < size < NOISE else (state, size)
+
+    def _polished(self, state: State, error: Array, J: Array, size: float) -> tuple[State, float]:
+        """Plain Newton steps, faint directions too, as long as they are short for the residual that they remove."""
+        start = (state, size)
+        for _ in range(10):
+            step = -np.linalg.lstsq(J, error, rcond=RANK_CUTOFF)[0]
+            if np.max(np.abs(step), initial=0.0) > SHORT * size:
+                return start
+            state = self.stepped(state, step)
+            error, J = self.system(state)
+            size = float(np.linalg.norm(error))
+            if size <= CLOSED:
+                return state, size
+        return start
 
     def _step(self, error: Array, J: Array, size: float, factor: float) -> Array:
         U, values, Vt = np.linalg.svd(J, full_matrices=False)
@@ -231,7 +247,9 @@ def unlocked(assembly: Assembly, state: State, seed: int = 0) -> State | None:
     rng = np.random.default_rng(seed)
     best, found, origin = replace(here, weakest=BETTER * here.weakest), None, state
     for number in range(TRIES):
-        if best.weakest > FIRM or (number >= 3 and found is None and here.weakest > NEARLY):
+        if found is not None and best.weakest > FIRM:
+            break
+        if number >= 3 and found is None and here.weakest > NEARLY:
             break
         kernel = assembly.kernel(origin)
         step = kernel @ rng.normal(size=kernel.shape[1])

@@ -81,8 +81,11 @@ def points_in_planes(mechanism: Mechanism) -> Mechanism:
 
 def _plane_of(joint: Joint, joints: list[Joint]) -> Array | None:
     """The normal of the plane in which the joint's two links move relative to each other, or None."""
-    turning = [j for j in joints if j.type is JointType.REVOLUTE and set(j.links) & set(joint.links)]
-    for candidate in turning:
+    bonds: nx.Graph[str] = nx.Graph()
+    bonds.add_nodes_from(joint.links)
+    bonds.add_edges_from(j.links for j in joints if j.type is JointType.FIXED)
+    bodies = {link for end in joint.links for link in nx.node_connected_component(bonds, end)}
+    for candidate in [j for j in joints if j.type is JointType.REVOLUTE and bodies & set(j.links)]:
         normal = candidate.axis
         flat: nx.Graph[str] = nx.Graph()
         flat.add_nodes_from(joint.links)

@@ -45,6 +45,8 @@ class Graph:
     observations: list[Direction] = field(default_factory=list)
     rest: list[str] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
+    closing: set[str] = field(default_factory=set)
+    """Frames that only tell where a loop closes."""
     assumed: dict[str, list[str]] = field(default_factory=dict)
     """Guesses of one kind about many joints: what, and which."""
 

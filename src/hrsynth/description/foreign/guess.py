@@ -59,7 +59,7 @@ class _Bodies:
         self.graph.add_nodes_from(self.members)
         self.graph.add_edges_from({(self.into[a], self.into[b]) for a, b in _moving(graph.edges.values())})
         self.graph.remove_edges_from(nx.selfloop_edges(self.graph))
-        self.edges = list(graph.edges.values())
+        self.edges, self.closing = list(graph.edges.values()), graph.closing
 
     def platform(self) -> tuple[str | None, str, Sequence[str]]:
         """The platform's body and why, or None and the candidates."""
@@ -110,7 +110,7 @@ class _Bodies:
     def _frames(self, body: str) -> list[str]:
         """Links of a body that hang on one fixed joint and carry nothing."""
         found = []
-        for link in self.members[body]:
+        for link in [each for each in self.members[body] if each not in self.closing]:
             own = [edge for edge in self.edges if link in edge.links]
             if len(own) == 1 and own[0].type is JointType.FIXED and own[0].links[1] == link:
                 found.append(link)

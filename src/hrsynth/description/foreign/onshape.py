@@ -29,3 +29,4 @@ def read(reader: Reader, graph: Graph) -> None:
         kind = JointType.REVOLUTE if hinge else JointType.SPHERICAL
         name = graph.fresh(match["name"])
         graph.edges[name] = Edge(name, kind, ends, (np.array([0.0, 0.0, 1.0]),) * kind.axes, in_tree=False)
+        graph.closing.update({link, f"closing_{match['name']}_2", f"{link}_z", f"closing_{match['name']}_2_z"})

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 
 from ...errors import BadRobotFile, Defect
@@ -37,7 +38,7 @@ def read(path: Path, wishes: Given) -> Mechanism:
 
 def said(path: Path, *, strict: bool = True) -> Graph | Mechanism:
     """What a file says: the mechanism itself in the native dialect (where it is read strictly), else a joint graph."""
-    if path.is_dir():
+    if os.path.isdir(path):
         return _folder(path, strict)
     data = xml.content(path)
     if path.suffix.lower() in (".yaml", ".yml") and not data.lstrip().startswith(b"<"):
@@ -64,7 +65,7 @@ def _settings(path: Path, root: xml.Element) -> Path | None:
         return None
     for name in dict.fromkeys((path.with_suffix(".yaml").name, *(_FOLDER if path.stem == "robot" else ()))):
         beside = path.with_name(name)
-        if beside != path and beside.is_file() and gepetto.sayings(beside) is not None:
+        if beside != path and os.path.isfile(beside) and gepetto.sayings(beside) is not None:
             return beside
     return None
 
