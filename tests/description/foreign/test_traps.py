@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from description.foreign.examples import FILES, MJCF, TREE, A, B, C, D, at, ends, mjcf, urdf
-from description.foreign.test_dialects import lines, mobility, written
+from description.foreign.test_dialects import lines, mobility
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError, LoopsNotClosed, RankUndecided
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -112,7 +112,7 @@ def test_rods_and_axes_of_six_digits_are_equal_and_parallel(tmp_path: Path):
     from hrsynth.analysis.setting import prepare
     from hrsynth.description.writers import sdf
 
-    rng, robot = np.random.default_rng(3), with_rods()
+    rng, robot = np.random.default_rng(3), replace(with_rods(), observations=())
     joints = {name: replace(joint, point=joint.point + 2e-6 * rng.uniform(-1, 1, 3),
                             axes=tuple(axis + 2e-6 * rng.uniform(-1, 1, 3) for axis in joint.axes))
               for name, joint in robot.joints.items()}

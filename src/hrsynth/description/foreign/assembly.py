@@ -32,8 +32,8 @@ FIRM = 3e-2
 BETTER = 2.0
 """Factor by which another pose must be firmer to take the place of a nearly singular one."""
 TRIES = 24
-LARGEST = 300
-"""Coordinates above which no random pushes are tried."""
+EFFORT = 100_000
+"""Joints visited (and their like) after which solving is given up: some seconds."""
 State = dict[str, Array]
 
 
@@ -73,6 +73,8 @@ class Assembly:
             self._column[edge.name] = self.size
             self.size += kind_of(edge).freedoms
         self._ways = ways
+        self._effort = len(self.tree) + len(self.loops) + self.size**2 // 50
+        self._spent = 0
 
     def _way(self, link: str) -> frozenset[str]:
         names = set()
@@ -102,6 +104,7 @@ class Assembly:
 
     def system(self, state: State) -> tuple[Array, Array]:
         """What is open in all loops and gears (rows,), and its derivative by the active coordinates (rows, size)."""
+        self._spent += self._effort
         X = self.poses(state)
         twists = np.zeros((6, self.size))
         for edge in self.active:
@@ -145,7 +148,7 @@ class Assembly:
         error, J = self.system(state)
         size, factor = float(np.linalg.norm(error)), 1.0
         for _ in range(iterations):
-            if size <= CLOSED or factor > 1e6 or not self.size:
+            if size <= CLOSED or factor > 1e6 or not self.size or self._spent > EFFORT:
                 break
             step = self._step(error, J, size, factor)
             trial = self.stepped(state, step)
@@ -228,7 +231,7 @@ def solve(assembly: Assembly, seed: int = 0, tries: int = 24) -> Solution:
     best = Solution(state, residual)
     rng = np.random.default_rng(seed)
     for number in range(tries):
-        if best.residual <= NOISE or assembly.size > LARGEST:
+        if best.residual <= NOISE:
             break
         amplitude = (0.1, 0.3, 0.6, 1.0)[min(3, number // 6)]
         start = assembly.stepped(assembly.zero(), amplitude * rng.normal(size=assembly.size))
@@ -242,7 +245,7 @@ def unlocked(assembly: Assembly, state: State, seed: int = 0) -> State | None:
     """A closed state near ``state`` with fewer freedoms, or with loops that resist much more firmly, where ``state`` is
     singular or nearly so; None where it is neither, or nothing better is found."""
     here = assembly.freedom(state)
-    if here.value == 0 or assembly.size > LARGEST:
+    if here.value == 0:
         return None
     rng = np.random.default_rng(seed)
     best, found, origin = replace(here, weakest=BETTER * here.weakest), None, state

@@ -16,9 +16,9 @@ from .assembly import FAINT, Assembly, Solution, State, solve, unlocked
 from .given import Given
 from .graph import Gear, Graph, listed
 
-LINKS = 5000
+LINKS = 2000
 """Links above which a foreign file is refused."""
-SIZE = 600
+SIZE = 240
 """Coordinates of joints in loops above which loops are not solved."""
 
 
@@ -47,8 +47,9 @@ def build(graph: Graph, wishes: Given) -> Mechanism:
     if platform == base and wishes.base is None:
         raise BadRequest(f"{graph.file}: the platform is the base", platform, "another link")
     assembly = Assembly(base, list(graph.edges.values()), graph.gears)
-    if assembly.size > SIZE:
-        raise BadRequest(f"{graph.file}: coordinates of joints in loops", assembly.size, f"up to {SIZE}")
+    if assembly.size > SIZE or len(assembly.loops) > SIZE:
+        raise BadRequest(f"{graph.file}: {len(assembly.loops)} loops through joints with {assembly.size} coordinates",
+                         None, f"up to {SIZE} of each")
     solution = solve(assembly)
     if not solution.residual <= NOISE:
         raise LoopsNotClosed(graph.file, solution.residual, NOISE, assembly.worst(solution.state)[0])
@@ -153,9 +154,9 @@ def assembly_of(mechanism: Mechanism) -> Assembly:
 
 def _as_meant(mechanism: Mechanism, residual: float) -> Mechanism:
     """Geometry that nearly keeps relations keeps them; the gap of the singular values is the evidence."""
-    written = assembly_of(mechanism)
-    if not written.loops:
+    if all(joint.in_tree for joint in mechanism.joints.values()):
         return mechanism
+    written = assembly_of(mechanism)
     found = relations.exact(mechanism)
     if found is None:
         if residual > SAME_GEOMETRY:
@@ -175,9 +176,9 @@ def _as_meant(mechanism: Mechanism, residual: float) -> Mechanism:
 
 def _away_from_singular(mechanism: Mechanism) -> Mechanism:
     """A zero pose at which the loops have more freedoms than nearby is left for one nearby."""
-    assembly = assembly_of(mechanism)
-    if not assembly.loops:
+    if all(joint.in_tree for joint in mechanism.joints.values()):
         return mechanism
+    assembly = assembly_of(mechanism)
     start = assembly.zero()
     there = unlocked(assembly, start)
     if there is None:

@@ -59,7 +59,11 @@ class _Bodies:
         self.graph.add_nodes_from(self.members)
         self.graph.add_edges_from({(self.into[a], self.into[b]) for a, b in _moving(graph.edges.values())})
         self.graph.remove_edges_from(nx.selfloop_edges(self.graph))
-        self.edges, self.closing = list(graph.edges.values()), graph.closing
+        self.closing = graph.closing
+        self.edges: dict[str, list[Edge]] = {link: [] for link in graph.links}
+        for edge in graph.edges.values():
+            for link in edge.links:
+                self.edges[link].append(edge)
 
     def platform(self) -> tuple[str | None, str, Sequence[str]]:
         """The platform's body and why, or None and the candidates."""
@@ -90,8 +94,7 @@ class _Bodies:
         frames = self._frames(body)
         if len(frames) == 1:
             return frames[0]
-        count = {link: sum(link in edge.links for edge in self.edges) for link in self.members[body]}
-        return max(self.members[body], key=lambda link: count[link])
+        return max(self.members[body], key=lambda link: len(self.edges[link]))
 
     def _ways(self, others: Collection[str]) -> dict[str, int]:
         """The number of ways from each body to the base that share no body."""
@@ -111,7 +114,7 @@ class _Bodies:
         """Links of a body that hang on one fixed joint and carry nothing."""
         found = []
         for link in [each for each in self.members[body] if each not in self.closing]:
-            own = [edge for edge in self.edges if link in edge.links]
+            own = self.edges[link]
             if len(own) == 1 and own[0].type is JointType.FIXED and own[0].links[1] == link:
                 found.append(link)
         return found

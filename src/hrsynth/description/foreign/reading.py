@@ -44,6 +44,8 @@ def said(path: Path, *, strict: bool = True) -> Graph | Mechanism:
     if path.suffix.lower() in (".yaml", ".yml") and not data.lstrip().startswith(b"<"):
         return _with_urdf(path)
     root = xml.document(data, str(path))
+    if not (strict and root.find("hrsynth") is not None):
+        _require_few(path, root)
     match root.tag:
         case "mujoco":
             return mjcf.read(with_includes(root, str(path)), str(path))
@@ -57,6 +59,13 @@ def said(path: Path, *, strict: bool = True) -> Graph | Mechanism:
     if root.tag != "robot" or (strict and root.find("hrsynth") is not None):
         return native(root, str(path))
     return urdf.read(root, str(path))
+
+
+def _require_few(path: Path, root: xml.Element) -> None:
+    """Refuse what has too many links before any of them is read."""
+    for count, _ in enumerate(root.iter("link", "body", "model", "default", "frame"), 1):
+        if count > 2 * LINKS:
+            raise _refused(path, f"more than {2 * LINKS} links, bodies and frames", f"up to {LINKS} links")
 
 
 def _settings(path: Path, root: xml.Element) -> Path | None:
