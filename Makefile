@@ -1,6 +1,8 @@
 # Everything happens in .venv, made by the first target that needs it: locked versions, checked by hash.
 PYTHON ?= python3
 JOBS ?= 2
+MUTATIONS ?= 100000
+SEED ?= 0
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --quiet --no-input --disable-pip-version-check
@@ -10,7 +12,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all lint types robots readme lock setup setup-dev setup-all clean
+.PHONY: help demo test test-all fuzz lint types robots readme lock setup setup-dev setup-all clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -24,6 +26,9 @@ test: setup-dev  ## the tests, without the slow ones
 
 test-all: setup-dev  ## all tests
 	@$(PYTEST) tests
+
+fuzz: setup-dev  ## 100,000 mutations of robot files (MUTATIONS=, SEED=): each is read or refused
+	@$(BIN)/python tests/description/foreign/fuzz.py --count $(MUTATIONS) --seed $(SEED)
 
 lint: setup-dev  ## style and import order
 	@$(BIN)/ruff check --quiet . && echo "lint: no complaint"

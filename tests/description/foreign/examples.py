@@ -1,4 +1,4 @@
-"""One four-bar in every dialect: R joints with the axis y at A, B, C and D; link frames are tilted where that matters."""
+"""One four-bar in every dialect: R joints with the axis y at A, B, C and D; most link frames are tilted."""
 
 from __future__ import annotations
 

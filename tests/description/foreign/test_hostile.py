@@ -1,4 +1,4 @@
-"""Hostile and broken files: refused in one line, with exit status 2, within 5 s and 1 GB; nothing fetched or written."""
+"""Hostile and broken files: refused in one line, exit status 2, within 5 s and 1 GB; nothing fetched or written."""
 
 from __future__ import annotations
 
@@ -54,7 +54,6 @@ def test_broken_text_is_refused_with_its_line(dialect: str, tmp_path: Path):
     text = ONE[dialect]
     refused(made(tmp_path, text.encode("utf-16")), "not UTF-8")
     refused(made(tmp_path, text.replace("four_bar", "f\udcff", 1).encode("utf-8", "surrogateescape")), "not UTF-8")
-    refused(made(tmp_path, text[: len(text) // 2]), ":1: ", "malformed XML") if "\n" not in text else None
     for cut in (10, 100, len(text) - 3):
         refused(made(tmp_path, text[:cut]), "malformed XML")
     refused(made(tmp_path, ""), "an empty file")
@@ -109,7 +108,8 @@ def test_includes_stay_in_their_folder_and_come_once(tmp_path: Path):
     (tmp_path / "secret.xml").write_text("<mujoco><worldbody><body name='s'><joint/></body></worldbody></mujoco>")
     folder = tmp_path / "model"
     (folder / "parts").mkdir(parents=True)
-    (folder / "parts" / "arm.xml").write_text("<mujocoinclude><body name='arm'><joint name='j'/></body></mujocoinclude>")
+    arm = "<body name='arm'><joint name='j'/></body>"
+    (folder / "parts" / "arm.xml").write_text(f"<mujocoinclude>{arm}</mujocoinclude>")
     main = "<mujoco><worldbody>{}</worldbody></mujoco>"
     robot = load(made(folder, main.format('<include file="parts/arm.xml"/>')))
     assert list(robot.joints) == ["j"]
@@ -137,7 +137,8 @@ def test_frames_in_a_ring_or_nowhere(frames: str, tmp_path: Path):
 
 
 @pytest.mark.parametrize("yaml", [
-    "a: &a [1]\nclosed_loop: [*a]", "closed_loop: " + "[" * 3000 + "]" * 3000, "closed_loop: !!python/object:os.system x",
+    "a: &a [1]\nclosed_loop: [*a]", "closed_loop: " + "[" * 3000 + "]" * 3000,
+    "closed_loop: !!python/object:os.system x",
     "closed_loop: 3", "closed_loop: [['one', 'none']]", "closed_loop: [['one', 'one']]", "closed_loop: [[1, 2]]",
     "name_mot: ['none']", "joint_name: ['a']\njoint_type: ['ODD']", "joint_name: ['a']", "closed_loop: ['one']",
     "closed_loop: [\x01]", "name_mot: {a: b}"])

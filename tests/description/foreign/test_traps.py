@@ -1,4 +1,4 @@
-"""What real files do: rounded numbers, flat and open zero poses, gears, chains cut in the wrong place, odd conventions."""
+"""What real files do: rounded numbers, flat and open zero poses, gears, joints cut elsewhere, odd conventions."""
 
 from __future__ import annotations
 
@@ -157,9 +157,9 @@ def test_a_gearbox_couples_the_two_joints_on_its_reference_body(tmp_path: Path):
                 f'<axis><xyz>0 0 1</xyz></axis>{extra}</joint>')
 
     gear = "<gearbox_reference_body>base</gearbox_reference_body><gearbox_ratio>0.25</gearbox_ratio>"
-    robot = read(tmp_path, '<sdf version="1.6"><model name="m"><link name="base"/><link name="fast"/><link name="slow"/>'
-                 + joint("i", "revolute", "base", "fast") + joint("o", "revolute", "base", "slow")
-                 + joint("g", "gearbox", "fast", "slow", gear) + "</model></sdf>", "sdf", platform="slow")
+    links = "".join(f'<link name="{name}"/>' for name in ("base", "fast", "slow"))
+    robot = read(tmp_path, f'<sdf version="1.6"><model name="m">{links}' + joint("i", "revolute", "base", "fast")
+                 + joint("o", "revolute", "base", "slow") + joint("g", "gearbox", "fast", "slow", gear) + "</model></sdf>", "sdf", platform="slow")
     assert full_mobility(robot) == 1
     assert [(c.predecessor, c.successor, c.ratio) for c in robot.couplings] == [("fast", "slow", -0.25)]
 
@@ -198,9 +198,8 @@ def test_efforts_of_zero_tell_the_motors_and_others_tell_nothing(tmp_path: Path)
     assert any(note.kind == "guess" and "motors" in note.text for note in robot.notes)
 
 
-@pytest.mark.parametrize(("head", "R"), [
-    ('<compiler eulerseq="xyz"/>', "xyz"), ('<compiler eulerseq="XYZ"/>', "XYZ"), ('<compiler eulerseq="zyx"/>', "zyx")])
-def test_euler_angles_follow_their_sequence(head: str, R: str, tmp_path: Path):
+@pytest.mark.parametrize("R", ["xyz", "XYZ", "zyx"])
+def test_euler_angles_follow_their_sequence(R: str, tmp_path: Path):
     from hrsynth.mechanism.vectors import rotation_about
 
     angles = np.radians([30, 40, 50])
@@ -208,18 +207,20 @@ def test_euler_angles_follow_their_sequence(head: str, R: str, tmp_path: Path):
     for letter, angle in zip(R, angles, strict=True):
         turn = rotation_about(np.eye(3)["xyz".index(letter.lower())], angle)
         expected = expected @ turn if letter.islower() else turn @ expected
-    robot = read(tmp_path, f'<mujoco>{head}<worldbody><body name="b" euler="30 40 50"><joint/><body name="c" pos="1 0 0">'
-                 '<joint/></body></body></worldbody></mujoco>', "xml")
+    head = f'<compiler eulerseq="{R}"/>'
+    body = '<worldbody><body name="b" euler="{}"><joint/></body></worldbody></mujoco>'
+    robot = read(tmp_path, f"<mujoco>{head}{body.format('30 40 50')}", "xml")
     assert np.allclose(robot.links["b"].pose[:3, :3], expected)
     text = " ".join(map(repr, map(float, angles)))
-    radians = read(tmp_path, f'<mujoco><compiler angle="radian"/>{head}<worldbody><body name="b" euler="{text}"><joint/>'
-                   '</body></worldbody></mujoco>', "xml")
+    radians = read(tmp_path, f'<mujoco><compiler angle="radian"/>{head}{body.format(text)}', "xml")
     assert np.allclose(radians.links["b"].pose[:3, :3], expected)
 
 
 @pytest.mark.parametrize(("given", "matrix"), [
-    ('quat="0 0 0 2"', [[-1, 0, 0], [0, -1, 0], [0, 0, 1]]), ('axisangle="0 0 3 90"', [[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
-    ('xyaxes="0 1 0 -1 0 0"', [[0, -1, 0], [1, 0, 0], [0, 0, 1]]), ('zaxis="1 0 0"', [[0, 0, 1], [0, 1, 0], [-1, 0, 0]])])
+    ('quat="0 0 0 2"', [[-1, 0, 0], [0, -1, 0], [0, 0, 1]]),
+    ('axisangle="0 0 3 90"', [[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+    ('xyaxes="0 1 0 -1 0 0"', [[0, -1, 0], [1, 0, 0], [0, 0, 1]]),
+    ('zaxis="1 0 0"', [[0, 0, 1], [0, 1, 0], [-1, 0, 0]])])
 def test_orientations_of_mjcf(given: str, matrix: list, tmp_path: Path):
     robot = read(tmp_path, f'<mujoco><worldbody><body name="b" {given}><joint/></body></worldbody></mujoco>', "xml")
     assert np.allclose(robot.links["b"].pose[:3, :3], matrix)
@@ -305,7 +306,8 @@ def test_a_tool_on_a_fixed_joint_may_be_the_platform(tmp_path: Path):
                                                                                           + "<transmission", 1)
     assert normal_form(native.parse(named)).mechanism.platform == "tool"
     assert check(native.parse(named)).postures[0].dof == 1
-    foreign = read(tmp_path, FILES["urdf: urdf+"]["robot.urdf"].replace("</robot>", _frame("tool", "bar", B) + "</robot>"))
+    text = FILES["urdf: urdf+"]["robot.urdf"].replace("</robot>", _frame("tool", "bar", B) + "</robot>")
+    foreign = read(tmp_path, text)
     assert foreign.platform == "tool"
 
 

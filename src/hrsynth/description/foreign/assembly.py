@@ -55,8 +55,10 @@ class Assembly:
         self.length = _spread(base, tree)
         self.tree = [(_scaled(edge, self.length), parent, child) for edge, parent, child in tree]
         used = {edge.name for edge, _, _ in tree}
-        self.loops = [_scaled(edge, self.length) for edge in edges if edge.name not in used]
         self._parent = {child: (edge, parent) for edge, parent, child in self.tree}
+        reached = {base, *self._parent}
+        self.loops = [_scaled(edge, self.length) for edge in edges
+                      if edge.name not in used and reached.issuperset(edge.links)]
         self._depth = {base: 0}
         for _, parent, child in self.tree:
             self._depth[child] = self._depth[parent] + 1
@@ -168,7 +170,7 @@ class Assembly:
         """Plain Newton steps, faint directions too, as long as they are short for the residual that they remove."""
         start = (state, size)
         for _ in range(10):
-            step = -np.linalg.lstsq(J, error, rcond=RANK_CUTOFF)[0]
+            step: Array = np.asarray(-np.linalg.lstsq(J, error, rcond=RANK_CUTOFF)[0], dtype=float)
             if np.max(np.abs(step), initial=0.0) > SHORT * size:
                 return start
             state = self.stepped(state, step)

@@ -192,6 +192,8 @@ class Reader(Elements):
             X, Y = inverse(one) @ two, np.eye(4)
             if np.any(relative[3:]):
                 X = pose(relative[:3], self.compiler.rotation(self, element, relative[3:]))
+            Y = pose(self._numbers(element, given, "anchor", (0, 0, 0)))
+            X = X @ Y
         return End(str(names[0]), frozen(X), line), End(str(names[1]), frozen(Y), line)
 
     def _gear(self, element: xml.Element, given: dict[str, str], name: str) -> None:

@@ -115,7 +115,9 @@ def _closure(equality: xml.Element, robot: Mechanism, joint: Joint) -> None:
     if joint.type is JointType.FIXED:
         relative = X @ robot.links[two].pose
         relpose = _text((*relative[:3, 3], *rotation_quaternion(relative[:3, :3])))
-        etree.SubElement(equality, "weld", {"name": joint.name, **names, "relpose": relpose})
+        Y = inverse(robot.links[two].pose)
+        etree.SubElement(equality, "weld", {"name": joint.name, **names, "relpose": relpose,
+                                            "anchor": _text(Y[:3, :3] @ joint.point + Y[:3, 3])})
         return
     points = [joint.point]
     if joint.type is JointType.REVOLUTE:
