@@ -158,8 +158,10 @@ def test_a_gearbox_couples_the_two_joints_on_its_reference_body(tmp_path: Path):
 
     gear = "<gearbox_reference_body>base</gearbox_reference_body><gearbox_ratio>0.25</gearbox_ratio>"
     links = "".join(f'<link name="{name}"/>' for name in ("base", "fast", "slow"))
-    robot = read(tmp_path, f'<sdf version="1.6"><model name="m">{links}' + joint("i", "revolute", "base", "fast")
-                 + joint("o", "revolute", "base", "slow") + joint("g", "gearbox", "fast", "slow", gear) + "</model></sdf>", "sdf", platform="slow")
+    joints = joint("i", "revolute", "base", "fast") + joint("o", "revolute", "base", "slow")
+    joints += joint("g", "gearbox", "fast", "slow", gear)
+    text = f'<sdf version="1.6"><model name="m">{links}{joints}</model></sdf>'
+    robot = read(tmp_path, text, "sdf", platform="slow")
     assert full_mobility(robot) == 1
     assert [(c.predecessor, c.successor, c.ratio) for c in robot.couplings] == [("fast", "slow", -0.25)]
 
