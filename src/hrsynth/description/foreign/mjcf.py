@@ -189,11 +189,10 @@ class Reader(Elements):
             Y = pose((inverse(two) @ one @ X)[:3, 3])
         else:
             relative = self._numbers(element, given, "relpose", (0, 1, 0, 0, 0, 0, 0))
-            X, Y = inverse(one) @ two, np.eye(4)
+            Y = pose(self._numbers(element, given, "anchor", (0, 0, 0)))
+            X = inverse(one) @ two @ Y
             if np.any(relative[3:]):
                 X = pose(relative[:3], self.compiler.rotation(self, element, relative[3:]))
-            Y = pose(self._numbers(element, given, "anchor", (0, 0, 0)))
-            X = X @ Y
         return End(str(names[0]), frozen(X), line), End(str(names[1]), frozen(Y), line)
 
     def _gear(self, element: xml.Element, given: dict[str, str], name: str) -> None:

@@ -114,7 +114,7 @@ def _closure(equality: xml.Element, robot: Mechanism, joint: Joint) -> None:
     names = {"body1": one, "body2": two}
     if joint.type is JointType.FIXED:
         relative = X @ robot.links[two].pose
-        relpose = _text((*relative[:3, 3], *rotation_quaternion(relative[:3, :3])))
+        relpose = _text((*(X[:3, :3] @ joint.point + X[:3, 3]), *rotation_quaternion(relative[:3, :3])))
         Y = inverse(robot.links[two].pose)
         etree.SubElement(equality, "weld", {"name": joint.name, **names, "relpose": relpose,
                                             "anchor": _text(Y[:3, :3] @ joint.point + Y[:3, 3])})
