@@ -50,6 +50,15 @@ points that coincide, equal rods) counts as meant and is made exact: printed dig
 EXACT = 1e-11
 """Deviation (characteristic lengths, radians) below which such a relation holds as well as numbers allow."""
 
+FAINT = 1e-3
+"""Singular value of a file's loops, as part of the largest, below which a direction is held by rounding alone."""
+
+NEARLY_SINGULAR = 5e-3
+"""Weakest singular value, as part of the largest, below which a foreign file's zero pose is left for a firmer one."""
+
+FIRM = 3e-2
+"""Weakest singular value, as part of the largest, at which a pose is firm enough."""
+
 SAME_PLANE = 1e-4
 """Sine of the angle between two planes below which they count as one when directions are put in order for drawing."""
 

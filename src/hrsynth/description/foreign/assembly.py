@@ -13,25 +13,15 @@ import numpy as np
 
 from ...mechanism.model import JointType
 from ...mechanism.vectors import Array, inverse
-from ...tolerances import NOISE, RANK_CUTOFF, RANK_GAP
+from ...tolerances import FAINT, NOISE, RANK_CUTOFF, SOLVED
 from ..draft import Edge, End
 from .graph import Gear, spanning_tree
 from .motion import displacement, kind_of, moved, opening, screws, zero
 
-CLOSED = 1e-12
-FAINT = 1e-3
-"""Part of the largest singular value below which a direction counts as resisted by rounding alone."""
 SHORT = 1e4
 """Length of a step, as a multiple of the residual that it removes, beyond which it follows rounded numbers."""
 STRIDE = 0.4
 """Largest change of a coordinate in one step."""
-NEARLY = 5e-3
-"""Weakest singular value, as part of the largest, below which a pose counts as nearly singular."""
-FIRM = 3e-2
-"""Such a value at which a pose is firm enough."""
-BETTER = 2.0
-"""Factor by which another pose must be firmer to take the place of a nearly singular one."""
-TRIES = 24
 EFFORT = 100_000
 """Joints visited (and their like) after which solving is given up: some seconds."""
 State = dict[str, Array]
@@ -150,7 +140,7 @@ class Assembly:
         error, J = self.system(state)
         size, factor = float(np.linalg.norm(error)), 1.0
         for _ in range(iterations):
-            if size <= CLOSED or factor > 1e6 or not self.size or self._spent > EFFORT:
+            if size <= SOLVED or factor > 1e6 or not self.size or self._spent > EFFORT:
                 break
             step = self._step(error, J, size, factor)
             trial = self.stepped(state, step)
@@ -164,7 +154,7 @@ class Assembly:
                     break
             else:
                 factor *= 10.0
-        return self._polished(state, error, J, size) if CLOSED < size < NOISE else (state, size)
+        return self._polished(state, error, J, size) if SOLVED < size < NOISE else (state, size)
 
     def _polished(self, state: State, error: Array, J: Array, size: float) -> tuple[State, float]:
         """Plain Newton steps, faint directions too, as long as they are short for the residual that they remove."""
@@ -176,7 +166,7 @@ class Assembly:
             state = self.stepped(state, step)
             error, J = self.system(state)
             size = float(np.linalg.norm(error))
-            if size <= CLOSED:
+            if size <= SOLVED:
                 return state, size
         return start
 
@@ -216,57 +206,6 @@ class Assembly:
                   for gear in self.gears]
         miss, name = max(found, default=(0.0, "none"))
         return name, miss
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """A closed state, what is left open in it, and whether a random push was needed to get there."""
-
-    state: State
-    residual: float
-    pushed: bool = False
-
-
-def solve(assembly: Assembly, seed: int = 0, tries: int = 24) -> Solution:
-    """Close all loops from zero; where that stalls (flat and collinear poses), from randomly pushed states too."""
-    state, residual = assembly.closed(assembly.zero())
-    best = Solution(state, residual)
-    rng = np.random.default_rng(seed)
-    for number in range(tries):
-        if best.residual <= NOISE:
-            break
-        amplitude = (0.1, 0.3, 0.6, 1.0)[min(3, number // 6)]
-        start = assembly.stepped(assembly.zero(), amplitude * rng.normal(size=assembly.size))
-        state, residual = assembly.closed(start)
-        if residual < best.residual:
-            best = Solution(state, residual, True)
-    return best
-
-
-def unlocked(assembly: Assembly, state: State, seed: int = 0) -> State | None:
-    """A closed state near ``state`` with fewer freedoms, or with loops that resist much more firmly, where ``state`` is
-    singular or nearly so; None where it is neither, or nothing better is found."""
-    here = assembly.freedom(state)
-    if here.value == 0:
-        return None
-    rng = np.random.default_rng(seed)
-    best, found, origin = replace(here, weakest=BETTER * here.weakest), None, state
-    for number in range(TRIES):
-        if found is not None and best.weakest > FIRM:
-            break
-        if number >= 3 and found is None and here.weakest > NEARLY:
-            break
-        kernel = assembly.kernel(origin)
-        step = kernel @ rng.normal(size=kernel.shape[1])
-        step *= (0.3, 0.15, 0.5)[number % 3] / float(np.max(np.abs(step), initial=1e-12))
-        there, residual = assembly.closed(assembly.stepped(origin, step))
-        freedom = assembly.freedom(there)
-        if residual > 10 * CLOSED or freedom.gap < RANK_GAP:
-            continue
-        firmer = freedom.weakest > best.weakest and (found is not None or here.weakest <= NEARLY)
-        if freedom.value < best.value or (freedom.value == best.value and firmer):
-            best, found, origin = freedom, there, there
-    return found
 
 
 def _scaled(edge: Edge, length: float) -> Edge:

@@ -8,13 +8,14 @@ from dataclasses import replace
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed, RankUndecided
 from ...mechanism.model import Coupling, Joint, JointType, Limits, Mechanism, Note
 from ...mechanism.vectors import Array, inverse, pose, unit
-from ...tolerances import NOISE, RANK_GAP, SAME_GEOMETRY
+from ...tolerances import FAINT, NOISE, RANK_CUTOFF, RANK_GAP, SAME_GEOMETRY
 from ..draft import Edge, End
 from ..tree import spanning
 from . import closures, given, guess, relations
-from .assembly import FAINT, Assembly, Solution, State, solve, unlocked
+from .assembly import Assembly, State
 from .given import Given
 from .graph import Gear, Graph, listed
+from .solving import Solution, solve, unlocked
 
 LINKS = 2000
 """Links above which a foreign file is refused."""
@@ -164,7 +165,7 @@ def _as_meant(mechanism: Mechanism, residual: float) -> Mechanism:
         return mechanism
     meant = found.mechanism
     rank = assembly_of(meant).freedom(assembly_of(meant).zero())
-    before, loose = (written.freedom(written.zero(), cutoff) for cutoff in (1e-7, FAINT))
+    before, loose = (written.freedom(written.zero(), cutoff) for cutoff in (RANK_CUTOFF, FAINT))
     text = (f"{found.mended} relations of joints (parallel, perpendicular, meeting, equal) that hold to {NOISE:g} are "
             f"made exact, largest change {found.change:.1e}")
     if before.value != rank.value or residual > SAME_GEOMETRY:
