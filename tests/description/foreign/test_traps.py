@@ -257,6 +257,15 @@ def test_equalities_that_are_off_or_hold_a_joint(tmp_path: Path):
         read(tmp_path, mjcf('<joint joint1="b" joint2="a" polycoef="0 1 2"/>'), "xml", platform="bar")
 
 
+def test_actuators_on_passive_joints_are_told(tmp_path: Path):
+    everywhere = MJCF["connect"].replace("</actuator>", '<position joint="b"/><position joint="c"/></actuator>')
+    notes = [str(note) for note in read(tmp_path, everywhere, "xml").notes]
+    assert any(note.startswith("open: 3 coordinates are driven, but there are 1 freedoms") for note in notes)
+    robot = read(tmp_path, everywhere, "xml", motors=["a"])
+    assert not any(note.kind == "open" for note in robot.notes)
+    assert not any(note.kind == "open" for note in read(tmp_path, MJCF["connect"], "xml").notes)
+
+
 def test_joint_types_of_the_yaml_replace_those_of_the_urdf(tmp_path: Path):
     (tmp_path / "robot.yaml").write_text("joint_name: ['q', 'r']\njoint_type: ['SPHERICAL', 'UJOINT_XY']\n"
                                          "closed_loop: []\n")

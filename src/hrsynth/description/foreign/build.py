@@ -56,7 +56,8 @@ def build(graph: Graph, wishes: Given) -> Mechanism:
         raise LoopsNotClosed(graph.file, solution.residual, NOISE, assembly.worst(solution.state)[0])
     _tell_solution(graph, assembly, solution)
     mechanism = _mechanism(graph, base, platform, assembly, solution.state)
-    return _away_from_singular(_as_meant(closures.points_in_planes(mechanism), solution.residual))
+    meant = _as_meant(closures.points_in_planes(mechanism), solution.residual)
+    return _motors_weighed(_away_from_singular(meant))
 
 
 def _pruned(graph: Graph, base: str) -> None:
@@ -190,6 +191,21 @@ def _away_from_singular(mechanism: Mechanism) -> Mechanism:
     note = Note("solved", f"the zero pose is {why}: moved to {_moves(assembly, there)}")
     moved = moved_to(mechanism, assembly, there)
     return replace(moved, notes=(*mechanism.notes, note))
+
+
+def _motors_weighed(mechanism: Mechanism) -> Mechanism:
+    """A note where more coordinates are driven than there are freedoms: files put actuators on passive joints too."""
+    driven = sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.actuated)
+    inside = sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.in_tree)
+    if driven == 0 or all(joint.in_tree for joint in mechanism.joints.values()):
+        return mechanism
+    assembly = assembly_of(mechanism)
+    free = inside - assembly.size + assembly.freedom(assembly.zero()).value
+    if driven <= free:
+        return mechanism
+    note = Note("open", f"{driven} coordinates are driven, but there are {free} freedoms: some motors may stand on "
+                        "passive joints (--motors JOINTS to name the driven ones)")
+    return replace(mechanism, notes=(*mechanism.notes, note))
 
 
 def moved_to(mechanism: Mechanism, assembly: Assembly, state: State) -> Mechanism:
