@@ -174,7 +174,7 @@ def _observed(anatomy: Anatomy, normal: NormalForm, defaults: dict[str, Observat
         raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
     if observe is None or list(observe) == ["all"]:
         for leg in anatomy.legs:
-            if leg.label not in defaults:
+            if leg.label not in defaults and (leg.links or not defaults):
                 default_observation(anatomy, leg)
         return tuple(defaults.values())
     chosen: dict[tuple[str, ...], Observation] = {}

@@ -134,7 +134,7 @@ class Twin:
             self.model, half, offset, b, pin.SE3(np.eye(3), point - self._centre[b])))
 
     def _gear_rows(self) -> Array:
-        """One row a coupling: successor's rate − ratio × predecessor's rate."""
+        """One row a coupling: successor's rate − ratio × predecessor's rate (metres, radians)."""
         rows = np.zeros((len(self.mechanism.couplings), self.model.nv))
         for row, coupling in zip(rows, self.mechanism.couplings, strict=True):
             for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
@@ -142,7 +142,8 @@ class Twin:
                             if j.successor == link and j.in_tree and j.type.freedoms == 1]
                 if not carriers:
                     raise BadMechanism(f"coupling {coupling.name!r}: no single joint carries the link", link)
-                row[self.coordinates[carriers[0].name][0]] += factor
+                unit = self.length if carriers[0].type is JointType.PRISMATIC else 1.0
+                row[self.coordinates[carriers[0].name][0]] += factor * unit
         return rows
 
     def at(self, q: Array) -> None:
