@@ -9,6 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled
+from ..kinematics.batch.engine import Batch
+from ..kinematics.parts import PlatformMotion
 from ..kinematics.ranks import range_basis
 from ..kinematics.relation import Question, Relation
 from ..kinematics.sampling import Sample, Samples, draw
@@ -56,6 +58,19 @@ class Setting:
     def dof(self) -> int:
         """The robot's dof: the dimension of its platform's twists."""
         return self.everything.members[0].relation.dof.decided("the robot's dof")
+
+    @cached_property
+    def motion(self) -> PlatformMotion:
+        """What the platform generically does."""
+        configurations = [self.everything.start, *(member.configuration for member in self.everything.members)]
+        return PlatformMotion.of(configurations, self.everything.question)
+
+    @cached_property
+    def batch(self) -> Batch | None:
+        """The robot compiled for many poses, with the default segment of each leg; None where it cannot be."""
+        configurations = [self.everything.start, *(member.configuration for member in self.everything.members)]
+        defaults = self.everything.question.observations[: self.defaults]
+        return Batch.of(self.anatomy, defaults, self.motion, configurations)
 
     @cached_property
     def mobility(self) -> Mobility:
