@@ -10,6 +10,7 @@ import numpy as np
 
 from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled
 from ..kinematics.batch.engine import Batch
+from ..kinematics.batch.placing import Placer
 from ..kinematics.parts import PlatformMotion
 from ..kinematics.ranks import range_basis
 from ..kinematics.relation import Question, Relation
@@ -18,6 +19,7 @@ from ..kinematics.twin import Twin
 from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import Anatomy, default_observation, dissect, observation_of
 from ..mechanism.normal import NormalForm, normal_form
+from ..mechanism.observation import Direction
 
 SAMPLES = 20
 """Configurations of a certificate and of a generic verdict."""
@@ -71,6 +73,12 @@ class Setting:
         configurations = [self.everything.start, *(member.configuration for member in self.everything.members)]
         defaults = self.everything.question.observations[: self.defaults]
         return Batch.of(self.anatomy, defaults, self.motion, configurations)
+
+    @cached_property
+    def placer(self) -> Placer | None:
+        """What makes closed configurations of many platform poses; None where a leg is no known subproblem."""
+        defaults = [o for o in self.everything.question.observations[: self.defaults] if isinstance(o, Direction)]
+        return None if self.batch is None else Placer.of(self.batch, self.everything.twin, self.anatomy, defaults)
 
     @cached_property
     def mobility(self) -> Mobility:

@@ -62,17 +62,23 @@ def vector(name: str) -> Any:
 
 def evaluate(expression: Any, values: Mapping[str, Array]) -> Array:
     """Values of an expression for vectors (n, 3), shape (n,)."""
+    names = tuple(sorted(values))
+    run = _function(expression, names)
+    size = max((len(values[name]) for name in names), default=1)
+    return np.broadcast_to(np.asarray(run(*(values[name] for name in names)), dtype=float), (size,))
+
+
+@cache
+def _function(expression: Any, names: tuple[str, ...]) -> Any:
+    """The NumPy function of an expression."""
     import sympy
 
-    names = sorted(values)
     functions = {
         "dot": lambda a, b: np.einsum("...i,...i->...", a, b),
         "cross": np.cross,
         "det": lambda a, b, c: np.einsum("...i,...i->...", a, np.cross(b, c)),
     }
-    run = sympy.lambdify([sympy.Symbol(name) for name in names], expression, modules=[functions, "numpy"])
-    size = max((len(values[name]) for name in names), default=1)
-    return np.broadcast_to(np.asarray(run(*(values[name] for name in names)), dtype=float), (size,))
+    return sympy.lambdify([sympy.Symbol(name) for name in names], expression, modules=[functions, "numpy"])
 
 
 def components(expression: Any) -> Any:

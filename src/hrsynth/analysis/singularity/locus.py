@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRequest, PlaneNotMet, PoseNotReached
+from ...kinematics.batch.placing import Placer
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.parts import PlatformMotion
 from ...kinematics.reach import reach, sweep
@@ -19,6 +20,7 @@ from ...mechanism.vectors import Array
 from ...tolerances import SAME_GEOMETRY, SAME_RELATION
 from .agreement import descend, spectrum, weakest
 from .condition import Condition
+from .quick import Quick
 from .structure import Structure
 
 Asked = tuple[Question, Structure, Condition]
@@ -74,21 +76,22 @@ def _table(values: Array) -> list[list[float | None]]:
 
 def locus(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None, steps: int,
           hidden: Asked, real: Asked | None,
-          progress: Callable[[], None] | None = None) -> Locus:
+          progress: Callable[[], None] | None = None, placer: Placer | None = None) -> Locus:
     """Both robots over the plane that ``plane`` fixes (default: of three parts the third as at the zero configuration).
 
     Raises ``PlaneNotMet`` where no pose of it is reached, ``BadRequest`` where it does not leave two parts free.
     """
     question = hidden[0]
-    grid = _grid(start, question, motion, plane, steps, progress)
-    configurations = sweep(start, question, grid, motion, progress)
+    grid = _grid(start, question, motion, plane, steps, progress, placer)
+    configurations = sweep(start, question, grid, motion, progress, placer)
     if not any(configurations):
         raise PlaneNotMet(start.twin.mechanism.name, str(grid.fixed), "none of its poses is reached")
 
     def field(asked: Question, structure: Structure, condition: Condition) -> Field:
         reached = [(i, at) for i, at in enumerate(configurations) if at is not None]
         places, here = [i for i, _ in reached], [at for _, at in reached]
-        smallest, largest = spectrum(here, asked)
+        quick = Quick.of(placer, asked)
+        smallest, largest = spectrum(here, asked) if quick is None else quick.spectrum(here, spectrum)
         value = condition.expressed(structure.scene(here))
         tables = []
         for column in (value, smallest, 1 / np.where(largest > 0, largest, np.nan)):
@@ -103,7 +106,7 @@ def locus(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
 
 
 def _grid(start: ClosedConfiguration, question: Question, motion: PlatformMotion, plane: Pose | None, steps: int,
-          progress: Callable[[], None] | None) -> Grid:
+          progress: Callable[[], None] | None, placer: Placer | None) -> Grid:
     plane, names = _axes(start, motion, plane)
     try:
         first = reach(start, question, plane, motion) if plane.given else start
@@ -114,7 +117,7 @@ def _grid(start: ClosedConfiguration, question: Question, motion: PlatformMotion
         half = [np.pi if name == "phi" else wide * start.twin.length for name in names]
         axes = [(name, np.linspace(c - h, c + h, COARSE)) for name, c, h in zip(names, centre, half, strict=True)]
         coarse = Grid(tuple(axes), plane)
-        found = [at is not None for at in sweep(first, question, coarse, motion, progress)]
+        found = [at is not None for at in sweep(first, question, coarse, motion, progress, placer)]
         cells = np.argwhere(np.array(found).reshape(coarse.shape))
         if not len(cells):
             cells = np.array([[COARSE // 2, COARSE // 2]])

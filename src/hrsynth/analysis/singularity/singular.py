@@ -121,7 +121,7 @@ def singular(robot: Mechanism, observe: Sequence[str] | str | None = None, camer
         return Singularity(setting, question, real, verdict, structure, None, words, None, ())
     found = condition(structure, question)
     checked = agreement(samples.start, question, structure, found, points, seed=seed,
-                        progress=lambda: tell("random poses"))
+                        progress=lambda: tell("random poses"), placer=setting.placer)
     tell("singular poses")
     motion = PlatformMotion.of([samples.start, *configurations], question)
     examples = tuple(_example(setting, question, motion, at) for at in checked.on_locus[:EXAMPLES])
@@ -158,7 +158,7 @@ def drawn(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
         if max(relation(at, driven).rank for at in configurations) == setting.dof:
             real = asked(driven)
     wanted = Pose.parse(plane) if isinstance(plane, str) else plane
-    return locus(samples.start, motion, wanted, steps, asked(question), real, tell)
+    return locus(samples.start, motion, wanted, steps, asked(question), real, tell, setting.placer)
 
 
 def motors(setting: Setting) -> Question:

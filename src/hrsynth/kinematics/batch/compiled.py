@@ -253,89 +253,111 @@ def several(B, S, w, here, there, starts):  # type: ignore[no-untyped-def]
 
 
 @_jit
-def rod(kind, limb, C, u, t):  # type: ignore[no-untyped-def]
-    """1 / |BC| with u and the tangent of B's path, for C seen from the limb's centre; −1 where the leg does not reach
-    (``plain.rod``)."""
-    radius, length, side, sense = limb[12], limb[13], limb[14], limb[15]
-    square = C[0] * C[0] + C[1] * C[1] + C[2] * C[2]
+def rod(kind, limbs, leg, x, y, z):  # type: ignore[no-untyped-def]
+    """1 / |BC|, u and the tangent of B's path, for C at (x, y, z) seen from the limb's centre; a negative length where
+    the leg does not reach (``plain.rod``)."""
+    ax, ay, az = limbs[leg, 0], limbs[leg, 1], limbs[leg, 2]
+    radius, length, side, sense = limbs[leg, 12], limbs[leg, 13], limbs[leg, 14], limbs[leg, 15]
+    square = x * x + y * y + z * z
     if kind == DISTANCE:
         if square == 0.0:
-            return -1.0
+            return -1.0, x, y, z, ax, ay, az
         short = 1 / sqrt(square)
-        for i in range(3):
-            u[i] = C[i] * sense * short
-            t[i] = u[i]
-        return short
-    x, y, z = limb[0], limb[1], limb[2]
-    height = x * C[0] + y * C[1] + z * C[2]
-    short = 1 / length
+        gain = sense * short
+        return short, x * gain, y * gain, z * gain, x, y, z
+    height = ax * x + ay * y + az * z
+    gain = sense / length
     if kind == LINE:
         inside = length * length - square + height * height
         if not inside > 0.0:
-            return -1.0
+            return -1.0, x, y, z, ax, ay, az
         along = height - side * sqrt(inside)
-        for i in range(3):
-            u[i] = (C[i] - limb[i] * along) * sense * short
-            t[i] = limb[i]
-        return short
-    fx, fy, fz = C[0] - x * height, C[1] - y * height, C[2] - z * height
-    flat = fx * fx + fy * fy + fz * fz
-    along = (flat + (height * height + (radius * radius - length * length))) * (0.5 / flat)
-    inside = radius * radius / flat - along * along
+        return 1 / length, (x - ax * along) * gain, (y - ay * along) * gain, (z - az * along) * gain, ax, ay, az
+    fx, fy, fz = x - ax * height, y - ay * height, z - az * height
+    flat = 1 / (fx * fx + fy * fy + fz * fz)
+    along = 0.5 + 0.5 * flat * (height * height + (radius * radius - length * length))
+    inside = radius * radius * flat - along * along
     if not inside > 0.0:
-        return -1.0
+        return -1.0, x, y, z, ax, ay, az
     across = side * sqrt(inside)
-    bx = fx * along + (y * fz - z * fy) * across
-    by = fy * along + (z * fx - x * fz) * across
-    bz = fz * along + (x * fy - y * fx) * across
-    u[0], u[1], u[2] = (C[0] - bx) * sense * short, (C[1] - by) * sense * short, (C[2] - bz) * sense * short
-    t[0], t[1], t[2] = y * bz - z * by, z * bx - x * bz, x * by - y * bx
-    return short
+    bx = fx * along + (ay * fz - az * fy) * across
+    by = fy * along + (az * fx - ax * fz) * across
+    bz = fz * along + (ax * fy - ay * fx) * across
+    return (1 / length, (x - bx) * gain, (y - by) * gain, (z - bz) * gain,
+            ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
 
 
 @_jit
-def rows(kind, limb, span, p, R, u, M, work):  # type: ignore[no-untyped-def]
-    """u (3,) and the leg's rows of Mᵀ (3, d) at one pose; False where the leg does not reach (``plain.block``)."""
+def from_centre(limbs, leg, X, p, i):  # type: ignore[no-untyped-def]
+    """The leg's tip at pose i, seen from its limb's centre."""
+    bx, by, bz = limbs[leg, 3], limbs[leg, 4], limbs[leg, 5]
+    return (p[0] + X[i, 0, 0] * bx + X[i, 0, 1] * by + X[i, 0, 2] * bz + (limbs[leg, 6] - limbs[leg, 9]),
+            p[1] + X[i, 1, 0] * bx + X[i, 1, 1] * by + X[i, 1, 2] * bz + (limbs[leg, 7] - limbs[leg, 10]),
+            p[2] + X[i, 2, 0] * bx + X[i, 2, 1] * by + X[i, 2, 2] * bz + (limbs[leg, 8] - limbs[leg, 11]))
+
+
+@_jit
+def rows(kind, limbs, leg, span, p, X, U, M, i, place):  # type: ignore[no-untyped-def]
+    """u and the leg's rows of Mᵀ at pose i, where it is watched (``place`` ≥ 0); False where the leg does not reach
+    (``plain.block``)."""
     d = span.shape[1]
-    arm, C, t = work[0], work[1], work[2]
+    row = 3 * place
+    ax, ay, az = limbs[leg, 0], limbs[leg, 1], limbs[leg, 2]
     if kind == CONSTANT:
-        for i in range(3):
-            u[i] = limb[i]
+        if place >= 0:
+            U[i, place, 0], U[i, place, 1], U[i, place, 2] = ax, ay, az
             for j in range(d):
-                M[i, j] = 0.0
+                M[i, row, j] = M[i, row + 1, j] = M[i, row + 2, j] = 0.0
         return True
     if kind == TURNING:
-        for i in range(3):
-            u[i] = R[i, 0] * limb[0] + R[i, 1] * limb[1] + R[i, 2] * limb[2]
-        for j in range(d):
-            wx, wy, wz = span[3, j], span[4, j], span[5, j]
-            M[0, j], M[1, j], M[2, j] = wy * u[2] - wz * u[1], wz * u[0] - wx * u[2], wx * u[1] - wy * u[0]
+        ux = X[i, 0, 0] * ax + X[i, 0, 1] * ay + X[i, 0, 2] * az
+        uy = X[i, 1, 0] * ax + X[i, 1, 1] * ay + X[i, 1, 2] * az
+        uz = X[i, 2, 0] * ax + X[i, 2, 1] * ay + X[i, 2, 2] * az
+        if limbs[leg, 12] > 0.0:
+            cx, cy, cz = from_centre(limbs, leg, X, p, i)
+            away = cx * ux + cy * uy + cz * uz
+            if not limbs[leg, 12] * limbs[leg, 12] - (cx * cx + cy * cy + cz * cz) + away * away > 0.0:
+                return False
+        if place >= 0:
+            U[i, place, 0], U[i, place, 1], U[i, place, 2] = ux, uy, uz
+            for j in range(d):
+                wx, wy, wz = span[3, j], span[4, j], span[5, j]
+                M[i, row, j] = wy * uz - wz * uy
+                M[i, row + 1, j] = wz * ux - wx * uz
+                M[i, row + 2, j] = wx * uy - wy * ux
         return True
-    for i in range(3):
-        arm[i] = R[i, 0] * limb[3] + R[i, 1] * limb[4] + R[i, 2] * limb[5]
-        C[i] = p[i] + arm[i] + (limb[6 + i] - limb[9 + i])
-    short = rod(kind, limb, C, u, t)
+    bx, by, bz = limbs[leg, 3], limbs[leg, 4], limbs[leg, 5]
+    rx = X[i, 0, 0] * bx + X[i, 0, 1] * by + X[i, 0, 2] * bz
+    ry = X[i, 1, 0] * bx + X[i, 1, 1] * by + X[i, 1, 2] * bz
+    rz = X[i, 2, 0] * bx + X[i, 2, 1] * by + X[i, 2, 2] * bz
+    short, ux, uy, uz, tx, ty, tz = rod(kind, limbs, leg, p[0] + rx + (limbs[leg, 6] - limbs[leg, 9]),
+                                        p[1] + ry + (limbs[leg, 7] - limbs[leg, 10]),
+                                        p[2] + rz + (limbs[leg, 8] - limbs[leg, 11]))
     if short < 0.0:
         return False
-    gain = short * limb[15]
-    slip = 1 / (u[0] * t[0] + u[1] * t[1] + u[2] * t[2])
-    for j in range(d):
-        wx, wy, wz = span[3, j], span[4, j], span[5, j]
-        yx = span[0, j] + wy * arm[2] - wz * arm[1]
-        yy = span[1, j] + wz * arm[0] - wx * arm[2]
-        yz = span[2, j] + wx * arm[1] - wy * arm[0]
-        push = (u[0] * yx + u[1] * yy + u[2] * yz) * slip
-        M[0, j], M[1, j], M[2, j] = (yx - t[0] * push) * gain, (yy - t[1] * push) * gain, (yz - t[2] * push) * gain
+    if place >= 0:
+        U[i, place, 0], U[i, place, 1], U[i, place, 2] = ux, uy, uz
+        gain = short * limbs[leg, 15]
+        slip = 1 / (ux * tx + uy * ty + uz * tz)
+        for j in range(d):
+            wx, wy, wz = span[3, j], span[4, j], span[5, j]
+            yx = span[0, j] + wy * rz - wz * ry
+            yy = span[1, j] + wz * rx - wx * rz
+            yz = span[2, j] + wx * ry - wy * rx
+            push = (ux * yx + uy * yy + uz * yz) * slip
+            M[i, row, j] = (yx - tx * push) * gain
+            M[i, row + 1, j] = (yy - ty * push) * gain
+            M[i, row + 2, j] = (yz - tz * push) * gain
     return True
 
 
 @_jit
-def factor(M, Q, T):  # type: ignore[no-untyped-def]
-    """M = Q T by Gram and Schmidt; False where a column depends on those before it (``spread._orthogonal``)."""
-    m, d = M.shape
+def factor(M, pose, Q, T):  # type: ignore[no-untyped-def]
+    """M[pose] = Q T by Gram and Schmidt; False where a column depends on those before it (``spread._orthogonal``)."""
+    m, d = Q.shape
     for i in range(m):
         for j in range(d):
-            Q[i, j] = M[i, j]
+            Q[i, j] = M[pose, i, j]
     whole, smallest = 0.0, np.inf
     for j in range(d):
         size = 0.0
@@ -346,8 +368,9 @@ def factor(M, Q, T):  # type: ignore[no-untyped-def]
         smallest = min(smallest, size)
         T[j, j] = size
         if size > 0.0:
+            size = 1 / size
             for i in range(m):
-                Q[i, j] /= size
+                Q[i, j] *= size
         for k in range(j + 1, d):
             push = 0.0
             for i in range(m):
@@ -360,17 +383,19 @@ def factor(M, Q, T):  # type: ignore[no-untyped-def]
 
 
 @_jit
-def maxima(rows3, T, Q, cones, only, single, P, B, S, w, terms, weights, starts):  # type: ignore[no-untyped-def]
-    """Largest error and its lower bound for the rows (3, d) of position or of orientation (``spread._spread``)."""
+def maxima(span, part, T, Q, cones, only, single, P, B, S, w, terms, weights, starts):  # type: ignore[no-untyped-def]
+    """Largest error and its lower bound for the rows of position (``part`` 0) or of orientation (1)
+    (``spread._spread``)."""
     d, k = T.shape[0], len(cones)
-    if single == 0:
+    if single[part] == 0:
         return 0.0, 0.0
-    for i in range(3):
-        for j in range(d):
-            value = rows3[i, j]
+    for j in range(d):
+        short = 1 / T[j, j]
+        for i in range(3):
+            value = span[3 * part + i, j]
             for m in range(j):
                 value -= P[i, m] * T[m, j]
-            P[i, j] = value / T[j, j]
+            P[i, j] = value * short
     for leg in range(k):
         for i in range(6):
             B[leg, i] = 0.0
@@ -389,10 +414,10 @@ def maxima(rows3, T, Q, cones, only, single, P, B, S, w, terms, weights, starts)
             B[leg, 5] += y * z
         for i in range(6):
             B[leg, i] *= cones[leg] * cones[leg]
-    if single == 1:
+    if single[part] == 1:
         total = 0.0
         for leg in range(k):
-            total += along(B[leg], only)
+            total += along(B[leg], only[part])
         return total, total
     if k == 1:
         value = sqrt(max(top(B[0], w), 0.0))
@@ -411,25 +436,17 @@ def swept(kinds, table, watched, span, X, point, cones, only, single, reached, c
     Q, T, P = np.zeros((3 * k, d)), np.zeros((d, d)), np.zeros((3, d))
     B, S, w, terms, weights, starts = (np.zeros((k, 6)), np.zeros(6), np.zeros(3), np.zeros(k), np.zeros(k),
                                        np.zeros((4, 3)))
-    work, spare_u, spare_M, p, R = np.zeros((3, 3)), np.zeros(3), np.zeros((3, 0)), np.zeros(3), np.zeros((3, 3))
-    none = np.zeros((6, 0))
+    p = np.zeros(3)
     slot = np.full(len(kinds), -1)
     for place in range(k):
         slot[watched[place]] = place
     for i in range(n):
         for row in range(3):
-            p[row] = X[i, row, 3]
-            for column in range(3):
-                R[row, column] = X[i, row, column]
-                p[row] += R[row, column] * point[column]
+            p[row] = (X[i, row, 3] + X[i, row, 0] * point[0] + X[i, row, 1] * point[1] + X[i, row, 2] * point[2])
         there = True
         for leg in range(len(kinds)):
-            place = slot[leg]
-            if place >= 0:
-                there &= rows(kinds[leg], table[leg], span, p, R, U[i, place], M[i, 3 * place : 3 * place + 3], work)
-            else:
-                there &= rows(kinds[leg], table[leg], none, p, R, spare_u, spare_M, work)
-            if not there:
+            if not rows(kinds[leg], table, leg, span, p, X, U, M, i, slot[leg]):
+                there = False
                 break
         reached[i] = there
         if not there:
@@ -438,9 +455,8 @@ def swept(kinds, table, watched, span, X, point, cones, only, single, reached, c
             found[i] = np.nan
             clear[i] = True
         elif len(cones):
-            clear[i] = factor(M[i], Q, T)
+            clear[i] = factor(M, i, Q, T)
             if clear[i]:
-                found[i, 0], found[i, 1] = maxima(span[:3], T, Q, cones, only[0], single[0], P, B, S, w, terms, weights,
-                                                  starts)
-                found[i, 2], found[i, 3] = maxima(span[3:], T, Q, cones, only[1], single[1], P, B, S, w, terms, weights,
-                                                  starts)
+                for part in range(2):
+                    value, lower = maxima(span, part, T, Q, cones, only, single, P, B, S, w, terms, weights, starts)
+                    found[i, 2 * part], found[i, 2 * part + 1] = value, lower

@@ -23,7 +23,7 @@ from ..configuration import ClosedConfiguration
 from ..parts import PlatformMotion
 from .chain import Chain, Ends
 from .limb import Limb, recognised
-from .plain import Flags, Poses, block
+from .plain import Flags, Poses, block, within
 from .spread import Spread, freedom, spreads
 from .stage import Stage, frames_at
 
@@ -137,6 +137,19 @@ class Batch:
             return self._compiled(X, watched, half)
         starts = range(0, max(len(X), 1), CHUNK)
         return _joined([self._part(X[start : start + CHUNK], watched, half) for start in starts])
+
+    def reached(self, X: Array) -> Flags:
+        """Where known subproblems alone reach the poses X (n, 4, 4); what else ``evaluate`` says is left out."""
+        found = [self._reached(X[start : start + CHUNK]) for start in range(0, len(X), CHUNK)]
+        return np.concatenate(found) if found else np.zeros(0, dtype=bool)
+
+    def _reached(self, X: Array) -> Flags:
+        poses = Poses.of(*self.stage.place(X))
+        there = np.ones(len(X), dtype=bool)
+        for leg in self.legs.values():
+            if isinstance(leg, Limb):
+                there &= within(leg, poses)
+        return there
 
     def sweep(self, parts: Iterable[Array], legs: Sequence[str] | None = None, cones: ArrayLike | None = None
               ) -> Iterator[Evaluation]:

@@ -43,7 +43,8 @@ class Limb:
     (``centre``, ``axis``), or on the line through ``centre`` along ``axis``; |BC| = ``rod``; u = ``sense`` (C − B) /
     |BC|.
 
-    ``side`` tells the two solutions apart (the working mode). TURNING: u = R ``axis``; CONSTANT: u = ``axis``.
+    ``side`` tells the two solutions apart (the working mode). TURNING: u = R ``axis``; where there is a ``radius``, B
+    is on the circle about ``centre`` and on the line through the tip along u. CONSTANT: u = ``axis``.
     """
 
     label: str
@@ -56,6 +57,12 @@ class Limb:
     rod: float = 0.0
     side: float = 1.0
     sense: float = 1.0
+    crank: str = ""
+    """The link that carries B, of CIRCLE and LINE."""
+    place: Array = field(default_factory=lambda: np.zeros(3))
+    """B at the zero configuration."""
+    pivot: Array = field(default_factory=lambda: np.zeros(3))
+    """The axis of the circle."""
 
     def row(self) -> Array:
         """The numbers of the subproblem, (16,): axis, b, c, centre, radius, rod, side, sense."""
@@ -79,12 +86,13 @@ def recognised(anatomy: Anatomy, leg: Leg, seen: Direction, stage: Stage, frames
 
 
 def _holds(limb: Limb, p: Array, R: Array, u: Array) -> bool:
-    from .plain import Poses, rod
+    from .plain import Poses, rod, turning
 
     if limb.kind is Kind.CONSTANT:
         return bool(np.max(np.abs(u - limb.axis)) <= SAME_GEOMETRY)
     if limb.kind is Kind.TURNING:
-        return bool(np.max(np.abs(u - R @ limb.axis)) <= SAME_GEOMETRY)
+        return bool(np.max(np.abs(u - R @ limb.axis)) <= SAME_GEOMETRY) and bool(
+            np.all(turning(limb, Poses.of(p, R))[1]))
     poses = Poses.of(p, R)
     errors = []
     for side in (limb.side, -limb.side):
@@ -96,11 +104,16 @@ def _holds(limb: Limb, p: Array, R: Array, u: Array) -> bool:
 def _candidates(anatomy: Anatomy, leg: Leg, stage: Stage, frames: Frames, p: Array, R: Array, u: Array
                 ) -> Iterator[Limb | None]:
     mechanism = anatomy.mechanism
-    yield Limb(leg.label, Kind.CONSTANT, u[0])
-    if anatomy.point is None:
-        yield Limb(leg.label, Kind.TURNING, R[0].T @ u[0])
     joints = [mechanism.joints[name] for name in leg.joints]
     feet = [joint for joint in joints if mechanism.base in joint.links]
+    if sum(joint.type.slides for joint in joints) >= 2:
+        yield Limb(leg.label, Kind.CONSTANT, u[0])
+        yield Limb(leg.label, Kind.TURNING, R[0].T @ u[0])
+    if leg.takes_platform:
+        yield Limb(leg.label, Kind.TURNING, R[0].T @ u[0])
+    for one in feet:
+        for joint in joints:
+            yield _crossing(anatomy, leg, stage, one, joint, frames, R, u)
     for tip, ends in _tips(anatomy, leg, stage):
         for one in feet:
             for start in dict.fromkeys(map(tuple, (one.point, ends(one)[0]))):
@@ -114,7 +127,7 @@ def _candidates(anatomy: Anatomy, leg: Leg, stage: Stage, frames: Frames, p: Arr
                 start = tip(far)
                 C = (p + R @ start[0] + start[1])[0]
                 for place in (near, joint.point):
-                    yield _crank(leg.label, start, one, place, displacement(frames, mechanism, crank), C, u[0])
+                    yield _crank(leg.label, start, one, crank, place, displacement(frames, mechanism, crank), C, u[0])
 
 
 Place = Callable[[Array], tuple[Array, Array]]
@@ -150,24 +163,50 @@ def displacement(frames: Frames, mechanism: Mechanism, link: str) -> Array:
     return frames[link][0] @ inverse(mechanism.links[link].pose)
 
 
+def _crossing(anatomy: Anatomy, leg: Leg, stage: Stage, first: Joint, second: Joint, frames: Frames, R: Array, u: Array
+              ) -> Limb | None:
+    """A crank whose end slides along a line of the platform: an R at the base, an R, a P."""
+    mechanism, body = anatomy.mechanism, stage.bodies.get(leg.attach)
+    kinds = "".join(mechanism.joints[name].type.value for name in leg.joints)
+    crank = first.other(mechanism.base)
+    if body is None or sorted(kinds) != ["P", "R", "R"] or first is second or {first.type, second.type} != {
+            JointType.REVOLUTE} or crank not in second.links or not body.turns:
+        return None
+
+    def moved(link: str) -> Array:
+        X = displacement(frames, mechanism, link)
+        return np.asarray(X[:3, :3] @ second.point + X[:3, 3])
+
+    B, tip = moved(crank), body.point(inverse(mechanism.links[leg.attach].pose)[:3] @ np.append(second.point, 1.0))
+    C = moved(leg.attach)
+    centre = foot(second.point, first.point, first.axis)
+    if np.linalg.norm(np.cross(B - C, u[0])) > SAME_GEOMETRY * mechanism.length:
+        return None
+    radius = float(np.linalg.norm(second.point - centre))
+    return Limb(leg.label, Kind.TURNING, R[0].T @ u[0], *tip, centre=centre, radius=radius, crank=crank,
+                place=second.point, pivot=first.axis, side=_sign(float((B - centre) @ u[0])))
+
+
 def _spring(label: str, tip: tuple[Array, Array], start: Array, p: Array, R: Array, u: Array) -> Limb:
     limb = Limb(label, Kind.DISTANCE, b=tip[0], c=tip[1], centre=start)
     return replace(limb, sense=_sign(float((limb.tip(p, R)[0] - start) @ u[0])))
 
 
-def _crank(label: str, tip: tuple[Array, Array], first: Joint, place: Array, moved: Array, C: Array, u: Array
-           ) -> Limb | None:
+def _crank(label: str, tip: tuple[Array, Array], first: Joint, crank: str, place: Array, moved: Array, C: Array,
+           u: Array) -> Limb | None:
     """The rod to C from the point that was at ``place`` on the link that the leg's first joint carries; C, u and the
     link's displacement are those of the first configuration."""
     B = moved[:3, :3] @ place + moved[:3, 3]
     rod = float(np.linalg.norm(C - B))
     if rod == 0:
         return None
-    limb = Limb(label, Kind.LINE, first.axis, *tip, centre=place, rod=rod, sense=_sign(float((C - B) @ u)))
+    limb = Limb(label, Kind.LINE, first.axis, *tip, centre=place, rod=rod, sense=_sign(float((C - B) @ u)),
+                crank=crank, place=place)
     if first.type is JointType.PRISMATIC:
         return replace(limb, side=_sign(float((C - B) @ first.axis)))
     centre = foot(place, first.point, first.axis)
-    return replace(limb, kind=Kind.CIRCLE, centre=centre, radius=float(np.linalg.norm(place - centre)),
+    radius = float(np.linalg.norm(place - centre))
+    return replace(limb, kind=Kind.CIRCLE, centre=centre, pivot=first.axis, radius=radius,
                    side=_sign(float(np.cross(first.axis, C - centre) @ (B - centre))))
 
 

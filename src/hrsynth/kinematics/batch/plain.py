@@ -80,6 +80,26 @@ def rod(limb: Limb, poses: Poses) -> Rod:
     return Rod((C - B) * (limb.sense / limb.rod), tangent, 1 / limb.rod, arm, reached)
 
 
+def turning(limb: Limb, poses: Poses) -> tuple[Array, Flags, Array]:
+    """u (3, n) of a direction that turns with the platform, where the leg reaches, and where its crank ends (3, n)."""
+    u = poses.turned(limb.axis)
+    C = poses.p + poses.turned(limb.b) + (limb.c - limb.centre)[:, None]
+    if not limb.radius:
+        return u, np.ones(u.shape[1], dtype=bool), C
+    away = dot(C, u)
+    inside = limb.radius**2 - dot(C, C) + away * away
+    reached = inside > 0
+    B = C + u * (limb.side * np.sqrt(np.where(reached, inside, np.nan)) - away)
+    return u, reached, B + limb.centre[:, None]
+
+
+def within(limb: Limb, poses: Poses) -> Flags:
+    """Where the leg reaches, (n,)."""
+    if limb.kind is Kind.CONSTANT:
+        return np.ones(poses.p.shape[1], dtype=bool)
+    return turning(limb, poses)[1] if limb.kind is Kind.TURNING else rod(limb, poses).reached
+
+
 def block(limb: Limb, twists: Array, poses: Poses) -> tuple[Array, Array, Flags]:
     """u (3, n), the leg's rows of Mᵀ (3, d, n) on the basis ``twists`` (6, d), and where the leg reaches."""
     n, d = poses.p.shape[1], twists.shape[1]
@@ -87,10 +107,10 @@ def block(limb: Limb, twists: Array, poses: Poses) -> tuple[Array, Array, Flags]
         return np.broadcast_to(limb.axis[:, None], (3, n)), np.zeros((3, d, n)), np.ones(n, dtype=bool)
     M = np.empty((3, d, n))
     if limb.kind is Kind.TURNING:
-        u = poses.turned(limb.axis)
+        u, reached, _ = turning(limb, poses)
         for j in range(d):
             M[:, j] = cross(twists[3:, j], u)
-        return u, M, np.ones(n, dtype=bool)
+        return u, M, reached
     found = rod(limb, poses)
     u, t = found.u, found.tangent
     gain = found.shortness * limb.sense
