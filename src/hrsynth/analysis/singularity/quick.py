@@ -53,10 +53,11 @@ class Quick:
         values[:, : found.singular_values.shape[1]] = found.singular_values
         here = np.flatnonzero(same)
         for i in np.random.default_rng(seed).choice(here, min(SPOTS, len(here)), replace=False):
-            self._checked(configurations[i], values[i])
+            self._checked(configurations[int(i)], values[i])
         smallest, largest = values[:, -1].copy(), values[:, 0].copy()
         if not same.all():
-            smallest[~same], largest[~same] = others([configurations[i] for i in np.flatnonzero(~same)], self.question)
+            elsewhere = [configurations[int(i)] for i in np.flatnonzero(~same)]
+            smallest[~same], largest[~same] = others(elsewhere, self.question)
         return smallest, largest
 
     def _checked(self, at: ClosedConfiguration, values: Array) -> None:

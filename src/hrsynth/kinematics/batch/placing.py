@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import takewhile
 
 import numpy as np
 
@@ -74,20 +75,24 @@ class Placer:
         limit = FAR * float(batch.evaluate(batch.home[None]).singular_values[0, 0])
         given = failed = 0
         while given < count:
-            walks = -(-(count - given) // steps)
+            walks = -(-2 * (count - given) // steps)
             ways = self._walks(rng, walks, steps, limit)
             failed += sum(len(way) < steps for way in ways)
-            if not any(ways) or failed > 10 * (given + walks + 10):
+            met = self.configurations(np.concatenate(ways)) if any(map(len, ways)) else []
+            for way in np.split(np.arange(len(met)), np.cumsum([len(way) for way in ways])[:-1]):
+                for at in takewhile(lambda at: at is not None, (met[i] for i in way)):
+                    assert at is not None
+                    yield at
+                    given += 1
+                    if given == count:
+                        return
+            if failed > 10 * (given + walks + 10):
                 raise NotSampled(self.twin.mechanism.name, given, count)
-            for at in (at for way in ways for at in way):
-                yield at
-                given += 1
-                if given == count:
-                    return
 
-    def _walks(self, rng: np.random.Generator, walks: int, steps: int, limit: float) -> list[list[ClosedConfiguration]]:
+    def _walks(self, rng: np.random.Generator, walks: int, steps: int, limit: float) -> list[Array]:
+        """The platform poses (k, 4, 4) of each walk."""
         stage, length = self.batch.stage, self.batch.length
-        ways: list[list[ClosedConfiguration]] = [[] for _ in range(walks)]
+        ways: list[list[Array]] = [[] for _ in range(walks)]
         X = np.repeat(self.batch.home[None], walks, axis=0)
         velocity = np.zeros((walks, stage.dof))
         live = np.arange(walks)
@@ -96,20 +101,15 @@ class Placer:
             velocity /= np.linalg.norm(velocity, axis=1, keepdims=True)
             shift, spin = np.split(STEP * velocity, [stage.shifts.shape[1]], axis=1)
             p, R = stage.place(X)
+            X = X.copy()
             X[:, :3, :3] = exponentials(spin @ stage.spins.T) @ R
             X[:, :3, 3] = p + length * (shift @ stage.shifts.T) - X[:, :3, :3] @ stage.point
             found = self.batch.evaluate(X, compiled=False)
-            near = found.reached & (found.singular_values[:, 0] <= limit)
-            there = self.configurations(X)
-            kept = [i for i, at in enumerate(there) if at is not None and near[i]]
-            for i in kept:
-                at = there[i]
-                assert at is not None
-                ways[live[i]].append(at)
+            kept = np.flatnonzero(found.reached & ~(found.singular_values[:, 0] > limit))
             X, velocity, live = X[kept], velocity[kept], live[kept]
-            if not kept:
-                break
-        return ways
+            for walk, pose in zip(live, X, strict=True):
+                ways[walk].append(pose)
+        return [np.array(way).reshape(-1, 4, 4) for way in ways]
 
     def frames(self, X: Array) -> tuple[dict[str, Array], Flags]:
         """Poses (n, 4, 4) of all links, metres, and where the legs are closed (n,)."""
