@@ -10,7 +10,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all lint types robots readme lock setup setup-dev setup-all clean
+.PHONY: help demo test test-all lint types robots readme bench lock setup setup-dev setup-all clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -36,6 +36,9 @@ robots: setup  ## regenerate robots/*.urdf from the families
 
 readme: setup  ## regenerate the README's table of robots
 	@$(BIN)/python -m hrsynth.present.readme README.md
+
+bench: setup-all  ## run the benchmarks and write their table in the README (some minutes)
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py README.md
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt

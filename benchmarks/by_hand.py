@@ -73,6 +73,63 @@ def maxima(M: Array, cone: float) -> tuple[Array, Array]:
     return cone * largest(A1 @ A1.transpose(0, 2, 1), A2 @ A2.transpose(0, 2, 1)), orientation
 
 
+def maxima_tuned(M: Array, cone: float) -> tuple[Array, Array]:
+    """The same by the package's own method, written out for this robot: Gram and Schmidt, and eigenvalues in closed
+    form, components first."""
+    Q, R = np.ascontiguousarray(M.transpose(1, 2, 0)), np.zeros((4, 4, len(M)))
+    for j in range(4):
+        R[j, j] = np.sqrt(np.einsum("rn,rn->n", Q[:, j], Q[:, j]))
+        Q[:, j] /= R[j, j]
+        for i in range(j + 1, 4):
+            R[j, i] = np.einsum("rn,rn->n", Q[:, j], Q[:, i])
+            Q[:, i] -= R[j, i] * Q[:, j]
+    turn = Q[:, 3] / R[3, 3]
+    orientation = cone * (np.sqrt(np.sum(turn[:3] ** 2, axis=0)) + np.sqrt(np.sum(turn[3:] ** 2, axis=0)))
+    J = np.empty((3, 6, len(M)))
+    J[2] = (Q[:, 2] - R[2, 3] * turn) / R[2, 2]
+    J[1] = (Q[:, 1] - R[1, 2] * J[2] - R[1, 3] * turn) / R[1, 1]
+    J[0] = (Q[:, 0] - R[0, 1] * J[1] - R[0, 2] * J[2] - R[0, 3] * turn) / R[0, 0]
+    B, C = (np.array([np.einsum("rn,rn->n", J[a, rows], J[b, rows]) for a, b in
+                      ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))]) for rows in (slice(3), slice(3, 6)))
+    return cone * two_cones(B, C), orientation
+
+
+def two_cones(B: Array, C: Array) -> Array:
+    """As :func:`largest`, for entries xx, yy, zz, xy, xz, yz (6, n)."""
+    value, live = np.full(B.shape[1], np.inf), np.arange(B.shape[1])
+    a, b = np.sqrt(B[0] + B[1] + B[2]), np.sqrt(C[0] + C[1] + C[2])
+    t, low, high, below, above = a / (a + b), np.zeros_like(a), np.ones_like(a), a, -b
+    for step in range(60):
+        S = B / t + C / (1 - t)
+        mean = (S[0] + S[1] + S[2]) / 3
+        x, y, z, f, g, h = S[0] - mean, S[1] - mean, S[2] - mean, S[3], S[4], S[5]
+        spread = np.sqrt((x * x + y * y + z * z + 2 * (f * f + g * g + h * h)) / 6)
+        third = (x * (y * z - h * h) - f * (f * z - g * h) + g * (f * h - g * y)) / (2 * spread**3)
+        size = 2 * spread * np.cos(np.arccos(np.clip(third, -1, 1)) / 3)
+        x, y, z = x - size, y - size, z - size
+        xy, xz, yz = g * h - f * z, f * h - g * y, f * g - h * x
+        columns = np.array([[y * z - h * h, xy, xz], [xy, x * z - g * g, yz], [xz, yz, x * y - f * f]])
+        best = np.argmax(np.abs(np.array([columns[0, 0], columns[1, 1], columns[2, 2]])), axis=0)
+        x, y, z = np.take_along_axis(columns, best[None, None], axis=0)[0]
+        scale = 1 / (x * x + y * y + z * z)
+        a, b = (np.sqrt(scale * (G[0] * x * x + G[1] * y * y + G[2] * z * z
+                                 + 2 * (G[3] * x * y + G[4] * x * z + G[5] * y * z))) for G in (B, C))
+        value[live] = np.minimum(value[live], np.sqrt(mean + size))
+        off = a * (1 - t) - b * t
+        up = off > 0
+        low, high = np.where(up, t, low), np.where(up, high, t)
+        below, above = np.where(up, off, below / 2), np.where(up, above / 2, off)
+        more = (off * off > 1e-14 * t * (1 - t) * (a + b) ** 2) & (high - low > 1e-15)
+        if not more.any():
+            break
+        fixed = a / (a + b)
+        t = np.where((fixed > low) & (fixed < high) & (step % 3 == 0), fixed,
+                     low + (high - low) * below / (below - above))
+        live, B, C, t = live[more], B[:, more], C[:, more], t[more]
+        low, high, below, above = low[more], high[more], below[more], above[more]
+    return value
+
+
 def largest(B: Array, C: Array) -> Array:
     """The maximum over unit w of √(wᵀBw) + √(wᵀCw), (n,): the fixed point t = a / (a + b), kept in a bracket, poses
     that are done left out."""

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled
-from ..kinematics.batch.engine import Batch
-from ..kinematics.batch.placing import Placer
 from ..kinematics.parts import PlatformMotion
 from ..kinematics.ranks import range_basis
 from ..kinematics.relation import Question, Relation
@@ -20,6 +19,10 @@ from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import Anatomy, default_observation, dissect, observation_of
 from ..mechanism.normal import NormalForm, normal_form
 from ..mechanism.observation import Direction
+
+if TYPE_CHECKING:
+    from ..kinematics.batch.engine import Batch
+    from ..kinematics.batch.placing import Placer
 
 SAMPLES = 20
 """Configurations of a certificate and of a generic verdict."""
@@ -70,6 +73,8 @@ class Setting:
     @cached_property
     def batch(self) -> Batch | None:
         """The robot compiled for many poses, with the default segment of each leg; None where it cannot be."""
+        from ..kinematics.batch.engine import Batch
+
         configurations = [self.everything.start, *(member.configuration for member in self.everything.members)]
         defaults = self.everything.question.observations[: self.defaults]
         return Batch.of(self.anatomy, defaults, self.motion, configurations)
@@ -77,6 +82,8 @@ class Setting:
     @cached_property
     def placer(self) -> Placer | None:
         """What makes closed configurations of many platform poses; None where a leg is no known subproblem."""
+        from ..kinematics.batch.placing import Placer
+
         defaults = [o for o in self.everything.question.observations[: self.defaults] if isinstance(o, Direction)]
         return None if self.batch is None else Placer.of(self.batch, self.everything.twin, self.anatomy, defaults)
 

@@ -176,6 +176,8 @@ class Batch:
         known = self.stage.constant and all(isinstance(leg, Limb) for leg in self.legs.values() if leg is not None)
         if compiled is None:
             return known and n >= COMPILED_FROM and find_spec("numba") is not None
+        if compiled and find_spec("numba") is None:
+            raise BadRequest("numba is not installed", True, "compiled=False, or the extra fast")
         if compiled and not known:
             raise BadRequest("a batch whose legs are solved by iteration is not compiled", True, "compiled=False")
         return compiled

@@ -74,8 +74,9 @@ class Placer:
         rng, batch = np.random.default_rng(seed), self.batch
         limit = FAR * float(batch.evaluate(batch.home[None]).singular_values[0, 0])
         given = failed = 0
+        walks = -(-count // steps)
         while given < count:
-            walks = -(-2 * (count - given) // steps)
+            walks *= 2
             ways = self._walks(rng, walks, steps, limit)
             failed += sum(len(way) < steps for way in ways)
             met = self.configurations(np.concatenate(ways)) if any(map(len, ways)) else []
