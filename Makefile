@@ -1,6 +1,7 @@
 # Everything happens in .venv, made by the first target that needs it: locked versions, checked by hash.
 PYTHON ?= python3
 JOBS ?= 2
+INSTANCES ?= 10000
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --quiet --no-input --disable-pip-version-check
@@ -10,7 +11,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all lint types robots readme bench lock setup setup-dev setup-all clean
+.PHONY: help demo test test-all bounds lint types robots readme bench pictures lock setup setup-dev setup-all clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -22,8 +23,11 @@ demo: setup  ## derive the hidden robot of a Quattro of which legs 1 and 4 are o
 test: setup-dev  ## the tests, without the slow ones
 	@$(PYTEST) -m "not slow and not browser" tests
 
-test-all: setup-dev  ## all tests
+test-all: setup-all  ## all tests
 	@$(PYTEST) tests
+
+bounds: setup-dev  ## 10,000 random instances of every family of assembly modes (INSTANCES=10000; half an hour)
+	@cd tests && OMP_NUM_THREADS=1 ../$(BIN)/python -m analysis.modes.bounds $(INSTANCES)
 
 lint: setup-dev  ## style and import order
 	@$(BIN)/ruff check --quiet . && echo "lint: no complaint"
@@ -34,11 +38,21 @@ types: setup-dev  ## type check
 robots: setup  ## regenerate robots/*.urdf from the families
 	@$(BIN)/python -m hrsynth.families
 
-readme: setup  ## regenerate the README's table of robots
+readme: setup  ## regenerate the README's tables
 	@$(BIN)/python -m hrsynth.present.readme README.md
 
 bench: setup-all  ## run the benchmarks and write their table in the README (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py README.md
+
+pictures: setup  ## draw the pictures in docs/pictures again
+	@mkdir -p docs/pictures
+	@$(BIN)/hrsynth modes rrrrr_m1 -o docs/pictures/modes_rrrrr.png > /dev/null
+	@$(BIN)/hrsynth modes 3rrr_m1 -o docs/pictures/modes_3rrr.png > /dev/null
+	@$(BIN)/hrsynth modes gough_stewart --observe 1,3,5 --at x=-0.03,y=-0.06,z=0.37,rpy=-0.1/0.5/0.1 -o docs/pictures/modes_gough_stewart.png > /dev/null
+	@$(BIN)/hrsynth modes hexa --observe 1,3,5 -o docs/pictures/modes_hexa.png > /dev/null
+	@$(BIN)/hrsynth modes quattro --observe 1,4 -o docs/pictures/modes_quattro.png > /dev/null
+	@$(BIN)/hrsynth modes delta -o docs/pictures/modes_delta.png > /dev/null
+	@$(BIN)/hrsynth modes delta --real -o docs/pictures/modes_delta_real.png > /dev/null
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt

@@ -25,6 +25,7 @@ FIELDS = {
     "check": {"characteristic_length", "observed", "camera", "configurations", "redundant", "grid"},
     "singular": {"measured", "dof", "verdict", "lost", "always", "never", "words", "expression", "where", "factors",
                  "characteristic_length", "checked", "examples", "locus", "file"},
+    "modes": {"kind", "at", "observed", "complex", "complete", "proof", "modes", "near", "degenerate", "continuum"},
     "path": {"verdict", "certified", "path", "margin", "boxes", "start", "goal", "reason", "value", "point"},
     "robots": {"robots"},
     "convert": {"file"},
@@ -467,7 +468,7 @@ def test_path_text_has_the_verdict_the_path_and_what_is_not_proved(run):
     assert (answer.status, answer.err) == (0, "")
     assert re.search(r"^verdict +same aspect \(certified\)$", answer.out, re.MULTILINE)
     assert re.search(r"^path +x=0.05,", answer.out, re.MULTILINE)
-    assert re.search(r"^not proved +joint limits", answer.out, re.MULTILINE)
+    assert re.search(r"^not proved +collisions", answer.out, re.MULTILINE)
 
 
 @pytest.mark.parametrize(("arguments", "status", "words"), [
@@ -478,6 +479,55 @@ def test_path_text_has_the_verdict_the_path_and_what_is_not_proved(run):
     (["--from", "x=0"], 2, ["--to"])])
 def test_path_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
     (line,) = run("path", "3rrr_m1", *arguments).refused(status)
+    assert all(word in line for word in words)
+
+
+# ---- modes
+
+
+@pytest.mark.parametrize(("arguments", "count", "real"), [
+    (["3rrr_m1"], 6, 2), (["3rps"], 8, 8), (["quattro", "--observe", "1,3", "--at", "x=0.05,y=0.1,z=-0.7"], 4, 4),
+    (["3rrr_m1", "--real", "--at", "x=0.02,phi=5deg"], 6, 2)])
+def test_modes_json_is_the_contract(run, arguments: list[str], count: int, real: int):
+    data = run("modes", *arguments, "--json").data
+    check_record(data, "modes", arguments[0])
+    assert (data["complex"], data["complete"], len(data["modes"])) == (count, True, real)
+    for mode in data["modes"]:
+        assert mode.keys() >= {"pose", "radius", "residual", "goal", "reachable", "type2_distance"}
+        assert 0 <= mode["radius"] < 1e-9
+        assert 0 <= mode["residual"] < 1e-9
+        assert (mode["type2_distance"] is None) is bool(mode["open"])
+        if mode["goal"]:
+            assert mode["reachable"]
+            assert mode["pose"]["x"] == pytest.approx(data["at"]["x"], abs=1e-9)
+    assert sum(mode["goal"] for mode in data["modes"]) == 1
+
+
+def test_modes_of_too_few_legs_are_a_continuum(run):
+    data = run("modes", "delta", "--observe", "1", "--json").data
+    assert (data["continuum"], data["modes"], data["complete"]) == (1, [], False)
+    answer = run("modes", "delta", "--observe", "1")
+    assert answer.status == 0
+    assert "a continuum of dimension 1" in answer.out
+
+
+def test_modes_text_numbers_them_and_says_what_is_proved(run):
+    answer = run("modes", "3rrr_m1")
+    assert (answer.status, answer.err) == (0, "")
+    said = r"^modes +2 real of 6 complex, proved to be all among poses in the plane of motion$"
+    assert re.search(said, answer.out, re.MULTILINE)
+    assert len(re.findall(r"^mode \d", answer.out, re.MULTILINE)) == 2
+    assert answer.out.count("(the pose itself)") == 1
+
+
+@pytest.mark.parametrize(("arguments", "status", "words"), [
+    (["3rrr_m1", "--at", "x=9"], 3, ["x=9", "is not reached"]),
+    (["3rrr_m1", "--at", "w=9"], 2, ["unknown part", "'w'"]),
+    (["3rrr_m1", "--observe", "7"], 2, ["no leg or link", "'7'"]),
+    (["3rrr_m1", "-o", "modes.svg"], 2, ["modes.svg", ".png"]),
+    (["delta", "--observe", "1", "-o", "modes.png"], 2, ["nothing to draw"])])
+def test_modes_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
+    (line,) = run("modes", *arguments).refused(status)
     assert all(word in line for word in words)
 
 

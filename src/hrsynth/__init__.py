@@ -8,11 +8,12 @@ if TYPE_CHECKING:
     from .analysis.check import check
     from .analysis.controllability import legs
     from .analysis.derive import derive
+    from .analysis.modes.modes import modes
     from .analysis.singularity.singular import singular
     from .description import load, save, shipped
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "advise", "check", "derive", "legs", "load", "path", "save", "shipped", "singular"]
+__all__ = ["__version__", "advise", "check", "derive", "legs", "load", "modes", "path", "save", "shipped", "singular"]
 
 _HOME = {
     "advise": ".analysis.advice",
@@ -20,6 +21,7 @@ _HOME = {
     "derive": ".analysis.derive",
     "legs": ".analysis.controllability",
     "load": ".description",
+    "modes": ".analysis.modes.modes",
     "path": ".analysis.aspects.path",
     "save": ".description",
     "shipped": ".description",

@@ -178,6 +178,36 @@ def advise(
 
 
 @app.command()
+def modes(
+    robot: Robot,
+    at: Annotated[str | None, typer.Option("--at", metavar="POSE", help="Pose whose directions are held, as "
+                                           "x=0.02,y=0.1,z=-0.7 (default: the zero configuration's).")] = None,
+    observe: Observe = "all",
+    camera: Camera = None,
+    real: Annotated[bool, typer.Option("--real", help="The real robot with its own motors held instead.")] = False,
+    output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Draw the modes (.png).")] = None,
+    json: Json = False,
+    seed: Seed = 0,
+) -> None:
+    """All assembly modes: every pose of the platform with the same directions, each proved."""
+    from .analysis.modes.modes import modes as run
+    from .description import load
+    from .present import modes as pictures
+    from .present import records
+    from .present.text.modes import modes
+
+    pictures.writable(output)
+    with Progress() as progress:
+        found = run(load(robot), _list(observe), camera, at=at, real=real, seed=seed, progress=progress.tell)
+    if output is not None:
+        pictures.write(found, output)
+    if json:
+        typer.echo(records.record("modes", found.setting.robot.name, {**found.to_dict(), "file": output}))
+    else:
+        typer.echo(modes(found, output))
+
+
+@app.command()
 def path(
     robot: Robot,
     start: Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")],

@@ -163,3 +163,23 @@ class NotCertified(HrsynthError):
         super().__init__(
             f"{robot}: no hidden robot passed the certificate, largest angle {angle:.3g}, allowed: {tolerance:.3g}"
         )
+
+
+class MissingExtra(HrsynthError):
+    """Something that needs an optional package which is not installed: what, and the extra that brings it."""
+
+    exit_status = 3
+
+    def __init__(self, what: str, extra: str) -> None:
+        self.what, self.extra = what, extra
+        super().__init__(f'{what} needs an optional package: pip install "hrsynth[{extra}]"')
+
+
+class Unsolved(HrsynthError):
+    """An external solver that gave no answer: which, and why."""
+
+    exit_status = 3
+
+    def __init__(self, solver: str, reason: str) -> None:
+        self.solver, self.reason = solver, reason
+        super().__init__(f"{solver} did not solve the system: {reason}")

@@ -46,6 +46,22 @@ SAME_DIRECTION = 1e-7
 SAME_PLANE = 1e-4
 """Sine of the angle between two planes below which they count as one when directions are put in order for drawing."""
 
+SAME_SPOT = 1e-6
+"""Distance (metres; of poses, of their matrices) below which two singular poses are told once."""
+
+ON_PLANE = 10**-4.5
+"""Error (characteristic lengths, radians) up to which a singular pose that was sought near a plane of poses counts as
+lying in it."""
+
+NUDGE = 1e-6
+"""Step (characteristic lengths, radians) over which a slope is taken."""
+
+NAMED = 1e-6
+"""Difference (metres, pure numbers) up to which a freedom is the one that a direction or a line of the robot names."""
+
+INVERTED = 1e-9
+"""Singular values below this fraction of the largest are left out where a map is inverted on its range."""
+
 SAME_GEOMETRY = 1e-9
 """Largest difference (metres, pure numbers) at which two mechanisms count as the same."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import combinations, islice
 from math import comb
 from typing import Any
@@ -12,14 +12,13 @@ import numpy as np
 
 from ..errors import RankUndecided
 from ..kinematics.ranks import kernel_basis, largest_angle, range_basis
-from ..kinematics.relation import relation
-from ..kinematics.sampling import Sample, Samples
-from ..mechanism import Mechanism, Observation
+from ..kinematics.sampling import Samples
+from ..mechanism import Mechanism
 from ..mechanism.vectors import Array
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
 from .candidates import Measurement, candidates
 from .controllability import CONTROLLABLE, Verdict, verdict_of
-from .setting import Setting, prepare, restricted
+from .setting import Setting, prepare, restricted, silent
 
 PROBES = 3
 """Configurations at which all sets are tried; what sees most there is verified at all samples."""
@@ -81,8 +80,7 @@ class Advice:
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         now = self.now
-        return {"observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
-                "camera": self.setting.mechanism.reference, "verdict": now.verdict, "rank": now.rank, "dof": now.dof,
+        return {**self.setting.to_dict(), "verdict": now.verdict, "rank": now.rank, "dof": now.dof,
                 "lost": [freedom.to_dict() for freedom in now.lost], "nothing_missing": self.nothing_missing,
                 "sets": [each.to_dict() for each in self.sets], "size": self.size, "tried": self.tried,
                 "complete": self.complete, "undecided": self.undecided}
@@ -97,14 +95,14 @@ def advise(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     direction is observed, and an encoder on any joint. Every set that is returned is verified at all samples. Raises
     ``BadRequest`` for unknown names, ``RankUndecided`` where what is seen now has no clear rank.
     """
-    tell = progress or (lambda what: None)
+    tell = progress or silent
     tell("sampling")
     setting = prepare(robot, observe, camera, seed=seed)
-    now = verdict_of(setting, tuple(dict.fromkeys(o.leg for o in setting.observed)), setting.samples)
+    now = verdict_of(setting, setting.labels, setting.samples)
     if now.verdict == CONTROLLABLE:
         return Advice(setting, now, (), 0, True)
     everything = candidates(setting)
-    samples = _watching(setting, (*setting.observed, *(each.observation for each in everything)))
+    samples = setting.measuring((*setting.observed, *(each.observation for each in everything)))
     search = Search(samples, len(setting.observed), everything)
     chosen, complete = search.smallest(tell)
     tell("verification")
@@ -117,23 +115,14 @@ def advise(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
 
 def _verified(setting: Setting, samples: Samples, sets: Sequence[tuple[Measurement, ...]]) -> list[Cure]:
     """Each set with its verdict at all samples; those whose rank has no clear gap are left out."""
-    labels = tuple(dict.fromkeys(o.leg for o in setting.observed))
     found: list[Cure] = []
     for added in sets:
         watched = (*setting.observed, *(each.observation for each in added))
         try:
-            found.append(Cure(added, verdict_of(setting, labels, restricted(samples, watched))))
+            found.append(Cure(added, verdict_of(setting, setting.labels, restricted(samples, watched))))
         except RankUndecided:
             continue
     return found
-
-
-def _watching(setting: Setting, observations: tuple[Observation, ...]) -> Samples:
-    """The samples' configurations again, with ρ for other observations (and no ways)."""
-    drawn = setting.everything
-    question = replace(drawn.question, observations=observations)
-    members = tuple(Sample(m.configuration, (), relation(m.configuration, question)) for m in drawn.members)
-    return Samples(question, drawn.twin, drawn.start, members, drawn.discarded)
 
 
 class Search:

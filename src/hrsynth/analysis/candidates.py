@@ -52,9 +52,8 @@ def candidates(setting: Setting) -> tuple[Measurement, ...]:
 
 
 def _legs(setting: Setting) -> Iterator[Measurement]:
-    watched = {o.leg for o in setting.observed}
-    for segment in setting.everything.question.observations[: setting.defaults]:
-        if segment.leg not in watched:
+    for segment in setting.segments:
+        if segment.leg not in setting.labels:
             yield Measurement("leg", segment.leg, segment, segment.leg)
 
 

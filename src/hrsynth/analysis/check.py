@@ -13,7 +13,7 @@ from ..mechanism import Mechanism
 from ..mechanism.pose import SCALARS, Grid, Pose
 from .posture import Examiner, Posture
 from .redundancy import Redundancy, listed
-from .setting import Setting, prepare
+from .setting import Setting, prepare, silent
 
 UNREACHABLE = "unreachable"
 MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degrees_per_degree")
@@ -63,8 +63,7 @@ class Check:
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
         return {"characteristic_length": self.length,
-                "observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
-                "camera": self.setting.mechanism.reference,
+                **self.setting.to_dict(),
                 "configurations": [each.to_dict() for each in self.postures],
                 "redundant": [each.to_dict() for each in self.redundant],
                 "grid": self.grid and self.grid.to_dict()}
@@ -86,14 +85,11 @@ def check(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
     poses = [Pose.parse(each) if isinstance(each, str) else each for each in at]
     cells = Grid.parse(grid) if isinstance(grid, str) else grid
 
-    def tell(text: str) -> None:
-        if progress is not None:
-            progress(text)
-
+    tell = progress or silent
     tell("sampling")
     setting = prepare(robot, observe, camera, seed=seed)
     examiner = Examiner(setting)
-    start, question, motion = setting.everything.start, setting.everything.question, examiner.motion
+    start, question, motion = setting.everything.start, setting.everything.question, setting.motion
     configurations = [reach(start, question, pose, motion) for pose in poses] or [start]
     tell("poses")
     postures = tuple(map(examiner.examine, configurations))

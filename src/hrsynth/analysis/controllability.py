@@ -7,15 +7,14 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
-import numpy as np
-
 from ..kinematics.ranks import Rank
 from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
+from ..mechanism.observation import labels_of
 from ..tolerances import RANK_GAP
 from .exact import ExactVerdict, architecture
-from .freedoms import Freedom, name_freedoms
+from .freedoms import Freedom, name_freedoms, point_text
 from .setting import Setting, prepare, restricted
 from .verdict import BLIND as BLIND
 from .verdict import CONTROLLABLE as CONTROLLABLE
@@ -92,14 +91,10 @@ def _lost(setting: Setting, samples: Samples, legs: tuple[str, ...], count: int)
     if found.shape[1] != count or start.gap < RANK_GAP:
         member = next(member for member in samples.members if member.relation.lost.shape[1] == count)
         found, position = member.relation.lost, member.configuration.pose(samples.question.platform)[:3, 3]
-    twists = np.zeros((6, count))
-    twists[: found.shape[0]] = found
-    twists[:3] *= setting.everything.twin.length
-    named = name_freedoms(twists, setting.anatomy, legs, position)
+    named = name_freedoms(found, setting.anatomy, legs, position)
     if position is None:
         return named
-    where = " ".join(f"{0.0 if abs(value) < 1e-9 else value:.4g}" for value in position)
-    return tuple(replace(each, name=f"{each.name} (with the platform at ({where}))") for each in named)
+    return tuple(replace(each, name=f"{each.name} (with the platform at {point_text(position)})") for each in named)
 
 
 def legs(robot: Mechanism, camera: str | None = None, *, progress: Callable[[], None] | None = None,
@@ -107,8 +102,8 @@ def legs(robot: Mechanism, camera: str | None = None, *, progress: Callable[[], 
     """The verdict of every set of legs at their default segments (theory 3, verdicts)."""
     setting = prepare(robot, None, camera, seed=seed)
     anatomy = setting.anatomy
-    segments = setting.everything.question.observations[: setting.defaults]
-    labels = tuple(o.leg for o in segments)
+    segments = setting.segments
+    labels = labels_of(segments)
     sets, exact = list[Verdict](), list[ExactVerdict]()
     generic = architecture(setting)
     complete = len(labels) <= LARGEST_COMPLETE

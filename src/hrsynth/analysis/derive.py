@@ -26,7 +26,7 @@ from .controllability import Verdict, verdict_of
 from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
-from .setting import Mobility, Setting, prepare
+from .setting import Mobility, Setting, prepare, silent
 
 STEP_SAMPLES = 3
 """Configurations at which a single step is checked."""
@@ -84,8 +84,7 @@ class Derivation:
         certificate = self.certificate
         written = self.setting.mobility_as_written
         return {
-            "observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
-            "camera": self.setting.mechanism.reference,
+            **self.setting.to_dict(),
             "notation": {"real": self.architecture.unicode, "hidden": hidden and hidden.unicode,
                          "real_ascii": self.architecture.ascii, "hidden_ascii": hidden and hidden.ascii,
                          "hidden_latex": hidden and hidden.latex},
@@ -120,14 +119,11 @@ def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     if form not in FORMS:
         raise BadRequest("unknown form", form, FORMS)
 
-    def tell(text: str) -> None:
-        if progress is not None:
-            progress(text)
-
+    tell = progress or silent
     tell("sampling")
     setting = prepare(robot, observe, camera, seed=seed)
     anatomy, samples = setting.anatomy, setting.samples
-    verdict = verdict_of(setting, tuple(dict.fromkeys(o.leg for o in setting.observed)), samples)
+    verdict = verdict_of(setting, setting.labels, samples)
     exact = exact_architecture(setting).verdict(setting.observed)
     evidence = Evidence(anatomy, samples)
 
@@ -219,7 +215,7 @@ def _paper_form(setting: Setting, evidence: Evidence, samples: Samples, certifie
             return PaperForm(architecture, True, found.largest_angle, reason="equivalent, but not the simplest form")
         tried.append((found, architecture))
     found, architecture = min(reversed(tried), key=lambda pair: pair[0].largest_angle)
-    gains, loses = _exchanged(setting.anatomy, found, samples.twin.length)
+    gains, loses = _exchanged(setting.anatomy, found)
     return PaperForm(architecture, False, found.largest_angle, gains, loses, found.reason)
 
 
@@ -231,16 +227,14 @@ def _planar(samples: Samples) -> bool:
     return range_basis(twists[3:], 1.0)[1].value <= 1 and range_basis(twists[:3], 1.0)[1].value <= 2
 
 
-def _exchanged(anatomy: Anatomy, found: Certificate,
-               length: float) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
+def _exchanged(anatomy: Anatomy, found: Certificate) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
     """The platform's freedoms that a wrong hidden robot gains and loses, at the configuration where they differ."""
     if found.mismatch is None or found.mismatch.real.twist_rows != 6:
         return (), ()
     real, hidden, position = found.mismatch.real, found.mismatch.hidden, found.mismatch.position
 
     def beyond(inner: Array, outer: Array) -> tuple[Freedom, ...]:
-        rest = range_basis(inner - outer @ (outer.T @ inner), 1.0)[0].copy()
-        rest[:3] *= length
+        rest = range_basis(inner - outer @ (outer.T @ inner), 1.0)[0]
         return name_freedoms(rest, anatomy, position=position)
 
     gains, loses = beyond(hidden.twists, real.twists), beyond(real.twists, hidden.twists)

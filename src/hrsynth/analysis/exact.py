@@ -23,7 +23,7 @@ import numpy as np
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Question, Relation
 from ..mechanism import Mechanism, Observation
-from ..mechanism.observation import Direction
+from ..mechanism.observation import Direction, labels_of
 from ..mechanism.relations import Relations, recognise
 from .instances import Instance, NotRecognised, draw, instance
 from .setting import Setting, selected
@@ -96,7 +96,7 @@ class ExactArchitecture:
 
     def verdict(self, observed: Sequence[Observation]) -> ExactVerdict:
         """The verdict for some of the observations."""
-        legs = tuple(dict.fromkeys(o.leg for o in observed))
+        legs = labels_of(observed)
         try:
             rank, instances = self._rank(observed)
         except NotRecognised as error:
@@ -125,7 +125,7 @@ class ExactArchitecture:
 def architecture(setting: Setting) -> ExactArchitecture:
     """The architecture of a robot, from its zero configuration and its samples."""
     everything = setting.everything
-    at = [everything.start, *(member.configuration for member in everything.members)]
+    at = [everything.start, *setting.configurations]
     return architecture_of(setting.mechanism, everything.question, at, everything.members[0].relation)
 
 

@@ -10,9 +10,9 @@ from ..kinematics.ranks import kernel_basis, range_basis
 from ..mechanism import JointType
 from ..mechanism.legs import Anatomy
 from ..mechanism.vectors import Array, unit
+from ..tolerances import NAMED
 
 _AXES = "xyz"
-_NEAR = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,14 +29,15 @@ class Freedom:
 
 def name_freedoms(twists: Array, anatomy: Anatomy, labels: tuple[str, ...] | None = None,
                   position: Array | None = None) -> tuple[Freedom, ...]:
-    """Named twists that span the columns of ``twists`` (6, k), metres and radians, at the zero configuration.
+    """Named twists that span the columns of ``twists`` (6, k), or (3, k) of a point body, in characteristic lengths of
+    the mechanism, at the zero configuration.
 
     ``labels`` are the legs whose tips are tried as points of rotation axes (default: all). With ``position`` the twists
     belong to another configuration, with the platform's origin there: lines of the robot are not named then.
     """
     if twists.shape[1] == 0:
         return ()
-    twists = range_basis(twists)[0]
+    twists = range_basis(_metric(twists, anatomy.mechanism.length))[0]
     found: list[Freedom] = []
     free, _ = kernel_basis(twists[3:], 1.0)
     translations = range_basis(twists[:3] @ free, 1.0)[0] if free.shape[1] else np.zeros((3, 0))
@@ -53,16 +54,29 @@ def name_freedoms(twists: Array, anatomy: Anatomy, labels: tuple[str, ...] | Non
         if len(found) == twists.shape[1]:
             break
         rest = _without(column, found)
-        if np.linalg.norm(rest[3:]) > _NEAR and not _spanned(rest, found):
+        if np.linalg.norm(rest[3:]) > NAMED and not _spanned(rest, found):
             twist = rest / np.linalg.norm(rest[3:])
             origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3] if position is None else position
             found.append(Freedom(twist, _screw(origin, twist)))
     return tuple(found)
 
 
+def point_text(point: Array) -> str:
+    """A point or a vector in words: ``(0.1 0 -0.7)``."""
+    return "(" + " ".join(f"{0.0 if abs(value) < 1e-9 else value:.4g}" for value in point) + ")"
+
+
+def _metric(twists: Array, length: float) -> Array:
+    """Twists (6 or 3, k) in lengths of ``length`` metres as (6, k) in metres and radians."""
+    found = np.zeros((6, twists.shape[1]))
+    found[: len(twists)] = twists
+    found[:3] *= length
+    return found
+
+
 def _inside(twist: Array, span: Array) -> bool:
     unit_twist = twist / np.linalg.norm(twist)
-    return bool(np.linalg.norm(unit_twist - span @ (span.T @ unit_twist)) < _NEAR)
+    return bool(np.linalg.norm(unit_twist - span @ (span.T @ unit_twist)) < NAMED)
 
 
 def _without(twist: Array, found: list[Freedom]) -> Array:
@@ -73,7 +87,7 @@ def _without(twist: Array, found: list[Freedom]) -> Array:
 
 
 def _spanned(twist: Array, found: list[Freedom]) -> bool:
-    return bool(np.linalg.norm(_without(twist / np.linalg.norm(twist), found)) < _NEAR)
+    return bool(np.linalg.norm(_without(twist / np.linalg.norm(twist), found)) < NAMED)
 
 
 def _nice_directions(basis: Array, anatomy: Anatomy) -> list[Array]:
@@ -84,21 +98,20 @@ def _nice_directions(basis: Array, anatomy: Anatomy) -> list[Array]:
     chosen: list[Array] = []
     for candidate in candidates:
         inside = basis @ (basis.T @ candidate)
-        if len(chosen) < basis.shape[1] and np.linalg.norm(inside - candidate) < _NEAR:
+        if len(chosen) < basis.shape[1] and np.linalg.norm(inside - candidate) < NAMED:
             stacked = np.column_stack([*chosen, candidate])
-            if np.linalg.matrix_rank(stacked, tol=1e-6) == len(chosen) + 1:
+            if np.linalg.matrix_rank(stacked, tol=NAMED) == len(chosen) + 1:
                 chosen.append(unit(candidate))
     return chosen
 
 
 def _name(direction: Array, anatomy: Anatomy) -> str:
     for i in range(3):
-        if abs(abs(direction[i]) - 1) < _NEAR:
+        if abs(abs(direction[i]) - 1) < NAMED:
             return _AXES[i]
     along = [j.name for j in anatomy.mechanism.joints.values()
-             if j.type is JointType.PRISMATIC and np.linalg.norm(np.cross(j.axis, direction)) < _NEAR]
-    text = "(" + " ".join(f"{round(float(value), 9) + 0.0:.4g}" for value in direction) + ")"
-    return f"{text}, the axis of {along[0]}" if along else text
+             if j.type is JointType.PRISMATIC and np.linalg.norm(np.cross(j.axis, direction)) < NAMED]
+    return f"{point_text(direction)}, the axis of {along[0]}" if along else point_text(direction)
 
 
 def _tips(anatomy: Anatomy, labels: tuple[str, ...] | None) -> list[tuple[str, Array]]:
@@ -120,7 +133,7 @@ def _lines(anatomy: Anatomy, labels: tuple[str, ...] | None) -> list[tuple[Array
     lines: list[tuple[Array, Array, str]] = []
     for i, (a, p) in enumerate(tips):
         for b, q in tips[i + 1:]:
-            if np.linalg.norm(q - p) > _NEAR:
+            if np.linalg.norm(q - p) > NAMED:
                 lines.append((p, unit(q - p), f"the line B{a} B{b}"))
     for axis, name in zip(np.eye(3), _AXES, strict=True):
         lines.append((origin, axis, f"the platform's {name} axis"))
@@ -141,14 +154,10 @@ def _rotation(anatomy: Anatomy, point: Array, direction: Array) -> Array:
     return np.concatenate([np.cross(direction, origin - point), direction])
 
 
-def _text(vector: Array) -> str:
-    return "(" + " ".join(f"{0.0 if abs(value) < 1e-9 else value:.4g}" for value in vector) + ")"
-
-
 def _screw(origin: Array, twist: Array) -> str:
     """The screw of a twist with unit angular part at ``origin``: its axis and pitch (m/rad)."""
     v, w = twist[:3], twist[3:]
     point = origin + np.cross(w, v)
     pitch = float(w @ v)
-    kind = "rotation" if abs(pitch) < _NEAR else f"screw motion of pitch {pitch:.4g} m/rad"
-    return f"{kind} about the line through {_text(point)} along {_text(w)}"
+    kind = "rotation" if abs(pitch) < NAMED else f"screw motion of pitch {pitch:.4g} m/rad"
+    return f"{kind} about the line through {point_text(point)} along {point_text(w)}"

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.parts import PlatformMotion
 from ..kinematics.ranks import range_basis
 from ..kinematics.relation import Relation, relation, relation_of
 from ..mechanism.pose import Pose
@@ -129,12 +128,6 @@ class Examiner:
     setting: Setting
 
     @cached_property
-    def motion(self) -> PlatformMotion:
-        """What the platform generically does."""
-        everything = self.setting.everything
-        return PlatformMotion.of((member.configuration for member in everything.members), everything.question)
-
-    @cached_property
     def usual(self) -> Counts:
         """The generic counts of the observed directions."""
         return generic([Counts.of(member.relation) for member in self.setting.samples.members])
@@ -142,12 +135,12 @@ class Examiner:
     @cached_property
     def usual_real(self) -> Counts:
         """The generic counts of the motors."""
-        return generic([Counts.of(self._real(member.configuration)) for member in self.setting.everything.members])
+        return generic([Counts.of(self._real(at)) for at in self.setting.configurations])
 
     @cached_property
     def redundant(self) -> Rows:
         """The redundant rows of each loop in general."""
-        return usual_rows(member.configuration for member in self.setting.everything.members)
+        return usual_rows(self.setting.configurations)
 
     def _real(self, at: ClosedConfiguration) -> Relation:
         return relation_of(at, self.setting.samples.question, np.eye(at.twin.nv)[at.twin.actuated()])
@@ -156,11 +149,10 @@ class Examiner:
         """What can be said without names: no freedoms, no redundant constraints."""
         setting = self.setting
         found = relation(at, setting.samples.question)
-        defaults = relation(at, replace(setting.everything.question,
-                                        observations=setting.everything.question.observations[: setting.defaults]))
+        defaults = relation(at, replace(setting.everything.question, observations=setting.segments))
         real = self._kinds(self._real(at), self.usual_real) if at.twin.actuated() else None
         mobility = Mobility(found.mobility, found.mobility - defaults.dimension)
-        return Posture(at, self.motion.pose(at.pose(self.motion.link)), mobility, found.dof.value,
+        return Posture(at, setting.motion.pose(at.pose(setting.motion.link)), mobility, found.dof.value,
                        self._kinds(found, self.usual), real, self._distances(at, found))
 
     def examine(self, at: ClosedConfiguration) -> Posture:
@@ -201,7 +193,7 @@ class Examiner:
         """The platform's twists that it has only here; all of them where the general ones change from pose to pose."""
         if found.dof.value <= self.usual.dof:
             return np.zeros((found.twist_rows, 0))
-        usual = self.motion.twists[: found.twist_rows]
+        usual = self.setting.motion.twists[: found.twist_rows]
         if usual.shape[1] != self.usual.dof:
             return found.twists
         return range_basis(found.twists - usual @ (usual.T @ found.twists), 1.0)[0]
@@ -209,11 +201,7 @@ class Examiner:
     def _named(self, at: ClosedConfiguration, twists: Array) -> tuple[Freedom, ...]:
         """Twists (3 or 6, k) in characteristic lengths as named freedoms."""
         setting = self.setting
-        metric = np.zeros((6, twists.shape[1]))
-        metric[: len(twists)] = twists
-        metric[:3] *= at.twin.length
-        labels = tuple(dict.fromkeys(o.leg for o in setting.observed))
         start = setting.everything.start
         at_zero = at.twin is start.twin and np.max(np.abs(at.q - start.q), initial=0.0) < PASSED_BY * PASSED_BY
-        position = None if at_zero else at.pose(self.motion.link)[:3, 3]
-        return name_freedoms(metric, setting.anatomy, labels, position)
+        position = None if at_zero else at.pose(self.setting.motion.link)[:3, 3]
+        return name_freedoms(twists, setting.anatomy, setting.labels, position)

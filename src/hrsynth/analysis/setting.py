@@ -5,20 +5,22 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled
+from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.parts import PlatformMotion
 from ..kinematics.ranks import range_basis
-from ..kinematics.relation import Question, Relation
+from ..kinematics.relation import Question, Relation, relation
 from ..kinematics.sampling import Sample, Samples, draw
 from ..kinematics.twin import Twin
 from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import Anatomy, default_observation, dissect, observation_of
 from ..mechanism.normal import NormalForm, normal_form
-from ..mechanism.observation import Direction
+from ..mechanism.observation import Direction, labels_of
+from ..mechanism.sensors import encoders
 
 if TYPE_CHECKING:
     from ..kinematics.batch.engine import Batch
@@ -54,6 +56,26 @@ class Setting:
         """The mechanism in normal form."""
         return self.anatomy.mechanism
 
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The observed legs."""
+        return labels_of(self.observed)
+
+    @property
+    def segments(self) -> tuple[Observation, ...]:
+        """The default segments of all legs."""
+        return self.everything.question.observations[: self.defaults]
+
+    @property
+    def configurations(self) -> tuple[ClosedConfiguration, ...]:
+        """The configurations of the samples, without the zero configuration."""
+        return tuple(member.configuration for member in self.everything.members)
+
+    @cached_property
+    def motion(self) -> PlatformMotion:
+        """What the platform generically does."""
+        return PlatformMotion.of(self.configurations, self.everything.question)
+
     @cached_property
     def samples(self) -> Samples:
         """The samples, for the observed segments alone."""
@@ -65,26 +87,18 @@ class Setting:
         return self.everything.members[0].relation.dof.decided("the robot's dof")
 
     @cached_property
-    def motion(self) -> PlatformMotion:
-        """What the platform generically does."""
-        configurations = [self.everything.start, *(member.configuration for member in self.everything.members)]
-        return PlatformMotion.of(configurations, self.everything.question)
-
-    @cached_property
     def batch(self) -> Batch | None:
         """The robot compiled for many poses, with the default segment of each leg; None where it cannot be."""
         from ..kinematics.batch.engine import Batch
 
-        configurations = [self.everything.start, *(member.configuration for member in self.everything.members)]
-        defaults = self.everything.question.observations[: self.defaults]
-        return Batch.of(self.anatomy, defaults, self.motion, configurations)
+        return Batch.of(self.anatomy, self.segments, self.motion, (self.everything.start, *self.configurations))
 
     @cached_property
     def placer(self) -> Placer | None:
         """What makes closed configurations of many platform poses; None where a leg is no known subproblem."""
         from ..kinematics.batch.placing import Placer
 
-        defaults = [o for o in self.everything.question.observations[: self.defaults] if isinstance(o, Direction)]
+        defaults = [o for o in self.segments if isinstance(o, Direction)]
         return None if self.batch is None else Placer.of(self.batch, self.everything.twin, self.anatomy, defaults)
 
     @cached_property
@@ -100,10 +114,26 @@ class Setting:
         if (len(self.robot.links), len(self.robot.joints)) == (len(self.mechanism.links), len(self.mechanism.joints)):
             return self.mobility
         question = replace(self.everything.question, observations=tuple(
-            o for o in self.everything.question.observations[: self.defaults] if o.link in self.robot.links))
+            o for o in self.segments if o.link in self.robot.links))
         written = draw(Twin(self.robot, self.mechanism.length), question, 3, seed=1)
         total = written.mobility
         return Mobility(total, total - (self.mobility.total - self.mobility.idle))
+
+    def measuring(self, observations: tuple[Observation, ...]) -> Samples:
+        """The samples' configurations again, with ρ for other observations (and no ways)."""
+        drawn = self.everything
+        question = replace(drawn.question, observations=observations)
+        members = tuple(Sample(at, (), relation(at, question)) for at in self.configurations)
+        return Samples(question, drawn.twin, drawn.start, members, drawn.discarded)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What is observed, and from which link, as the records of the command line begin."""
+        return {"observed": [{"leg": o.leg, "link": o.link} for o in self.observed],
+                "camera": self.mechanism.reference}
+
+
+def silent(text: str) -> None:
+    """The progress of a question that nobody follows."""
 
 
 def prepare(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
@@ -182,6 +212,17 @@ def _observed(anatomy: Anatomy, normal: NormalForm, defaults: dict[str, Observat
                              + ", ".join(n for leg in anatomy.legs for n in leg.links))
         chosen[observation.key] = observation
     return tuple(chosen.values())
+
+
+def motors(setting: Setting) -> Question:
+    """The question that a robot's own motors answer: their coordinates, as encoders would give them."""
+    mechanism, anatomy = setting.mechanism, setting.anatomy
+    of = {name: leg.label for leg in anatomy.legs for name in leg.joints}
+    driven = [joint for joint in mechanism.joints.values() if joint.actuated]
+    if not driven:
+        raise BadRequest(f"{mechanism.name} has no motor", None, "a transmission on a joint")
+    found = tuple(each for joint in driven for each in encoders(mechanism, joint, of.get(joint.name, "")))
+    return replace(setting.everything.question, observations=found)
 
 
 def restricted(samples: Samples, observations: Iterable[Observation]) -> Samples:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..errors import LoopsNotClosed
 from ..mechanism.observation import Observation
-from ..mechanism.vectors import Array, frozen, hat
+from ..mechanism.vectors import Array, frozen, hat, vee
 from ..tolerances import CLOSED
 from .ranks import Rank, kernel_basis
 from .twin import Twin
@@ -82,9 +82,7 @@ class Target:
                       / twin.length]
             blocks = [point_velocity(V, X, self.point, twin.length)]
         else:
-            D = X[:3, :3] @ self.pose[:3, :3].T
-            errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length,
-                      0.5 * np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]])]
+            errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length, vee(X[:3, :3] @ self.pose[:3, :3].T)]
             blocks = [V]
         errors += [value - wanted for value, (_, wanted) in zip(values, self.measured, strict=True)]
         return np.concatenate(errors), np.vstack([*blocks, *rates])
@@ -127,18 +125,15 @@ def closed(twin: Twin, q: Array, target: Wanted | None = None, *, tolerance: flo
     residual's own size, which must not be followed; near closure the convergence stays fast.
     """
     identity = np.eye(twin.nv)
-    error, J = _system(twin, q, target)
+    error, J = system(twin, q, target)
     size = float(np.linalg.norm(error))
     factor = 1.0
     for _ in range(iterations):
         if size <= tolerance or factor > 1e8:
             break
-        step = np.linalg.solve(J.T @ J + max(factor * size**2, 1e-14) * identity, -(J.T @ error))
-        length = float(np.max(np.abs(step), initial=0.0))
-        if length > 0.5:
-            step *= 0.5 / length
-        trial = twin.moved(q, np.asarray(step, dtype=float))
-        trial_error, trial_J = _system(twin, trial, target)
+        step = np.asarray(np.linalg.solve(J.T @ J + max(factor * size**2, 1e-14) * identity, -(J.T @ error)))
+        trial = twin.moved(q, limited(step, 0.5))
+        trial_error, trial_J = system(twin, trial, target)
         trial_size = float(np.linalg.norm(trial_error))
         if trial_size < size:
             q, error, J, size = trial, trial_error, trial_J, trial_size
@@ -148,7 +143,14 @@ def closed(twin: Twin, q: Array, target: Wanted | None = None, *, tolerance: flo
     return q, size
 
 
-def _system(twin: Twin, q: Array, target: Wanted | None) -> tuple[Array, Array]:
+def limited(step: Array, longest: float) -> Array:
+    """A step (nv,), shortened where a coordinate would change by more than ``longest``."""
+    largest = float(np.max(np.abs(step), initial=0.0))
+    return step * (longest / largest) if largest > longest else step
+
+
+def system(twin: Twin, q: Array, target: Wanted | None) -> tuple[Array, Array]:
+    """Error and Jacobian of the loops and, below them, of the target."""
     error, J = twin.residual(q), twin.jacobian(q)
     if target is None:
         return error, J

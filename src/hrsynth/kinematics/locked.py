@@ -6,7 +6,7 @@ Lengths in characteristic lengths; twists at the base frame's origin, base axes.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..mechanism import Joint, Mechanism, Observation
 from ..mechanism.legs import Leg
 from ..mechanism.screws import constraints
 from ..mechanism.vectors import Array, hat, inverse
+from ..tolerances import INVERTED
 from .configuration import ClosedConfiguration, point_velocity
 from .ranks import kernel_basis, range_basis
 from .relation import Question
@@ -80,32 +81,42 @@ def interaction(at: ClosedConfiguration, question: Question) -> Array:
     still, _ = kernel_basis(moving, 1.0)
     hidden = range_basis(rates @ still, 1.0)[0] if still.shape[1] else np.zeros((len(rates), 0))
     basis, _ = range_basis(moving, 1.0)
-    found: Array = rates @ np.linalg.pinv(basis.T @ moving, rcond=1e-9)
+    found: Array = rates @ np.linalg.pinv(basis.T @ moving, rcond=INVERTED)
     return found - hidden @ (hidden.T @ found)
 
 
 def moved(at: ClosedConfiguration, joint: Joint) -> tuple[Array, list[Array]]:
     """Centre (characteristic lengths) and axes of a joint where a configuration has them."""
-    mechanism = at.twin.mechanism
+    point, axes = carried(at.twin.mechanism, joint, at.pose)
+    return point / at.twin.length, axes
+
+
+def carried(mechanism: Mechanism, joint: Joint, pose: Callable[[str], Array]) -> tuple[Array, list[Array]]:
+    """Centre (m) and axes of a joint, carried by links that are at these poses (4, 4)."""
 
     def displacement(link: str) -> Array:
-        return at.pose(link) @ inverse(mechanism.links[link].pose)
+        return pose(link) @ inverse(mechanism.links[link].pose)
 
     D = displacement(joint.predecessor)
     carriers = (joint.predecessor, joint.successor)
     axes = [displacement(link)[:3, :3] @ axis for link, axis in zip(carriers, joint.axes, strict=False)]
-    return (D[:3, :3] @ joint.point + D[:3, 3]) / at.twin.length, axes
+    return D[:3, :3] @ joint.point + D[:3, 3], axes
 
 
 def rezeroed(at: ClosedConfiguration) -> Mechanism:
     """The same mechanism with ``at`` as its zero configuration."""
-    mechanism, length = at.twin.mechanism, at.twin.length
+    mechanism = at.twin.mechanism
+    return placed(mechanism, {name: at.pose(name) for name in mechanism.links})
+
+
+def placed(mechanism: Mechanism, poses: Mapping[str, Array]) -> Mechanism:
+    """The same mechanism with its links, all of them, at these poses (4, 4) as its zero configuration."""
     joints = []
     for joint in mechanism.joints.values():
-        point, axes = moved(at, joint)
-        joints.append(replace(joint, point=point * length, axes=tuple(axes)))
-    links = [replace(link, pose=at.pose(name)) for name, link in mechanism.links.items()]
-    return mechanism.changed(links=links, joints=joints)
+        point, axes = carried(mechanism, joint, poses.__getitem__)
+        joints.append(replace(joint, point=point, axes=tuple(axes)))
+    return mechanism.changed(links=[replace(link, pose=poses[name]) for name, link in mechanism.links.items()],
+                             joints=joints)
 
 
 @dataclass(frozen=True, eq=False)

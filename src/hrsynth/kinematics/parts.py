@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import BadRequest
 from ..mechanism.pose import Pose
-from ..mechanism.vectors import Array, hat, rotation_about
+from ..mechanism.vectors import Array, hat, rotation_about, vee
 from ..tolerances import AS_PRINTED, RANK_CUTOFF
 from .configuration import ClosedConfiguration, point_velocity
 from .ranks import range_basis
@@ -187,9 +187,9 @@ class PlatformMotion:
 
 def rotation_vector(R: Array) -> Array:
     """The rotation vector (3,) of a rotation by less than π; where it is zero its rate is the angular velocity."""
-    vee = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
-    sine, cosine = float(np.linalg.norm(vee)), 0.5 * (float(np.trace(R)) - 1)
-    return vee if sine < 1e-12 else vee * (float(np.arctan2(sine, cosine)) / sine)
+    across = vee(R)
+    sine, cosine = float(np.linalg.norm(across)), 0.5 * (float(np.trace(R)) - 1)
+    return across if sine < 1e-12 else across * (float(np.arctan2(sine, cosine)) / sine)
 
 
 def exponential(vector: Array) -> Array:

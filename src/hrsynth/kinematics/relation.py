@@ -9,6 +9,7 @@ import numpy as np
 
 from ..mechanism.observation import Observation
 from ..mechanism.vectors import Array
+from ..tolerances import INVERTED
 from .configuration import ClosedConfiguration, Target, measure, point_velocity
 from .ranks import Rank, kernel_basis, range_basis
 
@@ -121,6 +122,15 @@ class Relation:
     def rank(self) -> int:
         """Freedoms of the platform that the observations see: dof − RO."""
         return self.dof.value - self.lost.shape[1]
+
+
+def platform_motions(at: ClosedConfiguration, question: Question) -> Array:
+    """Joint velocities (nv, dof), without idle motions, that move the platform by an orthonormal basis of its twists
+    (characteristic lengths)."""
+    kernel, _ = at.kernel()
+    image = question.rows(at)[: question.twist_rows] @ kernel
+    moves, _ = range_basis(image, 1.0)
+    return np.asarray(kernel @ np.linalg.lstsq(image, moves, rcond=INVERTED)[0])
 
 
 def relation(at: ClosedConfiguration, question: Question, *, blind: frozenset[str] = frozenset()) -> Relation:

@@ -16,8 +16,8 @@ import numpy as np
 from ..errors import BadMechanism, NotSampled
 from ..mechanism.observation import Observation
 from ..mechanism.vectors import Array
-from ..tolerances import CLOSED, FOLLOWED, PASSED_BY, RANK_GAP, SOLVED
-from .configuration import ClosedConfiguration, Target, closed
+from ..tolerances import CLOSED, FOLLOWED, INVERTED, PASSED_BY, RANK_GAP, SOLVED
+from .configuration import ClosedConfiguration, Target, closed, limited
 from .ranks import range_basis
 from .relation import Question, Relation, relation
 from .twin import Twin
@@ -118,7 +118,7 @@ def _velocity(at: ClosedConfiguration, question: Question, wish: Array | None,
     if norm < 1e-6:
         return None
     wanted = wanted / norm
-    return kernel @ np.linalg.lstsq(image, wanted, rcond=1e-9)[0], wanted
+    return kernel @ np.linalg.lstsq(image, wanted, rcond=INVERTED)[0], wanted
 
 
 def _walk(start: ClosedConfiguration, question: Question, leading: set[tuple[str, ...]],
@@ -158,10 +158,7 @@ def _step(here: ClosedConfiguration, question: Question, wish: Array | None, wea
 
 def _moved(here: ClosedConfiguration, velocity: Array) -> ClosedConfiguration | None:
     """The configuration a step along ``velocity`` leads to; None where it does not close near its prediction."""
-    step = STEP * velocity
-    largest = float(np.max(np.abs(step), initial=0.0))
-    if largest > 3 * STEP:
-        step = step * (3 * STEP / largest)
+    step = limited(STEP * velocity, 3 * STEP)
     predicted = here.twin.moved(here.q, step)
     q, residual = closed(here.twin, predicted, tolerance=SOLVED)
     if residual <= CLOSED and np.linalg.norm(q - predicted) <= 0.5 * np.linalg.norm(step) + 1e-9:

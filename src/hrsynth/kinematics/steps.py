@@ -8,7 +8,7 @@ import numpy as np
 
 from ..mechanism.vectors import Array
 from ..tolerances import CLOSED, FOLLOWED, NEAREST, PASSED_BY, RANK_CUTOFF, SOLVED
-from .configuration import ClosedConfiguration, closed
+from .configuration import ClosedConfiguration, closed, limited, system
 from .parts import Goal, PlatformMotion
 from .ranks import kernel_basis, range_basis
 from .twin import Twin
@@ -67,8 +67,7 @@ def _eased(here: ClosedConfiguration, goal: Goal, X: Array, stride: float) -> Cl
         if fraction == 1 and np.linalg.norm(error) <= SOLVED:
             break
         step = kernel @ np.linalg.lstsq(rows @ kernel, -error, rcond=EASY_RANK)[0]
-        largest = float(np.max(np.abs(step), initial=0.0))
-        there = _corrected(here, step * min(1.0, 3 * STRIDE / largest) if largest > 0 else step, None)
+        there = _corrected(here, limited(step, 3 * STRIDE), None)
         if there is None:
             break
         here = there
@@ -79,12 +78,12 @@ def _stepped(here: ClosedConfiguration, goal: Goal, home: Goal) -> ClosedConfigu
     """The configuration at a goal nearby, moved towards ``home`` where parts are free; None where it jumps or lies
     beyond a fold, in another working mode."""
     twin = here.twin
-    error, rows = _system(twin, here.q, goal)
+    error, rows = system(twin, here.q, goal)
     step = np.asarray(np.linalg.lstsq(rows, -error, rcond=RANK_CUTOFF)[0])
     if np.max(np.abs(step), initial=0.0) > LONGEST:
         return None
     there = _corrected(here, step, goal)
-    if there is None or _beyond(rows, _system(twin, there.q, goal)[1]):
+    if there is None or _beyond(rows, system(twin, there.q, goal)[1]):
         return None
     return _drawn_home(there, goal, home, 1)
 
@@ -125,9 +124,7 @@ def _drawn_home(here: ClosedConfiguration, goal: Goal, home: Goal, iterations: i
         if np.linalg.norm(error @ free) <= NEAREST:
             break
         step = kernel @ np.linalg.lstsq(free, -error, rcond=RANK_CUTOFF)[0]
-        largest = float(np.max(np.abs(step)))
-        step *= min(1.0, STRIDE / largest) if largest > 0 else 1.0
-        for there in _shrinking(here, step, goal):
+        for there in _shrinking(here, limited(step, STRIDE), goal):
             if np.linalg.norm(home.rows(twin, there.q)[0]) <= np.linalg.norm(error) + SOLVED:
                 here = there
                 break
@@ -147,11 +144,11 @@ def polished(here: ClosedConfiguration, goal: Goal) -> ClosedConfiguration:
     """Newton steps of minimum norm until the residual no longer falls: on the edge of the workspace a configuration
     is only as exact as the square root of its residual."""
     twin, q = here.twin, here.q
-    error, rows = _system(twin, q, goal)
+    error, rows = system(twin, q, goal)
     for _ in range(20):
         step = np.linalg.lstsq(rows, -error, rcond=FOLLOWED)[0]
         trial = twin.moved(q, np.asarray(step, dtype=float))
-        trial_error, trial_rows = _system(twin, trial, goal)
+        trial_error, trial_rows = system(twin, trial, goal)
         if not np.linalg.norm(trial_error) < 0.9 * np.linalg.norm(error):
             break
         q, error, rows = trial, trial_error, trial_rows
@@ -161,20 +158,15 @@ def polished(here: ClosedConfiguration, goal: Goal) -> ClosedConfiguration:
 def _on_fold(twin: Twin, q: Array, goal: Goal) -> Array:
     """The configuration on a fold of the way (the edge of the workspace) where ``q`` cannot be told from it: where the
     weak singular value of loops and goal vanishes, if the residual stays within ``SOLVED`` there."""
-    rows = _system(twin, q, goal)[1]
+    rows = system(twin, q, goal)[1]
     left, values, right = np.linalg.svd(rows, full_matrices=False)
     weak = np.nonzero((values < NEAR_FOLD) & (values > FOLLOWED))[0]
     if len(weak) != 1:
         return q
     across, along, size = left[:, weak[0]], right[weak[0]], float(values[weak[0]])
-    ahead = _system(twin, twin.moved(q, PASSED_BY * along), goal)[1]
+    ahead = system(twin, twin.moved(q, PASSED_BY * along), goal)[1]
     slope = (float(across @ ahead @ along) - size) / PASSED_BY
     if abs(slope) * PASSED_BY < size:
         return q
     there = twin.moved(q, -size / slope * along)
-    return there if np.linalg.norm(_system(twin, there, goal)[0]) <= SOLVED else q
-
-
-def _system(twin: Twin, q: Array, goal: Goal) -> tuple[Array, Array]:
-    error, rows = goal.rows(twin, q)
-    return np.concatenate([twin.residual(q), error]), np.vstack([twin.jacobian(q), rows])
+    return there if np.linalg.norm(system(twin, there, goal)[0]) <= SOLVED else q

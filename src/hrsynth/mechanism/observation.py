@@ -3,7 +3,7 @@ measured space."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import ClassVar
 
@@ -60,6 +60,11 @@ class Observation:
         """What differs from another observation, in words."""
         same = type(self) is type(other) and self.key == other.key
         return [] if same else [f"observation of leg {self.leg}: {self!r} / {other!r}"]
+
+
+def labels_of(observations: Iterable[Observation]) -> tuple[str, ...]:
+    """The legs that are measured, each once, in order."""
+    return tuple(dict.fromkeys(each.leg for each in observations))
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,6 +32,11 @@ def hat(vector: ArrayLike) -> Array:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
+def vee(matrix: Array) -> Array:
+    """The vector v of the skew part [v]ₓ of a matrix (3, 3): of a rotation, its axis times the sine of its angle."""
+    return 0.5 * np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+
+
 def pose(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Array:
     """The homogeneous pose X_AB with p_AB and R_AB; shape (4, 4)."""
     matrix = np.eye(4)

@@ -43,7 +43,7 @@ def locus_map(found: Singularity, drawn: Locus) -> bytes:
     if square:
         place.set_aspect("equal")
     _legend(figure, drawn)
-    legs = ", ".join(dict.fromkeys(o.leg for o in found.setting.observed))
+    legs = ", ".join(found.setting.labels)
     fixed = str(drawn.grid.fixed).replace(",", ", ").replace("=", " = ")
     figure.suptitle(f"{found.setting.robot.name}: Type 2 singularities, legs {legs} observed"
                     + (f"\n{fixed} (m, rad)" if fixed else ""), fontsize=11)

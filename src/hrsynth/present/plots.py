@@ -37,7 +37,7 @@ def distance_map(found: Check) -> bytes:
         raise BadRequest(f"{found.setting.robot.name}: there is nothing to draw: {what}", None,
                          "another grid, or a table (.csv)")
     figure = _curve(grid) if grid.grid.ndim == 1 else _maps(grid)
-    legs = ", ".join(dict.fromkeys(o.leg for o in found.setting.observed))
+    legs = ", ".join(found.setting.labels)
     fixed = str(grid.grid.fixed).replace(",", ", ").replace("=", " = ")
     figure.suptitle(f"{found.setting.robot.name}: distance to Type 2 singularities, legs {legs} observed"
                     + (f"\n{fixed} (m, rad)" if fixed else ""), fontsize=11)

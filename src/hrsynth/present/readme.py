@@ -1,4 +1,4 @@
-"""The README's table of shipped robots; ``python -m hrsynth.present.readme README.md`` writes it between its marks."""
+"""The README's tables; ``python -m hrsynth.present.readme README.md`` writes each between its marks."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from ..analysis.controllability import legs
 from ..analysis.derive import derive
 from ..analysis.singularity.singular import singular
 from ..description import load, shipped
+from . import printed
 
 START, END = "<!-- generated: robots -->", "<!-- end -->"
 HEADS = ("robot", "architecture", "dof", "hidden robot, all legs watched", "verdict", "exact", "lost",
@@ -19,7 +20,6 @@ POINTS = 200
 """Random poses at which the condition in words is checked before it is printed."""
 
 _LONGEST_LIST = 4
-_BLOCK = re.compile(rf"({re.escape(START)}\n).*?({re.escape(END)})", re.DOTALL)
 
 
 def row(name: str) -> str:
@@ -44,18 +44,22 @@ def table(names: Iterable[str] | None = None) -> str:
     return "\n".join([_line(HEADS), rule, *(row(name) for name in (shipped() if names is None else names))]) + "\n"
 
 
-def block(text: str) -> str:
+def block(text: str, start: str = START) -> str:
     """What stands between the marks; raises ``ValueError`` where they are not there."""
-    match = _BLOCK.search(text)
+    match = _between(start).search(text)
     if match is None:
-        raise ValueError(f"no {START} … {END}")
-    return match[0].removeprefix(f"{START}\n").removesuffix(END)
+        raise ValueError(f"no {start} … {END}")
+    return match[2]
 
 
-def replaced(text: str, made: str) -> str:
+def replaced(text: str, made: str, start: str = START) -> str:
     """The text with ``made`` between the marks."""
-    block(text)
-    return _BLOCK.sub(lambda match: match[1] + made + match[2], text)
+    block(text, start)
+    return _between(start).sub(lambda match: match[1] + made + match[3], text)
+
+
+def _between(start: str) -> re.Pattern[str]:
+    return re.compile(rf"({re.escape(start)}\n)(.*?)({re.escape(END)})", re.DOTALL)
 
 
 def _line(cells: Sequence[str]) -> str:
@@ -77,4 +81,5 @@ def _smallest(sets: Sequence[Sequence[str]]) -> str:
 if __name__ == "__main__":
     for argument in sys.argv[1:]:
         file = Path(argument)
-        file.write_text(replaced(file.read_text(encoding="utf-8"), table()), encoding="utf-8", newline="\n")
+        text = replaced(file.read_text(encoding="utf-8"), table())
+        file.write_text(replaced(text, printed.table(), printed.START), encoding="utf-8", newline="\n")

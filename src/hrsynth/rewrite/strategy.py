@@ -8,6 +8,7 @@ from typing import Protocol
 
 from ..mechanism import Mechanism
 from ..mechanism.legs import Anatomy
+from ..mechanism.observation import labels_of
 from .evidence import Evidence
 from .rule import Proposal, Refusal, Rule
 from .rules import (
@@ -154,7 +155,7 @@ def _virtual_legs(anatomy: Anatomy, evidence: Evidence, check: Check | None,
     start = State(anatomy, replace(anatomy.mechanism, observations=()))
     run = _Run(start, evidence, check, progress=progress)
     run.attempt(motors_off.RULE, None)
-    legs = tuple(dict.fromkeys(o.leg for o in evidence.samples.question.observations))
+    legs = labels_of(evidence.samples.question.observations)
     run.each([lift.RULE, direction_locus.RULE, anchor_locus.RULE, prismatic_merge.RULE, takeover.RULE,
               companion.RULE], legs)
     return run

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hrsynth.analysis.modes.articulated import Articulated
-from hrsynth.analysis.modes.curves import Circle, Curve, Line, Point
+from hrsynth.analysis.modes.curves import Circle, Line, Plane, Point, Reach, Sphere
 from hrsynth.analysis.modes.planar import Planar
 from hrsynth.analysis.modes.spatial import Spatial
 from hrsynth.analysis.modes.systems import System
@@ -26,11 +26,17 @@ class Draw(NamedTuple):
     goal: Array
 
 
-def through(rng: Rng, kind: str, tip: Array, normal: Array | None = None) -> Curve:
-    """A point P, line L or circle C through ``tip``, in the plane of ``normal`` where one is given."""
+def through(rng: Rng, kind: str, tip: Array, normal: Array | None = None) -> Reach:
+    """A point P, line L or circle C through ``tip``, in the plane of ``normal`` where one is given; a sphere S or a
+    plane E through it."""
     if kind == "P":
         return Point(tip)
     drawn = unit(rng.normal(size=3))
+    if kind == "S":
+        radius = rng.uniform(0.5, 1.5)
+        return Sphere(tip - radius * drawn, radius)
+    if kind == "E":
+        return Plane(tip + np.cross(drawn, rng.normal(size=3)), drawn)
     if kind == "L":
         along = drawn if normal is None else unit(np.cross(normal, drawn))
         return Line(tip - along * rng.normal(), along)
@@ -78,6 +84,18 @@ def articulated(rng: Rng, kinds: str, parallel: tuple[int, ...] = ()) -> Draw:
     return Draw(Articulated(tuple(curves), tips, (0, 1), slide), pose(p))
 
 
+def on_two_bodies(rng: Rng, kinds: tuple[str, str]) -> Draw:
+    """The legs of each body; the bodies translate, the second on a circle about the first."""
+    p = rng.normal(size=3)
+    slide = Circle(rng.normal(scale=0.1, size=3), unit(rng.normal(size=3)), rng.uniform(0.3, 1.5))
+    bodies = tuple(body for body in (0, 1) for _ in kinds[body])
+    origins = np.array([p, p + slide.at(rng.uniform(-3, 3))])[list(bodies)]
+    tips = rng.normal(scale=0.4, size=(len(bodies), 3))
+    curves = [through(rng, kind, origin + tip)
+              for kind, origin, tip in zip(kinds[0] + kinds[1], origins, tips, strict=True)]
+    return Draw(Articulated(tuple(curves), tips, bodies, slide), pose(p))
+
+
 class Family(NamedTuple):
     """How to draw a member, and how many complex modes each has."""
 
@@ -106,3 +124,30 @@ FAMILIES = {
     "two bodies, a line and a circle": Family(lambda rng: articulated(rng, "LC"), 4),
     "two bodies, lines": Family(lambda rng: articulated(rng, "LL"), 2),
 }
+"""Tips on points, lines and circles."""
+
+MEETING = {
+    "three spheres": Family(lambda rng: translating(rng, "SSS"), 2),
+    "two spheres and a plane": Family(lambda rng: translating(rng, "SES"), 2),
+    "a sphere and two planes": Family(lambda rng: translating(rng, "EES"), 2),
+    "three planes": Family(lambda rng: translating(rng, "EEE"), 1),
+    "a circle and a sphere": Family(lambda rng: translating(rng, "SC"), 2),
+    "a circle and a plane": Family(lambda rng: translating(rng, "CE"), 2),
+    "a line and a sphere": Family(lambda rng: translating(rng, "LS"), 2),
+    "a line and a plane": Family(lambda rng: translating(rng, "EL"), 1),
+}
+"""Platforms that translate, with tips on surfaces: solved by elimination."""
+
+SURFACES = {
+    "spatial, six spheres": Family(lambda rng: spatial(rng, "SSSSSS"), 40),
+    "spatial, a line and four spheres": Family(lambda rng: spatial(rng, "LSSSS"), 28),
+    "spatial, two circles and two spheres": Family(lambda rng: spatial(rng, "CCSS"), 32),
+    "spatial, three planes and three spheres": Family(lambda rng: spatial(rng, "EEESSS"), 40),
+    "spatial, six planes": Family(lambda rng: spatial(rng, "EEEEEE"), 8),
+    "spatial, a pivot and three spheres": Family(lambda rng: spatial(rng, "PSSS"), 8),
+    "two bodies, four spheres": Family(lambda rng: on_two_bodies(rng, ("SS", "SS")), 8),
+    "two bodies, three spheres on one": Family(lambda rng: on_two_bodies(rng, ("SSS", "S")), 4),
+    "two bodies, planes and spheres": Family(lambda rng: on_two_bodies(rng, ("ES", "SE")), 8),
+    "two bodies, a circle and two spheres": Family(lambda rng: on_two_bodies(rng, ("C", "SS")), 8),
+}
+"""Tips on surfaces that only msolve solves."""

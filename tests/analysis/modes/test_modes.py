@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 import sympy
 
-from analysis.modes.draws import FAMILIES, Draw, articulated, planar, spatial, translating
+from analysis.modes.draws import FAMILIES, articulated, planar, spatial, translating
+from analysis.modes.laws import among, check_member, draw
 from analysis.modes.newton import pose_of, real_ones, solutions
 from hrsynth.analysis.modes.articulated import Articulated
 from hrsynth.analysis.modes.curves import Circle, Curve, Line, shifted
@@ -22,29 +23,6 @@ ALL = sorted(FAMILIES)
 MOST = {"planar, three circles": (47, 6), "spatial, three lines": (259, 8), "two bodies, circles": (2197, 8),
         "spatial, three circles": (1130, 12)}
 """Seeds at which many modes are real, and how many."""
-
-
-def draw(name: str, seed: int) -> Draw:
-    return FAMILIES[name].draw(np.random.default_rng(seed))
-
-
-def among(goal: Array, modes: Modes) -> float:
-    """How far the nearest mode is from a pose."""
-    return min((float(np.abs(mode.pose - goal).max()) for mode in modes.modes), default=np.inf)
-
-
-def check_member(name: str, seed: int) -> None:
-    system, goal = draw(name, seed)
-    modes = solve(system)
-    assert modes.complex == FAMILIES[name].count, f"seed {seed}: {modes.proof}"
-    assert modes.complete, f"seed {seed}: {modes.proof}"
-    assert (modes.complex - len(modes.modes)) % 2 == 0, f"seed {seed}: complex ones come in pairs"
-    tolerance = max(1e-10, 100 * max((mode.radius for mode in modes.modes), default=0.0))
-    assert among(goal, modes) < tolerance, f"seed {seed}: the goal is not among the modes"
-    for mode in modes.modes:
-        assert mode.residual < 1e-12, f"seed {seed}: a tip is off its curve by {mode.residual:.1e}"
-        assert np.abs(mode.pose[:3, :3].T @ mode.pose[:3, :3] - np.eye(3)).max() < 1e-12
-        assert np.linalg.det(mode.pose[:3, :3]) > 0
 
 
 @pytest.mark.parametrize("name", ALL)

@@ -1,22 +1,29 @@
-"""The curves of held tips: found for the papers' robots, each tip on its curve; refused on surfaces."""
+"""Where held tips can be: found for the papers' robots, each tip on its curve or surface; refused where it is none."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 
-from hrsynth.analysis.modes.curves import Circle, Line, Point
+from analysis.modes.laws import installed
+from hrsynth.analysis.modes.build import model
+from hrsynth.analysis.modes.curves import Circle, Line, Plane, Point, Sphere
+from hrsynth.analysis.modes.solve import solve
 from hrsynth.analysis.modes.tips import confinement
-from hrsynth.analysis.setting import prepare
-from hrsynth.analysis.singularity.singular import motors
+from hrsynth.analysis.setting import motors, prepare
 from hrsynth.analysis.singularity.structure import recognise
 from hrsynth.description import load, shipped
 from hrsynth.errors import NotConfined
+from hrsynth.kinematics.locked import moved
+from hrsynth.mechanism.legs import dissect
 
 HIDDEN = {"3rrr_m1": Circle, "3rpr_m2": Line, "3prr_m1": Line, "gough_stewart": Line, "hexa": Circle, "6pus": Line,
           "delta": Circle, "orthoglide": Line, "quattro": Circle, "quattro_rigid": Circle, "3rps": Line, "3upu": Line,
           "rrrrr_m1": Circle, "rprpr_m1": Line, "prrrp_m1": Line}
 REAL = {"3rrr_m1": {Circle}, "3rpr_m2": {Circle}, "3rps": {Circle}, "rrrrr_m1": {Point, Circle}}
+RODS = ("delta", "linear_delta", "orthoglide", "uranesx", "3upu", "3puu", "3ruu", "quattro", "quattro_rigid",
+        "gough_stewart", "hexa", "hexaglide", "6pus")
+"""Real robots whose tips stay on spheres with the motors held."""
 
 
 def confined(name: str, *, real: bool = False, member: int = 1):
@@ -41,10 +48,10 @@ def test_tips_of_hidden_robots_lie_on_their_curves(name: str):
     assert missed(found) < 1e-9
 
 
-@pytest.mark.parametrize("name", REAL)
+@pytest.mark.parametrize("name", [*REAL, *RODS])
 def test_tips_with_the_motors_held(name: str):
     found = confined(name, real=True)
-    assert {type(tip.curve) for tip in found.tips} == REAL[name]
+    assert {type(tip.curve) for tip in found.tips} == REAL.get(name, {Sphere})
     assert missed(found) < 1e-9
 
 
@@ -57,7 +64,49 @@ def test_circles_have_the_length_of_the_cranks():
         assert tip.curve.radius == pytest.approx(crank, abs=1e-9)
 
 
-@pytest.mark.parametrize("name", ["3prp", "3ppr_m1", "i4l"])
-def test_tips_on_surfaces_are_refused(name: str):
+def test_spheres_have_the_length_of_the_rods():
+    """With its motor held the tip of a leg U-P-S keeps its distance from the U."""
+    found = confined("gough_stewart", real=True)
+    ends = {leg.label: leg.joints for leg in dissect(found.goal.twin.mechanism).legs}
+    poses = {body: found.goal.pose(body) for body in found.bodies}
+    for tip in found.tips:
+        centres = [moved(found.goal, found.goal.twin.mechanism.joints[name])[0] for name in ends[tip.leg]]
+        rod = max(np.linalg.norm(a - b) for a in centres for b in centres) * found.goal.twin.length
+        assert tip.curve.radius == pytest.approx(rod, abs=1e-9)
+        end = (poses[tip.body] @ np.append(tip.place, 1.0))[:3]
+        assert np.linalg.norm(end - tip.curve.centre) == pytest.approx(rod)
+
+
+@pytest.mark.parametrize("name", ["3prp", "3rrp"])
+def test_tips_that_two_slides_carry_stay_in_a_plane(name: str):
+    found = confined(name)
+    assert {type(tip.curve) for tip in found.tips} == {Plane}
+    assert missed(found) < 1e-9
+
+
+@pytest.mark.parametrize(("name", "real"), [("3ppr_m1", False), ("i4l", False), ("3prp", True)])
+def test_tips_without_a_place_are_refused(name: str, real: bool):
     with pytest.raises(NotConfined, match="cannot be listed"):
-        confined(name)
+        confined(name, real=real)
+
+
+@pytest.mark.parametrize(("name", "complex_count"), [("delta", 2), ("orthoglide", 2), ("3upu", 2), ("3rps", 16)])
+def test_real_robots_have_their_known_number_of_modes(name: str, complex_count: int):
+    check_real_robot(name, complex_count)
+
+
+def check_real_robot(name: str, complex_count: int) -> None:
+    """Complete, of that number, and the pose itself among them."""
+    system = model(confined(name, real=True))
+    modes = solve(system.system)
+    assert modes.complete
+    assert modes.complex == complex_count
+    home = system.system.pose(system.home)
+    assert min(np.abs(mode.pose - home).max() for mode in modes.modes) < 1e-10
+
+
+@pytest.mark.skipif(not installed(), reason="msolve is not installed (extra `solve`)")
+@pytest.mark.parametrize(("name", "complex_count"), [
+    ("quattro", 8), pytest.param("hexa", 40, marks=pytest.mark.slow)])
+def test_real_robots_with_rods_have_their_known_number_of_modes(name: str, complex_count: int):
+    check_real_robot(name, complex_count)

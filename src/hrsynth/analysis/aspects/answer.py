@@ -18,7 +18,6 @@ from .crossing import Crossing
 from .proof import Way
 
 SAME, SEPARATED, UNDECIDED = "same aspect", "separated", "undecided"
-NOT_PROVED = "joint limits, collisions and constraint singularities of the loops are not considered"
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +55,16 @@ class PathAnswer:
     signed: bool
     carriage: Carriage | None = None
     ways: tuple[Way, ...] = ()
+    limits: tuple[str, ...] = ()
+    """Joints whose limits hold all along a certified path."""
+    unlimited: tuple[str, ...] = ()
+    """Joints whose limits are not considered."""
+
+    @property
+    def not_proved(self) -> str:
+        """What a certificate says nothing about."""
+        joints = f"limits of joints {', '.join(self.unlimited)}; " if self.unlimited else ""
+        return f"{joints}collisions and constraint singularities of the loops are not considered"
 
     @property
     def crossings(self) -> tuple[tuple[str, int], ...]:
@@ -76,7 +85,7 @@ class PathAnswer:
                 "margin": self.margin, "boxes": self.boxes,
                 "value": "expression" if self.signed else "smallest singular value",
                 "start": self.start.to_dict(), "goal": self.goal.to_dict(), "reason": self.reason,
-                "not_considered": NOT_PROVED}
+                "limits": list(self.limits), "not_considered": self.not_proved}
 
 
 def between(answer: PathAnswer, carriage: Carriage, ways: Sequence[Way]) -> list[Pose]:

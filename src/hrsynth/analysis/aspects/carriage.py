@@ -19,6 +19,9 @@ from ...mechanism.vectors import Array, inverse
 from ...tolerances import FOLLOWED, RANK_CUTOFF
 from .balls import Field, widened
 
+Place = tuple[Array, Array]
+"""A pose: the point (3,) and the platform's rotation (3, 3)."""
+
 
 @dataclass(frozen=True, eq=False)
 class Carriage:
@@ -89,14 +92,35 @@ class Stretch:
         return widened(p, FOLLOWED), widened(R, FOLLOWED)
 
     @property
-    def size(self) -> float:
-        """Its length (characteristic lengths, radians)."""
-        return float(np.hypot(np.linalg.norm(self.shift), np.linalg.norm(self.turn)))
-
-    @property
     def end(self) -> tuple[Array, Array]:
         """The pose at λ = 1."""
         return self.p + self.shift, exponential(self.turn) @ self.R
+
+
+def stretched(p: Array, R: Array, q: Array, S: Array, fractions: Array) -> tuple[Array, Array, Array]:
+    """Poses (n, k, 3), (n, k, 3, 3) on the ways from poses (p, R) to (q, S), (n, 3) and (n, 3, 3), at fractions (k,);
+    and the ways' lengths (n,) (characteristic lengths, radians)."""
+    turns = rotation_vectors(S @ R.transpose(0, 2, 1))
+    places = p[:, None] + fractions[:, None] * (q - p)[:, None]
+    turned = exponentials((fractions[:, None] * turns[:, None]).reshape(-1, 3)).reshape(len(p), -1, 3, 3) @ R[:, None]
+    return places, turned, np.hypot(np.linalg.norm(q - p, axis=1), np.linalg.norm(turns, axis=1))
+
+
+def rotation_vectors(R: Array) -> Array:
+    """The rotation vectors (n, 3) of rotations (n, 3, 3) by less than π."""
+    vee = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
+    sine, cosine = np.linalg.norm(vee, axis=1), 0.5 * (np.trace(R, axis1=1, axis2=2) - 1)
+    small = sine < FOLLOWED
+    return np.asarray(vee * np.where(small, 1.0, np.arctan2(sine, cosine) / np.where(small, 1.0, sine))[:, None])
+
+
+def exponentials(vectors: Array) -> Array:
+    """The rotations (n, 3, 3) of rotation vectors (n, 3)."""
+    angles = np.linalg.norm(vectors, axis=1)
+    x, y, z = (vectors / np.where(angles > 0, angles, 1.0)[:, None]).T
+    o = np.zeros_like(x)
+    K = np.stack([o, -z, y, z, o, -x, -y, x, o], axis=1).reshape(-1, 3, 3)
+    return np.asarray(np.eye(3) + np.sin(angles)[:, None, None] * K + (1 - np.cos(angles))[:, None, None] * K @ K)
 
 
 @dataclass(frozen=True, eq=False)

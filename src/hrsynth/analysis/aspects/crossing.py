@@ -10,10 +10,8 @@ import numpy as np
 from ...mechanism.vectors import Array
 from ...tolerances import FOLLOWED
 from .balls import Field, cross, widened
-from .carriage import Carriage, Rigid
+from .carriage import Carriage, Place, Rigid
 from .limbs import Limb, OnCrank, OnRail
-
-Place = tuple[Array, Array]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,19 +12,21 @@ from ...kinematics.reach import reach
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...tolerances import RANK_CUTOFF, RANK_GAP
-from ..controllability import verdict_of
 from ..setting import Setting, prepare
 from ..singularity.agreement import smallest_of
-from ..singularity.condition import Condition, Named, condition
-from ..singularity.structure import Structure, recognise
+from ..singularity.condition import Condition, Named
+from ..singularity.measured import Measured
+from ..singularity.structure import Structure
 from .answer import SAME, SEPARATED, UNDECIDED, End, PathAnswer, between
 from .carriage import carriages
-from .itinerary import itinerary
-from .pattern import NoChart, Pattern, pattern
-from .plan import Region, plan
+from .limits import limited
+from .pattern import Pattern, pattern
+from .plan import Plan, plan
 from .proof import Reading, enclosed, sign_of
+from .region import Region
+from .sources import NoChart
 
-BUDGET = 20_000
+BUDGET = 10_000
 """Intervals that are enclosed in all before a path is given up."""
 CLEAR = RANK_CUTOFF * RANK_GAP
 """Values of a condition below this may be zero."""
@@ -46,19 +48,14 @@ class Aspects:
            seed: int = 0) -> Aspects:
         """The condition of a robot from random samples of its motion."""
         setting = prepare(robot, observe, camera, seed=seed)
-        samples = setting.samples
-        members = [member.configuration for member in samples.members]
-        structure = recognise(setting.anatomy, samples.question, members)
-        verdict = verdict_of(setting, tuple(dict.fromkeys(o.leg for o in setting.observed)), samples)
-        motion = PlatformMotion.of([samples.start, *members], samples.question)
-        return cls(setting, motion, structure, condition(structure, samples.question),
-                   tuple(freedom.name for freedom in verdict.lost))
+        seen = Measured.watched(setting)
+        return cls(setting, setting.motion, seen.structure, seen.condition,
+                   tuple(freedom.name for freedom in seen.verdict.lost))
 
     @property
     def members(self) -> list[ClosedConfiguration]:
         """The zero configuration and the samples."""
-        samples = self.setting.samples
-        return [samples.start, *(member.configuration for member in samples.members)]
+        return [self.setting.everything.start, *self.setting.configurations]
 
     @cached_property
     def pattern(self) -> Pattern | str:
@@ -67,7 +64,9 @@ class Aspects:
             return "the condition has no named vectors"
         used = {str(symbol) for symbol in self.condition.expression.free_symbols}
         features = [f for f in self.structure.features if not sign_of(self.condition) or f.symbol in used]
-        reason = "the platform's pose has parts that depend on each other"
+        many = self.motion.shifts.shape[1] + self.motion.spins.shape[1]
+        reason = (f"the {many} parts of the platform's pose that change depend on each other, {self.setting.dof} are "
+                  "free: ways that move a point straight and turn about one axis do not keep to the others")
         for each in carriages(self.setting.anatomy, self.setting.samples.question, self.setting.dof, self.members):
             try:
                 return pattern(self.setting.anatomy, features, each, self.members)
@@ -106,36 +105,37 @@ class Aspects:
         assert isinstance(self.pattern, Pattern)
         carriage = self.pattern.carriage
         p, R = carriage.of([answer.start.configuration, answer.goal.configuration, *self.members])
-        sure, bounds = zip(*(enclosed(readings[i], p[i], R[i]) for i in range(2)), strict=True)
-        margin = min(map(abs, bounds))
+        sure, values = zip(*(enclosed(readings[i].unlimited, p[i], R[i]) for i in range(2)), strict=True)
+        margin = min(map(abs, values))
         if not all(sure) or margin == 0:
             return replace(answer, reason="at a pose reach or value cannot be enclosed away from zero")
-        if readings[0].signed and bounds[0] * bounds[1] < 0:
+        if readings[0].signed and values[0] * values[1] < 0:
             return replace(answer, verdict=SEPARATED, certified=True, margin=margin, boxes=2, reason=(
                 "the expression is enclosed with opposite signs at the two configurations: every path between them "
                 "crosses its zeros"))
         if answer.signed and answer.start.value * answer.goal.value < 0:
             return _pointwise(answer, "its sign is that of a determinant")
-        modes = [reading.chart.modes for reading in readings]
-        region, places = Region.around(carriage, p, R), ((p[0], R[0]), (p[1], R[1]))
-        if modes[0] == modes[1]:
-            found = plan(readings[0], region, *places, seed=seed, budget=budget, progress=progress)
-        else:
-            legs = dict.fromkeys(limb.leg for limb, a, b in zip(self.pattern.limbs, *modes, strict=True) if a != b)
-            through = itinerary((readings[0], readings[1]), region, *places, seed=seed, budget=budget,
-                                progress=progress)
-            if through is None:
-                return replace(answer, reason=(f"no path was proved: leg {', '.join(legs)} is in different working "
-                                               "modes at the two poses"))
-            found = through
-        answer = replace(answer, carriage=carriage, ways=found.ways, boxes=found.boxes,
-                         poses=(answer.start.pose, *between(answer, carriage, found.ways), answer.goal.pose))
+        for end, reading, place, turn in zip(("start", "goal"), readings, p, R, strict=False):
+            beyond = reading.chart.beyond(place, turn)
+            if beyond:
+                return replace(answer, reason=f"at the {end} beyond its limits: joint {', '.join(beyond)}")
+        found = plan((readings[0], readings[1]), Region.around(carriage, p, R), (p[0], R[0]), (p[1], R[1]), seed=seed,
+                     budget=budget, progress=progress)
+        answer = self._shown(answer, found, self.pattern)
         if not found.proved:
-            used = ("the intervals allowed are used up" if found.boxes >= budget
-                    else "the road map does not join the poses")
-            return replace(answer, reason=f"no path was proved: {used}; the path shown is proved but for its last part")
+            return replace(answer, reason=_unproved(found, readings, budget))
         return replace(answer, verdict=SAME, certified=True, margin=found.margin, reason=(
             "the condition and the reach of all legs are enclosed away from zero along the path"))
+
+    def _shown(self, answer: PathAnswer, found: Plan, known: Pattern) -> PathAnswer:
+        """The answer with a plan's ways, and the joints whose limits these keep."""
+        kept = tuple(bound.joint for bound in known.bounds)
+        answer = replace(answer, boxes=found.boxes, limits=kept,
+                         unlimited=tuple(name for name in limited(self.setting.robot) if name not in kept))
+        if not found.ways:
+            return answer
+        poses = answer.start.pose, *between(answer, known.carriage, found.ways), answer.goal.pose
+        return replace(answer, carriage=known.carriage, ways=found.ways, poses=poses)
 
 
 def path(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
@@ -143,8 +143,9 @@ def path(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: s
          progress: Callable[[str], None] | None = None) -> PathAnswer:
     """Whether a path without Type 2 singularity of the hidden robot joins two poses (theory 5, aspects).
 
-    Both are reached from the zero configuration in its working mode. A certificate encloses, by interval arithmetic,
-    the condition's value away from zero and the reach of every leg all along the path, for all poses within
+    Both are reached from the zero configuration in its working mode; on the way legs may pass their limits into other
+    working modes (Type 1). A certificate encloses, by interval arithmetic, the condition's value away from zero, the
+    reach of every leg and the limits of R and P joints all along the path, for all poses within
     ``tolerances.FOLLOWED`` of it; opposite signs of an expression at the two ends separate them. At most ``budget``
     intervals are tried. ``observe`` and ``camera`` as for ``derive``.
 
@@ -162,6 +163,16 @@ def path(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: s
     tell("poses")
     ends = [reach(samples.start, samples.question, pose, aspects.motion) for pose in wanted]
     return aspects.join(*ends, seed=seed, budget=budget, progress=lambda: tell("road map"))
+
+
+def _unproved(found: Plan, readings: Sequence[Reading], budget: int) -> str:
+    """Why a plan decides nothing."""
+    used = "the intervals allowed are used up" if found.boxes >= budget else "the road map does not join the poses"
+    if found.ways:
+        return f"no path was proved: {used}; the path shown is proved but for its last part"
+    pairs = zip(*(reading.chart.limbs for reading in readings), strict=True)
+    legs = dict.fromkeys(one.leg for one, other in pairs if one.branch != other.branch)
+    return f"no path was proved: {used}; leg {', '.join(legs)} is in different working modes at the two poses"
 
 
 def _pointwise(answer: PathAnswer, why: str) -> PathAnswer:

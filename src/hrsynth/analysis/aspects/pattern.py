@@ -15,12 +15,10 @@ from ...mechanism.vectors import Array
 from ...tolerances import FOLLOWED, SAME_RELATION
 from ..singularity.features import Feature, Segment, Spot, Tangent, axis_of, centre_of, poses_at
 from .carriage import Carriage, Rigid, rigid
-from .chart import Borne, Chart, Made
+from .chart import Chart
 from .limbs import Limb, on_crank, on_rail, sliding
-
-
-class NoChart(Exception):
-    """Why a pose does not decide what the legs do: the reason, for the answer."""
+from .limits import Bound, bounds
+from .sources import Borne, Made, NoChart, Source
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,8 +28,10 @@ class Pattern:
     carriage: Carriage
     limbs: tuple[Limb, ...]
     carried: tuple[Feature, ...]
-    vectors: Mapping[str, Rigid | Borne | Made]
+    vectors: Mapping[str, Source]
     points: tuple[str, ...]
+    bounds: tuple[Bound, ...] = ()
+    """Limits of joints that are kept."""
 
     def chart(self, at: ClosedConfiguration) -> Chart:
         """The chart in the working mode of a configuration; raises ``NoChart`` where a leg does not follow its form."""
@@ -44,7 +44,7 @@ class Pattern:
             if not np.linalg.norm(limb.solve(tip, branch)[1] - actual) < SAME_RELATION:
                 raise NoChart(f"leg {limb.leg} does not follow its form")
             limbs.append(replace(limb, branch=float(branch[0])))
-        return Chart(tuple(limbs), self.vectors, self.points)
+        return Chart(tuple(limbs), self.vectors, self.points, self.bounds)
 
 
 def pattern(anatomy: Anatomy, features: Sequence[Feature], carriage: Carriage,
@@ -59,7 +59,8 @@ def pattern(anatomy: Anatomy, features: Sequence[Feature], carriage: Carriage,
         found += of_leg
     limbs, carried = (tuple(part) for part in zip(*found, strict=True))
     vectors = {f.symbol: sight.source(f, carried) for f in features}
-    return Pattern(carriage, limbs, carried, vectors, tuple(f.symbol for f in features if isinstance(f, Spot)))
+    return Pattern(carriage, limbs, carried, vectors, tuple(f.symbol for f in features if isinstance(f, Spot)),
+                   tuple(bounds(sight, lambda feature: sight.source(feature, carried))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +137,7 @@ class Sight:
                             yield found, direction
                             return
 
-    def source(self, feature: Feature, carried: Sequence[Feature]) -> Rigid | Borne | Made:
+    def source(self, feature: Feature, carried: Sequence[Feature]) -> Source:
         """How a vector follows from pose and limbs."""
         values = self.values(feature)
         rule = self.rule(values)

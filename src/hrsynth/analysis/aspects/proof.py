@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -39,19 +39,15 @@ class Reading:
         """Whether the value has a sign."""
         return sign_of(self.condition)
 
-    @cached_property
-    def _run(self) -> tuple[list[str], Callable[..., Any]]:
-        import sympy
-
-        names = sorted(str(symbol) for symbol in self.condition.expression.free_symbols)
-        products = {"dot": dot, "cross": cross, "det": det}
-        return names, sympy.lambdify([sympy.Symbol(name) for name in names], self.condition.expression,
-                                     modules=[products])
+    @property
+    def unlimited(self) -> Reading:
+        """The same without joint limits."""
+        return replace(self, chart=replace(self.chart, bounds=()))
 
     def raw(self, p: Field, R: Field, leading: Leading = None) -> tuple[Field, Field]:
         """Reserves (n, limbs) and the expression (n,) of a condition with a sign, for numbers, balls or jets."""
         found = self.chart.at(p, R, leading)
-        names, run = self._run
+        names, run = _compiled(self.condition.expression)
         return found.reserves, run(*(found.values[name] for name in names))
 
     def at(self, p: Field, R: Field, leading: Leading = None) -> tuple[NDArray[np.bool_], Field]:
@@ -83,6 +79,16 @@ class Reading:
         middles, moving = self.raw(*way.at(balls(middle, middle))), self.raw(*way.at(jets(boxes[weak])))
         found[weak] = below(centred(middles[1], moving[1], boxes[weak] - middle))
         return found
+
+
+@lru_cache(maxsize=64)
+def _compiled(expression: Any) -> tuple[list[str], Callable[..., Any]]:
+    """The symbols of an expression in vectors, and the function of them, for numbers, balls and jets."""
+    import sympy
+
+    names = sorted(str(symbol) for symbol in expression.free_symbols)
+    products = {"dot": dot, "cross": cross, "det": det}
+    return names, sympy.lambdify([sympy.Symbol(name) for name in names], expression, modules=[products])
 
 
 def sign_of(condition: Named) -> bool:

@@ -4,7 +4,8 @@ A *table* f, shape (3, 3), is the polynomial Σ f[i, j] xⁱ yʲ. The resultant 
 
     (a₂b₀ − a₀b₂)² − (a₂b₁ − a₁b₂)(a₁b₀ − a₀b₁),   and their common root   y = −(a₂b₀ − a₀b₂) / (a₂b₁ − a₁b₂),
 
-so that every root x at which the denominators do not vanish carries exactly one solution, real if x is.
+so that every root x at which the denominators do not vanish carries exactly one solution, real if x is. At a root with
+several solutions, as symmetry makes them, the quadratics are solved one by one and what fits the last is kept.
 """
 
 from __future__ import annotations
@@ -25,12 +26,14 @@ class Eliminant:
     """The polynomial in the kept unknown, and the other unknowns at a root.
 
     ``bound`` is the degree that it has when no solution lies at infinity. ``others`` gives, for a ball about a root,
-    the balls of the other unknowns; where a denominator cannot be told from zero these are not finite.
+    the balls of the other unknowns; where a denominator cannot be told from zero these are not finite. ``several``
+    gives for such a root all that the other unknowns can be, or None where that cannot be told.
     """
 
     polynomial: fmpz_poly
     bound: int
     others: Callable[[Any], tuple[Any, ...]]
+    several: Callable[[Any], list[tuple[Any, ...]] | None] = lambda x: None
 
 
 def univariate(f: Sequence[int]) -> Eliminant:
@@ -48,8 +51,13 @@ def pair(f: Table, g: Table) -> Eliminant:
     def others(x: Any) -> tuple[Any, ...]:
         return (_divided(-low(x), top(x)),)
 
+    def several(x: Any) -> list[tuple[Any, ...]] | None:
+        ys = _two([p(x) for p in a])
+        last = [p(x) for p in b]
+        return None if ys is None else [(y,) for y in ys if (last[0] + y * (last[1] + y * last[2])).contains(0)]
+
     bound = 2 * sum(max((p.degree() for p in each), default=0) for each in (a, b))
-    return Eliminant(low * low - top * mixed, bound, others)
+    return Eliminant(low * low - top * mixed, bound, others, several)
 
 
 def cycle(f: Table, g: Table, h: Table) -> Eliminant:
@@ -71,7 +79,13 @@ def cycle(f: Table, g: Table, h: Table) -> Eliminant:
         y = _divided(ax[0] * bz[2] - ax[2] * bz[0], ax[2] * bz[1] - ax[1] * bz[2])
         return y, z
 
-    return Eliminant(polynomial, 16, others)
+    def several(x: Any) -> list[tuple[Any, ...]] | None:
+        ys, zs = _two([p(x) for p in a]), _two([p(x) for p in (c0, c1, c2)])
+        if ys is None or zs is None:
+            return None
+        return [(y, z) for y in ys for z in zs if sum(q(z) * y**k for k, q in enumerate(b)).contains(0)]
+
+    return Eliminant(polynomial, 16, others, several)
 
 
 def without(polynomial: fmpz_poly, factor: fmpz_poly) -> tuple[fmpz_poly, int]:
@@ -133,6 +147,16 @@ def _exact(norm: fmpz_poly, divisor: fmpz_poly) -> fmpz_poly:
     quotient, rest = divmod(norm, divisor)
     assert not rest, "a norm is divisible by the power of the leading coefficient that scaled it"
     return quotient
+
+
+def _two(c: Sequence[Any]) -> list[Any] | None:
+    """The two roots of c₂ y² + c₁ y + c₀ as balls apart from each other; None where they cannot be told apart or from
+    infinity."""
+    below = c[1] * c[1] - 4 * c[2] * c[0]
+    if c[2].contains(0) or below.contains(0):
+        return None
+    root = below.sqrt()
+    return [(-c[1] + sign * root) / (2 * c[2]) for sign in (1, -1)]
 
 
 def _divided(numerator: Any, denominator: Any) -> Any:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -9,16 +10,18 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import BadRequest
-from ...mechanism.vectors import Array, frozen, pose
+from ...mechanism.vectors import Array
 from ...tolerances import PARALLEL
 from .certify import Equation
-from .conics import Conic, Numbers, direction, spatial_frame
-from .curves import Circle, Curve, Line, Point, cross, extent, length, shifted
+from .conics import Conic, Numbers, direction, spatial_frame, spokes
+from .curves import Circle, Curve, Line, Point, Surface, cross, extent, length, shifted
+from .quadrics import Chart, Moving, normals, on_circle, shifting
 from .squares import Square, on_plane, single, sum_on_plane, sum_on_sphere
+from .systems import Shifting
 
 
 @dataclass(frozen=True, eq=False)
-class Articulated:
+class Articulated(Shifting):
     """Two bodies that translate: q = (p, θ), p (3,) the first body's origin, θ where the second is on ``slide``.
 
     tip_i = p + b_i on the first body, p + slide(θ) + b_i on the second; ``bodies`` says which, 0 or 1, for each
@@ -26,16 +29,13 @@ class Articulated:
     lies on the third curve.
     """
 
-    curves: tuple[Curve, ...]
-    tips: Array
     bodies: tuple[int, ...]
     slide: Circle
+    freedoms = 4
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "tips", frozen(self.tips))
-        if self.tips.shape != (len(self.curves), 3) or len(self.bodies) != len(self.curves):
-            raise BadRequest("tips of a platform", list(self.tips.shape), f"{len(self.curves)} by 3, a body each")
-        if not set(self.bodies) <= {0, 1}:
+        super().__post_init__()
+        if len(self.bodies) != len(self.curves) or not set(self.bodies) <= {0, 1}:
             raise BadRequest("bodies of an articulated platform", self.bodies, "0 or 1 for each leg")
 
     @cached_property
@@ -43,42 +43,47 @@ class Articulated:
         """What residuals are divided by (m)."""
         return max(extent(self.curves, self.tips), self.slide.radius)
 
-    @property
-    def missing(self) -> int:
-        """Freedoms that too few legs leave."""
-        sides = [[3 - curve.freedoms for curve, side in zip(self.curves, self.bodies, strict=True) if side == body]
-                 for body in (0, 1)]
-        return max(0, 4 - sum(map(sum, sides)), *(1 for side in sides if not side))
+    def left(self, legs: Sequence[int]) -> int:
+        """Freedoms that some legs leave: of each body's three, and one at least where a body has no leg."""
+        sides = [sum(self.forbids[k] for k in legs if self.bodies[k] == body) for body in (0, 1)]
+        return max(4 - sum(min(3, side) for side in sides), *(int(side == 0) for side in sides), 0)
 
-    @cached_property
-    def paths(self) -> tuple[Curve, ...]:
-        """The curves of each leg's own body's origin."""
-        return tuple(shifted(curve, -tip) for curve, tip in zip(self.curves, self.tips, strict=True))
+    def reached(self, q: Array) -> Array:
+        """Where the tips are at a pose; shape (legs, 3), metres."""
+        origins = np.array([q[:3], q[:3] + self.slide.at(float(q[3]))])
+        return np.asarray(origins[list(self.bodies)] + self.tips)
 
-    def pose(self, q: Array) -> Array:
-        """The first body's frame in the base frame; shape (4, 4)."""
-        return pose(q[:3])
+    def chart(self, number: int) -> Chart:
+        """p, cos θ and sin θ."""
+        middle = spatial_frame(self.paths, self.size).origin
+        frame = replace(spatial_frame((*self.paths, self.slide), self.size), origin=middle)
 
-    def misses(self, q: Array) -> Array:
-        """What separates each tip from its curve; shape (legs, 3), metres."""
-        origins = (q[:3], q[:3] + self.slide.at(float(q[3])))
-        return np.array([path.miss(origins[body]) for path, body in zip(self.paths, self.bodies, strict=True)])
+        def tips(numbers: Numbers) -> list[Moving]:
+            centre = numbers.vector(frame.vector(self.slide.centre))
+            a, b = spokes(self.slide, frame, 0.0, numbers)
+            both = shifting(5, centre * 0), shifting(5, centre, ((4, a), (5, b)))
+            return [both[body] for body in self.bodies]
+
+        def place(x: Sequence[float]) -> Array:
+            return np.array([*(frame.origin + frame.size * (np.array(x[:3]) @ frame.R)), math.atan2(x[4], x[3])])
+
+        return Chart(frame, 5, self.paths, tips, (on_circle(5, 4, 5),), place)
 
     def squares(self) -> Iterator[Square]:
         """The pairs of legs, one on each body, each in both roles; first those where no plane is the slide's own."""
-        one, two = ([k for k, side in enumerate(self.bodies) if side == body] for body in (0, 1))
-        roles = [legs for i in one for j in two for legs in ((i, j), (j, i))]
-        for legs in sorted(roles, key=lambda legs: self._along_slide(self.curves[legs[1]])):
-            if not isinstance(self.curves[legs[1]], Point):
-                yield self._square(legs)
+        curves = [(k, path) for k, path in enumerate(self.paths) if not isinstance(path, Surface)]
+        one, two = ([each for each in curves if self.bodies[each[0]] == body] for body in (0, 1))
+        roles = [roles for i in one for j in two for roles in ((i, j), (j, i))]
+        for first, onto in sorted(roles, key=lambda roles: self._along_slide(roles[1][1])):
+            if not isinstance(onto[1], Point):
+                yield self._square((first[0], onto[0]), first[1], onto[1])
 
     def _along_slide(self, curve: Curve) -> bool:
         """Whether a circle lies in a plane parallel to the slide's."""
         return isinstance(curve, Circle) and length(cross(curve.axis, self.slide.axis)) < PARALLEL
 
-    def _square(self, legs: tuple[int, int]) -> Square:
+    def _square(self, legs: tuple[int, int], first: Curve, onto: Line | Circle) -> Square:
         """The first leg's tip carries the slide to the second leg's curve."""
-        first, onto = (self.paths[k] for k in legs)
         sign = 1 if self.bodies[legs[0]] == 0 else -1
         size = max(extent((first, onto), np.zeros((1, 3))), self.slide.radius, length(self.slide.centre))
         middle = (first.centre + onto.centre) / 2
@@ -88,12 +93,12 @@ class Articulated:
 
         def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
             centre = numbers.vector(frame.point(end.centre))
-            normals = [direction(n, frame, numbers) for n in _normals(onto)]
+            across = [direction(n, frame, numbers) for n in normals(onto)]
             if resting:
                 left = centre - numbers.vector(frame.point(start.centre))
-                quadratics = [on_plane(conics[0], sign * n, n @ left) for n in normals]
+                quadratics = [on_plane(conics[0], sign * n, n @ left) for n in across]
                 return [single(quadratics[0])]
-            tables = [sum_on_plane(conics[0], conics[1], sign, n, n @ centre) for n in normals]
+            tables = [sum_on_plane(conics[0], conics[1], sign, n, n @ centre) for n in across]
             if isinstance(onto, Circle):
                 rho = numbers.vector(np.array([onto.radius / frame.size]))[0]
                 tables.append(sum_on_sphere(conics[0], conics[1], sign, centre, rho * rho))
@@ -107,12 +112,3 @@ class Articulated:
         unknowns = (self.slide,) if resting else (start, self.slide)
         whole = len(self.curves) == 2 and not resting
         return Square(legs, unknowns, frame, build, place, whole)
-
-
-def _normals(curve: Curve) -> tuple[Array, ...]:
-    """The plane of a circle, or two planes that hold a line: their normals."""
-    if isinstance(curve, Line):
-        first = np.linalg.svd(curve.direction[None])[2][1]
-        return first, cross(curve.direction, first)
-    assert isinstance(curve, Circle)
-    return (curve.axis,)

@@ -8,7 +8,7 @@ choice of coefficients in the balls.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
@@ -19,6 +19,15 @@ FINEST = 2.0 ** -100
 """Radius of the smallest box that is tried, relative to 1 plus the unknown."""
 
 
+class Polynomial(Protocol):
+    """What the operator asks of an equation in n unknowns."""
+
+    def value(self, x: Sequence[Any]) -> Any:
+        """The value at balls x (n,)."""
+    def slopes(self, x: Sequence[Any]) -> Sequence[Any]:
+        """The derivative by each unknown (n,) at balls x (n,)."""
+
+
 class Equation(NamedTuple):
     """Σ table[a, b] x_iᵃ x_jᵇ = 0; ``table`` has shape (3, 3); integers or balls."""
 
@@ -26,8 +35,36 @@ class Equation(NamedTuple):
     i: int
     j: int
 
+    def value(self, x: Sequence[Any]) -> Any:
+        """The value at x."""
+        return _powers(x[self.i]) @ self.table @ _powers(x[self.j])
 
-def krawczyk(equations: Sequence[Equation], start: Sequence[Any]) -> list[Any] | None:
+    def slopes(self, x: Sequence[Any]) -> list[Any]:
+        """The derivative by each unknown at x."""
+        left, right = _powers(x[self.i]), _powers(x[self.j])
+        row: list[Any] = [0.0] * len(x)
+        row[self.i] = _slopes(x[self.i]) @ (self.table @ right)
+        row[self.j] = row[self.j] + left @ self.table @ _slopes(x[self.j])
+        return row
+
+
+class Quadric(NamedTuple):
+    """xᵀ A x = 0 with x = (1, x₁ … xₙ); ``A`` has shape (n + 1, n + 1); integers or balls."""
+
+    A: Any
+
+    def value(self, x: Sequence[Any]) -> Any:
+        """The value at x."""
+        ends = np.array([1, *x], dtype=object)
+        return ends @ self.A @ ends
+
+    def slopes(self, x: Sequence[Any]) -> Any:
+        """The derivative by each unknown at x."""
+        ends = np.array([1, *x], dtype=object)
+        return (self.A @ ends + ends @ self.A)[1:]
+
+
+def krawczyk(equations: Sequence[Polynomial], start: Sequence[Any]) -> list[Any] | None:
     """A box about the balls ``start`` that is proved to hold exactly one solution, for all coefficients in their balls.
 
     None where the proof fails, as it does at a double solution.
@@ -44,7 +81,7 @@ def krawczyk(equations: Sequence[Equation], start: Sequence[Any]) -> list[Any] |
     except np.linalg.LinAlgError:
         return None
     Y = np.array([[arb(float(v)) for v in row] for row in inverse], dtype=object)
-    step = Y @ np.array(_values(equations, middle), dtype=object)
+    step = Y @ np.array([equation.value(middle) for equation in equations], dtype=object)
     least = [FINEST * (1.0 + abs(float(m))) for m in middle]
     radii = [4.0 * float(s.abs_upper()) + tiny for s, tiny in zip(step, least, strict=True)]
     for _ in range(ATTEMPTS):
@@ -65,18 +102,5 @@ def _slopes(x: Any) -> Any:
     return np.array([0, 1, 2 * x], dtype=object)
 
 
-def _values(equations: Sequence[Equation], x: Sequence[Any]) -> list[Any]:
-    powers = [_powers(each) for each in x]
-    return [powers[i] @ table @ powers[j] for table, i, j in equations]
-
-
-def _jacobian(equations: Sequence[Equation], x: Sequence[Any]) -> list[list[Any]]:
-    powers, slopes = [_powers(each) for each in x], [_slopes(each) for each in x]
-    rows = []
-    for table, i, j in equations:
-        row = [0.0] * len(x)
-        half = table @ powers[j]
-        row[i] = row[i] + slopes[i] @ half
-        row[j] = row[j] + powers[i] @ table @ slopes[j]
-        rows.append(row)
-    return rows
+def _jacobian(equations: Sequence[Polynomial], x: Sequence[Any]) -> list[Sequence[Any]]:
+    return [equation.slopes(x) for equation in equations]

@@ -20,7 +20,7 @@ import numpy as np
 
 from ...mechanism.vectors import Array, perpendicular
 from ...tolerances import PARALLEL
-from .curves import Circle, Curve, Line, cross, length
+from .curves import Circle, Curve, Line, Plane, Reach, cross, length
 
 BITS = 52
 """Coordinates are integers in units of the size times 2 to the minus this."""
@@ -60,17 +60,18 @@ class Frame:
         return self.vector(p - self.origin)
 
 
-def spatial_frame(curves: Sequence[Curve], size: float) -> Frame:
-    """A frame whose third axis is the direction that most curves share, circles first; size rounded to a power of 2."""
+def spatial_frame(curves: Sequence[Reach], size: float) -> Frame:
+    """A frame whose third axis is the direction that most share, circles first; size rounded to a power of 2."""
     directions = [curve.axis for curve in curves if isinstance(curve, Circle)]
     directions += [curve.direction for curve in curves if isinstance(curve, Line)]
+    directions += [curve.normal for curve in curves if isinstance(curve, Plane)]
     shared = [sum(_parallel(a, b) for b in directions) for a in directions]
     n = directions[int(np.argmax(shared))] if directions else np.array([0.0, 0.0, 1.0])
     e = perpendicular(n)
     return Frame(_middle(curves), np.array([e, cross(n, e), n]), _power(size), n)
 
 
-def planar_frame(curves: Sequence[Curve], X_plane: Array, size: float) -> Frame:
+def planar_frame(curves: Sequence[Reach], X_plane: Array, size: float) -> Frame:
     """Two axes in the plane of X_plane (4, 4), the first along the direction that most lines share."""
     lines = [curve.direction for curve in curves if isinstance(curve, Line)]
     shared = [sum(_parallel(a, b) for b in lines) for a in lines]
@@ -111,7 +112,7 @@ def conic(curve: Curve, frame: Frame, turn: float, numbers: Numbers = Rounded) -
         d = direction(curve.direction, frame, numbers)
         return Conic(np.array([c, d, zero]), np.array([c @ c, 2 * (c @ d), d @ d]), np.array([1, 0, 0], dtype=object))
     if isinstance(curve, Circle):
-        a, b = _spokes(curve, frame, turn, numbers)
+        a, b = spokes(curve, frame, turn, numbers)
         rho = a @ a
         Q = [c @ c + rho + 2 * (c @ a), 4 * (c @ b), c @ c + rho - 2 * (c @ a)]
         return Conic(np.array([c + a, 2 * b, c - a]), np.array(Q), np.array([1, 0, 1], dtype=object))
@@ -136,7 +137,7 @@ def parameter(curve: Curve, frame: Frame, turn: float, t: Any) -> Any:
     return 2 * t.atan() + arb(turn) if isinstance(curve, Circle) else t * arb(frame.size)
 
 
-def _spokes(circle: Circle, frame: Frame, turn: float, numbers: Numbers) -> tuple[Any, Any]:
+def spokes(circle: Circle, frame: Frame, turn: float, numbers: Numbers) -> tuple[Any, Any]:
     """Spokes a ⟂ b of equal length with tip = c + a cos φ + b sin φ, φ = θ − ``turn``, exactly so where planes are
     shared."""
     assert circle.start is not None
@@ -154,7 +155,7 @@ def _spokes(circle: Circle, frame: Frame, turn: float, numbers: Numbers) -> tupl
     return numbers.vector(a), numbers.vector(b)
 
 
-def _middle(curves: Sequence[Curve]) -> Array:
+def _middle(curves: Sequence[Reach]) -> Array:
     return np.asarray(sum(curve.centre for curve in curves) / len(curves))
 
 

@@ -1,4 +1,4 @@
-"""What the tip of an observed leg can reach while its direction is held: a point, a line or a circle.
+"""What the tip of an observed leg can reach while its direction is held: a point, a curve or a surface.
 
 Lengths in metres, angles in radians, all coordinates in one frame that the caller chooses (the base frame).
 """
@@ -6,9 +6,10 @@ Lengths in metres, angles in radians, all coordinates in one frame that the call
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import overload
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -70,12 +71,9 @@ class Circle:
 
     def __post_init__(self) -> None:
         axis = _unit(self.axis)
-        radius = float(self.radius)
-        if not (radius > 0 and np.isfinite(radius)):
-            raise BadRequest("a circle without a radius", radius, "a positive length in metres")
         object.__setattr__(self, "centre", _vector(self.centre))
         object.__setattr__(self, "axis", axis)
-        object.__setattr__(self, "radius", radius)
+        object.__setattr__(self, "radius", _radius("circle", self.radius))
         object.__setattr__(self, "start", frozen(perpendicular(axis, self.start)))
 
     def at(self, parameter: float) -> Array:
@@ -101,17 +99,60 @@ class Circle:
         return along + spoke * (1.0 - self.radius / reach)
 
 
+@dataclass(frozen=True, eq=False)
+class Sphere:
+    """The tip is at the distance ``radius`` from ``centre``."""
+
+    centre: Array
+    radius: float
+    freedoms = 2
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", _vector(self.centre))
+        object.__setattr__(self, "radius", _radius("sphere", self.radius))
+
+    def miss(self, tip: Array) -> Array:
+        """From the nearest point of the sphere to ``tip``; shape (3,), metres."""
+        v = tip - self.centre
+        reach = length(v)
+        return v * (1.0 - self.radius / reach) if reach > 0.0 else np.array([-self.radius, 0.0, 0.0])
+
+
+@dataclass(frozen=True, eq=False)
+class Plane:
+    """The tip is in the plane through ``centre`` that the unit vector along ``normal`` is normal to."""
+
+    centre: Array
+    normal: Array
+    freedoms = 2
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", _vector(self.centre))
+        object.__setattr__(self, "normal", _unit(self.normal))
+
+    def miss(self, tip: Array) -> Array:
+        """From the nearest point of the plane to ``tip``; shape (3,), metres."""
+        return self.normal * float(self.normal @ (tip - self.centre))
+
+
 Curve = Point | Line | Circle
+Surface = Sphere | Plane
+Reach = Curve | Surface
+"""What a tip can reach."""
 
 
-def shifted(curve: Curve, by: ArrayLike) -> Curve:
-    """The curve moved by ``by`` (3,), with the same parameter at each of its points."""
-    centre = curve.centre + np.asarray(by, dtype=float)
-    if isinstance(curve, Point):
-        return Point(centre)
-    if isinstance(curve, Line):
-        return Line(centre, curve.direction)
-    return Circle(centre, curve.axis, curve.radius, curve.start)
+def curves_of(reaches: Iterable[Reach]) -> list[int]:
+    """The places of those that have one freedom or none."""
+    return [k for k, reach in enumerate(reaches) if not isinstance(reach, Surface)]
+
+
+@overload
+def shifted(reach: Curve, by: ArrayLike) -> Curve: ...
+@overload
+def shifted(reach: Reach, by: ArrayLike) -> Reach: ...
+def shifted(reach: Reach, by: ArrayLike) -> Reach:
+    """The same moved by ``by`` (3,), with the same parameter at each point of a curve."""
+    return replace(reach, centre=reach.centre + np.asarray(by, dtype=float))
 
 
 def cross(a: Array, b: Array) -> Array:
@@ -125,13 +166,13 @@ def length(v: Array) -> float:
     return math.hypot(*v.tolist())
 
 
-def extent(curves: Sequence[Curve], tips: Array) -> float:
+def extent(curves: Sequence[Reach], tips: Array) -> float:
     """The size that residuals are divided by: the largest spread of centres, radius, or spread of tips (m)."""
     spreads = []
     for points in ([curve.centre for curve in curves], list(tips)):
         middle = sum(points) / len(points)
         spreads += [length(point - middle) for point in points]
-    radii = [curve.radius for curve in curves if isinstance(curve, Circle)]
+    radii = [curve.radius for curve in curves if isinstance(curve, Circle | Sphere)]
     size = max([*spreads, *radii])
     return size if size > 0 else 1.0
 
@@ -141,6 +182,13 @@ def _vector(values: ArrayLike) -> Array:
     if array.shape != (3,) or not np.isfinite(array).all():
         raise BadRequest("a curve's vector", np.asarray(values).tolist(), "three finite numbers")
     return array
+
+
+def _radius(what: str, value: float) -> float:
+    radius = float(value)
+    if not (radius > 0 and np.isfinite(radius)):
+        raise BadRequest(f"a {what} without a radius", radius, "a positive length in metres")
+    return radius
 
 
 def _unit(values: ArrayLike) -> Array:

@@ -8,14 +8,21 @@ import numpy as np
 
 from ...mechanism.vectors import Array
 from ...tolerances import LOCUS, NEAR_MODE, VANISHES
-from .squares import Square
 from .systems import System
 
 STARTS = 40
-"""Random places on the curves from which a pose of a continuum is looked for."""
+"""Random poses from which a pose of a continuum is looked for."""
 
 APART = 1e-6
-"""Distance of coordinates (m or rad over sizes) below which two stationary poses are one."""
+"""Difference of poses and of misses (sizes) below which two stationary poses are one."""
+
+FAR = 0.3
+"""Misses (sizes) beyond which a start leads to no near mode."""
+
+
+def residual(system: System, q: Array) -> float:
+    """The largest distance of a tip from its curve, in sizes of the mechanism."""
+    return float(np.linalg.norm(system.misses(q), axis=1).max()) / system.size
 
 
 def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) -> list[Array]:
@@ -23,25 +30,25 @@ def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) 
     found: list[tuple[float, Array]] = []
     seen = [np.asarray(q) for q in known]
     for start in starts:
+        if residual(system, start) > FAR:
+            continue
         q = _minimised(system, start)
-        miss = float(np.linalg.norm(system.misses(q), axis=1).max()) / system.size
-        if VANISHES < miss <= NEAR_MODE and all(_apart(q, other) > APART for other in seen):
+        miss = residual(system, q)
+        if VANISHES < miss <= NEAR_MODE and all(_apart(system, q, other) > APART for other in seen):
             found.append((miss, q))
             seen.append(q)
     return [q for _, q in sorted(found, key=lambda each: each[0])]
 
 
-def dimension(system: System, squares: Sequence[Square]) -> int | None:
+def dimension(system: System) -> int | None:
     """The largest dimension of the real poses about one that closes; None where none is found."""
     rng = np.random.default_rng(0)
     found = []
-    for square in squares:
-        for _ in range(STARTS // len(squares) + 1):
-            scale = [np.pi if half else system.size for half in square.round]
-            q = _minimised(system, square.place(list(rng.uniform(-1, 1, len(scale)) * scale)))
-            if float(np.linalg.norm(system.misses(q), axis=1).max()) <= VANISHES * system.size:
-                values = np.linalg.svd(_slopes(system, q), compute_uv=False)
-                found.append(int(len(q) - np.sum(values > np.sqrt(LOCUS) * values[0])))
+    for _ in range(STARTS):
+        q = _minimised(system, system.somewhere(rng))
+        if residual(system, q) <= VANISHES:
+            values = np.linalg.svd(_slopes(system, q), compute_uv=False)
+            found.append(int(len(q) - np.sum(values > np.sqrt(LOCUS) * values[0])))
     return max(found, default=None)
 
 
@@ -59,5 +66,9 @@ def _slopes(system: System, q: Array, step: float = 1e-6) -> Array:
     return np.column_stack(columns)
 
 
-def _apart(one: Array, other: Array) -> float:
-    return float(np.abs(one - other).max())
+def _apart(system: System, one: Array, other: Array) -> float:
+    """How far two poses, or the tips of two bodies, are from each other (sizes, pure numbers)."""
+    X, Y = system.pose(one), system.pose(other)
+    moved = (X[:3, 3] - Y[:3, 3], system.misses(one) - system.misses(other))
+    turned = float(np.abs(X[:3, :3] - Y[:3, :3]).max())
+    return max(max(float(np.abs(each).max()) for each in moved) / system.size, turned)

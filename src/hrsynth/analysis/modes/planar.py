@@ -6,7 +6,6 @@ import cmath
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import combinations
 from typing import Any
 
@@ -17,54 +16,70 @@ from ...mechanism.vectors import Array
 from ...tolerances import SAME_DIRECTION, SAME_POINT
 from .certify import Equation
 from .conics import Conic, Frame, Numbers, direction, planar_frame
-from .curves import Circle, Curve, Line, Point, cross, extent, length
+from .curves import Circle, Curve, Line, Point, Surface, cross, extent, length
+from .quadrics import Chart, Moving, on_circle, shifting
 from .squares import Square, distance, on_sphere, single
-from .systems import alike
+from .systems import System
 
 
 @dataclass(frozen=True, eq=False)
-class Planar:
+class Planar(System):
     """A platform that moves in the plane of ``X_plane`` (4, 4), whose z axis is the normal: q = (x, y, φ).
 
     ``tips`` are their coordinates in the platform's frame, shape (n, 2); X_platform = X_plane · (turn φ, shift (x, y)).
     """
 
-    curves: tuple[Curve, ...]
-    tips: Array
     X_plane: Array
 
+    freedoms = 3
+    space = 2
+
     def __post_init__(self) -> None:
-        alike(self.curves, self.tips, 2)
+        super().__post_init__()
         n = self.X_plane[:3, 2]
         for curve in self.curves:
             off = (length(cross(n, curve.axis)) if isinstance(curve, Circle) else
                    abs(float(n @ curve.direction)) if isinstance(curve, Line) else 0.0)
             if off > SAME_DIRECTION:
                 raise BadRequest("a curve outside the plane of motion, sine", off, f"at most {SAME_DIRECTION}")
+        if self.surfaces:
+            raise BadRequest("what tips in a plane are confined to", "a surface", "points, lines and circles")
 
-    @cached_property
-    def size(self) -> float:
-        """What residuals are divided by (m)."""
-        return extent(self.curves, self.tips)
-
-    @property
-    def missing(self) -> int:
-        """Freedoms that too few legs leave."""
-        return max(0, 3 - sum(2 - curve.freedoms for curve in self.curves))
+    def position(self, origin: Array) -> Array:
+        """The coordinates (2,) of a platform whose origin is at a point (3,)."""
+        return np.asarray((origin - self.X_plane[:3, 3]) @ self.X_plane[:3, :2])
 
     def pose(self, q: Array) -> Array:
-        """The platform\'s frame in the base frame; shape (4, 4)."""
+        """The platform's frame in the base frame; shape (4, 4)."""
         c, s = math.cos(q[2]), math.sin(q[2])
         return np.asarray(self.X_plane @ np.array([[c, -s, 0, q[0]], [s, c, 0, q[1]], [0, 0, 1, 0], [0, 0, 0, 1]]))
 
-    def misses(self, q: Array) -> Array:
-        """What separates each tip from its curve; shape (legs, 3), metres."""
+    def reached(self, q: Array) -> Array:
+        """Where the tips are at a pose, each in the plane of its own curve; shape (legs, 3), metres."""
         X, n = self.pose(q), self.X_plane[:3, 2]
         found = []
         for curve, tip in zip(self.curves, self.tips, strict=True):
             at = X[:3, 3] + X[:3, :2] @ tip
-            found.append(curve.miss(at - n * float(n @ (at - curve.centre))))
+            found.append(at - n * float(n @ (at - curve.centre)))
         return np.array(found)
+
+    def chart(self, number: int) -> Chart:
+        """x, y, cos and sin of the turn from the working frame to the platform's."""
+        frame = planar_frame(self.curves, self.X_plane, self.size)
+
+        def tips(numbers: Numbers) -> list[Moving]:
+            found = []
+            for tip in self.tips:
+                b = numbers.vector(tip / frame.size)
+                found.append(shifting(4, b * 0, ((3, b), (4, np.array([-b[1], b[0]], dtype=object)))))
+            return found
+
+        def place(x: Sequence[float]) -> Array:
+            at = frame.origin + frame.size * (np.array(x[:2]) @ frame.R)
+            first = self.X_plane[:3, :2].T @ (np.array(x[2:]) @ frame.R)
+            return np.array([*self.position(at), math.atan2(first[1], first[0])])
+
+        return Chart(frame, 4, self.curves, tips, (on_circle(4, 3, 4),), place)
 
     def squares(self) -> Iterator[Square]:
         """A pivot and a curve, or three curves in each order that two tips apart allow."""
@@ -80,7 +95,7 @@ class Planar:
                     yield self._square((i, j, k), len(self.curves) == 3)
 
     def _square(self, legs: tuple[int, ...], whole: bool) -> Square:
-        curves = tuple(self.curves[k] for k in legs)
+        curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
         b = self.tips[list(legs)]
         frame = planar_frame(curves, self.X_plane, extent(curves, b))
 
@@ -96,7 +111,7 @@ class Planar:
         def place(parameters: Sequence[float]) -> Array:
             free = iter(parameters)
             two = np.array([curve.centre if isinstance(curve, Point) else curve.at(next(free)) for curve in curves[:2]])
-            flat = (two - self.X_plane[:3, 3]) @ self.X_plane[:3, :2]
+            flat = self.position(two)
             turn = complex(*(flat[1] - flat[0])) / complex(*(b[1] - b[0]))
             at = flat[0] - _turned(turn / abs(turn), b[0])
             return np.array([*at, cmath.phase(turn)])

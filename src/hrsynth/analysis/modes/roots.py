@@ -7,15 +7,15 @@ other unknowns are rational functions of it carries exactly one. Where a denomin
 from __future__ import annotations
 
 import random
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...tolerances import NEARLY_DOUBLE
 from .algebra import Eliminant, cycle, height, pair, primitive, univariate, without
-from .certify import Equation, krawczyk
+from .certify import Equation, Polynomial, krawczyk
 from .conics import Balls, parameter
 from .squares import Square
 
@@ -30,6 +30,9 @@ PRECISIONS = 4
 
 STARTS = (0.0, 1.1, -0.9)
 """Origins of the angles (rad) that are tried until none of the solutions lies at t = ∞."""
+
+Solution = tuple[list[Any], int]
+"""Balls of all unknowns, and the multiplicity."""
 
 LOUD = 1 << 16
 """A resultant counts as zero if changes of the input in the last bit change it by more than this part of its size."""
@@ -55,8 +58,8 @@ class Root:
 class Roots:
     """All solutions of a square system; ``complex`` counts them with multiplicity, ``values`` are those of all.
 
-    ``degree`` is that of the resultant, ``extraneous`` how many of its roots lie at infinity. ``continuum`` says that
-    it vanishes, ``closest`` is the smallest distance between two solutions in their parameters.
+    ``degree`` is that of the polynomial that was isolated, ``extraneous`` how many roots of it lie at infinity.
+    ``continuum`` says that all such polynomials vanish, ``closest`` is the smallest distance between two solutions.
     """
 
     complex: int = 0
@@ -66,6 +69,7 @@ class Roots:
     complete: bool = True
     continuum: bool = False
     closest: float = np.inf
+    method: str = "exact resultant"
 
 
 def solve_square(square: Square) -> Roots:
@@ -142,23 +146,48 @@ def _roots(square: Square, turn: float, order: tuple[int, ...], eliminant: Elimi
     if kept_round:
         polynomial, pairs = without(polynomial, fmpz_poly([1, 0, 1]))
         extraneous = 2 * pairs
-    degree = polynomial.degree()
+    resolved = all_solutions(polynomial, lambda x, m: _over(x, m, order, eliminant, square.round))
+    with ctx.workprec(PRECISION):
+        real = tuple(_enclosed(square, turn, equations, thick, [v.real for v in values], m)
+                     for values, m in resolved if is_real(values))
+        real += tuple(_middle(square, turn, values) for values, m in resolved if almost_real(values))
+    found = gathered(polynomial.degree(), resolved, real)
+    return replace(found, extraneous=extraneous, complete=found.complete and not at_infinity)
+
+
+def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solution]]) -> list[Solution]:
+    """The solutions ``over`` each complex root and its multiplicity, as precise as it takes to have them all."""
+    from flint import ctx
+
     precision = PRECISION
     for _ in range(PRECISIONS):
         with ctx.workprec(precision):
-            solutions = [(_restored(order, (x, *eliminant.others(x))), m) for x, m in _isolated(polynomial)]
-            resolved = [(values, m) for values, m in solutions if _finite(values, square.round)]
-            if len(resolved) == len(solutions):
+            resolved = [each for x, m in _isolated(polynomial) for each in over(x, m)]
+            if sum(m for _, m in resolved) == polynomial.degree():
                 break
         precision *= 2
+    return resolved
+
+
+def gathered(degree: int, resolved: Sequence[Solution], real: tuple[Root, ...], method: str = Roots.method) -> Roots:
+    """All solutions together; complete if each root has its solution and each real one is enclosed or multiple."""
     count = sum(m for _, m in resolved)
-    with ctx.workprec(PRECISION):
-        real = tuple(_enclosed(square, turn, equations, thick, [v.real for v in values], m)
-                     for values, m in resolved if _real(values))
-        real += tuple(_middle(square, turn, values) for values, m in resolved if _almost_real(values))
     proved = all(root.real and (root.unique or root.multiplicity > 1) for root in real)
-    complete = count == degree and not at_infinity and proved
-    return Roots(count, real, degree, extraneous, complete, closest=_closest([values for values, _ in resolved]))
+    return Roots(count, real, degree, complete=count == degree and proved,
+                 closest=_closest([values for values, _ in resolved]), method=method)
+
+
+def _over(x: Any, multiplicity: int, order: tuple[int, ...], eliminant: Eliminant, half_angles: Sequence[bool]
+          ) -> list[Solution]:
+    """The solutions over a root, each with its multiplicity; none where they cannot be told from infinity or from each
+    other."""
+    one = _restored(order, (x, *eliminant.others(x)))
+    if _finite(one, half_angles):
+        return [(one, multiplicity)]
+    found = [_restored(order, (x, *others)) for others in eliminant.several(x) or ()]
+    if len(found) != multiplicity or not all(_finite(values, half_angles) for values in found):
+        return []
+    return [(values, 1) for values in found]
 
 
 def _isolated(polynomial: fmpz_poly) -> list[tuple[Any, int]]:
@@ -181,12 +210,12 @@ def _finite(values: Sequence[Any], half_angles: Sequence[bool]) -> bool:
                for v, half in zip(values, half_angles, strict=True))
 
 
-def _real(values: Sequence[Any]) -> bool:
-    """Whether a solution is real: it is where the root is, the other unknowns being rational in it."""
+def is_real(values: Sequence[Any]) -> bool:
+    """Whether a solution is real: it is where the root is and the other unknowns are rational in it or roots of it."""
     return all(v.imag.is_zero() for v in values)
 
 
-def _almost_real(values: Sequence[Any]) -> bool:
+def almost_real(values: Sequence[Any]) -> bool:
     """Whether a solution is the first of a conjugate pair that nearly is one real solution."""
     size = max(abs(float(v.imag)) / (1.0 + abs(float(v.real))) for v in values)
     return 0.0 < size < NEARLY_DOUBLE / 2 and next(float(v.imag) for v in values if not v.imag.is_zero()) > 0
@@ -204,15 +233,24 @@ def _enclosed(square: Square, turn: float, equations: Sequence[Equation], thick:
               start: Sequence[Any], multiplicity: int) -> Root:
     """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
     assert square.frame is not None
-    box, wide = (krawczyk(thick, start), True) if multiplicity == 1 else (None, False)
-    if box is None:
-        box, wide = (krawczyk(equations, start), False) if multiplicity == 1 else (None, False)
-    values = list(start) if box is None else box
+    values, unique, wide = boxed(equations, thick, start, multiplicity)
     own = tuple(parameter(curve, square.frame, origin, t)
                 for curve, origin, t in zip(square.unknowns, square.turns(turn), values, strict=True))
     radius = max(float(each.rad()) / (1.0 if half else square.frame.size)
                  for each, half in zip(own, square.round, strict=True))
-    return Root(own, radius, multiplicity, box is not None, wide)
+    return Root(own, radius, multiplicity, unique, wide)
+
+
+def boxed(equations: Sequence[Polynomial], thick: Sequence[Polynomial], start: Sequence[Any], multiplicity: int
+          ) -> tuple[list[Any], bool, bool]:
+    """The box about a simple solution, whether it holds exactly one, and whether it does so for the exact input."""
+    if multiplicity == 1:
+        box, wide = krawczyk(thick, start), True
+        if box is None:
+            box, wide = krawczyk(equations, start), False
+        if box is not None:
+            return box, True, wide
+    return list(start), False, False
 
 
 def _closest(solutions: Sequence[Sequence[Any]]) -> float:

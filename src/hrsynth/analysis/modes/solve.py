@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from ...mechanism.vectors import Array, frozen
 from ...tolerances import NEARLY_DOUBLE, VANISHES
-from .near import dimension, stationary
+from .near import dimension, residual, stationary
+from .quadrics import Whole
 from .roots import Root, Roots, nearly_double, solve_square
 from .squares import Square
 from .systems import System
+from .translating import Translating
+from .whole import solve_whole, wholes
+
+CHOICES = 5
+"""Choices of legs that are given to msolve until one has finitely many solutions, and, besides the first, whose
+solutions are starts for near modes."""
+
+Part = Square | Whole
 
 
 @dataclass(frozen=True, eq=False)
 class Mode:
     """A pose with the directions that are held.
 
-    ``parameters`` of the curves that were solved for (m, rad), each within ``radius`` (sizes, rad); ``legs`` the places
-    of the curves in the square part; ``residual`` the largest distance of a tip from its curve (sizes); ``q`` the
+    ``parameters`` of the curves that were solved for (m, rad), each within ``radius`` (sizes, rad); none where the pose
+    itself was solved for, then each tip's coordinates are within ``radius``; ``legs`` the places of the curves in the
+    square part; ``residual`` the largest distance of a tip from its curve (sizes); ``q`` the
     system's own coordinates; ``pose`` (4, 4) the platform's frame in the base frame. A size is that of the mechanism.
     """
 
@@ -67,47 +79,78 @@ def solve(system: System) -> Modes:
     """All modes of a system: the solutions of its first square part that is not degenerate at which all tips fit.
 
     Where more is observed than needed, a pose is a mode if its residual is at most ``VANISHES``; ``near`` are the poses
-    with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, found from every square part.
+    with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, found from several square parts.
+    Tips on surfaces are left to :func:`solve_by_msolve` where no square part decides the pose; it raises
+    ``MissingExtra`` where that is not installed.
     """
     if system.missing:
-        return _continuum(f"too few legs: a continuum of dimension {system.missing}", system.missing)
+        return _too_few(system)
     square = None
     for square in system.squares():
         roots = solve_square(square)
         if not roots.continuum:
-            return _judged(system, square, roots)
-    if square is None:
+            others = (each for each in system.squares() if each.legs != square.legs)
+            return _judged(system, square, roots, ((each, solve_square(each)) for each in islice(others, CHOICES)))
+    if system.surfaces and not isinstance(system, Translating):
+        return solve_by_msolve(system)
+    return _undecided(system, square is not None)
+
+
+def solve_by_msolve(system: System) -> Modes:
+    """All modes of a system in the pose's own coordinates, counted by msolve and enclosed here.
+
+    As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
+    one choice of legs alone. Raises ``MissingExtra``, ``Unsolved``.
+    """
+    if system.missing:
+        return _too_few(system)
+    part = None
+    for part in islice(wholes(system), CHOICES):
+        roots = solve_whole(part)
+        if not roots.continuum:
+            return _judged(system, part, roots, ())
+    return _undecided(system, part is not None)
+
+
+def _too_few(system: System) -> Modes:
+    return continuum(f"too few legs: a continuum of dimension {system.missing}", system.missing)
+
+
+def _undecided(system: System, tried: bool) -> Modes:
+    """What is said where no choice of legs has finitely many solutions."""
+    if not tried:
         return Modes(0, (), False, "nothing proved", degenerate="no choice of legs decides the pose: tips on one line, "
                      "in one point, or at rest")
-    size = dimension(system, list(system.squares()))
+    size = dimension(system)
     if size is None:
-        return _continuum("the equations depend on each other, but no real pose was found", None)
-    return _continuum(f"the curves coincide or slide along each other: a continuum of dimension {size}", size)
+        return continuum("the equations depend on each other, but no real pose was found", None)
+    return continuum(f"the tips can move together: a continuum of dimension {size}", size)
 
 
-def _continuum(text: str, size: int | None) -> Modes:
+def continuum(text: str, size: int | None) -> Modes:
+    """Modes that form a continuum of this dimension, None where it is not known."""
     return Modes(0, (), False, "a continuum is not counted", degenerate=text, continuum=size)
 
 
-def _judged(system: System, square: Square, roots: Roots) -> Modes:
-    """The modes among the solutions of a square part."""
+def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[Part, Roots]]) -> Modes:
+    """The modes among the solutions of a square part; near ones are looked for from those of others too."""
     found = [_mode(system, square, root) for root in roots.real]
     if square.whole:
         return Modes(roots.complex, tuple(found), roots.complete, _proof(roots), degenerate=_special(roots))
     modes = tuple(mode for mode in found if mode.residual <= VANISHES)
     starts = [mode.q for mode in found]
-    for other in system.squares():
-        if other.legs != square.legs:
-            starts += [_mode(system, other, root).q for root in solve_square(other).real]
+    for other, found_there in others:
+        starts += [_mode(system, other, root).q for root in found_there.real]
     near = tuple(_nearly(system, q) for q in stationary(system, starts, [mode.q for mode in modes]))
     proof = f"{_proof(roots)}; of these, {len(modes)} put the other tips on their curves, to {VANISHES:g} of the size"
     return Modes(len(modes), modes, roots.complete, proof, near, _special(roots))
 
 
-def _mode(system: System, square: Square, root: Root) -> Mode:
+def _mode(system: System, square: Part, root: Root) -> Mode:
     parameters = tuple(float(each.mid()) for each in root.parameters)
     q = square.place(parameters)
-    return Mode(parameters, root.radius, residual(system, q), frozen(system.pose(q)), frozen(q), square.legs,
+    own = parameters if isinstance(square, Square) else ()
+    return Mode(own, root.radius, residual(system, q), frozen(system.pose(q)), frozen(q), square.legs,
                 root.multiplicity)
 
 
@@ -115,15 +158,10 @@ def _nearly(system: System, q: Array) -> Mode:
     return Mode((), np.inf, residual(system, q), frozen(system.pose(q)), frozen(q))
 
 
-def residual(system: System, q: Array) -> float:
-    """The largest distance of a tip from its curve, in sizes of the mechanism."""
-    return float(np.linalg.norm(system.misses(q), axis=1).max()) / system.size
-
-
 def _proof(roots: Roots) -> str:
-    text = f"exact resultant of degree {roots.degree}"
+    text = f"{roots.method} of degree {roots.degree}"
     if roots.extraneous:
-        text += f" ({roots.extraneous} more roots at infinity divided out)"
+        text += f" ({roots.extraneous} more roots that are no poses left out)"
     text += f", {roots.complex} roots isolated"
     if roots.real:
         thin = sum(root.unique and not root.thick for root in roots.real)

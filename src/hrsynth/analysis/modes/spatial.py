@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import combinations
 
 import numpy as np
@@ -14,46 +12,37 @@ from ...mechanism.vectors import Array, pose, rotation_about
 from ...tolerances import SAME_POINT
 from .certify import Equation
 from .conics import Conic, Numbers, spatial_frame
-from .curves import Curve, Point, cross, extent, length
+from .curves import Point, Surface, cross, curves_of, extent, length
+from .quadrics import Chart
 from .squares import Square, distance, on_sphere
-from .systems import alike
+from .study import rotation_vector, study
+from .systems import System
 
 
 @dataclass(frozen=True, eq=False)
-class Spatial:
+class Spatial(System):
     """A rigid platform in space: q = (p, rotation vector); ``tips`` has shape (n, 3), no three used on one line."""
 
-    curves: tuple[Curve, ...]
-    tips: Array
-
-    def __post_init__(self) -> None:
-        alike(self.curves, self.tips, 3)
-
-    @cached_property
-    def size(self) -> float:
-        """What residuals are divided by (m)."""
-        return extent(self.curves, self.tips)
-
-    @property
-    def missing(self) -> int:
-        """Freedoms that too few legs leave."""
-        return max(0, 6 - sum(3 - curve.freedoms for curve in self.curves))
+    freedoms = 6
 
     def pose(self, q: Array) -> Array:
-        """The platform\'s frame in the base frame; shape (4, 4)."""
+        """The platform's frame in the base frame; shape (4, 4)."""
         angle = length(q[3:])
         return pose(q[:3], rotation_about(q[3:], angle) if angle > 0 else None)
 
-    def misses(self, q: Array) -> Array:
-        """What separates each tip from its curve; shape (legs, 3), metres."""
+    def reached(self, q: Array) -> Array:
+        """Where the tips are at a pose; shape (legs, 3), metres."""
         X = self.pose(q)
-        return np.array([curve.miss(X[:3, 3] + X[:3, :3] @ tip)
-                         for curve, tip in zip(self.curves, self.tips, strict=True)])
+        return np.asarray(X[:3, 3] + self.tips @ X[:3, :3].T)
+
+    def chart(self, number: int) -> Chart:
+        """Study's coordinates, with a linear form of the quaternion that depends on the number made 1."""
+        return study(self.curves, self.tips, self.size, number)
 
     def squares(self) -> Iterator[Square]:
         """A tip at rest and two curves, or three curves, with tips not on one line."""
         points = [k for k, curve in enumerate(self.curves) if isinstance(curve, Point)]
-        moving = [k for k in range(len(self.curves)) if k not in points]
+        moving = [k for k in curves_of(self.curves) if k not in points]
         choices = [(i, j, k) for k in points for i, j in combinations(moving, 2)] + list(combinations(moving, 3))
         for legs in choices:
             a, b, c = self.tips[list(legs)]
@@ -62,7 +51,7 @@ class Spatial:
 
     def _square(self, legs: tuple[int, ...], whole: bool) -> Square:
         """Three distances between three tips; with a tip at rest, given last, the two that decide the others."""
-        curves = tuple(self.curves[k] for k in legs)
+        curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
         b = self.tips[list(legs)]
         unknowns = tuple(curve for curve in curves if not isinstance(curve, Point))
         frame = spatial_frame(curves, extent(curves, b))
@@ -81,7 +70,7 @@ class Spatial:
             free = iter(parameters)
             three = np.array([curve.at(0.0 if isinstance(curve, Point) else next(free)) for curve in curves])
             R = _triad(three) @ _triad(b).T
-            return np.array([*(three.mean(axis=0) - R @ b.mean(axis=0)), *_rotation_vector(R)])
+            return np.array([*(three.mean(axis=0) - R @ b.mean(axis=0)), *rotation_vector(R)])
 
         return Square(legs, unknowns, frame, build, place, whole)
 
@@ -93,16 +82,3 @@ def _triad(points: Array) -> Array:
     n = cross(first, second)
     n = n / length(n)
     return np.column_stack([e, cross(n, e), n])
-
-
-def _rotation_vector(R: Array) -> Array:
-    """The axis of a rotation times its angle in [0, π], by the best of four forms of its quaternion; shape (3,)."""
-    (a, b, c), (d, e, f), (g, h, i) = R.tolist()
-    w, x, y, z = max(((1 + a + e + i, h - f, c - g, d - b), (h - f, 1 + a - e - i, b + d, c + g),
-                      (c - g, b + d, 1 - a + e - i, f + h), (d - b, c + g, f + h, 1 - a - e + i)),
-                     key=lambda form: sum(v * v for v in form))
-    sine = math.hypot(x, y, z)
-    if sine == 0.0:
-        return np.zeros(3)
-    angle = 2.0 * math.atan2(sine, abs(w))
-    return np.array([x, y, z]) * (math.copysign(angle, w) / sine)

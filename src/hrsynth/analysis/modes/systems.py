@@ -1,42 +1,109 @@
-"""What the solver asks of a platform whose tips lie on curves.
+"""What the solver asks of a platform whose tips are confined.
 
-A system knows its poses, q, how far the tips of a pose miss their curves, and its *squares*: the choices of legs that
-give as many equations as unknowns. All curves are in one frame, the base frame; ``tips`` are in the platform's frame.
+A system knows its poses, q, how far the tips of a pose miss what they can reach, its *squares*: the choices of legs on
+curves that give as many equations as unknowns, and its *chart*: coordinates of the pose in which all conditions are of
+degree two. All curves and surfaces are in one frame, the base frame; ``tips`` are in the platform's frame.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from typing import Protocol
+from dataclasses import dataclass
+from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
 from ...errors import BadRequest
-from ...mechanism.vectors import Array
-from .curves import Curve
+from ...mechanism.vectors import Array, frozen, pose
+from .curves import Reach, curves_of, extent, shifted
+from .quadrics import Chart
 from .squares import Square
 
 
-class System(Protocol):
-    """What the solver asks of a system."""
+@dataclass(frozen=True, eq=False)
+class System:
+    """A platform of which ``tips`` (n, d) are confined to ``curves`` (or surfaces), one a leg."""
 
-    @property
-    def curves(self) -> tuple[Curve, ...]: ...
-    @property
+    curves: tuple[Reach, ...]
+    tips: Array
+
+    freedoms: ClassVar[int]
+    """How many coordinates a pose has; the first d are lengths (m), the others angles (rad)."""
+    space: ClassVar[int] = 3
+    """d: in how many directions a tip moves."""
+
+    def __post_init__(self) -> None:
+        tips = frozen(self.tips)
+        if tips.shape != (len(self.curves), self.space) or not np.all(np.isfinite(tips)):
+            raise BadRequest("tips of a platform", list(tips.shape),
+                             f"{len(self.curves)} by {self.space} finite numbers")
+        object.__setattr__(self, "tips", tips)
+
+    @cached_property
     def size(self) -> float:
         """What residuals are divided by (m)."""
+        return extent(self.curves, self.tips)
+
+    @cached_property
+    def forbids(self) -> tuple[int, ...]:
+        """How many equations each leg gives."""
+        return tuple(self.space - curve.freedoms for curve in self.curves)
+
     @property
     def missing(self) -> int:
         """Freedoms that too few legs leave: the dimension of the continuum, 0 where there are legs enough."""
-    def squares(self) -> Iterator[Square]:
-        """The choices of legs, best first."""
+        return self.left(range(len(self.curves)))
+
+    def left(self, legs: Sequence[int]) -> int:
+        """Freedoms that some legs leave."""
+        return max(0, self.freedoms - sum(self.forbids[k] for k in legs))
+
+    @property
+    def surfaces(self) -> bool:
+        """Whether a tip is confined to a surface only."""
+        return len(curves_of(self.curves)) < len(self.curves)
+
     def misses(self, q: Array) -> Array:
-        """What separates each tip from its curve at a pose; shape (legs, 3), metres."""
+        """What separates each tip from what it can reach at a pose; shape (legs, 3), metres."""
+        return np.array([curve.miss(tip) for curve, tip in zip(self.curves, self.reached(q), strict=True)])
+
+    def somewhere(self, rng: np.random.Generator) -> Array:
+        """A random pose within the size of the system."""
+        middle = sum(curve.centre for curve in self.curves) / len(self.curves)
+        at = self.position(np.asarray(middle)) + self.size * rng.uniform(-1.0, 1.0, self.space)
+        return np.array([*at, *rng.uniform(-np.pi, np.pi, self.freedoms - self.space)])
+
+    def position(self, origin: Array) -> Array:
+        """The coordinates (d,) of a platform whose origin is at a point (3,)."""
+        return origin
+
+    def reached(self, q: Array) -> Array:
+        """Where the tips are at a pose; shape (legs, 3), metres."""
+        raise NotImplementedError
+
     def pose(self, q: Array) -> Array:
         """The platform's frame in the base frame; shape (4, 4)."""
+        raise NotImplementedError
+
+    def squares(self) -> Iterator[Square]:
+        """The choices of legs that can be solved by elimination, best first."""
+        raise NotImplementedError
+
+    def chart(self, number: int) -> Chart:
+        """Coordinates of the pose; where there are many charts, that of a number."""
+        raise NotImplementedError
 
 
-def alike(curves: Sequence[Curve], tips: Array, dimension: int) -> None:
-    """Raises ``BadRequest`` unless there is a tip (dimension,) for each curve."""
-    if np.shape(tips) != (len(curves), dimension) or not np.all(np.isfinite(tips)):
-        raise BadRequest("tips of a platform", list(np.shape(tips)), f"{len(curves)} by {dimension} finite numbers")
+@dataclass(frozen=True, eq=False)
+class Shifting(System):
+    """A platform whose bodies only translate; q starts with the position p of the first."""
+
+    @cached_property
+    def paths(self) -> tuple[Reach, ...]:
+        """Where each leg lets its own body's origin be."""
+        return tuple(shifted(curve, -tip) for curve, tip in zip(self.curves, self.tips, strict=True))
+
+    def pose(self, q: Array) -> Array:
+        """The first body's frame in the base frame; shape (4, 4)."""
+        return pose(q[:3])

@@ -1,19 +1,21 @@
-"""Where the tips of a hidden robot can be while its directions are held: curves found from the mechanism itself.
+"""Where the tips of a hidden robot can be while its directions are held, found from the mechanism itself.
 
-The pattern of the held legs names the tangent of each tip's path; here the whole path is written down, as a line or a
-circle, and checked by moving the leg on its own along it.
+The pattern of the held legs names the tangent of each tip's path, or the normal of the surface that it stays on; here
+the whole path or surface is written down, as a line or a circle, a sphere or a plane, and checked by moving the leg on
+its own along all of its freedoms.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 
 from ...errors import NotConfined
 from ...kinematics.configuration import ClosedConfiguration, closed, measure
-from ...kinematics.locked import rezeroed
+from ...kinematics.locked import moved, rezeroed
 from ...kinematics.misses import alone
 from ...kinematics.ranks import kernel_basis
 from ...kinematics.relation import Question
@@ -24,26 +26,29 @@ from ...mechanism.vectors import Array
 from ...tolerances import CLOSED, SAME_POINT, SAME_RELATION, SOLVED
 from ..singularity.features import Carried, Feature, Spot, Tangent, poses_at
 from ..singularity.structure import HeldLeg, Structure
-from .curves import Circle, Curve, Line, Point
+from .curves import Circle, Line, Plane, Point, Reach, Sphere
 
 MOVES = (-0.4, -0.15, 0.15, 0.4)
-"""How far a leg is moved along its freedom to check the path of its tip (characteristic lengths, radians)."""
+"""How far a leg is moved along a freedom to check where its tip can be (characteristic lengths, radians)."""
+
+MIXED = 4
+"""Combinations of its freedoms along which a leg with several of them is moved besides."""
 
 
 @dataclass(frozen=True, eq=False)
 class Tip:
-    """The tip of a held leg: the body that carries it, where (3,) in the body's frame (m), and its curve in the base
-    frame (m)."""
+    """The tip of a held leg: the body that carries it, where (3,) in the body's frame (m), and the curve or surface in
+    the base frame (m) that it stays on."""
 
     leg: str
     body: str
     place: Array
-    curve: Curve
+    curve: Reach
 
 
 @dataclass(frozen=True, eq=False)
 class Confinement:
-    """The platform at one configuration with its directions held: tips on curves.
+    """The platform at one configuration with its directions held: tips on curves and surfaces.
 
     ``motion`` is that of :class:`Structure`; ``plane`` the normal of planar motion; ``slide`` the circle on which the
     second body's origin moves relative to the first's; ``bodies`` their names.
@@ -58,9 +63,10 @@ class Confinement:
 
 
 def confinement(anatomy: Anatomy, question: Question, structure: Structure, goal: ClosedConfiguration) -> Confinement:
-    """The curves of all watched legs' tips with the directions held at their values at ``goal``.
+    """Where all watched legs' tips can be with the directions held at their values at ``goal``.
 
-    Raises ``NotConfined`` where a tip's path is no point, line or circle, or the platform's motion none of those known.
+    Raises ``NotConfined`` where that is no point, line, circle, sphere or plane, or the platform's motion none of those
+    known.
     """
     name = anatomy.mechanism.name
     if structure.motion == "other":
@@ -76,19 +82,23 @@ def _tip(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfigu
     X = goal.pose(leg.body)
     place = X[:3, :3].T @ (B - X[:3, 3])
     paths = _held_paths(anatomy, question, leg, goal, place)
+    if not leg.fixed and not paths:
+        raise NotConfined(anatomy.mechanism.name, f"leg {leg.label} cannot be moved to see where its tip goes")
     worst = np.inf
-    for curve in _candidates(leg, B, goal):
+    for curve in _candidates(anatomy, leg, B, goal):
         miss = max((float(np.linalg.norm(curve.miss(point))) for point in paths), default=0.0) / goal.twin.length
         if miss <= SAME_RELATION:
             return Tip(leg.label, leg.body, place, curve)
         worst = min(worst, miss)
-    what = "moves on a surface" if worst == np.inf else f"leaves its curve by {worst:.2g} characteristic lengths"
+    what = ("is confined to no curve or surface that has a name" if worst == np.inf else
+            f"leaves its curve or surface by {worst:.2g} characteristic lengths")
     raise NotConfined(anatomy.mechanism.name, f"the tip of leg {leg.label} {what}")
 
 
-def _candidates(leg: HeldLeg, tip: Array, goal: ClosedConfiguration) -> Iterator[Curve]:
+def _candidates(anatomy: Anatomy, leg: HeldLeg, tip: Array, goal: ClosedConfiguration) -> Iterator[Reach]:
     """Curves with the tangent that the pattern names: a circle about the axis with the tip on it, or with the tip
-    carried along by the end of the link that turns."""
+    carried along by the end of the link that turns. Surfaces with the normal that it names: a plane, or a sphere with
+    the radius of a link that lies along the normal."""
     if leg.fixed:
         yield Point(tip)
     elif isinstance(leg.line, Carried):
@@ -99,6 +109,21 @@ def _candidates(leg: HeldLeg, tip: Array, goal: ClosedConfiguration) -> Iterator
         spoke = tip - on - axis * float(axis @ (tip - on))
         if np.linalg.norm(spoke) > SAME_POINT * goal.twin.length:
             yield Circle(tip - spoke, axis, float(np.linalg.norm(spoke)), spoke)
+    elif leg.normal is not None:
+        n = _value(leg.normal, goal)
+        for rod in _rods(anatomy, leg, n, goal):
+            yield from (Sphere(tip - rod, float(np.linalg.norm(rod))), Sphere(tip + rod, float(np.linalg.norm(rod))))
+        yield Plane(tip, n)
+
+
+def _rods(anatomy: Anatomy, leg: HeldLeg, along: Array, goal: ClosedConfiguration) -> list[Array]:
+    """From joint centre to joint centre (m) of a leg, where that is parallel to a direction."""
+    joints = [anatomy.mechanism.joints[name] for name in anatomy.leg(leg.label).joints]
+    centres = [moved(goal, joint)[0] * goal.twin.length for joint in joints]
+    between = [other - one for one, other in combinations(centres, 2)]
+    small = SAME_POINT * goal.twin.length
+    return [rod for rod in between if np.linalg.norm(rod) > small
+            and np.linalg.norm(np.cross(rod, along)) <= SAME_RELATION * np.linalg.norm(rod)]
 
 
 def _circle(tangent: Tangent, tip: Array, goal: ClosedConfiguration) -> Circle:
@@ -111,10 +136,23 @@ def _circle(tangent: Tangent, tip: Array, goal: ClosedConfiguration) -> Circle:
 
 
 def _slide(structure: Structure, goal: ClosedConfiguration) -> Circle:
-    """The circle of the second body's origin relative to the first's."""
+    """The circle of the second body's origin relative to the first's: of the two with the tangent that the pattern
+    names (whichever of the bodies its link turns about) the one that nearby configurations keep to."""
     assert isinstance(structure.slide, Tangent)
-    first, second = (goal.pose(body)[:3, 3] for body in structure.bodies)
-    return _circle(structure.slide, second - first, goal)
+    at, moving = _apart(structure, goal, goal.q)
+    one = _circle(structure.slide, at, goal)
+    other = Circle(2 * at - one.centre, one.axis, one.radius, one.centre - at)
+    kernel, _ = goal.kernel()
+    step = kernel @ np.linalg.svd(moving @ kernel)[2][0]
+    nearby, _ = closed(goal.twin, goal.twin.moved(goal.q, MOVES[-1] * step), tolerance=SOLVED)
+    there, _ = _apart(structure, goal, nearby)
+    return min((one, other), key=lambda circle: float(np.linalg.norm(circle.miss(there))))
+
+
+def _apart(structure: Structure, goal: ClosedConfiguration, q: Array) -> tuple[Array, Array]:
+    """From the first body's origin to the second's (3,), and its velocity (3, nv)."""
+    X, V = goal.twin.frames(q, structure.bodies)
+    return X[1, :3, 3] - X[0, :3, 3], V[1, :3] - V[0, :3]
 
 
 @dataclass(frozen=True, eq=False)
@@ -132,7 +170,8 @@ class _Held:
 
 def _held_paths(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfiguration,
                 place: Array) -> list[Array]:
-    """Positions of a tip when its leg alone, with what is measured held, is moved along each of its freedoms."""
+    """Positions of a tip when its leg alone, with what is measured held, is moved along each of its freedoms, and along
+    some random combinations of them."""
     own = [o for o in question.observations if o.leg == leg.label]
     rest = dissect(rezeroed(goal))
     twin = Twin(alone(rest, rest.leg(leg.label)), goal.twin.length)
@@ -141,7 +180,11 @@ def _held_paths(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: Closed
     start = ClosedConfiguration.of(twin, twin.q0, SAME_RELATION)
     free, _ = kernel_basis(np.vstack([twin.jacobian(start.q), held.rows(twin, start.q)[1]]))
     found = []
-    for direction in free.T:
+    directions = free.T
+    if len(directions) > 1:
+        mixed = np.random.default_rng(0).normal(size=(MIXED, len(directions))) @ directions
+        directions = np.vstack([directions, mixed / np.linalg.norm(mixed, axis=1, keepdims=True)])
+    for direction in directions:
         for size in MOVES:
             q, residual = closed(twin, twin.moved(start.q, size * direction), held, tolerance=SOLVED)
             X = twin.pose(q, leg.body)

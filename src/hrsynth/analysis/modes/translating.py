@@ -4,79 +4,75 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
-from ...mechanism.vectors import Array, pose
+from ...mechanism.vectors import Array
 from ...tolerances import VANISHES
 from .certify import Equation
 from .conics import Conic, Numbers, direction, spatial_frame
-from .curves import Circle, Curve, Line, Point, cross, extent, length, shifted
+from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, cross, extent, length
+from .quadrics import Chart, Moving, shifting
 from .squares import Square, on_plane, on_sphere, resting, single
-from .systems import alike
+from .surfaces import three_surfaces
+from .systems import Shifting
 
 
 @dataclass(frozen=True, eq=False)
-class Translating:
+class Translating(Shifting):
     """A platform that only translates: q = p, shape (3,). ``tips`` has shape (n, 3).
 
-    The curves moved by −b_i share the point p. Two curves of one plane meet as often as their degrees say; two others
-    do not meet at all unless one condition holds, so there one is met with a plane of the other, and the rest checked.
+    What each tip can reach, moved by −b_i, holds the point p. Two curves of one plane meet as often as their degrees
+    say; two others do not meet at all unless one condition holds, so there one is met with a plane of the other, and
+    the rest checked.
     """
 
-    curves: tuple[Curve, ...]
-    tips: Array
+    freedoms = 3
 
-    def __post_init__(self) -> None:
-        alike(self.curves, self.tips, 3)
+    def reached(self, q: Array) -> Array:
+        """Where the tips are at a pose; shape (legs, 3), metres."""
+        return np.asarray(q + self.tips)
 
-    @cached_property
-    def size(self) -> float:
-        """What residuals are divided by (m)."""
-        return extent(self.curves, self.tips)
+    def chart(self, number: int) -> Chart:
+        """The position."""
+        frame = spatial_frame(self.paths, self.size)
 
-    @property
-    def missing(self) -> int:
-        """Freedoms that too few legs leave."""
-        return max(0, 3 - sum(3 - curve.freedoms for curve in self.curves))
+        def tips(numbers: Numbers) -> list[Moving]:
+            return [shifting(3, numbers.vector(np.zeros(3)))] * len(self.paths)
 
-    @cached_property
-    def paths(self) -> tuple[Curve, ...]:
-        """The curves of p, one a leg."""
-        return tuple(shifted(curve, -tip) for curve, tip in zip(self.curves, self.tips, strict=True))
-
-    def pose(self, q: Array) -> Array:
-        """The platform\'s frame in the base frame; shape (4, 4)."""
-        return pose(q[:3])
-
-    def misses(self, q: Array) -> Array:
-        """What separates each tip from its curve; shape (legs, 3), metres."""
-        return np.array([path.miss(q) for path in self.paths])
+        return Chart(frame, 3, self.paths, tips, (), lambda x: frame.origin + frame.size * (np.array(x) @ frame.R))
 
     def squares(self) -> Iterator[Square]:
-        """A tip at rest, or pairs of paths, those of one plane first."""
-        paths = self.paths
-        moving = [k for k, curve in enumerate(self.curves) if not isinstance(curve, Point)]
-        for k, path in enumerate(paths):
+        """A tip at rest; pairs of paths that are curves, those of one plane first; a curve and a surface; three
+        surfaces, those that meet most squarely first."""
+        curves = {k: path for k, path in enumerate(self.paths) if not isinstance(path, Surface)}
+        surfaces = {k: path for k, path in enumerate(self.paths) if isinstance(path, Surface)}
+        for k, path in curves.items():
             if isinstance(path, Point):
-                yield resting((k,), path.centre, len(paths) == 1)
-        pairs = sorted(combinations(moving, 2), key=lambda two: not _coplanar(paths[two[0]], paths[two[1]], self.size))
+                yield resting((k,), path.centre, len(self.paths) == 1)
+        moving = [k for k, path in curves.items() if not isinstance(path, Point)]
+        pairs = sorted(combinations(moving, 2), key=lambda two: not coplanar(curves[two[0]], curves[two[1]], self.size))
         for i, j in pairs:
-            if isinstance(paths[j], Line) and isinstance(paths[i], Circle):
+            if isinstance(curves[j], Line) and isinstance(curves[i], Circle):
                 i, j = j, i
-            yield self._square((i, j), len(self.curves) == 2 and _coplanar(paths[i], paths[j], self.size))
+            whole = len(self.curves) == 2 and coplanar(curves[i], curves[j], self.size)
+            yield self._on_curve((i, j), curves[i], curves[j], whole)
+        for i in moving:
+            for j, surface in surfaces.items():
+                yield self._on_curve((i, j), curves[i], surface, len(self.curves) == 2)
+        triples = [three_surfaces([(k, surfaces[k]) for k in legs], len(self.curves) == 3)
+                   for legs in combinations(surfaces, 3)]
+        yield from (square for _, square in sorted(triples, key=lambda each: -each[0]))
 
-    def _square(self, legs: tuple[int, ...], whole: bool) -> Square:
-        one, other = (self.paths[k] for k in legs)
+    def _on_curve(self, legs: tuple[int, int], one: Curve, other: Reach, whole: bool) -> Square:
+        """The curve's points at which the other is met."""
         both = (one, other)
         frame = spatial_frame(both, extent(both, np.zeros((1, 3))))
-        together = _coplanar(one, other, self.size)
 
         def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
             centre = numbers.vector(frame.point(other.centre))
-            if isinstance(other, Circle) and together:
+            if isinstance(other, Sphere) or (isinstance(other, Circle) and coplanar(one, other, self.size)):
                 rho = numbers.vector(np.array([other.radius / frame.size]))[0]
                 return [single(on_sphere(conics[0], centre, rho * rho))]
             normal = direction(_normal(one, other), frame, numbers)
@@ -85,10 +81,10 @@ class Translating:
         return Square(legs, (one,), frame, build, lambda parameters: one.at(parameters[0]), whole)
 
 
-def _normal(one: Curve, other: Curve) -> Array:
+def _normal(one: Curve, other: Reach) -> Array:
     """The normal of the plane of ``other`` that ``one`` is met with."""
-    if isinstance(other, Circle):
-        return other.axis
+    if isinstance(other, Circle | Plane):
+        return other.axis if isinstance(other, Circle) else other.normal
     assert isinstance(one, Line)
     assert isinstance(other, Line)
     n = cross(other.direction, cross(one.direction, other.direction))
@@ -96,7 +92,7 @@ def _normal(one: Curve, other: Curve) -> Array:
     return n / size if size > 0 else n
 
 
-def _coplanar(one: Curve, other: Curve, size: float) -> bool:
+def coplanar(one: Curve, other: Curve, size: float) -> bool:
     """Whether two curves lie in one plane, to ``VANISHES``."""
     between = (other.centre - one.centre) / size
     circles = [curve for curve in (one, other) if isinstance(curve, Circle)]

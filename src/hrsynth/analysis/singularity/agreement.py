@@ -16,10 +16,10 @@ from ...errors import Disagreement
 from ...kinematics.batch.placing import Placer
 from ...kinematics.configuration import ClosedConfiguration, closed
 from ...kinematics.ranks import kernel_basis, range_basis
-from ...kinematics.relation import Question, relation
+from ...kinematics.relation import Question, platform_motions, relation
 from ...kinematics.sampling import WEAKEST, wander
 from ...mechanism.vectors import Array
-from ...tolerances import CLOSED, FOLLOWED, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SHARP
+from ...tolerances import CLOSED, FOLLOWED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT, SHARP
 from .condition import Condition, Named
 from .quick import SPOTS, Quick
 from .structure import Scene, Structure
@@ -29,10 +29,6 @@ ON_LOCUS = 10
 """Poses on the locus that are constructed, where there are so many."""
 TRIES = 4
 """Starts from which a pose is sought on a locus across which the expression has no sign."""
-NUDGE = 1e-6
-"""Step (characteristic lengths, radians) over which a slope is taken."""
-SAME_SPOT = 1e-6
-"""Distance of pose matrices below which two singular poses are told once."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,8 +213,7 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], stru
             continue
 
         def there(fraction: float, one: ClosedConfiguration = one, step: Array = step) -> ClosedConfiguration:
-            q, residual = closed(one.twin, one.twin.moved(one.q, fraction * step), tolerance=SHARP)
-            return ClosedConfiguration(one.twin, q, residual)
+            return _stepped(one, fraction * step)
 
         def value(fraction: float, there: Callable[[float], ClosedConfiguration] = there) -> float:
             return float(condition.expressed(structure.scene([there(fraction)]))[0])
@@ -230,6 +225,12 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], stru
             found = _sharpened(ClosedConfiguration.of(twin, root.q), step, structure, condition)
             if abs(float(condition.expressed(structure.scene([found]))[0])) <= FOLLOWED:
                 yield found
+
+
+def _stepped(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
+    """Where a step (nv,) leads, closed as sharply as it can be; that it is closed its residual tells."""
+    q, residual = closed(here.twin, here.twin.moved(here.q, step), tolerance=SHARP)
+    return ClosedConfiguration(here.twin, q, residual)
 
 
 def _sharpened(at: ClosedConfiguration, step: Array, structure: Structure, condition: Condition
@@ -269,21 +270,17 @@ def descend(start: ClosedConfiguration, question: Question, structure: Structure
     none near."""
     from scipy.optimize import least_squares
 
-    twin = start.twin
     here = start
     for _ in range(4):
-        kernel, _ = here.kernel()
-        image = question.rows(here)[: question.twist_rows] @ kernel
-        moves, _ = range_basis(image, 1.0)
-        motion = kernel @ np.linalg.lstsq(image, moves, rcond=1e-9)[0]
+        motion = platform_motions(here, question)
+        count = motion.shape[1]
         start_rows = condition.rows(structure.scene([here]))[0]
         shape, x0 = start_rows.shape, np.linalg.svd(start_rows)[2][-1]
 
         def reached(s: Array, here: ClosedConfiguration = here, motion: Array = motion) -> ClosedConfiguration:
-            q, residual = closed(twin, twin.moved(here.q, motion @ s), tolerance=SHARP)
-            return ClosedConfiguration(twin, q, residual)
+            return _stepped(here, motion @ s)
 
-        def residuals(z: Array, count: int = moves.shape[1], shape: tuple[int, ...] = shape,
+        def residuals(z: Array, count: int = count, shape: tuple[int, ...] = shape,
                       reached: Callable[[Array], ClosedConfiguration] = reached) -> Array:
             at = reached(z[:count])
             x = z[count:]
@@ -292,13 +289,13 @@ def descend(start: ClosedConfiguration, question: Question, structure: Structure
                 return np.ones(shape[0] + 1)
             return np.append(rows @ x, x @ x - 1.0)
 
-        limits = np.concatenate([np.full(moves.shape[1], 0.3), np.full(len(x0), 2.0)])
-        fit = least_squares(residuals, np.concatenate([np.zeros(moves.shape[1]), x0]), bounds=(-limits, limits),
+        limits = np.concatenate([np.full(count, 0.3), np.full(len(x0), 2.0)])
+        fit = least_squares(residuals, np.concatenate([np.zeros(count), x0]), bounds=(-limits, limits),
                             xtol=1e-15, ftol=1e-15, gtol=1e-15, max_nfev=60)
-        there = reached(fit.x[: moves.shape[1]])
+        there = reached(fit.x[:count])
         if there.residual > CLOSED:
             return None
-        here = ClosedConfiguration.of(twin, there.q)
+        here = ClosedConfiguration.of(there.twin, there.q)
         if np.linalg.norm(fit.fun) < FOLLOWED:
             return here
     return None

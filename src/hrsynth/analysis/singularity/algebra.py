@@ -6,8 +6,8 @@ vectors, :func:`components` the polynomial in the vectors' coordinates.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from functools import cache
+from collections.abc import Callable, Mapping
+from functools import cache, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -62,23 +62,23 @@ def vector(name: str) -> Any:
 
 def evaluate(expression: Any, values: Mapping[str, Array]) -> Array:
     """Values of an expression for vectors (n, 3), shape (n,)."""
-    names = tuple(sorted(values))
-    run = _function(expression, names)
-    size = max((len(values[name]) for name in names), default=1)
+    names, run = _compiled(expression)
+    size = max(map(len, values.values()), default=1)
     return np.broadcast_to(np.asarray(run(*(values[name] for name in names)), dtype=float), (size,))
 
 
-@cache
-def _function(expression: Any, names: tuple[str, ...]) -> Any:
-    """The NumPy function of an expression."""
+@lru_cache(maxsize=64)
+def _compiled(expression: Any) -> tuple[tuple[str, ...], Callable[..., Any]]:
+    """An expression as a function of arrays of its vectors, with their names in order."""
     import sympy
 
+    names = tuple(sorted(str(symbol) for symbol in expression.free_symbols))
     functions = {
         "dot": lambda a, b: np.einsum("...i,...i->...", a, b),
         "cross": np.cross,
         "det": lambda a, b, c: np.einsum("...i,...i->...", a, np.cross(b, c)),
     }
-    return sympy.lambdify([sympy.Symbol(name) for name in names], expression, modules=[functions, "numpy"])
+    return names, sympy.lambdify([sympy.Symbol(name) for name in names], expression, modules=[functions, "numpy"])
 
 
 def components(expression: Any) -> Any:

@@ -17,14 +17,10 @@ from ...kinematics.reach import reach, sweep
 from ...kinematics.relation import Question
 from ...mechanism.pose import Grid, Pose
 from ...mechanism.vectors import Array
-from ...tolerances import SAME_GEOMETRY, SAME_RELATION
+from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from .agreement import descend, spectrum, weakest
-from .condition import Condition
+from .measured import Measured
 from .quick import Quick
-from .structure import Structure
-
-Asked = tuple[Question, Structure, Condition]
-"""What is measured, and the pattern and condition that belong to it."""
 
 COARSE = 25
 """Poses a side of the grid that finds how far a plane is reached."""
@@ -74,35 +70,36 @@ def _table(values: Array) -> list[list[float | None]]:
     return [[float(value) if np.isfinite(value) else None for value in row] for row in values]
 
 
-def locus(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None, steps: int,
-          hidden: Asked, real: Asked | None,
-          progress: Callable[[], None] | None = None, placer: Placer | None = None) -> Locus:
+def locus(hidden: Measured, real: Measured | None, plane: Pose | None, steps: int,
+          progress: Callable[[], None] | None = None) -> Locus:
     """Both robots over the plane that ``plane`` fixes (default: of three parts the third as at the zero configuration).
 
     Raises ``PlaneNotMet`` where no pose of it is reached, ``BadRequest`` where it does not leave two parts free.
     """
-    question = hidden[0]
+    question, motion, start = hidden.question, hidden.setting.motion, hidden.setting.everything.start
+    placer = hidden.setting.placer
     grid = _grid(start, question, motion, plane, steps, progress, placer)
     configurations = sweep(start, question, grid, motion, progress, placer)
     if not any(configurations):
         raise PlaneNotMet(start.twin.mechanism.name, str(grid.fixed), "none of its poses is reached")
 
-    def field(asked: Question, structure: Structure, condition: Condition) -> Field:
+    def field(measured: Measured) -> Field:
+        condition = measured.condition
         reached = [(i, at) for i, at in enumerate(configurations) if at is not None]
         places, here = [i for i, _ in reached], [at for _, at in reached]
-        quick = Quick.of(placer, asked)
-        smallest, largest = spectrum(here, asked) if quick is None else quick.spectrum(here, spectrum)
-        value = condition.expressed(structure.scene(here))
+        quick = Quick.of(placer, measured.question)
+        smallest, largest = (spectrum(here, measured.question) if quick is None else quick.spectrum(here, spectrum))
+        value = condition.expressed(measured.structure.scene(here))
         tables = []
         for column in (value, smallest, 1 / np.where(largest > 0, largest, np.nan)):
             table = np.full(len(configurations), np.nan)
             table[places] = column
             tables.append(table.reshape(grid.shape))
         spots = np.zeros((0, 2)) if condition.signed or condition.never else _spots(
-            grid, motion, [here[places.index(i)] for i in _valleys(tables[1])], asked, structure, condition)
+            grid, [here[places.index(i)] for i in _valleys(tables[1])], measured)
         return Field(tables[0], condition.signed, tables[1], tables[2], spots)
 
-    return Locus(grid, field(*hidden), None if real is None else field(*real))
+    return Locus(grid, field(hidden), None if real is None else field(real))
 
 
 def _grid(start: ClosedConfiguration, question: Question, motion: PlatformMotion, plane: Pose | None, steps: int,
@@ -184,17 +181,17 @@ def _same_mode(start: ClosedConfiguration, at: ClosedConfiguration, question: Qu
     return weakest(there, question) < SAME_RELATION
 
 
-def _spots(grid: Grid, motion: PlatformMotion, starts: Sequence[ClosedConfiguration], question: Question,
-           structure: Structure, condition: Condition) -> Array:
+def _spots(grid: Grid, starts: Sequence[ClosedConfiguration], measured: Measured) -> Array:
     """Singular poses that lie in the plane, sought from its weakest poses."""
+    motion, question = measured.setting.motion, measured.question
     found: list[list[float]] = []
     for start in starts:
-        at = descend(start, question, structure, condition)
+        at = descend(start, question, measured.structure, measured.condition)
         if at is None:
             continue
         error, _ = motion.goal(grid.fixed).rows(at.twin, at.q)
         place = _coordinates(motion, at, grid.names)
-        new = all(np.linalg.norm(np.subtract(place, other)) > 1e-6 for other in found)
-        if new and np.linalg.norm(error) < SAME_GEOMETRY ** 0.5 and _same_mode(start, at, question, motion):
+        new = all(np.linalg.norm(np.subtract(place, other)) > SAME_SPOT for other in found)
+        if new and np.linalg.norm(error) < ON_PLANE and _same_mode(start, at, question, motion):
             found.append(place)
     return np.array(found).reshape(-1, 2)

@@ -3,28 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
-
-import numpy as np
 
 from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration, closed
-from ...kinematics.parts import PlatformMotion
-from ...kinematics.ranks import range_basis
-from ...kinematics.relation import Question, relation
+from ...kinematics.relation import Question, platform_motions, relation
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
-from ...mechanism.sensors import encoders
-from ...mechanism.vectors import Array
 from ...tolerances import SOLVED
-from ..controllability import Verdict, verdict_of
+from ..controllability import Verdict
 from ..freedoms import Freedom, name_freedoms
-from ..setting import Setting, prepare
+from ..setting import Setting, prepare, silent
 from .agreement import Agreement, agreement, weakest
-from .condition import Condition, always, condition
-from .locus import Asked, Locus, locus
-from .structure import Structure, recognise
+from .condition import Condition, always
+from .locus import Locus, locus
+from .measured import Measured
+from .structure import Structure
 
 POINTS = 10_000
 """Random poses at which words, expression and rank are compared."""
@@ -100,31 +95,21 @@ def singular(robot: Mechanism, observe: Sequence[str] | str | None = None, camer
     Words, expression and rank are compared at ``points`` random reachable poses and at singular poses constructed from
     the expression; raises ``Disagreement`` where they do not agree, ``BadRequest`` where a robot has no motor.
     """
-    def tell(text: str) -> None:
-        if progress is not None:
-            progress(text)
-
+    tell = progress or silent
     tell("sampling")
     setting = prepare(robot, observe, camera, seed=seed)
-    question = motors(setting) if real else setting.samples.question
-    samples = setting.samples
-    if real:
-        samples = replace(samples, question=question, members=tuple(
-            replace(m, relation=relation(m.configuration, question)) for m in samples.members))
-    labels = tuple(dict.fromkeys(o.leg for o in question.observations))
-    verdict = verdict_of(setting, labels, samples)
-    configurations = [member.configuration for member in samples.members]
+    measured = Measured.driven(setting) if real else Measured.watched(setting)
+    question, verdict = measured.question, measured.verdict
     tell("pattern of the legs' wrenches")
-    structure = recognise(setting.anatomy, question, configurations)
+    structure = measured.structure
     if verdict.rank < verdict.dof:
         words = always(structure, [freedom.name for freedom in verdict.lost])
         return Singularity(setting, question, real, verdict, structure, None, words, None, ())
-    found = condition(structure, question)
-    checked = agreement(samples.start, question, structure, found, points, seed=seed,
+    found = measured.condition
+    checked = agreement(setting.everything.start, question, structure, found, points, seed=seed,
                         progress=lambda: tell("random poses"), placer=setting.placer)
     tell("singular poses")
-    motion = PlatformMotion.of([samples.start, *configurations], question)
-    examples = tuple(_example(setting, question, motion, at) for at in checked.on_locus[:EXAMPLES])
+    examples = tuple(_example(setting, question, at) for at in checked.on_locus[:EXAMPLES])
     return Singularity(setting, question, real, verdict, structure, found, found.words, checked, examples)
 
 
@@ -136,60 +121,31 @@ def drawn(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
     ``plane`` fixes parts of the pose so that two are left; a robot that is only partially controllable has no locus
     (``BadRequest``). Raises ``PlaneNotMet`` where no pose of the plane is reached.
     """
-    def tell() -> None:
-        if progress is not None:
-            progress("poses of the plane")
-
+    tell = progress or silent
     setting = prepare(robot, observe, camera, seed=seed)
-    question, samples = setting.samples.question, setting.samples
-    configurations = [member.configuration for member in samples.members]
-    motion = PlatformMotion.of([samples.start, *configurations], question)
-    if verdict_of(setting, tuple(dict.fromkeys(o.leg for o in setting.observed)), samples).rank < setting.dof:
+    hidden = Measured.watched(setting)
+    if hidden.verdict.rank < setting.dof:
         raise BadRequest(f"{robot.name} has no locus: a freedom is lost at every pose", None,
                          "legs that make it controllable")
-
-    def asked(question: Question) -> Asked:
-        structure = recognise(setting.anatomy, question, configurations)
-        return question, structure, condition(structure, question)
-
     real = None
     if any(joint.actuated for joint in setting.mechanism.joints.values()):
-        driven = motors(setting)
-        if max(relation(at, driven).rank for at in configurations) == setting.dof:
-            real = asked(driven)
+        driven = Measured.driven(setting)
+        real = driven if driven.rank == setting.dof else None
     wanted = Pose.parse(plane) if isinstance(plane, str) else plane
-    return locus(samples.start, motion, wanted, steps, asked(question), real, tell, setting.placer)
+    return locus(hidden, real, wanted, steps, lambda: tell("poses of the plane"))
 
 
-def motors(setting: Setting) -> Question:
-    """The question that a robot's own motors answer: their coordinates, as encoders would give them."""
-    mechanism, anatomy = setting.mechanism, setting.anatomy
-    of = {name: leg.label for leg in anatomy.legs for name in leg.joints}
-    driven = [joint for joint in mechanism.joints.values() if joint.actuated]
-    if not driven:
-        raise BadRequest(f"{mechanism.name} has no motor", None, "a transmission on a joint")
-    found = tuple(each for joint in driven for each in encoders(mechanism, joint, of.get(joint.name, "")))
-    return replace(setting.samples.question, observations=found)
-
-
-def _example(setting: Setting, question: Question, motion: PlatformMotion, at: ClosedConfiguration) -> Example:
+def _example(setting: Setting, question: Question, at: ClosedConfiguration) -> Example:
     X = at.pose(question.platform)
-    found = relation(at, question)
-    twists = np.zeros((6, found.lost.shape[1]))
-    twists[: found.lost.shape[0]] = found.lost
-    twists[:3] *= at.twin.length
-    lost = name_freedoms(twists, setting.anatomy, position=X[:3, 3])
+    lost = name_freedoms(relation(at, question).lost, setting.anatomy, position=X[:3, 3])
     nearby = max((weakest(other, question) for other in neighbours(at, question, NEARBY)), default=0.0)
-    return Example(at, motion.pose(X), lost, weakest(at, question), nearby)
+    return Example(at, setting.motion.pose(X), lost, weakest(at, question), nearby)
 
 
 def neighbours(at: ClosedConfiguration, question: Question, distance: float) -> list[ClosedConfiguration]:
     """Configurations whose platform is ``distance`` (m; of its turn, times the characteristic length) away, to both
     sides in each of its freedoms."""
-    kernel, _ = at.kernel()
-    image = question.rows(at)[: question.twist_rows] @ kernel
-    moves, _ = range_basis(image, 1.0)
-    motion: Array = kernel @ np.linalg.lstsq(image, moves, rcond=1e-9)[0]
+    motion = platform_motions(at, question)
     found = []
     for column in (*motion.T, *-motion.T):
         q, residual = closed(at.twin, at.twin.moved(at.q, column * distance / at.twin.length), tolerance=SOLVED)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...analysis.aspects.answer import NOT_PROVED, PathAnswer
+from ...analysis.aspects.answer import PathAnswer
 from .tables import listing
 
 
@@ -25,5 +25,5 @@ def path(found: PathAnswer) -> str:
     rows += [("" if i else "crossings", f"leg {leg} changes its working mode at {found.poses[place]}")
              for i, (leg, place) in enumerate(found.crossings)]
     if found.certified:
-        rows.append(("not proved", NOT_PROVED))
+        rows.append(("not proved", found.not_proved))
     return listing(rows)

@@ -1,0 +1,154 @@
+"""Joint limits: the coordinates of R and P joints as functions of the pose, with a reserve that is positive within."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...kinematics.parts import wrapped
+from ...mechanism import Joint, JointType, Limits, Mechanism
+from ...mechanism.vectors import Array
+from ...tolerances import FOLLOWED, SAME_RELATION
+from ..singularity.features import axis_of
+from .balls import Field, cross, dot
+from .sources import NoChart, Source
+
+if TYPE_CHECKING:
+    from .pattern import Sight
+
+Value = Callable[[Source], Field]
+SHORTEST = 1e-3
+"""Part of a vector normal to an axis (characteristic lengths) from which a turn about the axis is read."""
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """A vector fixed in a link: from one source to another, or one source alone."""
+
+    end: Source
+    start: Source | None = None
+
+    def value(self, of: Value) -> Field:
+        return of(self.end) if self.start is None else np.asarray(of(self.end) - of(self.start))
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """An R joint's angle, from ``one`` in its predecessor to ``two`` in its successor about ``axis``, is nearer than
+    ``half`` to ``middle``. ``size`` is the product of the two vectors' parts normal to the axis."""
+
+    joint: str
+    axis: Source
+    one: Arm
+    two: Arm
+    middle: float
+    half: float
+    size: float
+
+    def reserve(self, of: Value) -> Field:
+        """size (cos(angle − middle) − cos half), (n,)."""
+        cosine, sine = _turned(self.one.value(of), self.two.value(of), of(self.axis))
+        along = cosine * float(np.cos(self.middle)) + sine * float(np.sin(self.middle))
+        return np.asarray(along - self.size * (float(np.cos(self.half)) + FOLLOWED))
+
+
+@dataclass(frozen=True, eq=False)
+class Slide:
+    """A P joint's shift along ``axis``, from a point of its predecessor to one of its successor (characteristic
+    lengths): |shift − middle| < half."""
+
+    joint: str
+    axis: Source
+    arm: Arm
+    middle: float
+    half: float
+
+    def reserve(self, of: Value) -> Field:
+        """half² − (shift − middle)², (n,)."""
+        shift = dot(self.arm.value(of), of(self.axis)) - self.middle
+        return np.asarray(self.half**2 - shift * shift)
+
+
+Bound = Turn | Slide
+
+
+def limited(robot: Mechanism) -> dict[str, Limits]:
+    """Joints whose coordinates are limited."""
+    return {joint.name: joint.limits for joint in robot.joints.values()
+            if joint.limits is not None and (joint.limits.lower, joint.limits.upper) != (None, None)}
+
+
+def bounds(sight: Sight, source: Callable[..., Source]) -> Iterator[Bound]:
+    """The limits of joints that can be told from the pose."""
+    for name, limits in limited(sight.mechanism).items():
+        joint = sight.mechanism.joints[name]
+        if limits.lower is None or limits.upper is None or not limits.lower < limits.upper:
+            continue
+        found = _bound(sight, source, joint, (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2)
+        if found is not None:
+            yield found
+
+
+def _bound(sight: Sight, source: Callable[..., Source], joint: Joint, middle: float, half: float) -> Bound | None:
+    twin = sight.configurations[0].twin
+    (place,) = twin.coordinates[joint.name] if joint.type.freedoms == 1 else (None,)
+    if place is None:
+        return None
+    coordinates = np.array([twin.difference(twin.q0, at.q)[place] for at in sight.configurations])
+    known = _Known(sight, source)
+    axis = known.source(axis_of(sight.mechanism, joint, "a"))
+    if axis is None:
+        return None
+    along = sight.values(axis_of(sight.mechanism, joint, "a"))
+    if joint.type is JointType.PRISMATIC:
+        for (one, start), (two, end) in product(known.points(joint.predecessor), known.points(joint.successor)):
+            offsets = np.einsum("ij,ij->i", two - one, along) - coordinates
+            if np.ptp(offsets) < SAME_RELATION:
+                length = sight.carriage.length
+                return Slide(joint.name, axis, Arm(end, start), middle / length + float(offsets[0]), half / length)
+    elif joint.type is JointType.REVOLUTE and half < np.pi:
+        for (one, first), (two, second) in product(known.arms(joint.predecessor), known.arms(joint.successor)):
+            cosine, sine = _turned(one, two, along)
+            offsets = [wrapped(float(x)) for x in np.arctan2(sine, cosine) - coordinates]
+            size = np.hypot(cosine, sine)
+            apart = [wrapped(x - offsets[0]) for x in offsets]
+            if np.max(np.abs(apart)) < SAME_RELATION and np.ptp(size) < FOLLOWED < SHORTEST**2 < size[0]:
+                return Turn(joint.name, axis, first, second, middle + offsets[0], half, float(size[0]))
+    return None
+
+
+@dataclass(frozen=True, eq=False)
+class _Known:
+    """Points and vectors of links that the pose decides, with their values at the configurations seen."""
+
+    sight: Sight
+    of: Callable[..., Source]
+
+    def source(self, feature: object) -> Source | None:
+        try:
+            return self.of(feature)
+        except NoChart:
+            return None
+
+    def points(self, link: str) -> list[tuple[Array, Source]]:
+        spots = [self.sight.centre(joint, link) for joint in self.sight.mechanism.joints_of(link)]
+        return [(self.sight.values(spot), found) for spot in spots if (found := self.source(spot)) is not None]
+
+    def arms(self, link: str) -> Iterator[tuple[Array, Arm]]:
+        for (one, start), (two, end) in combinations(self.points(link), 2):
+            yield two - one, Arm(end, start)
+        for joint in self.sight.mechanism.joints_of(link):
+            if joint.type is JointType.PRISMATIC:
+                axis = axis_of(self.sight.mechanism, joint, "p")
+                found = self.source(axis)
+                if found is not None:
+                    yield self.sight.values(axis), Arm(found)
+
+
+def _turned(one: Field, two: Field, axis: Field) -> tuple[Field, Field]:
+    """Cosine and sine of the turn from a vector to another about a unit axis, times their parts normal to it."""
+    return (np.asarray(dot(one, two) - dot(one, axis) * dot(two, axis)), dot(axis, cross(one, two)))

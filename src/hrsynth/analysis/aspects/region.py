@@ -1,0 +1,47 @@
+"""Where poses of a platform are drawn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...kinematics.parts import rotation_vector
+from ...mechanism.vectors import Array
+from .carriage import Carriage, Place, exponentials
+
+WIDER = 1.5
+"""How much wider than the known poses the region is from which poses are drawn."""
+
+
+@dataclass(frozen=True, eq=False)
+class Region:
+    """Where poses are drawn: boxes of shifts along, and turns about, what the platform can do, around a pose."""
+
+    carriage: Carriage
+    centre: Place
+    shift: Array
+    turn: Array
+
+    @classmethod
+    def around(cls, carriage: Carriage, p: Array, R: Array) -> Region:
+        """The region that is wider than known poses (n, 3), (n, 3, 3), around the first."""
+        motion = carriage.motion
+        shifts = (p - p[0]) @ motion.shifts
+        turns = np.array([rotation_vector(each @ R[0].T) for each in R]) @ motion.spins
+        middle = p[0] + motion.shifts @ ((shifts.max(axis=0) + shifts.min(axis=0)) / 2)
+        exact = cls(carriage, (middle, R[0]), np.ptp(shifts, axis=0) / 2,
+                    np.max(np.abs(turns), axis=0, initial=0.0))
+        return exact.wider(WIDER)
+
+    def wider(self, factor: float) -> Region:
+        """The region grown by a factor; no turn is longer than π."""
+        limit = np.pi / max(1.0, np.sqrt(len(self.turn)))
+        return replace(self, shift=factor * self.shift, turn=np.minimum(factor * self.turn, limit))
+
+    def draw(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
+        """Random poses (count, 3), (count, 3, 3)."""
+        motion = self.carriage.motion
+        p = self.centre[0] + (rng.uniform(-1, 1, (count, len(self.shift))) * self.shift) @ motion.shifts.T
+        turns = (rng.uniform(-1, 1, (count, len(self.turn))) * self.turn) @ motion.spins.T
+        return p, exponentials(turns) @ self.centre[1]

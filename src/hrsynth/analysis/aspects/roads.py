@@ -1,0 +1,244 @@
+"""Road maps: random poses on one side of the locus in several working modes, with roads between neighbours and
+crossings where a leg passes its limit; roads are proved when they are needed.
+
+Nearest neighbours by SciPy, shortest ways by NetworkX; a road that cannot be proved is taken off the map.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import combinations, pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...mechanism.vectors import Array
+from .carriage import Place, Stretch, stretched
+from .crossing import Crossing, crossing
+from .proof import FIRST, Proof, Reading, Way, prove
+from .region import Region
+
+if TYPE_CHECKING:
+    import networkx as nx
+
+DRAWS = 30
+"""Random poses that are drawn for each that is added to a working mode, at most."""
+NEIGHBOURS = 8
+SHEETS = 16
+"""Working modes that are looked at together, at most."""
+CROSSINGS = 12
+"""Crossings that are added between two working modes in each round, at most."""
+HOP = 2.0
+"""Length that a crossing counts for (characteristic lengths, radians)."""
+ROAD = 400
+"""Largest number of intervals for one road."""
+GLANCES = np.linspace(0, 1, 10)
+"""Places of a road that are looked at, in numbers, before it is put on the map."""
+
+Road = tuple[int, int]
+
+
+@dataclass(eq=False)
+class RoadMap:
+    """Poses, each in a working mode, and the roads between them: what is known of each, and proofs where tried.
+
+    The first pose is the start, the second the goal; ``readings`` are the condition in each working mode, ``sheets``
+    the places in it of each pose's own.
+    """
+
+    region: Region
+    readings: list[Reading]
+    places: list[Place]
+    sheets: list[int]
+    budget: int
+    spent: int = 0
+    scale: float = 0.0
+    """A usual value of the condition."""
+    proofs: dict[Road, Proof] = field(default_factory=dict)
+    weights: dict[Road, float] = field(default_factory=dict)
+    """Lengths of roads, longer where the condition is weak; infinite where a road leaves reach or side."""
+    crossings: dict[Road, Crossing] = field(default_factory=dict)
+
+    @classmethod
+    def between(cls, readings: tuple[Reading, Reading], region: Region, start: Place, goal: Place, budget: int
+                ) -> RoadMap:
+        """A map of two poses in their working modes."""
+        same = readings[0].chart.modes == readings[1].chart.modes
+        return cls(region, list(readings[: 1 if same else 2]), [start, goal], [0, 0 if same else 1], budget)
+
+    @property
+    def side(self) -> float:
+        """The sign of the condition's value at the start."""
+        (p, R), reading = self.places[0], self.readings[self.sheets[0]]
+        return float(np.sign(reading.at(p[None], R[None])[1][0]))
+
+    def open(self, limbs: Sequence[int]) -> None:
+        """Add the working modes in which some of these limbs differ from the start's; where they are too many, those in
+        which the first of them differ."""
+        many = 2 ** len(limbs) > SHEETS
+        chosen = [limbs[:k] for k in range(len(limbs) + 1)] if many else [
+            part for k in range(len(limbs) + 1) for part in combinations(limbs, k)]
+        known = {reading.chart.modes for reading in self.readings}
+        for part in chosen:
+            chart = self.readings[self.sheets[0]].chart
+            for limb in part:
+                chart = chart.flipped(limb)
+            if chart.modes not in known:
+                self.readings.append(replace(self.readings[0], chart=chart))
+
+    def add(self, region: Region, rng: np.random.Generator, count: int) -> None:
+        """Up to ``count`` random poses in each working mode, reachable and on the side of the start, with crossings
+        where two working modes have a pose near a limb's limit."""
+        p, R = region.draw(rng, DRAWS * count)
+        reserves = self.readings[0].chart.at(p, R).reserves
+        kept = (reserves[:, : len(self.readings[0].chart.limbs)] > 0).all(axis=1)
+        p, R, reserves = p[kept], R[kept], reserves[kept]
+        if not len(p):
+            return
+        fits = [reading.at(p, R) for reading in self.readings]
+        beside = [reached & (np.sign(values) == self.side) for reached, values in fits]
+        self.scale = self.scale or float(np.median(np.abs([values for _, values in fits])))
+        for sheet, fit in enumerate(beside):
+            for i in np.flatnonzero(fit)[:count]:
+                self._place((p[i], R[i]), sheet)
+        for one, two, limb in self._adjacent():
+            near = np.flatnonzero(beside[one] & beside[two])
+            for i in near[np.argsort(reserves[near, limb], kind="stable")][:CROSSINGS]:
+                self._cross((p[i], R[i]), one, two, limb)
+
+    def _adjacent(self) -> Iterator[tuple[int, int, int]]:
+        """Working modes that differ in one limb, and that limb."""
+        modes = np.array([reading.chart.modes for reading in self.readings])
+        for one, two in combinations(range(len(modes)), 2):
+            apart = np.flatnonzero(modes[one] != modes[two])
+            if len(apart) == 1:
+                yield one, two, int(apart[0])
+
+    def _place(self, place: Place, sheet: int) -> int:
+        self.places.append(place)
+        self.sheets.append(sheet)
+        return len(self.places) - 1
+
+    def _cross(self, place: Place, one: int, two: int, limb: int) -> None:
+        reading = self.readings[one]
+        ways = [crossing(self.region.carriage, self.readings[sheet].chart.limbs[limb], limb, place)
+                for sheet in (one, two)]
+        if ways[0] is None or ways[1] is None:
+            return
+        weight = self._weights(np.array([HOP]), *reading.at(*ways[0].at(GLANCES)))[0]
+        if np.isfinite(weight):
+            here, there = self._place(place, one), self._place(place, two)
+            self.crossings |= {(here, there): ways[0], (there, here): ways[1]}
+            self.weights[here, there] = weight
+
+    def road(self, one: int, two: int) -> Way:
+        """The way from a pose to another: straight, or through a limit."""
+        across = self.crossings.get((one, two))
+        return Stretch.between(self.places[one], self.places[two]) if across is None else across
+
+    def proof(self, one: int, two: int) -> Proof:
+        """The proof of a road, tried once."""
+        key = _key(one, two)
+        if key not in self.proofs:
+            allowed = min(ROAD, self.budget - self.spent)
+            self.proofs[key] = prove(self.readings[self.sheets[key[0]]], self.road(*key), allowed)
+            self.spent += self.proofs[key].boxes + FIRST
+        return self.proofs[key]
+
+    def graph(self) -> nx.Graph:
+        """Roads between neighbours that are open as far as numbers tell, and were not refused."""
+        import networkx as nx
+
+        sheets = np.array(self.sheets)
+        for sheet in range(len(self.readings)):
+            self._survey(np.flatnonzero(sheets == sheet))
+        graph: nx.Graph = nx.Graph()
+        graph.add_nodes_from(range(len(sheets)))
+        graph.add_weighted_edges_from((*road, weight) for road, weight in self.weights.items()
+                                      if np.isfinite(weight) and (road not in self.proofs or self.proofs[road].proved))
+        return graph
+
+    def _survey(self, members: NDArray[np.int_]) -> None:
+        """Look at the roads between neighbours in one working mode."""
+        from scipy.spatial import cKDTree
+
+        if len(members) < 2:
+            return
+        p, R = self._at(members)
+        flat = np.hstack([p, R.reshape(-1, 9) / np.sqrt(2)])
+        around = cKDTree(flat).query(flat, k=min(NEIGHBOURS + 1, len(flat)))[1]
+        roads = {_key(int(members[i]), int(members[j])) for i, row in enumerate(around) for j in row if i != j}
+        self._look(sorted(roads - self.weights.keys()))
+
+    def _look(self, roads: Sequence[Road]) -> None:
+        """Find the weights of straight roads in one working mode, of numbers along them."""
+        if not roads:
+            return
+        one, two = np.array(roads).T
+        places, turns, sizes = stretched(*self._at(one), *self._at(two), GLANCES)
+        reached, values = self.readings[self.sheets[one[0]]].at(places.reshape(-1, 3), turns.reshape(-1, 3, 3))
+        found = self._weights(sizes, reached.reshape(len(roads), -1), values.reshape(len(roads), -1))
+        self.weights.update(zip(roads, map(float, found), strict=True))
+
+    def _weights(self, sizes: Array, reached: NDArray[np.bool_], values: Array) -> Array:
+        """The weights of roads of these lengths (n,), from reach and values along them (n, k)."""
+        open_ = np.atleast_2d(reached & (np.sign(values) == self.side)).all(axis=1)
+        weakest = np.min(np.abs(np.atleast_2d(values)), axis=1)
+        return np.where(open_, sizes * (weakest + self.scale) / weakest, np.inf)
+
+    def _at(self, members: NDArray[np.int_]) -> tuple[Array, Array]:
+        p, R = zip(*(self.places[i] for i in members), strict=True)
+        return np.array(p), np.array(R)
+
+    def way(self) -> list[int] | None:
+        """The shortest way from the first place to the second whose roads are all proved."""
+        import networkx as nx
+
+        graph = self.graph()
+        while self.spent < self.budget and nx.has_path(graph, 0, 1):
+            found = list(pairwise(map(int, nx.shortest_path(graph, 0, 1, weight="weight"))))
+            hardest = sorted(found, key=lambda road: -self.weights[_key(*road)])
+            refused = next((road for road in hardest if not self.proof(*road).proved), None)
+            if refused is None:
+                return [found[0][0], *(two for _, two in found)]
+            graph.remove_edge(*refused)
+        return None
+
+    def shortened(self, way: list[int]) -> list[int]:
+        """The way with places left out where the road past them is proved too."""
+        kept, here = [way[0]], 0
+        while here < len(way) - 1:
+            here = next(j for j in range(len(way) - 1, here, -1) if j == here + 1 or self._past(way[here : j + 1]))
+            kept.append(way[here])
+        return kept
+
+    def _past(self, part: Sequence[int]) -> bool:
+        """Whether the straight road from the first to the last of a part in one working mode is proved."""
+        if any(self.sheets[i] != self.sheets[part[0]] for i in part):
+            return False
+        road = _key(part[0], part[-1])
+        if road not in self.weights:
+            self._look([road])
+        return bool(np.isfinite(self.weights[road])) and self.proof(*road).proved
+
+    def nearest(self) -> list[int]:
+        """Over proved roads to a place in the goal's working mode, as near to it as they lead, then straight on; no
+        place where none is proved."""
+        import networkx as nx
+
+        graph: nx.Graph = nx.Graph([road for road, proof in self.proofs.items() if proof.proved])
+        graph.add_node(0)
+        reached = {i: way for i, way in nx.single_source_shortest_path(graph, 0).items()
+                   if self.sheets[i] == self.sheets[1]}
+        if not reached:
+            return []
+        here = np.array(list(reached))
+        goal = np.ones_like(here)
+        last = here[np.argmin(stretched(*self._at(here), *self._at(goal), GLANCES)[2])]
+        return [int(i) for i in reached[int(last)]] + [1]
+
+
+def _key(one: int, two: int) -> Road:
+    return min(one, two), max(one, two)

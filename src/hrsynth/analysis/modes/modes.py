@@ -1,0 +1,161 @@
+"""All assembly modes of a hidden robot, or of the real one: every pose of the platform with the same measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...kinematics.assembly import Assembler, Assembly
+from ...kinematics.configuration import ClosedConfiguration, measure
+from ...kinematics.reach import reach
+from ...kinematics.relation import Question
+from ...mechanism import Mechanism
+from ...mechanism.pose import Pose
+from ...mechanism.vectors import Array
+from ...tolerances import SAME_RELATION
+from ..setting import Setting, prepare, silent
+from ..singularity.agreement import weakest
+from ..singularity.measured import Measured
+from .build import Model, model
+from .solve import Mode, Modes, continuum, solve
+from .tips import Confinement, confinement
+
+WITHIN = {"translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
+          "planar": "poses in the plane of motion", "spatial": "poses in space"}
+"""Among which poses the modes are listed, for each way in which the platform moves."""
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblyMode:
+    """A pose of the platform with the measurements of the goal.
+
+    ``radius``: each parameter of the proof's box is within it (characteristic lengths, radians), infinite where nothing
+    was proved; ``residual``: the largest distance of a tip from its curve (characteristic lengths). ``goal``: whether
+    it is the pose itself from which the measurements were taken. ``reachable``: whether the whole real robot, legs that
+    are not watched included, closes there within its joints' limits; ``open`` names the legs that do not close,
+    ``beyond`` the joints. ``type2_distance``: the smallest singular value of Mᵀ there, as ``check`` gives it; None
+    where the robot does not close.
+    """
+
+    pose: Pose
+    radius: float
+    residual: float
+    goal: bool
+    reachable: bool
+    type2_distance: float | None
+    open: tuple[str, ...] = ()
+    beyond: tuple[str, ...] = ()
+    configuration: ClosedConfiguration | None = None
+    multiplicity: int = 1
+    bodies: dict[str, Array] | None = None
+    """Poses (4, 4) of the bodies on which legs end."""
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"pose": self.pose.to_dict(), "radius": self.radius if np.isfinite(self.radius) else None,
+                "residual": self.residual, "goal": self.goal, "reachable": self.reachable,
+                "type2_distance": self.type2_distance, "open": list(self.open), "beyond": list(self.beyond),
+                "multiplicity": self.multiplicity}
+
+
+@dataclass(frozen=True, eq=False)
+class AssemblyModes:
+    """All assembly modes with the measurements of one pose, the goal.
+
+    ``complex``, ``complete``, ``proof``, ``degenerate`` and ``continuum`` as for :class:`Modes`; ``kind`` is ``hidden``
+    or ``real``; ``confined`` holds the curves of the tips (None where the measurements never decide the pose).
+    """
+
+    setting: Setting
+    kind: str
+    goal: ClosedConfiguration
+    pose: Pose
+    found: Modes
+    modes: tuple[AssemblyMode, ...]
+    near: tuple[AssemblyMode, ...]
+    confined: Confinement | None = None
+    model: Model | None = None
+
+    @property
+    def within(self) -> str | None:
+        """Among which poses the modes are all."""
+        return None if self.confined is None else WITHIN[self.confined.motion]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line, without the command's own fields."""
+        found = self.found
+        return {"kind": self.kind, "at": self.pose.to_dict(), "within": self.within,
+                "observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
+                "complex": found.complex, "complete": found.complete, "proof": found.proof,
+                "modes": [each.to_dict() for each in self.modes], "near": [each.to_dict() for each in self.near],
+                "degenerate": found.degenerate, "continuum": found.continuum}
+
+
+def modes(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+          at: Pose | str | None = None, real: bool = False, seed: int = 0,
+          progress: Callable[[str], None] = silent) -> AssemblyModes:
+    """All poses with the directions that are observed at ``at`` (default: the zero configuration), or with ``real`` the
+    motors' coordinates: complex solutions counted, real ones enclosed (theory 5; MMT 3.3, 4.1.2, 4.2).
+
+    A Π counts as a parallelogram throughout, never crossed; where legs or measurements keep the platform from turning,
+    poses that are turned all the same (another operation mode) are not looked for. ``observe`` and ``camera`` as for
+    ``derive``.
+
+    Raises ``BadRequest`` for names that there are not, ``PoseNotReached`` for a pose out of reach, ``NotConfined``
+    where the tips' paths are none of those known, ``MissingExtra`` where only an external solver could list the modes.
+    """
+    progress("sampling")
+    setting = prepare(robot, observe, camera, seed=seed)
+    measured = Measured.driven(setting) if real else Measured.watched(setting)
+    everything, motion = setting.everything, setting.motion
+    goal = everything.start
+    if at is not None:
+        goal = reach(goal, everything.question, Pose.parse(at) if isinstance(at, str) else at, motion)
+    pose = motion.pose(goal.pose(motion.link))
+    kind = "real" if real else "hidden"
+    free = setting.dof - measured.rank
+    if free:
+        text = f"the {'motors' if real else 'directions'} leave {free} of the platform's freedoms undetermined"
+        return AssemblyModes(setting, kind, goal, pose, continuum(f"{text}: a continuum of dimension {free}", free),
+                             (), ())
+    progress("modes")
+    confined = confinement(setting.anatomy, measured.question, measured.structure, goal)
+    made = model(confined)
+    found = solve(made.system)
+    reader = _Reader(setting, measured.question, goal, made)
+    return AssemblyModes(setting, kind, goal, pose, found, tuple(map(reader.read, found.modes)),
+                         tuple(map(reader.read, found.near)), confined, made)
+
+
+class _Reader:
+    """Poses of a system read as poses of the robot."""
+
+    def __init__(self, setting: Setting, question: Question, goal: ClosedConfiguration, made: Model) -> None:
+        self.question, self.motion, self.made, self.goal = question, setting.motion, made, goal
+        self.assembler = Assembler(setting.anatomy, goal.twin.length, question.reference)
+        values = measure(goal.twin, goal.q, question.reference, question.observations)[2]
+        self.measured = tuple(zip(question.observations, values, strict=True))
+
+    def read(self, mode: Mode) -> AssemblyMode:
+        """What a mode is for the robot."""
+        bodies, size = self.made.bodies(mode.q), self.goal.twin.length
+        at_goal = all(_alike(bodies[body], self.goal.pose(body), size) for body in bodies)
+        near = not np.isfinite(mode.radius)
+        held = () if near else self.measured
+        found = Assembly(self.goal) if at_goal and not near else self.assembler.at(bodies, held)
+        scale = self.made.system.size / size
+        X = self.goal.pose(self.motion.link) if found.platform is None else found.platform[self.motion.link]
+        return AssemblyMode(
+            self.motion.pose(X), mode.radius * scale,
+            mode.residual * scale, at_goal, found.reachable,
+            None if found.configuration is None else weakest(found.configuration, self.question),
+            found.open, found.beyond, found.configuration, mode.multiplicity, bodies)
+
+
+def _alike(X: Array, other: Array, length: float) -> bool:
+    """Whether two poses are one."""
+    return bool(np.max(np.abs(X[:3, 3] - other[:3, 3])) <= SAME_RELATION * length
+                and np.max(np.abs(X[:3, :3] - other[:3, :3])) <= SAME_RELATION)

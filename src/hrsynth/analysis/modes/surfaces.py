@@ -1,0 +1,104 @@
+"""A point on three surfaces, planes and spheres: everything is linear but one sphere.
+
+The difference of two spheres is a plane, so there are two planes and a third surface. The planes n₁·p = h₁ and
+n₂·p = h₂ meet in the line p = (h₁ n₂×d + h₂ d×n₁ + s n₁×n₂) / det[n₁, n₂, d], s = d·p, for any d that is not in both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ...mechanism.vectors import Array, unit
+from .certify import Equation
+from .conics import UNIT, Conic, Numbers, Rounded, direction, spatial_frame
+from .curves import Line, Plane, Sphere, Surface, cross, extent, length
+from .squares import Square, on_plane, on_sphere, single
+
+
+def three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tuple[float, Square]:
+    """The points on the surfaces of three legs, and the sine of the angle between the two planes: where that vanishes
+    the surfaces have no point in common, or a continuum of them."""
+    first, second, last = _ordered([surface for _, surface in legs])
+    all_three = (first, second, last)
+    frame = spatial_frame(all_three, extent(all_three, np.zeros((1, 3))))
+    one, two = (_normal(surface, last) for surface in (first, second))
+    along = cross(one, two)
+    sine = length(along)
+    d = unit(along) if sine > 0 else np.array([0.0, 0.0, 1.0])
+    offset = frame.origin
+    line = Line(_foot((one, two), [_offset(surface, last, offset) for surface in (first, second)], d) + offset, d)
+
+    def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
+        exact = Rounded.vector(frame.R @ d)
+        start = Rounded.vector(np.array([float(d @ (line.centre - frame.origin)) / frame.size]))[0] * UNIT
+        (n, h), (m, k) = (_plane(surface, last, frame, numbers) for surface in (first, second))
+        across = np.cross(n, m)
+        at, slope = h * np.cross(m, exact) + k * np.cross(exact, n) + start * across, UNIT * UNIT * across
+        point = _affine(at, slope, exact @ across)
+        centre = numbers.vector(frame.point(last.centre))
+        if isinstance(last, Plane):
+            normal = direction(last.normal, frame, numbers)
+            return [single(on_plane(point, normal, normal @ centre))]
+        rho = numbers.vector(np.array([last.radius / frame.size]))[0]
+        return [single(on_sphere(point, centre, rho * rho))]
+
+    return sine, Square(tuple(k for k, _ in legs), (line,), frame, build, lambda s: line.at(s[0]), whole)
+
+
+def _ordered(surfaces: Sequence[Surface]) -> list[Surface]:
+    """A sphere last where there is one; of several candidates the one that leaves the others most apart."""
+    def apart(last: int) -> tuple[bool, float]:
+        one, two = (_normal(surface, surfaces[last]) for k, surface in enumerate(surfaces) if k != last)
+        return isinstance(surfaces[last], Sphere), length(cross(one, two))
+
+    last = max(range(3), key=apart)
+    return [*(surface for k, surface in enumerate(surfaces) if k != last), surfaces[last]]
+
+
+def _normal(surface: Surface, last: Surface) -> Array:
+    """The unit normal of a plane, or of the one in which two spheres meet; zero where they have one centre."""
+    if isinstance(surface, Plane):
+        return surface.normal
+    between = surface.centre - last.centre
+    size = length(between)
+    return between / size if size > 0 else between
+
+
+def _offset(surface: Surface, last: Surface, origin: Array) -> float:
+    """h of a surface's plane n·(p − origin) = h."""
+    if isinstance(surface, Plane):
+        return float(surface.normal @ (surface.centre - origin))
+    assert isinstance(last, Sphere)
+    size = length(surface.centre - last.centre)
+    power = (last.radius ** 2 - surface.radius ** 2 + float((surface.centre - origin) @ (surface.centre - origin))
+             - float((last.centre - origin) @ (last.centre - origin)))
+    return power / (2.0 * size) if size > 0 else 0.0
+
+
+def _foot(normals: Sequence[Array], offsets: Sequence[float], d: Array) -> Array:
+    """The point of two planes nearest to the origin."""
+    found = np.linalg.lstsq(np.array([*normals, d]), np.array([*offsets, 0.0]), rcond=None)[0]
+    return np.asarray(found)
+
+
+def _plane(surface: Surface, last: Surface, frame: Any, numbers: Numbers) -> tuple[Any, Any]:
+    """n and h of the plane n·p = h, in working numbers: a plane's own, or the difference of two spheres."""
+    centre = numbers.vector(frame.point(surface.centre))
+    if isinstance(surface, Plane):
+        n = direction(surface.normal, frame, numbers)
+        return n, n @ centre
+    assert isinstance(last, Sphere)
+    other = numbers.vector(frame.point(last.centre))
+    rho, own = numbers.vector(np.array([last.radius, surface.radius]) / frame.size)
+    return 2 * (centre - other), rho * rho - own * own + centre @ centre - other @ other
+
+
+def _affine(at: Any, slope: Any, w: Any) -> Conic:
+    """The point (at + t slope) / w, with all of it multiplied by w."""
+    zero = at * 0
+    Q = [at @ at, 2 * (at @ slope), slope @ slope]
+    N = np.array([at * w, slope * w, zero], dtype=object)
+    return Conic(N, np.array(Q, dtype=object), np.array([w * w, 0, 0], dtype=object))

@@ -1,0 +1,97 @@
+"""All poses by way of msolve, for tips on curves or surfaces: the pose's own coordinates are the unknowns.
+
+msolve says how many solutions there are and where; each root of its polynomial is isolated here, and each real
+solution enclosed, with existence and uniqueness proved, from the equations themselves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from .certify import Quadric
+from .conics import Balls
+from .msolve import Parametrisation, parametrised
+from .quadrics import Chart, Whole
+from .roots import PRECISION, PRECISIONS, Root, Roots, Solution, all_solutions, almost_real, boxed, gathered, is_real
+from .systems import System
+
+METHOD = "msolve's parametrisation (Gröbner basis, lifted from many primes, for the rounded geometry: trusted)"
+
+FINE = 2.0 ** -256
+"""Radius of a ball that holds zero at which the number in it counts as zero."""
+
+
+def wholes(system: System, number: int = 0) -> Iterator[Whole]:
+    """The choices of legs with just as many equations as freedoms, then those with too many."""
+    chart = system.chart(number)
+    for size in range(1, len(system.curves) + 1):
+        for legs in combinations(range(len(system.curves)), size):
+            if sum(system.forbids[k] for k in legs) == system.freedoms and not system.left(legs):
+                yield Whole(legs, chart, size == len(system.curves))
+    for size in range(1, len(system.curves) + 1):
+        for legs in combinations(sorted(range(len(system.curves)), key=lambda k: -system.forbids[k]), size):
+            given = [system.forbids[k] for k in legs]
+            if sum(given) > system.freedoms > sum(given[:-1]) and not system.left(legs):
+                yield Whole(legs, chart, False)
+
+
+def solve_whole(part: Whole) -> Roots:
+    """All solutions of a choice of legs, distinct ones once. Raises ``MissingExtra``, ``Unsolved``."""
+    from flint import ctx
+
+    equations, nonzero = part.equations(), part.chart.nonzero
+    answer = parametrised(equations)
+    if answer is None and nonzero is not None:
+        answer, nonzero = parametrised(equations, nonzero), None
+    if answer is None:
+        return Roots(complete=False, continuum=True, method=METHOD)
+    found = all_solutions(answer.polynomial, lambda t, m: _over(answer, nonzero, t, m))
+    resolved = [each for each in found if not _no_pose(nonzero, each[0])]
+    with ctx.workprec(PRECISION):
+        thick = part.equations(Balls)
+        real = tuple(_enclosed(part.chart, equations, thick, values, m) for values, m in resolved if is_real(values))
+        real += tuple(_middle(values) for values, _ in resolved if almost_real(values))
+    extraneous = len(found) - len(resolved)
+    roots = gathered(answer.polynomial.degree() - extraneous, resolved, real, METHOD)
+    return replace(roots, extraneous=extraneous)
+
+
+def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
+    """The solution over a root; none where it is not finite or it cannot be told whether it is a pose."""
+    values = answer.others(t)
+    if not all(v.is_finite() for v in values):
+        return []
+    told = nonzero is None or float(nonzero.value(values).rad()) < FINE
+    return [(values, multiplicity)] if told else []
+
+
+def _no_pose(nonzero: Quadric | None, values: Sequence[Any]) -> bool:
+    """Whether what vanishes at no pose vanishes, to ``FINE``, at complex coordinates."""
+    from flint import ctx
+
+    with ctx.workprec(PRECISION << PRECISIONS):
+        return nonzero is not None and bool(nonzero.value(values).contains(0))
+
+
+def _enclosed(chart: Chart, equations: Sequence[Any], thick: Sequence[Any], values: Sequence[Any], multiplicity: int
+              ) -> Root:
+    box, unique, wide = boxed(equations, thick, [v.real for v in values], multiplicity)
+    return Root(tuple(box), _spread(chart, box), multiplicity, unique, wide)
+
+
+def _middle(values: Sequence[Any]) -> Root:
+    """The real part of a conjugate pair, with its imaginary part for a radius."""
+    middle = tuple(v.real.mid() for v in values)
+    return Root(middle, max(2.0 * abs(float(v.imag)) for v in values), 2, False, False, False)
+
+
+def _spread(chart: Chart, box: Sequence[Any]) -> float:
+    """The largest radius of a tip's coordinate in a box (sizes)."""
+    x = np.array([1, *box], dtype=object)
+    found = [(x @ tip.N[:, :, k] @ x) / (x @ tip.w @ x) for tip in chart.tips(Balls) for k in range(tip.N.shape[2])]
+    return max(float(each.rad()) for each in found) / 2.0 ** 52

@@ -1,0 +1,57 @@
+"""What is measured of a robot, what it sees of the platform, and where it loses a freedom: watched legs or motors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from ...kinematics.relation import Question
+from ...kinematics.sampling import Samples
+from ...mechanism.observation import labels_of
+from ..controllability import Verdict, verdict_of
+from ..setting import Setting, motors
+from .condition import Condition, condition
+from .structure import Structure, recognise
+
+
+@dataclass(frozen=True, eq=False)
+class Measured:
+    """A robot with samples for what is measured; verdict, pattern and condition are found when they are asked for."""
+
+    setting: Setting
+    samples: Samples
+
+    @classmethod
+    def watched(cls, setting: Setting) -> Measured:
+        """The observed directions: the hidden robot."""
+        return cls(setting, setting.samples)
+
+    @classmethod
+    def driven(cls, setting: Setting) -> Measured:
+        """The motors' coordinates: the real robot. Raises ``BadRequest`` where it has no motor."""
+        return cls(setting, setting.measuring(motors(setting).observations))
+
+    @property
+    def question(self) -> Question:
+        """What is asked at each configuration."""
+        return self.samples.question
+
+    @property
+    def rank(self) -> int:
+        """Freedoms of the platform that are seen at the best sample, whatever the gap."""
+        return max(member.relation.rank for member in self.samples.members)
+
+    @cached_property
+    def verdict(self) -> Verdict:
+        """What is seen generically; raises ``RankUndecided``."""
+        return verdict_of(self.setting, labels_of(self.question.observations), self.samples)
+
+    @cached_property
+    def structure(self) -> Structure:
+        """The pattern of the legs with their measurements held."""
+        return recognise(self.setting.anatomy, self.question, self.setting.configurations)
+
+    @cached_property
+    def condition(self) -> Condition:
+        """When a freedom is lost that is seen generically."""
+        return condition(self.structure, self.question)

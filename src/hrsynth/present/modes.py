@@ -1,0 +1,198 @@
+"""All assembly modes → a picture: what decides them on the left, the robot at each of them on the right."""
+
+from __future__ import annotations
+
+import io
+import json
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..analysis.modes.modes import AssemblyModes
+from ..description.files import require_folder, write_whole
+from ..errors import BadRequest
+from ..mechanism.vectors import Array
+from .scenes import CLOSES, GOAL, NEAR, OPEN, Placed, Scene, scene
+from .sketch import Box, Sketch
+
+MARKS = {GOAL: ("*", 15.0, "the pose itself"), CLOSES: ("o", 8.0, "mode, reachable"),
+         OPEN: ("X", 9.0, "mode, not reachable"), NEAR: ("D", 7.0, "near mode")}
+COLOURS = ("tab:orange", "tab:green", "tab:red", "tab:purple", "saddlebrown", "deeppink", "darkcyan", "olive", "navy",
+           "goldenrod", "maroon", "black")
+REACHES = ("black", "tab:brown", "tab:gray", "darkslateblue", "darkolivegreen", "teal")
+MOVING = "cornflowerblue"
+DPI, SHADES = 150, 160
+"""Resolution; colours of the file, whose translucent surfaces would else have thousands and be large."""
+MOST, FEW = 16, 6
+"""Robots drawn beside the curves at most; modes up to which their platforms are drawn among the curves too."""
+SIDE, LEFT, GAP, BELOW, ABOVE, TITLE = 5.2, 0.8, 0.3, 1.05, 0.9, 0.25
+"""The side of the drawing of curves, and the spaces about it and above each robot (inches)."""
+
+
+def writable(output: str | None) -> None:
+    """Raise ``BadRequest`` where the file's ending is no format, or its folder is not there."""
+    if output is None:
+        return
+    if Path(output).suffix.lower() != ".png":
+        raise BadRequest("cannot draw the modes: unknown ending", output, ".png")
+    require_folder(output)
+
+
+def write(found: AssemblyModes, file: str) -> None:
+    """Draw the modes in a file, whole or not at all; raises ``BadRequest`` where there is nothing to draw."""
+    write_whole(file, picture(found))
+
+
+def picture(found: AssemblyModes) -> bytes:
+    """The modes as PNG; its text ``Description`` holds :func:`described` as JSON."""
+    from PIL import Image
+    from PIL.PngImagePlugin import PngInfo
+
+    drawn = shown(found)
+    canvas = figure(found, drawn).canvas
+    canvas.draw()
+    texts, stream = PngInfo(), io.BytesIO()
+    texts.add_text("Description", json.dumps(described(found, drawn)))
+    image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
+    image.quantize(SHADES, dither=Image.Dither.NONE).save(stream, "PNG", optimize=True, pnginfo=texts, dpi=(DPI, DPI))
+    return stream.getvalue()
+
+
+def shown(found: AssemblyModes) -> Scene:
+    """What there is to draw; raises ``BadRequest`` for a continuum of modes, or none at all."""
+    name = found.setting.robot.name
+    if found.confined is None or found.found.continuum is not None or not (found.modes or found.near):
+        why = found.found.degenerate or "there is no mode"
+        raise BadRequest(f"{name}: there is nothing to draw: {why}", None, "isolated modes")
+    return scene(found)
+
+
+def described(found: AssemblyModes, drawn: Scene) -> dict[str, Any]:
+    """What was asked for and what is drawn, in a few numbers: enough to tell whether a picture is out of date."""
+    return {"robot": found.setting.robot.name, "observe": list(found.setting.labels), "real": found.kind == "real",
+            "at": str(found.pose), "complex": found.found.complex, **drawn.to_dict()}
+
+
+def figure(found: AssemblyModes, drawn: Scene) -> Any:
+    """The picture as a matplotlib figure."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    placed = drawn.placed[:MOST]
+    columns, rows = _grid(len(placed))
+    cell = SIDE / rows
+    top = BELOW + (SIDE + cell * -(-len(placed) // columns)) / 2
+    page = np.array([LEFT + SIDE + GAP + columns * cell, BELOW + SIDE + ABOVE])
+    whole = Figure(figsize=tuple(page), dpi=DPI)
+    FigureCanvasAgg(whole)
+    lines = [trace.points for trace in drawn.traces if trace.points.ndim == 2 and not trace.moving]
+    sketch = Sketch.of(drawn.normal, np.array([each.at for each in drawn.placed]), lines)
+    _curves(sketch, whole, _box(page, 0.0 if drawn.normal is None else LEFT, BELOW, LEFT + SIDE, BELOW + SIDE), drawn)
+    robots = np.vstack([drawn.ground, *(part for each in placed for part in (*each.platform, *each.strokes))])
+    for k, each in enumerate(placed):
+        row, column = divmod(k, columns)
+        x, y = LEFT + SIDE + GAP + column * cell, top - (row + 1) * cell
+        whole.text((x + cell / 2) / page[0], (y + cell - TITLE / 2) / page[1], f"{each.label}  {each.words}",
+                   ha="center", va="center", fontsize=9 if columns < 3 else 8, color=_colour(k))
+        _robot(sketch, sketch.place(whole, _box(page, x, y + 0.1, x + cell, y + cell - TITLE), robots, bare=True),
+               drawn, each, k)
+    _heading(whole, found, drawn)
+    _legend(whole, drawn)
+    return whole
+
+
+def _box(page: Array, left: float, bottom: float, right: float, top: float) -> Box:
+    """A box of the page, given in inches."""
+    width, height = page
+    return left / width, bottom / height, (right - left) / width, (top - bottom) / height
+
+
+def _grid(count: int) -> tuple[int, int]:
+    """Columns and rows for this many robots."""
+    columns = 1 + sum(count > most for most in (2, 6, 12))
+    return columns, max(2, -(-count // columns))
+
+
+def _colour(k: int) -> str:
+    return COLOURS[k % len(COLOURS)]
+
+
+def _curves(sketch: Sketch, whole: Any, box: Box, drawn: Scene) -> None:
+    """What decides the modes, the platform at each (in a plane the robot), and their numbers."""
+    few = len(drawn.placed) <= FEW
+    legs = [each.strokes if few and sketch.flat else () for each in drawn.placed]
+    platforms = [each.platform if few else () for each in drawn.placed]
+    curves = [trace.points for trace in drawn.traces]
+    spots = np.array([each.at for each in drawn.placed])
+    about = [curve.reshape(-1, 3) for curve in curves] + [part for parts in (*legs, *platforms) for part in parts]
+    place = sketch.place(whole, box, np.vstack([*about, spots]))
+    for trace, colour in zip(drawn.traces, _colours(drawn), strict=True):
+        if trace.points.ndim == 3:
+            sketch.surface(place, trace.points, colour)
+        else:
+            sketch.stroke(place, trace.points, color=colour, linewidth=1.8, zorder=3)
+    for k, each in enumerate(drawn.placed):
+        for stroke in legs[k]:
+            sketch.stroke(place, stroke, color=_colour(k), linewidth=0.9, alpha=0.6, marker="o", markersize=2, zorder=4)
+        for ring in platforms[k]:
+            sketch.stroke(place, ring, color=_colour(k), linewidth=1.8, zorder=5)
+        _mark(sketch, place, each, k, 1.0)
+    if any(legs):
+        sketch.stroke(place, drawn.ground, color="black", marker="s", markersize=3.4, linestyle="", zorder=5)
+    lines = [curve for curve in curves if curve.ndim == 2] + [ring for rings in platforms for ring in rings]
+    sketch.numbers(place, spots, [each.label for each in drawn.placed], [_colour(k) for k in range(len(spots))], lines)
+
+
+def _mark(sketch: Sketch, place: Any, each: Placed, k: int, scale: float) -> None:
+    mark, size, _ = MARKS[each.state]
+    sketch.stroke(place, each.at[None], color=_colour(k), marker=mark, markersize=scale * size, linestyle="",
+                  markeredgecolor="black", markeredgewidth=0.7, zorder=6)
+
+
+def _robot(sketch: Sketch, place: Any, drawn: Scene, each: Placed, k: int) -> None:
+    """The robot at one mode; its platform alone where the robot does not close."""
+    for stroke in each.strokes:
+        sketch.stroke(place, stroke, color="0.35", linewidth=1.2, marker="o", markersize=2.4, zorder=3)
+    sketch.stroke(place, drawn.ground, color="black", marker="s", markersize=3.4, linestyle="", zorder=4)
+    for ring in each.platform:
+        sketch.stroke(place, ring, color=_colour(k), linewidth=2.4, zorder=5)
+    _mark(sketch, place, each, k, 0.8)
+
+
+def _heading(whole: Any, found: AssemblyModes, drawn: Scene) -> None:
+    setting, count = found.setting, found.found
+    held = f"directions of legs {', '.join(setting.labels)}" if found.kind == "hidden" else "motor coordinates"
+    many = f"{len(found.modes)} real of {count.complex} complex" + ("" if count.complete else ", not proved to be all")
+    many += f"; {len(found.near)} near" if found.near else ""
+    many += f"; the first {MOST} drawn as robots" if len(drawn.placed) > MOST else ""
+    if drawn.rest:
+        many += f"\nof the points where the curves meet, only these fit leg{'s' * (len(drawn.rest) > 1)} "
+        many += ", ".join(drawn.rest) + " as well"
+    title = f"{setting.robot.name}   {setting.anatomy.architecture()}\nassembly modes with the same {held}: {many}"
+    whole.suptitle(title, fontsize=12, y=0.985, va="top")
+
+
+def _colours(drawn: Scene) -> Iterator[str]:
+    """A colour for each trace: one for what the platform traces, others for the reach of each leg."""
+    k = 0
+    for trace in drawn.traces:
+        yield MOVING if trace.moving else REACHES[k % len(REACHES)]
+        k += not trace.moving
+
+
+def _legend(whole: Any, drawn: Scene) -> None:
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import Patch
+
+    entries: dict[str, Any] = {}
+    for trace, colour in zip(drawn.traces, _colours(drawn), strict=True):
+        entries.setdefault(trace.words, Patch(facecolor=colour, alpha=0.4) if trace.points.ndim == 3
+                           else Line2D([], [], color=colour, linewidth=1.8))
+    for state in dict.fromkeys(each.state for each in drawn.placed):
+        mark, size, words = MARKS[state]
+        entries[words] = Line2D([], [], linestyle="", marker=mark, markersize=0.8 * size, color="0.6",
+                                markeredgecolor="black")
+    columns = len(entries) if len(entries) <= 5 else -(-len(entries) // 2)
+    whole.legend(list(entries.values()), list(entries), loc="lower center", ncols=columns, frameon=False, fontsize=9)

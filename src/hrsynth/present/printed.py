@@ -1,0 +1,65 @@
+"""The README's table of assembly modes that the papers print, beside those that are computed."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from functools import cache
+
+from ..analysis.modes.modes import AssemblyMode, AssemblyModes, modes
+from ..description import load, shipped
+from ..families.printed import CLAIMS, Claim, Place
+
+START = "<!-- generated: printed modes -->"
+HEADS = ("source", "robot", "legs", "printed x, y, z (φ = 0)", "computed x, y, z; φ", "apart", "word")
+
+
+@cache
+def computed(claim: Claim) -> AssemblyModes:
+    """All modes with the directions that the claim's legs have at its desired pose."""
+    return modes(load(shipped()[claim.robot]), claim.legs, at=claim.at)
+
+
+def nearest(place: Place, found: AssemblyModes) -> AssemblyMode:
+    """The mode whose place is nearest to a printed one."""
+    return min(found.modes, key=lambda mode: math.dist(place, _place(mode)))
+
+
+def table() -> str:
+    """The Markdown table of all claims: each printed pose with the nearest mode, then the modes not printed."""
+    rule = "|".join(["", *(" --- " for _ in HEADS), ""])
+    return "\n".join([_line(HEADS), rule, *(_line(row) for claim in CLAIMS for row in _rows(claim))]) + "\n"
+
+
+def _rows(claim: Claim) -> Iterator[tuple[str, ...]]:
+    found = computed(claim)
+    head = (claim.source, f"`{claim.robot}`", ", ".join(claim.legs))
+    met = []
+    for each in claim.modes:
+        mode = nearest(each.place, found)
+        met.append(mode)
+        apart = 1e3 * math.dist(each.place, _place(mode))
+        yield (*head, ", ".join(f"{v:g}" for v in each.place), _written(mode), f"{apart:.0f} mm", each.remark)
+    for mode in found.modes:
+        if mode not in met:
+            reached = "" if mode.reachable else f"; legs {', '.join(mode.open)} do not reach it"
+            yield (*head, "–", _written(mode), "–", f"not printed{reached}")
+
+
+def _place(mode: AssemblyMode) -> Place:
+    pose = mode.pose
+    assert pose.x is not None
+    assert pose.y is not None
+    assert pose.z is not None
+    return pose.x, pose.y, pose.z
+
+
+def _written(mode: AssemblyMode) -> str:
+    """A place to a tenth of a millimetre and the turn about z to a degree."""
+    assert mode.pose.rpy is not None
+    turn = round(math.degrees(mode.pose.rpy[2])) % 360
+    return f"{', '.join(f'{round(v, 4) + 0.0:.4f}' for v in _place(mode))}; {turn}°"
+
+
+def _line(cells: tuple[str, ...]) -> str:
+    return f"| {' | '.join(cells)} |"

@@ -1,0 +1,249 @@
+"""All assembly modes → what a picture of them shows, as points in the base frame (m).
+
+Which curves and surfaces are drawn follows from the way in which the platform moves (theory 5; MMT Figs. 5, 7, 11, 15).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from ..analysis.modes.curves import Circle, Curve, Line, Point, Reach, Sphere, shifted
+from ..analysis.modes.modes import AssemblyMode, AssemblyModes
+from ..analysis.modes.tips import Confinement, Tip
+from ..mechanism.vectors import Array, inverse
+from .coupler import chains, points, swept, traced
+from .skeleton import legs_of, outline
+
+GOAL, CLOSES, OPEN, NEAR = "goal", "reachable", "unreachable", "near"
+AROUND = 1.3
+"""Lines and planes are drawn over this many times the extent of what lies about them."""
+FINE, COARSE, TURN = 241, 61, 73
+"""Samples of a curve; of a surface along its first curve, and along its second."""
+
+
+@dataclass(frozen=True, eq=False)
+class Trace:
+    """A curve (n, 3) or surface (m, n, 3). ``moving``: traced by the platform on the other legs, not the reach of one
+    leg alone."""
+
+    points: Array
+    words: str
+    moving: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Placed:
+    """One mode: its number as in the text, its state, what is to be said of it, the marked point (3,), the outlines of
+    the platform's bodies, and the strokes of the real robot's legs (none where it does not close)."""
+
+    label: str
+    state: str
+    words: str
+    at: Array
+    platform: tuple[Array, ...]
+    strokes: tuple[Array, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """What is drawn. ``normal`` (3,) is that of the plane in which everything moves, None in space; ``ground``
+    (n, 3) are the centres of the base's joints; ``rest`` the legs whose curves are not drawn, though they count."""
+
+    normal: Array | None
+    traces: tuple[Trace, ...]
+    placed: tuple[Placed, ...]
+    ground: Array
+    rest: tuple[str, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """What the picture says, in a few numbers: each mode's marked point, each trace's middle and spread (m)."""
+        return {"modes": [{"label": each.label, "state": each.state, "at": each.at.tolist()} for each in self.placed],
+                "traces": [{"words": each.words, "middle": each.points.reshape(-1, 3).mean(axis=0).tolist(),
+                            "spread": each.points.reshape(-1, 3).std(axis=0).tolist()} for each in self.traces]}
+
+
+@dataclass(frozen=True, eq=False)
+class _Plot:
+    """The point that is marked, by its body and its place (3,) there, what the platform traces with it, what it can
+    reach by each leg alone, and the legs that are in this."""
+
+    body: str
+    place: Array
+    traces: tuple[Trace, ...] = ()
+    reaches: tuple[tuple[Reach, str], ...] = ()
+    legs: tuple[str, ...] = ()
+
+    def marked(self, mode: AssemblyMode) -> Array:
+        assert mode.bodies is not None
+        X = mode.bodies[self.body]
+        return np.asarray(X[:3, :3] @ self.place + X[:3, 3])
+
+
+def scene(found: AssemblyModes) -> Scene:
+    """What a picture of the modes shows; they must not be a continuum."""
+    assert found.confined is not None
+    plot = _PLOTS[found.confined.motion](found, found.confined)
+    listed = [(str(k), mode) for k, mode in enumerate(found.modes, 1)]
+    listed += [(f"near {k}", mode) for k, mode in enumerate(found.near, 1)]
+    placed = tuple(_placed(found, plot, label, mode) for label, mode in listed)
+    about = np.vstack([*(trace.points.reshape(-1, 3) for trace in plot.traces), *(each.at[None] for each in placed)])
+    drawn = tuple(Trace(_drawn(reach, about, found.goal.twin.length), words) for reach, words in plot.reaches)
+    mechanism = found.goal.twin.mechanism
+    ground = np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
+    rest = tuple(tip.leg for tip in found.confined.tips if plot.legs and tip.leg not in plot.legs)
+    return Scene(_normal(found), (*plot.traces, *drawn), placed, ground, rest)
+
+
+def _placed(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) -> Placed:
+    assert mode.bodies is not None
+    goal = found.goal
+    bodies = tuple(outline(goal.twin.mechanism, body, X) for body, X in mode.bodies.items())
+    strokes = () if mode.configuration is None else legs_of(mode.configuration, tuple(mode.bodies))
+    state = NEAR if label.startswith(NEAR) else GOAL if mode.goal else CLOSES if mode.reachable else OPEN
+    if mode.goal:
+        words = "the pose itself"
+    elif mode.open:
+        words = "not reachable: " + ("legs " if len(mode.open) > 1 else "leg ") + ", ".join(mode.open)
+    else:
+        words = "not reachable: beyond limits" if mode.beyond else "reachable"
+    return Placed(label, state, words, plot.marked(mode), bodies, strokes)
+
+
+def _normal(found: AssemblyModes) -> Array | None:
+    """The normal of the plane in which the platform moves, where there is one."""
+    assert found.confined is not None
+    if found.confined.plane is not None:
+        return found.confined.plane
+    shifts = found.setting.motion.shifts
+    return np.cross(*shifts.T) if shifts.shape[1] == 2 and found.confined.motion == "translations" else None
+
+
+def _at_goal(found: AssemblyModes, tip: Tip) -> Array:
+    """A tip at the goal, (3,)."""
+    X = found.goal.pose(tip.body)
+    return np.asarray(X[:3, :3] @ tip.place + X[:3, 3])
+
+
+def _platform(found: AssemblyModes, confined: Confinement) -> _Plot:
+    """The platform's own position, and no curves."""
+    body = confined.bodies[0]
+    p = found.pose
+    place = inverse(found.goal.pose(body)) @ np.array([p.x, p.y, p.z, 1.0])
+    return _Plot(body, place[:3])
+
+
+def _translating(found: AssemblyModes, confined: Confinement) -> _Plot:
+    """What the platform's position can be by each leg alone: they meet in the modes (MMT Fig. 5)."""
+    plot = _platform(found, confined)
+    X = found.goal.pose(plot.body)
+    p = X[:3, :3] @ plot.place + X[:3, 3]
+    reaches = tuple((shifted(tip.curve, p - _at_goal(found, tip)), f"platform on leg {tip.leg}")
+                    for tip in confined.tips if not isinstance(tip.curve, Point))
+    return _Plot(plot.body, plot.place, (), reaches)
+
+
+def _planar(found: AssemblyModes, confined: Confinement) -> _Plot:
+    """The coupler curve of two tips and the third leg's curve (MMT Fig. 7); about a pivot a circle and a curve."""
+    n = confined.plane
+    legs = _deciding(found, confined, 3) or _deciding(found, confined, 2)
+    if n is None or not legs:
+        return _platform(found, confined)
+    tips = [confined.tips[k] for k in legs]
+    at = np.array([_at_goal(found, tip) for tip in tips])
+    level = at - np.outer(at @ n, n)
+    flat = [shifted(_curve(tip), -n * float(n @ tip.curve.centre)) for tip in tips]
+    last = tips[-1]
+    reach, words, names = (flat[-1], _on(last, (last,))), _on(last, tips[:-1]), tuple(tip.leg for tip in tips)
+    if len(tips) == 2:
+        circle = Circle(flat[0].centre, n, float(np.linalg.norm(level[1] - level[0])))
+        return _Plot(last.body, last.place, (), ((circle, words), reach), names)
+    bar = float(np.linalg.norm(level[1] - level[0]))
+    branches = chains(flat[0], flat[1], bar, FINE)
+    traces = tuple(Trace(traced(each, level, n), words, True) for each in branches)
+    return _Plot(last.body, last.place, traces, (reach,), names)
+
+
+def _spatial(found: AssemblyModes, confined: Confinement) -> _Plot:
+    """The surface of the third tip while two tips slide on their curves, and the third leg's curve (MMT Fig. 11)."""
+    legs = _deciding(found, confined, 3)
+    if not legs:
+        return _platform(found, confined)
+    tips = [confined.tips[k] for k in legs]
+    at = np.array([_at_goal(found, tip) for tip in tips])
+    last = tips[-1]
+    branches = chains(_curve(tips[0]), _curve(tips[1]), float(np.linalg.norm(at[1] - at[0])), COARSE)
+    surfaces = (swept(each, at, TURN) for each in branches)
+    traces = tuple(Trace(each[0] if len(each) == 1 else each, _on(last, tips[:-1]), True)
+                   for each in surfaces)
+    return _Plot(last.body, last.place, traces, ((last.curve, _on(last, (last,))),), tuple(tip.leg for tip in tips))
+
+
+def _bodies(found: AssemblyModes, confined: Confinement) -> _Plot:
+    """The surface of translation of one body's curve and the slide, and the other body's curve (MMT Fig. 15)."""
+    legs = _deciding(found, confined, 2)
+    if not legs or confined.slide is None or len({confined.tips[k].body for k in legs}) < 2:
+        return _platform(found, confined)
+    first, last = (confined.tips[k] for k in legs)
+    sign = 1.0 if first.body == confined.bodies[0] else -1.0
+    arms = [_at_goal(found, tip) - found.goal.pose(tip.body)[:3, 3] for tip in (first, last)]
+    start = _drawn(first.curve, _at_goal(found, first)[None], 2 * confined.slide.radius, COARSE)
+    around = points(confined.slide, np.linspace(0, 2 * np.pi, TURN))
+    dome = (start - arms[0] + arms[1])[:, None] + sign * around
+    return _Plot(last.body, last.place, (Trace(dome, _on(last, (first,)), True),), ((last.curve, _on(last, (last,))),),
+                 (first.leg, last.leg))
+
+
+_PLOTS: dict[str, Callable[[AssemblyModes, Confinement], _Plot]] = {
+    "translations": _translating, "planar": _planar, "spatial": _spatial, "bodies": _bodies}
+
+
+def _on(tip: Tip, legs: Sequence[Tip]) -> str:
+    """What a trace is called: where the tip of a leg can be while the platform is held by these legs alone."""
+    return f"$B_{{{tip.leg}}}$ on leg{'s' if len(legs) > 1 else ''} {', '.join(each.leg for each in legs)}"
+
+
+def _deciding(found: AssemblyModes, confined: Confinement, count: int) -> tuple[int, ...]:
+    """The places of this many legs on curves for which the modes were solved, tips at rest first, and last the moving
+    tip whose places at the modes are farthest apart. Empty where there are none."""
+    legs = next((legs for mode in found.found.modes if len(legs := mode.legs) == count
+                 and all(isinstance(confined.tips[k].curve, Curve) for k in legs)), ())
+
+    def apart(k: int) -> tuple[bool, float, int]:
+        tip = confined.tips[k]
+        places = [_Plot(tip.body, tip.place).marked(mode) for mode in found.modes]
+        least = min((float(np.linalg.norm(a - b)) for a, b in combinations(places, 2)), default=0.0)
+        return not isinstance(tip.curve, Point), round(least / found.goal.twin.length, 6), k
+
+    last = max(legs, key=apart, default=None)
+    return tuple(sorted(legs, key=lambda k: (k == last, not isinstance(confined.tips[k].curve, Point))))
+
+
+def _curve(tip: Tip) -> Curve:
+    assert isinstance(tip.curve, Curve)
+    return tip.curve
+
+
+def _drawn(reach: Reach, about: Array, least: float, samples: int = FINE) -> Array:
+    """Points to draw a reach with: a circle or sphere whole, a line or plane as far as what lies ``about`` it (n, 3),
+    at least over ``least`` each way."""
+    if isinstance(reach, Point):
+        return reach.centre[None]
+    if isinstance(reach, Circle):
+        return points(reach, np.linspace(0, 2 * np.pi, samples))
+    if isinstance(reach, Sphere):
+        theta, phi = np.meshgrid(np.linspace(0, np.pi, COARSE), np.linspace(0, 2 * np.pi, TURN), indexing="ij")
+        ball = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1)
+        return reach.centre + reach.radius * ball
+    axes = reach.direction[None] if isinstance(reach, Line) else np.linalg.svd(reach.normal[None])[2][1:]
+    along = (about - reach.centre) @ axes.T
+    middle = (along.min(axis=0) + along.max(axis=0)) / 2
+    half = np.maximum(AROUND * (along.max(axis=0) - along.min(axis=0)) / 2, least)
+    sides = [middle[i] + half[i] * np.linspace(-1, 1, 3) for i in range(len(axes))]
+    if len(axes) == 1:
+        return np.asarray(reach.centre + sides[0][:, None] * axes[0])
+    return np.asarray(reach.centre + sides[0][:, None, None] * axes[0] + sides[1][None, :, None] * axes[1])

@@ -1,0 +1,65 @@
+"""Certified paths looked at again by Pinocchio: loops closed and ranks taken at many points."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hrsynth.analysis.aspects.answer import PathAnswer
+from hrsynth.analysis.aspects.crossing import Crossing
+from hrsynth.analysis.aspects.path import Aspects
+from hrsynth.analysis.singularity.agreement import smallest_of, weakest
+from hrsynth.analysis.singularity.condition import Condition
+from hrsynth.analysis.singularity.features import unit_rows
+from hrsynth.kinematics.configuration import ClosedConfiguration, Target, closed, measure
+from hrsynth.tolerances import CLOSED, RANK_CUTOFF
+
+FEWEST = 25
+"""Steps on each part of a path, at least: with longer ones the solver of loops may leave a leg's working mode."""
+
+
+def followed(aspects: Aspects, answer: PathAnswer, points: int) -> list[ClosedConfiguration]:
+    """The real robot's configurations along a path, found by closing its loops, small step after small step; where a
+    leg crosses its limit, with the direction of its rod."""
+    assert answer.carriage is not None
+    carriage, question = answer.carriage, aspects.setting.samples.question
+    here, found = answer.start.configuration, []
+    for way in answer.ways:
+        fractions = np.linspace(0, 1, max(points // len(answer.ways), FEWEST) + 1)
+        p, R = way.at(fractions)[:2]
+        held = [() for _ in fractions]
+        if isinstance(way, Crossing):
+            (seen,) = [o for o in question.observations if o.leg == way.leg]
+            values = measure(here.twin, here.q, question.reference, [seen])[2]
+            rods = unit_rows(way.rod.at(fractions))
+            assert np.linalg.norm(np.cross(values[0], rods[0])) < 1e-7, "the rod is what is watched"
+            held = [((seen, np.sign(values[0] @ rods[0]) * rod),) for rod in rods]
+        for place, turn, measured in zip(p, R, held, strict=True):
+            X = np.eye(4)
+            X[:3, 3] = carriage.length * place - carriage.motion.point
+            point = None if carriage.turning else carriage.motion.point
+            target = Target(carriage.motion.link, carriage.frame(place, turn) if carriage.turning else X, point,
+                            question.reference, measured)
+            q, residual = closed(here.twin, here.q, target, tolerance=1e-12)
+            assert residual <= CLOSED, "a leg does not reach"
+            here = ClosedConfiguration.of(here.twin, q)
+            found.append(here)
+    return found
+
+
+def check_certified(aspects: Aspects, answer: PathAnswer, points: int) -> None:
+    """Dense points of the path: all legs close, they lead to the goal, the condition's value keeps its side and stays
+    above the margin."""
+    assert answer.certified
+    assert answer.margin is not None
+    assert answer.margin > 0
+    way = followed(aspects, answer, points)
+    end = way[-1].pose(aspects.setting.mechanism.platform) - answer.goal.configuration.pose(
+        aspects.setting.mechanism.platform)
+    assert np.max(np.abs(end)) < 1e-7
+    scene = aspects.structure.scene(way)
+    condition: Condition = aspects.condition
+    values = condition.expressed(scene) if answer.signed else smallest_of(condition.rows(scene))
+    assert np.all(np.sign(values) == np.sign(answer.start.value))
+    assert np.min(np.abs(values)) >= answer.margin - 1e-9
+    ranks = [weakest(at, aspects.setting.samples.question) for at in way[:: max(1, len(way) // 20)]]
+    assert min(ranks) > RANK_CUTOFF

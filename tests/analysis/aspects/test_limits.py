@@ -1,0 +1,136 @@
+"""Joint limits: their reserves are those of the joints' coordinates, and certified paths keep to them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from analysis.aspects.certified import check_certified, followed
+from hrsynth.analysis.aspects.answer import SAME, SEPARATED, UNDECIDED
+from hrsynth.analysis.aspects.limits import Slide, Turn
+from hrsynth.analysis.aspects.path import Aspects
+from hrsynth.analysis.aspects.pattern import Pattern
+from hrsynth.description import load
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.sampling import wander
+from hrsynth.mechanism import JointType, Limits, Mechanism
+from strategies import planar
+
+KNOWN = [("3rrr_m1", None), ("3rpr_m1", None), ("3prr_m1", None), ("rrrrr_m1", None), ("gough_stewart", "1,2,3"),
+         ("quattro", "1,4"), ("quattro_rigid", None), ("3puu", None), ("hexa", None)]
+
+
+def with_limits(robot: Mechanism, limits: Mapping[str, Limits]) -> Mechanism:
+    joints = {name: replace(joint, limits=limits.get(name)) for name, joint in robot.joints.items()}
+    return replace(robot, joints=joints)
+
+
+def single(robot: Mechanism) -> list[str]:
+    """Its R and P joints."""
+    return [joint.name for joint in robot.joints.values() if joint.type in (JointType.REVOLUTE, JointType.PRISMATIC)]
+
+
+def coordinates(at: ClosedConfiguration, joint: str) -> float:
+    """A joint's coordinate: radians, or metres."""
+    (place,) = at.twin.coordinates[joint]
+    found = float(at.twin.difference(at.twin.q0, at.q)[place])
+    return found * at.twin.length if at.twin.mechanism.joints[joint].type is JointType.PRISMATIC else found
+
+
+@cache
+def limited(robot: str, observe: str | None) -> Aspects:
+    """A robot with limits on all its R and P joints, not in the middle of their zero."""
+    mechanism = load(robot)
+    rng = np.random.default_rng(0)
+    return Aspects.of(with_limits(mechanism, {name: Limits(*(rng.uniform(0.05, 0.5, 2) * [-1, 1])) for name in single(
+        mechanism)}), observe)
+
+
+@pytest.mark.parametrize(("robot", "observe"), KNOWN)
+def test_a_reserve_tells_how_far_a_coordinate_is_from_its_limits(robot: str, observe: str | None):
+    aspects = limited(robot, observe)
+    assert isinstance(aspects.pattern, Pattern)
+    assert {bound.joint for bound in aspects.pattern.bounds} == set(single(aspects.setting.mechanism))
+    beyond = 0
+    for at in wander(aspects.setting.samples.start, 12, 1):
+        chart = aspects.reading(at).chart
+        reserves = chart.at(*aspects.pattern.carriage.of([at])).reserves[0, len(chart.limbs) :]
+        for bound, reserve in zip(chart.bounds, reserves, strict=True):
+            joint = at.twin.mechanism.joints[bound.joint]
+            assert joint.limits is not None
+            middle, half = np.array([[0.5, 0.5], [-0.5, 0.5]]) @ [joint.limits.lower, joint.limits.upper]
+            away = coordinates(at, bound.joint) - middle
+            beyond += int(reserve < 0)
+            if isinstance(bound, Turn):
+                assert reserve == pytest.approx(bound.size * (np.cos(away) - np.cos(half)), abs=1e-6)
+            else:
+                assert isinstance(bound, Slide)
+                assert reserve == pytest.approx((half**2 - away**2) / at.twin.length**2, abs=1e-6)
+    assert beyond
+
+
+def furthest(path: list[ClosedConfiguration], joints: list[str]) -> tuple[str, float, float]:
+    """The joint that leaves the range of its values at a path's ends by most, and limits halfway to where it goes."""
+    values = {name: np.array([coordinates(at, name) for at in path]) for name in joints}
+    low, high = ({name: f(v[[0, -1]]) for name, v in values.items()} for f in (np.min, np.max))
+    leaves = {name: max(low[name] - v.min(), v.max() - high[name]) for name, v in values.items()}
+    joint = max(leaves, key=lambda name: leaves[name])
+    room = leaves[joint] / 2
+    return joint, float(low[joint] - room), float(high[joint] + room)
+
+
+@pytest.mark.parametrize("robot", [load("3rrr_m1"), planar(["RRR"] * 3, np.random.default_rng(3), [{0}] * 3)],
+                         ids=lambda robot: robot.name)
+def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
+    """Limits that a path without them leaves: another path keeps to them, or none is found."""
+    free = Aspects.of(robot)
+    places = list(wander(free.setting.samples.start, 40, 2))
+    led = []
+    for one, other in zip(places[:8:2], places[::-6], strict=False):
+        plain = free.join(one, other)
+        if plain.verdict != SAME:
+            continue
+        joint, low, high = furthest([one, *followed(free, plain, 40), other], single(robot))
+        if high - low > 6:
+            continue
+        aspects = Aspects.of(with_limits(robot, {joint: Limits(low, high)}))
+        answer = aspects.join(one, other)
+        assert answer.verdict in (SAME, UNDECIDED)
+        led.append(answer.verdict == SAME)
+        if answer.verdict == SAME:
+            assert answer.limits == (joint,)
+            check_certified(aspects, answer, 40)
+            assert all(low < coordinates(at, joint) < high for at in followed(aspects, answer, 60))
+    assert any(led)
+
+
+def test_a_pose_beyond_a_limit_is_named_and_still_separated():
+    robot = load("3rrr_m1")
+    free = Aspects.of(robot)
+    places = list(wander(free.setting.samples.start, 30, 0))
+    values = [coordinates(at, "elbow_1") for at in places]
+    low, high = np.quantile(values, [0.2, 0.8])
+    aspects = Aspects.of(with_limits(robot, {"elbow_1": Limits(low, high)}))
+    inside = [at for at, value in zip(places, values, strict=True) if low < value < high]
+    outside = [at for at, value in zip(places, values, strict=True) if not low <= value <= high]
+    verdicts = []
+    for start, goal in zip(inside, outside, strict=False):
+        answer = aspects.join(start, goal)
+        opposite = answer.start.value * answer.goal.value < 0
+        verdicts.append(answer.verdict)
+        assert answer.verdict == (SEPARATED if opposite else UNDECIDED)
+        assert opposite or answer.reason == "at the goal beyond its limits: joint elbow_1"
+    assert set(verdicts) == {SEPARATED, UNDECIDED}
+
+
+@pytest.mark.parametrize("limits", [Limits(-4.0, 4.0), Limits(lower=-1.0)])
+def test_limits_that_are_not_considered_are_named(limits: Limits):
+    aspects = Aspects.of(with_limits(load("3rrr_m1"), {"elbow_1": limits, "elbow_2": Limits(-3.0, 3.0)}))
+    places = list(wander(aspects.setting.samples.start, 2, 0))
+    answer = aspects.join(places[0], places[0])
+    assert (answer.verdict, answer.limits) == (SAME, ("elbow_2",))
+    assert answer.not_proved.startswith("limits of joints elbow_1; ")

@@ -1,0 +1,246 @@
+"""No mode of a whole robot is missing, and none is listed that is none: by random closings, screws and symmetries."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from analysis.modes.closings import asked, bodies_of, compared, distance, motor_places
+from hrsynth.analysis.controllability import legs
+from hrsynth.analysis.modes.modes import AssemblyModes, modes
+from hrsynth.description import load, shipped
+from hrsynth.errors import BadRequest, HrsynthError, MissingExtra, NotConfined, PoseNotReached
+from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.pose import Pose
+from hrsynth.mechanism.vectors import Array, pose
+from kinematics.robots import state_of
+from oracle import Oracle
+from strategies import PLANAR_WORDS, POD_WORDS, deltas, planar, pods, random_rotation, reordered, transformed
+
+Legs = tuple[str, ...]
+FAST = [("3rrr_m1", None, False), ("3rps", None, False), ("3rpr_m2", None, True), ("quattro", ("1", "4"), False),
+        ("gough_stewart", ("1", "3", "5"), False), ("rrrrr_m1", None, True), ("3prp", None, True)]
+FEW, MANY = 40, 100
+"""Random starts of a whole robot."""
+
+
+@cache
+def listed(name: str, observe: Legs | None, real: bool, sample: int | None = None) -> AssemblyModes | str:
+    """The modes at zero, or at the pose of a sample; what is said where there is no list."""
+    try:
+        found = modes(load(shipped()[name]), observe, real=real)
+        if sample is not None and found.model is not None:
+            at = found.setting.motion.pose(found.setting.configurations[sample].pose(found.setting.motion.link))
+            found = modes(load(shipped()[name]), observe, at=at, real=real)
+    except (MissingExtra, NotConfined, PoseNotReached) as error:
+        return str(error)
+    return found
+
+
+def check_completeness(found: AssemblyModes, starts: int, seed: int = 0) -> frozenset[int]:
+    """What closes is listed, and no leg is said to be open where it closes; the modes that were met."""
+    result = compared(found, starts, seed)
+    assert found.found.complete, found.found.proof
+    assert result.closed > starts // 4
+    assert result.missing == (), f"{len(result.missing)} of {result.closed} closings are no mode"
+    assert result.closed_though_open == ()
+    return result.met
+
+
+def check_modes(found: AssemblyModes) -> None:
+    """By screws: each reachable mode is closed and has the goal's measurements; exactly one is the goal."""
+    mechanism = found.setting.mechanism
+    oracle = Oracle(mechanism)
+    start = state_of(found.goal.twin, found.goal.q)
+    assert sum(mode.goal for mode in found.modes) == 1
+    for mode in found.modes:
+        assert mode.reachable == (not mode.open and not mode.beyond)
+        assert mode.reachable or not mode.goal
+        assert (mode.configuration is None) == bool(mode.open)
+        if mode.configuration is None:
+            continue
+        at = mode.configuration
+        state = np.array([at.pose(link) for link in mechanism.links])
+        assert oracle.error(state) < 1e-8
+        assert distance(found, mode, at) < 1e-8
+        if found.kind == "hidden":
+            u, wanted = (oracle.directions(each, asked(found).observations) for each in (state, start))
+            assert np.abs(u - wanted).max() < 1e-8
+        else:
+            places = [motor_places(mechanism, {link: c.pose(link) for link in mechanism.links})
+                      for c in (at, found.goal)]
+            assert max(np.abs(one - other).max() for one, other in zip(*places, strict=True)) < 1e-8
+
+
+@pytest.mark.parametrize(("name", "observe", "real"), FAST)
+def test_what_closes_is_listed(name: str, observe: Legs | None, real: bool):
+    found = listed(name, observe, real)
+    if name == "3prp" and isinstance(found, str):
+        assert "cannot be listed" in found
+        return
+    assert not isinstance(found, str), found
+    check_modes(found)
+    met = check_completeness(found, FEW)
+    assert any(found.modes[k].goal for k in met)
+
+
+@cache
+def sets_of(name: str) -> list[Legs | None]:
+    """All legs, and three of the smallest sets with the best verdict."""
+    return [None, *(tuple(each) for each in legs(load(shipped()[name])).minimal[:3])]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("real", [False, True])
+@pytest.mark.parametrize("name", shipped())
+def test_what_closes_is_listed_for_all_robots_and_leg_sets(name: str, real: bool):
+    """At a generic pose, and with all legs at the zero configuration, which often is symmetric."""
+    for observe in [None] if real else sets_of(name):
+        for sample in (3,) if observe else (3, None):
+            found = listed(name, observe, real, sample)
+            if isinstance(found, str):
+                assert real, f"{observe}: {found}"
+            elif found.found.continuum:
+                assert found.modes == ()
+                assert f"dimension {found.found.continuum}" in str(found.found.degenerate)
+            else:
+                check_modes(found)
+                check_completeness(found, MANY)
+
+
+def robot_of(kind: str, seed: int) -> tuple[Mechanism, bool]:
+    """A random robot in a tilted base, and whether its motors are to be held instead of its directions."""
+    rng = np.random.default_rng(seed)
+    if kind == "planar":
+        words = [PLANAR_WORDS[k] for k in rng.integers(len(PLANAR_WORDS), size=3)]
+        return planar(words, rng, [{int(rng.integers(3))} for _ in words]), bool(rng.integers(2))
+    if kind == "planar, a point":
+        words = [("RRR", "RPR", "PRR", "PPR")[k] for k in rng.integers(4, size=2)]
+        return planar(words, rng, [{int(rng.integers(3))} for _ in words], point=True), bool(rng.integers(2))
+    if kind == "pod":
+        words = ["UPS"] * 6 if seed % 2 else [POD_WORDS[k] for k in rng.integers(len(POD_WORDS), size=3)]
+        return pods(words, rng), False
+    n = int(rng.integers(2, 5))
+    return deltas("RP"[seed % 2] * n, ["2-SS" if seed % 3 else "UU"] * n, rng, seed % 4 != 3), False
+
+
+KINDS = ("planar", "planar, a point", "pod", "delta")
+
+
+def check_random(kind: str, seed: int, starts: int) -> str:
+    """What became of a random robot: ``listed``, ``continuum`` or ``refused``."""
+    mechanism, real = robot_of(kind, seed)
+    try:
+        found = modes(mechanism, real=real)
+    except (MissingExtra, NotConfined):
+        return "refused"
+    if found.found.continuum:
+        return "continuum"
+    check_modes(found)
+    check_completeness(found, starts)
+    return "listed"
+
+
+@pytest.mark.parametrize(("kind", "seed"), [("planar", 2), ("planar, a point", 1), ("pod", 0), ("delta", 0)])
+def test_what_closes_is_listed_for_random_robots(kind: str, seed: int):
+    assert check_random(kind, seed, 20) in ("listed", "continuum", "refused")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", KINDS)
+def test_what_closes_is_listed_for_many_random_robots(kind: str):
+    outcomes = [check_random(kind, seed, 100) for seed in range(100, 115)]
+    assert outcomes.count("listed") >= 3
+
+
+def same_modes(one: AssemblyModes, other: AssemblyModes, X: Array | None = None) -> None:
+    """The modes of one, moved by X (4, 4), are those of the other."""
+    assert one.found.complex == other.found.complex
+    assert one.found.complete == other.found.complete
+    assert len(one.modes) == len(other.modes)
+    X = np.eye(4) if X is None else X
+    for mode in one.modes:
+        twins = [each for each in other.modes
+                 if all(np.abs(X @ Y - each.bodies[body]).max() < 1e-7 for body, Y in mode.bodies.items())]
+        assert len(twins) == 1
+        assert (twins[0].goal, twins[0].reachable) == (mode.goal, mode.reachable)
+        assert len(twins[0].open) == len(mode.open)
+
+
+@pytest.mark.parametrize(("name", "observe", "real"), [FAST[2], FAST[3]])
+def test_modes_move_with_the_robot(name: str, observe: Legs | None, real: bool):
+    rng = np.random.default_rng(5)
+    R, p = random_rotation(rng), rng.normal(size=3)
+    found = listed(name, observe, real)
+    assert not isinstance(found, str), found
+    moved = modes(transformed(load(shipped()[name]), R, p), observe, real=real)
+    same_modes(found, moved, pose(p, R))
+
+
+@pytest.mark.parametrize(("name", "observe"), [("quattro", ("rod_1a", "rod_4a")), ("3rrr_m1", None)])
+def test_the_order_of_legs_and_links_does_not_matter(name: str, observe: Legs | None):
+    """Legs are named by their links here: their labels follow the order."""
+    found = listed(name, observe, False)
+    assert not isinstance(found, str), found
+    mechanism = load(shipped()[name])
+    same_modes(found, modes(mechanism, (observe or ("3", "1", "2"))[::-1]))
+    same_modes(found, modes(reordered(mechanism, np.random.default_rng(2)), observe))
+
+
+@pytest.mark.parametrize(("name", "observe"), [
+    ("3rrr_m1", None), pytest.param("quattro", ("1", "4"), marks=pytest.mark.slow)])
+def test_from_another_mode_the_list_is_the_same(name: str, observe: Legs | None):
+    """A servo loop cannot tell the modes apart, so no list may depend on which of them is the goal."""
+    found = listed(name, observe, False)
+    assert not isinstance(found, str), found
+    reached = []
+    for mode in found.modes:
+        if mode.goal or not mode.reachable:
+            continue
+        try:
+            other = modes(found.setting.robot, observe, at=mode.pose)
+        except HrsynthError:
+            continue
+        if np.abs(asked_directions(other) - asked_directions(found)).max() < 1e-9:
+            reached.append(mode)
+            assert len(other.modes) == len(found.modes)
+            for each in found.modes:
+                assert any(all(np.abs(X - twin.bodies[body]).max() < 1e-6 for body, X in each.bodies.items())
+                           for twin in other.modes)
+    assert reached or len(found.modes) == 1
+
+
+def asked_directions(found: AssemblyModes) -> Array:
+    """The goal's directions by screws (k, 3)."""
+    oracle = Oracle(found.setting.mechanism)
+    return oracle.directions(state_of(found.goal.twin, found.goal.q), asked(found).observations)
+
+
+@pytest.mark.parametrize(("name", "observe", "size"), [
+    ("3rrr_m1", ("1",), 2), ("gough_stewart", ("1", "2"), 2), ("quattro", ("1",), 2), ("prrrp_parallel", None, 1),
+    ("3ppr_m1", None, 3), ("3prp", None, 2), ("uranesx", None, 1)])
+def test_a_pose_that_is_left_undetermined_is_a_continuum(name: str, observe: Legs | None, size: int):
+    found = listed(name, observe, False)
+    assert not isinstance(found, str), found
+    assert (found.found.continuum, found.modes, found.near, found.found.complete) == (size, (), (), False)
+    assert f"dimension {size}" in str(found.found.degenerate)
+    assert found.to_dict()["continuum"] == size
+
+
+@pytest.mark.parametrize("arguments", [{"observe": ["7"]}, {"observe": []}, {"at": "phi=3deg,rpy=0/0/0"},
+                                       {"at": "nonsense"}, {"at": Pose(rpy=(0.1, 0.2, 0.3))}, {"camera": "nowhere"}])
+def test_what_is_asked_wrongly_is_refused_in_one_line(arguments):
+    with pytest.raises(BadRequest) as caught:
+        modes(load(shipped()["quattro"]), **arguments)
+    assert "\n" not in str(caught.value)
+
+
+def test_a_robot_is_closed_where_its_modes_are():
+    """The search itself: its closings are closed, and they differ."""
+    found = listed("3rrr_m1", None, False)
+    assert not isinstance(found, str), found
+    assert len(compared(found, FEW).met) == len(found.modes) == 2
+    poses = [bodies_of(found, mode.configuration)["platform"] for mode in found.modes]
+    assert np.abs(poses[0] - poses[1]).max() > 1e-2

@@ -1,0 +1,78 @@
+"""Robots assembled at a pose leg by leg: the pose and the measured values are those asked for, or a leg is named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.description import load, shipped
+from hrsynth.kinematics.assembly import Assembler
+from hrsynth.kinematics.configuration import ClosedConfiguration, measure
+from hrsynth.mechanism.model import JointType, Limits
+from hrsynth.mechanism.vectors import pose
+
+ROBOTS = sorted(shipped())
+
+
+def prepared(name: str) -> Setting:
+    return prepare(load(shipped()[name]), samples=3)
+
+
+def assembler(setting: Setting) -> Assembler:
+    return Assembler(setting.anatomy, setting.everything.twin.length, setting.everything.question.reference)
+
+
+def bodies(setting: Setting, at: ClosedConfiguration) -> dict[str, np.ndarray]:
+    return {leg.attach: at.pose(leg.attach) for leg in setting.anatomy.legs}
+
+
+def values(at: ClosedConfiguration, setting: Setting) -> list[np.ndarray]:
+    question = setting.everything.question
+    return measure(at.twin, at.q, question.reference, question.observations)[2]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_reachable_pose_is_assembled_with_its_directions(name: str):
+    """At random configurations the robot is found again: bodies, platform and directions, loops closed."""
+    setting = prepared(name)
+    build = assembler(setting)
+    for member in setting.everything.members:
+        there = member.configuration
+        wanted = values(there, setting)
+        observations = setting.everything.question.observations
+        found = build.at(bodies(setting, there), list(zip(observations, wanted, strict=True)))
+        assert found.reachable, found.open
+        assert found.configuration is not None
+        platform = setting.mechanism.platform
+        if setting.anatomy.point is None:
+            assert found.configuration.pose(platform) == pytest.approx(there.pose(platform), abs=1e-8)
+        for mine, theirs in zip(values(found.configuration, setting), wanted, strict=True):
+            assert mine == pytest.approx(theirs, abs=1e-8)
+
+
+@pytest.mark.parametrize("name", ["3rrr_m1", "delta", "quattro", "rrrrr_m1", "orthoglide"])
+def test_a_pose_far_away_names_the_legs_that_do_not_close(name: str):
+    setting = prepared(name)
+    far = {body: pose((50.0, 0.0, 0.0)) @ X for body, X in bodies(setting, setting.everything.start).items()}
+    found = assembler(setting).at(far, ())
+    assert not found.reachable
+    assert found.configuration is None
+    crowd = {leg.label for leg in setting.anatomy.legs}
+    assert found.open
+    assert set(found.open) <= crowd
+
+
+def test_limits_of_joints_are_kept():
+    """A slider that would have to leave its range is named; in a range that holds the pose it is not."""
+    robot = load(shipped()["gough_stewart"])
+    sliders = [joint for joint in robot.joints.values() if joint.type is JointType.PRISMATIC]
+    for upper, reachable in ((0.01, True), (-0.01, False)):
+        limited = replace(sliders[0], limits=Limits(lower=-0.2, upper=upper))
+        setting = prepare(robot.changed(joints=[limited]), samples=1)
+        found = assembler(setting).at(bodies(setting, setting.everything.start), ())
+        assert found.configuration is not None
+        assert found.reachable is reachable
+        assert found.beyond == (() if reachable else (limited.name,))

@@ -1,0 +1,47 @@
+"""Motions of the platform alone, and samples read again for other measurements."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hrsynth.kinematics.ranks import kernel_basis, largest_angle
+from hrsynth.kinematics.relation import platform_motions, relation
+from kinematics.robots import ROBOTS, setting_of
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_platform_motions_span_the_twists_and_nothing_idle(robot: str) -> None:
+    """J q̇ = 0 and t orthonormal over all feasible twists; q̇ is normal to every q̇ with t = 0."""
+    question = setting_of(robot).everything.question
+    for at in setting_of(robot).configurations:
+        motions = platform_motions(at, question)
+        twists = question.rows(at)[: question.twist_rows]
+        t = twists @ motions
+        assert np.linalg.norm(at.twin.jacobian(at.q) @ motions) < 1e-9
+        np.testing.assert_allclose(t.T @ t, np.eye(motions.shape[1]), atol=1e-9)
+        assert largest_angle(t, relation(at, question).twists) < 1e-9
+        kernel, _ = at.kernel()
+        idle = kernel @ kernel_basis(twists @ kernel, 1.0)[0]
+        assert np.linalg.norm(idle.T @ motions) < 1e-9
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_the_platform_generically_does_what_it_does_at_the_samples(robot: str) -> None:
+    setting = setting_of(robot)
+    motion = setting.motion
+    assert motion.dof == setting.dof
+    for at in setting.configurations:
+        twists = relation(at, setting.everything.question).twists
+        found = motion.twists[: len(twists)]
+        assert np.linalg.norm(twists - found @ (found.T @ twists)) < 1e-9
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_measured_again_the_samples_say_the_same(robot: str) -> None:
+    """ρ of fewer observations, computed anew, is the projection of ρ of all."""
+    setting = setting_of(robot, ("1",) if "1" in setting_of(robot).labels else None)
+    again = setting.measuring(setting.observed)
+    for old, new in zip(setting.samples.members, again.members, strict=True):
+        assert largest_angle(old.relation.basis, new.relation.basis) < 1e-9
+        assert (old.relation.rank, old.relation.sizes) == (new.relation.rank, new.relation.sizes)
