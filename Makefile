@@ -1,6 +1,8 @@
 # Everything happens in .venv, made by the first target that needs it: locked versions, checked by hash.
 PYTHON ?= python3
 JOBS ?= 2
+MUTATIONS ?= 100000
+SEED ?= 0
 INSTANCES ?= 10000
 VENV := .venv
 BIN := $(VENV)/bin
@@ -11,7 +13,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all bounds lint types robots readme pictures lock setup setup-dev setup-all clean
+.PHONY: help demo test test-all fuzz bounds bench lint types robots readme pictures lock setup setup-dev setup-all clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -25,6 +27,9 @@ test: setup-dev  ## the tests, without the slow ones
 
 test-all: setup-all  ## all tests
 	@$(PYTEST) tests
+
+fuzz: setup-dev  ## 100,000 mutations of robot files (MUTATIONS=, SEED=): each is read or refused
+	@$(BIN)/python tests/description/foreign/fuzz.py --count $(MUTATIONS) --seed $(SEED)
 
 bounds: setup-dev  ## 10,000 random instances of every family of assembly modes (INSTANCES=10000; half an hour)
 	@cd tests && OMP_NUM_THREADS=1 ../$(BIN)/python -m analysis.modes.bounds $(INSTANCES)
@@ -40,6 +45,9 @@ robots: setup  ## regenerate robots/*.urdf from the families
 
 readme: setup  ## regenerate the README's tables
 	@$(BIN)/python -m hrsynth.present.readme README.md
+
+bench: setup-all  ## run the benchmarks and write their table in the README (some minutes)
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py README.md
 
 pictures: setup  ## draw the pictures in docs/pictures again
 	@mkdir -p docs/pictures

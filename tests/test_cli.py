@@ -36,7 +36,7 @@ VERDICTS = {"controllable", "partially controllable", "uncontrollable"}
 
 # Bad input of the robot files: a sample of the reader's own tests, one a situation.
 BAD = ["malformed", "two root elements", "unknown joint type", "unknown loop type", "joint of a missing child",
-       "loop of a missing link", "zero axis", "zero axis2", "nan", "inf", "two roots", "no platform", "no own element",
+       "loop of a missing link", "zero axis", "zero axis2", "nan", "inf", "two roots", "no platform",
        "unknown platform", "platform elsewhere", "observe unknown", "unknown motor", "unknown camera"]
 
 
@@ -465,6 +465,13 @@ def test_path_json_is_the_contract_whatever_the_verdict(run, arguments: list[str
         assert data["margin"] is None
 
 
+@pytest.mark.parametrize("name", ["delta", "linear_delta", "quattro_rigid", "rrrrr_m1"])
+def test_path_of_too_few_legs_is_undecided(run, name: str):
+    data = run("path", name, "--observe", "1", "--from", "x=0.01", "--to", "x=0.02", "--json").data
+    assert data["verdict"] == "undecided"
+    assert "every pose is singular" in data["reason"]
+
+
 def test_path_text_has_the_verdict_the_path_and_what_is_not_proved(run):
     answer = run("path", "quattro", "--observe", "1,4", "--from", "x=0.05", "--to", "x=-0.05,phi=20deg")
     assert (answer.status, answer.err) == (0, "")
@@ -505,12 +512,15 @@ def test_modes_json_is_the_contract(run, arguments: list[str], count: int, real:
     assert sum(mode["goal"] for mode in data["modes"]) == 1
 
 
-def test_modes_of_too_few_legs_are_a_continuum(run):
+def test_modes_of_too_few_legs_are_a_continuum(run, tmp_path: Path):
     data = run("modes", "delta", "--observe", "1", "--json").data
-    assert (data["continuum"], data["modes"], data["complete"]) == (1, [], False)
-    answer = run("modes", "delta", "--observe", "1")
+    assert (data["continuum"], data["modes"], data["complete"], data["complex"]) == (1, [], False, None)
+    picture = tmp_path / "modes.png"
+    answer = run("modes", "delta", "--observe", "1", "-o", picture)
     assert answer.status == 0
     assert "a continuum of dimension 1" in answer.out
+    assert "is not drawn" in answer.err
+    assert not picture.exists()
 
 
 def test_modes_text_numbers_them_and_says_what_is_proved(run):
@@ -527,7 +537,7 @@ def test_modes_text_numbers_them_and_says_what_is_proved(run):
     (["3rrr_m1", "--at", "w=9"], 2, ["unknown part", "'w'"]),
     (["3rrr_m1", "--observe", "7"], 2, ["no leg or link", "'7'"]),
     (["3rrr_m1", "-o", "modes.svg"], 2, ["modes.svg", ".png"]),
-    (["delta", "--observe", "1", "-o", "modes.png"], 2, ["nothing to draw"])])
+    (["3rrr_m1", "--real", "--observe", "1"], 2, ["motors are held", "one of the two"])])
 def test_modes_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
     (line,) = run("modes", *arguments).refused(status)
     assert all(word in line for word in words)
@@ -555,7 +565,7 @@ def test_servo_text_names_the_mode_and_how_far_it_is(run):
                  "x=0,y=-0.25,z=-0.7", "--gain", "5")
     assert (answer.status, answer.err) == (0, "")
     assert re.search(r"^ended +mode after", answer.out, re.MULTILINE)
-    assert "its assembly mode 1 of 2" in answer.out
+    assert "its assembly mode 2 of 2" in answer.out
     assert "mm and 0 degrees from the goal" in answer.out
     assert answer.out.count("(the goal)") == 1
 
@@ -683,10 +693,10 @@ def test_observe_elements_that_contradict_the_legs(run, robot, observes: list[tu
 
 
 def test_files_that_are_none(run, robot, tmp_path: Path):
+    assert "a folder of no robot file" in run("derive", tmp_path).refused()[0]
     sparse = tmp_path / "junk.urdf"
     with open(sparse, "wb") as stream:
         stream.truncate(200_000_000)
-    assert "a directory" in run("derive", tmp_path).refused()[0]
     assert "no such file" in run("derive", tmp_path / "none.urdf").refused()[0]
     assert "too large" in run("derive", sparse).refused()[0]
     assert "empty file" in run("derive", robot("", "empty.urdf")).refused()[0]

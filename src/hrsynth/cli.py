@@ -2,24 +2,86 @@
 
 from __future__ import annotations
 
+import gc
+import inspect
 import os
 import sys
 import time
+from collections.abc import Callable
+from dataclasses import dataclass
 from types import TracebackType
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+
+if TYPE_CHECKING:
+    from .mechanism import Mechanism
 
 app = typer.Typer(
     name="hrsynth", invoke_without_command=True, add_completion=False, rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Hidden robots of parallel robots that are controlled by watching the directions of their legs.")
 
-Robot = Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file, or the name of a shipped robot.")]
+ROBOT = typer.Argument(metavar="ROBOT", help="A robot file in any dialect, or the name of a shipped robot.")
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
 Observe = Annotated[str, typer.Option("--observe", metavar="LEGS", help="Legs to watch (1,4), links, or all.")]
 Camera = Annotated[str | None, typer.Option("--camera", metavar="LINK", help="The link that carries the camera.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random configurations.")]
+
+
+@dataclass(frozen=True)
+class Source:
+    """A robot as the command line names it, with what its file does not say."""
+
+    robot: str
+    base: str | None = None
+    platform: str | None = None
+    motors: str | None = None
+    close: tuple[str, ...] = ()
+    freeze: str = ""
+
+    def load(self) -> Mechanism:
+        """The mechanism; what was guessed or solved goes to standard error, a line each."""
+        from .description import load
+
+        frozen = [name for name in self.freeze.split(",") if name]
+        mechanism = load(self.robot, base=self.base, platform=self.platform, motors=self.motors, close=self.close,
+                         freeze=frozen)
+        for note in mechanism.notes:
+            typer.echo(f"hrsynth: {note}", err=True)
+        return mechanism
+
+
+_GIVEN: dict[str, tuple[object, object]] = {
+    "base": (Annotated[str | None, typer.Option(metavar="LINK", help="Look only at what lies between this link and the "
+                                                "platform.")], None),
+    "platform": (Annotated[str | None, typer.Option(metavar="LINK", help="The platform, where the file names none.")],
+                 None),
+    "motors": (Annotated[str | None, typer.Option(metavar="JOINTS", help="The driven joints, where the file names "
+                                                  "none.")], None),
+    "close": (Annotated[list[str] | None, typer.Option(metavar="A:B[:TYPE]", help="A closure: the frames of two links "
+                                                       "meet (default: in a point); again for more.")], None),
+    "freeze": (Annotated[str, typer.Option(metavar="JOINTS", help="Joints to hold at zero.")], ""),
+}
+"""Options of every command that takes a robot: annotation and default."""
+
+
+def _of_robot(command: Callable[..., None]) -> Callable[..., None]:
+    """Give a command the options that complete a robot file; it receives them with the name as one ``Source``."""
+    signature = inspect.signature(command, eval_str=True)
+    parameters = [each.replace(annotation=Annotated[str, ROBOT]) if name == "robot" else each
+                  for name, each in signature.parameters.items()]
+    parameters += [inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=annotation)
+                   for name, (annotation, default) in _GIVEN.items()]
+
+    def run(*, robot: str, close: list[str] | None, **rest: Any) -> None:
+        given = {name: rest.pop(name) for name in _GIVEN if name != "close"}
+        command(robot=Source(robot, close=tuple(close or ()), **given), **rest)
+
+    run.__name__, run.__doc__ = command.__name__, command.__doc__
+    run.__signature__ = signature.replace(parameters=parameters)  # type: ignore[attr-defined]
+    run.__annotations__ = {each.name: each.annotation for each in parameters}
+    return run
 
 
 def _version(wanted: bool) -> None:
@@ -41,8 +103,9 @@ def _options(
 
 
 @app.command()
+@_of_robot
 def derive(
-    robot: Robot,
+    robot: Source,
     observe: Observe = "all",
     camera: Camera = None,
     form: Annotated[str, typer.Option(help="simplified (as in the paper) or general (sliders, all legs kept).")]
@@ -54,12 +117,12 @@ def derive(
 ) -> None:
     """The hidden robot of a robot, how it is derived, its certificate, and what the controller can see."""
     from .analysis.derive import derive as run
-    from .description import load, save
+    from .description import save
     from .present import records
     from .present.text.verdicts import derivation
 
     with Progress() as progress:
-        found = run(load(robot), _list(observe), camera, form=form, seed=seed, progress=progress.tell)
+        found = run(robot.load(), _list(observe), camera, form=form, seed=seed, progress=progress.tell)
     written = None
     if output is not None and found.hidden is not None:
         save(found.hidden, output)
@@ -73,21 +136,22 @@ def derive(
 
 
 @app.command()
-def legs(robot: Robot, camera: Camera = None, json: Json = False, seed: Seed = 0) -> None:
+@_of_robot
+def legs(robot: Source, camera: Camera = None, json: Json = False, seed: Seed = 0) -> None:
     """Every set of observed legs: its verdict, the freedoms it loses, and the smallest sets that see most."""
     from .analysis.controllability import legs as run
-    from .description import load
     from .present import records
     from .present.text.verdicts import legs as written
 
     with Progress() as progress:
-        found = run(load(robot), camera, seed=seed, progress=progress.tell)
+        found = run(robot.load(), camera, seed=seed, progress=progress.tell)
     typer.echo(records.record("legs", found.robot, found.to_dict()) if json else written(found))
 
 
 @app.command()
+@_of_robot
 def check(
-    robot: Robot,
+    robot: Source,
     observe: Observe = "all",
     camera: Camera = None,
     at: Annotated[list[str] | None, typer.Option(metavar="POSE", help="A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; "
@@ -101,7 +165,6 @@ def check(
 ) -> None:
     """Mobility, ranks, singularities and redundant constraints at poses, and over a grid of poses."""
     from .analysis.check import check as run
-    from .description import load
     from .errors import RankUndecided
     from .present import maps, records
     from .present.text.check import check as written
@@ -110,7 +173,7 @@ def check(
     if output is not None:
         maps.writable(output, grid)
     with Progress() as progress:
-        found = run(load(robot), _list(observe), camera, at=at or (), grid=grid, seed=seed, progress=progress.tell)
+        found = run(robot.load(), _list(observe), camera, at=at or (), grid=grid, seed=seed, progress=progress.tell)
     if output is not None and found.grid is not None:
         maps.write(found, output)
     typer.echo(records.record("check", found.setting.robot.name, found.to_dict()) if json else written(found))
@@ -120,8 +183,9 @@ def check(
 
 
 @app.command()
+@_of_robot
 def singular(
-    robot: Robot,
+    robot: Source,
     observe: Observe = "all",
     camera: Camera = None,
     real: Annotated[bool, typer.Option("--real", help="The real robot with its own motors instead of the hidden one.")]
@@ -136,12 +200,11 @@ def singular(
     """Where a freedom of the platform is lost: the Type 2 condition in words, as an expression and drawn."""
     from .analysis.singularity.singular import drawn
     from .analysis.singularity.singular import singular as run
-    from .description import load
     from .present import loci, records
     from .present.text.singularity import singularity
 
     loci.writable(output, plane)
-    mechanism = load(robot)
+    mechanism = robot.load()
     with Progress() as progress:
         picture = None
         if output is not None:
@@ -158,8 +221,9 @@ def singular(
 
 
 @app.command()
+@_of_robot
 def advise(
-    robot: Robot,
+    robot: Source,
     observe: Observe = "all",
     camera: Camera = None,
     json: Json = False,
@@ -167,18 +231,18 @@ def advise(
 ) -> None:
     """What is missing: the smallest sets of further measurements that make a robot controllable."""
     from .analysis.advice import advise as run
-    from .description import load
     from .present import records
     from .present.text.advice import advice
 
     with Progress() as progress:
-        found = run(load(robot), _list(observe), camera, seed=seed, progress=progress.tell)
+        found = run(robot.load(), _list(observe), camera, seed=seed, progress=progress.tell)
     typer.echo(records.record("advise", found.robot, found.to_dict()) if json else advice(found))
 
 
 @app.command()
+@_of_robot
 def modes(
-    robot: Robot,
+    robot: Source,
     at: Annotated[str | None, typer.Option("--at", metavar="POSE", help="Pose whose directions are held, as "
                                            "x=0.02,y=0.1,z=-0.7 (default: the zero configuration's).")] = None,
     observe: Observe = "all",
@@ -190,14 +254,17 @@ def modes(
 ) -> None:
     """All assembly modes: every pose of the platform with the same directions, each proved."""
     from .analysis.modes.modes import modes as run
-    from .description import load
     from .present import modes as pictures
     from .present import records
     from .present.text.modes import modes
 
     pictures.writable(output)
     with Progress() as progress:
-        found = run(load(robot), _list(observe), camera, at=at, real=real, seed=seed, progress=progress.tell)
+        found = run(robot.load(), _list(observe), camera, at=at, real=real, seed=seed, progress=progress.tell)
+    why = pictures.nothing(found)
+    if output is not None and why is not None:
+        typer.echo(f"hrsynth: {output} is not drawn: {why}", err=True)
+        output = None
     if output is not None:
         pictures.write(found, output)
     if json:
@@ -207,8 +274,9 @@ def modes(
 
 
 @app.command()
+@_of_robot
 def path(
-    robot: Robot,
+    robot: Source,
     start: Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")],
     goal: Annotated[str, typer.Option("--to", metavar="POSE", help="Where it ends.")],
     observe: Observe = "all",
@@ -218,18 +286,18 @@ def path(
 ) -> None:
     """Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, undecided."""
     from .analysis.aspects.path import path as run
-    from .description import load
     from .present import records
     from .present.text.aspects import path as written
 
     with Progress() as progress:
-        found = run(load(robot), _list(observe), camera, start=start, goal=goal, seed=seed, progress=progress.tell)
+        found = run(robot.load(), _list(observe), camera, start=start, goal=goal, seed=seed, progress=progress.tell)
     typer.echo(records.record("path", found.setting.robot.name, found.to_dict()) if json else written(found))
 
 
 @app.command()
+@_of_robot
 def servo(
-    robot: Robot,
+    robot: Source,
     start: Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")],
     goal: Annotated[str, typer.Option("--to", metavar="POSE", help="Pose whose directions are desired.")],
     observe: Observe = "all",
@@ -249,14 +317,13 @@ def servo(
     seed: Seed = 0,
 ) -> None:
     """A servo run on the directions of legs, simulated: where it ends, and what it passes on the way."""
-    from .description import load
     from .present import records, runs
     from .present.text.servo import servo as written
     from .servo.servo import servo as run
 
     runs.writable(output)
     with Progress() as progress:
-        found = run(load(robot), _list(observe), camera, start=start, goal=goal, gain=gain, noise=noise,
+        found = run(robot.load(), _list(observe), camera, start=start, goal=goal, gain=gain, noise=noise,
                     physics=physics, sense=sense, duration=duration, time=time, seed=seed, progress=progress.tell)
     if output is not None:
         runs.write(found, output)
@@ -286,18 +353,24 @@ def robots(json: Json = False) -> None:
 
 
 @app.command()
+@_of_robot
 def convert(
-    source: Annotated[str, typer.Argument(metavar="IN", help="A robot file, or the name of a shipped robot.")],
-    target: Annotated[str, typer.Argument(metavar="OUT", help="The file to write.")],
+    robot: Source,
+    target: Annotated[str, typer.Argument(metavar="OUT", help="The file to write; its ending says the dialect.")],
+    to: Annotated[str | None, typer.Option(metavar="DIALECT", help="native, gepetto, mjcf or sdf, whatever the "
+                                           "ending.")] = None,
     json: Json = False,
 ) -> None:
-    """Read a robot and write it again (native dialect)."""
-    from .description import load, save
+    """Read a robot in any dialect and write it in another: .urdf native, .yaml Gepetto, .xml MJCF, .sdf SDFormat."""
+    from .description import save
     from .present import records
 
-    mechanism = load(source)
-    save(mechanism, target)
-    fields: dict[str, Any] = {"file": target, "links": len(mechanism.links), "joints": len(mechanism.joints)}
+    mechanism = robot.load()
+    lost = save(mechanism, target, to)
+    for warning in lost:
+        typer.echo(f"hrsynth: {warning}", err=True)
+    fields: dict[str, Any] = {"file": target, "links": len(mechanism.links), "joints": len(mechanism.joints),
+                              "warnings": [str(warning) for warning in lost]}
     typer.echo(records.record("convert", mechanism.name, fields) if json
                else f"{mechanism.name}: {fields['links']} links, {fields['joints']} joints, written to {target}")
 
@@ -347,6 +420,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run the command line; every failure is one line a defect, never a traceback."""
     for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
         os.environ.setdefault(library, "1")
+    gc.set_threshold(50_000)
     for stream in (sys.stdout, sys.stderr):
         if hasattr(stream, "reconfigure"):
             stream.reconfigure(encoding="utf-8", errors="replace")

@@ -150,7 +150,7 @@ class NotConfined(HrsynthError):
 
     def __init__(self, robot: str, reason: str) -> None:
         self.robot, self.reason = robot, reason
-        super().__init__(f"{robot}: its assembly modes cannot be listed: {reason}")
+        super().__init__(f"{robot}: its assembly modes cannot be listed, which is not supported here: {reason}")
 
 
 class NotCertified(HrsynthError):

@@ -43,6 +43,22 @@ SAME_POINT = 1e-7
 SAME_DIRECTION = 1e-7
 """Sine of the angle below which two directions are parallel, cosine below which they are perpendicular."""
 
+NOISE = 1e-4
+"""Deviation (characteristic lengths, radians) up to which a relation in a foreign file (axes parallel or perpendicular,
+points that coincide, equal rods) counts as meant and is made exact: printed digits and CAD stay below."""
+
+EXACT = 1e-11
+"""Deviation (characteristic lengths, radians) below which such a relation holds as well as numbers allow."""
+
+FAINT = 1e-3
+"""Singular value of a file's loops, as part of the largest, below which a direction is held by rounding alone."""
+
+NEARLY_SINGULAR = 5e-3
+"""Weakest singular value, as part of the largest, below which a foreign file's zero pose is left for a firmer one."""
+
+FIRM = 3e-2
+"""Weakest singular value, as part of the largest, at which a pose is firm enough."""
+
 SAME_PLANE = 1e-4
 """Sine of the angle between two planes below which they count as one when directions are put in order for drawing."""
 

@@ -13,7 +13,7 @@ import strategies as some
 from description.samples import FOUR_BAR, every_joint, moved, rotation, with_rods
 from hrsynth.description import native, numerals, spanning, xml
 from hrsynth.description.closure import LoopEnds, residual
-from hrsynth.description.reader import LOOP_TYPES
+from hrsynth.description.urdf import LOOP_TYPES
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism.model import Coupling, Joint, JointType, Limits, Link, Mechanism, Motor
 from hrsynth.mechanism.observation import Direction, Observation

@@ -95,6 +95,6 @@ def check(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
     postures = tuple(map(examiner.examine, configurations))
     swept = None
     if cells is not None:
-        found = sweep(start, question, cells, motion, lambda: tell("grid"))
+        found = sweep(start, question, cells, motion, lambda: tell("grid"), setting.placer)
         swept = GridCheck(cells, tuple(None if each is None else examiner.glance(each) for each in found))
     return Check(setting, postures, listed(examiner.redundant, generic=True), swept)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -19,8 +19,12 @@ from ..kinematics.twin import Twin
 from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import Anatomy, default_observation, dissect, observation_of
 from ..mechanism.normal import NormalForm, normal_form
-from ..mechanism.observation import labels_of
+from ..mechanism.observation import Direction, labels_of
 from ..mechanism.sensors import encoders
+
+if TYPE_CHECKING:
+    from ..kinematics.batch.engine import Batch
+    from ..kinematics.batch.placing import Placer
 
 SAMPLES = 20
 """Configurations of a certificate and of a generic verdict."""
@@ -81,6 +85,21 @@ class Setting:
     def dof(self) -> int:
         """The robot's dof: the dimension of its platform's twists."""
         return self.everything.members[0].relation.dof.decided("the robot's dof")
+
+    @cached_property
+    def batch(self) -> Batch | None:
+        """The robot compiled for many poses, with the default segment of each leg; None where it cannot be."""
+        from ..kinematics.batch.engine import Batch
+
+        return Batch.of(self.anatomy, self.segments, self.motion, (self.everything.start, *self.configurations))
+
+    @cached_property
+    def placer(self) -> Placer | None:
+        """What makes closed configurations of many platform poses; None where a leg is no known subproblem."""
+        from ..kinematics.batch.placing import Placer
+
+        defaults = [o for o in self.segments if isinstance(o, Direction)]
+        return None if self.batch is None else Placer.of(self.batch, self.everything.twin, self.anatomy, defaults)
 
     @cached_property
     def mobility(self) -> Mobility:
@@ -174,7 +193,7 @@ def _observed(anatomy: Anatomy, normal: NormalForm, defaults: dict[str, Observat
         raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
     if observe is None or list(observe) == ["all"]:
         for leg in anatomy.legs:
-            if leg.label not in defaults:
+            if leg.label not in defaults and (leg.links or not defaults):
                 default_observation(anatomy, leg)
         return tuple(defaults.values())
     chosen: dict[tuple[str, ...], Observation] = {}

@@ -5,14 +5,21 @@ from __future__ import annotations
 import contextlib
 import difflib
 import os
+from collections.abc import Iterable
 from importlib import resources
 from pathlib import Path
 
 from ..errors import BadRequest
-from ..mechanism.model import Mechanism
+from ..mechanism.model import Mechanism, Note
 from . import native
 from .files import write_whole
+from .foreign.given import Given, names
+from .foreign.reading import read
 from .tree import spanning
+from .writers import gepetto, mjcf, sdf
+
+DIALECTS = ("native", "gepetto", "mjcf", "sdf")
+ENDINGS = {".xml": "mjcf", ".mjcf": "mjcf", ".sdf": "sdf", ".yaml": "gepetto", ".yml": "gepetto"}
 
 __all__ = ["load", "native", "save", "shipped", "spanning"]
 
@@ -24,37 +31,65 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.urdf"), key=lambda path: path.stem)}
 
 
-def load(robot: str | Path) -> Mechanism:
-    """The mechanism of a robot file, or of a shipped robot given by its name.
+def load(robot: str | Path, *, base: str | None = None, platform: str | None = None,
+         motors: Iterable[str] | str | None = None, observe: Iterable[str] | str | None = None,
+         close: Iterable[str] | str = (), freeze: Iterable[str] | str = ()) -> Mechanism:
+    """The mechanism of a robot file in any dialect, or of a shipped robot given by its name.
+
+    What a file does not say may be given: the ``platform`` link, the joints of the ``motors``, the links to
+    ``observe`` at their default segments, closures ``A:B[:type]`` that make the frames of two links meet, joints to
+    ``freeze``. With ``base`` only what lies between base and platform remains. Lists may be texts with commas. What was
+    guessed or solved is told in the mechanism's ``notes``.
 
     Raises
     ------
     BadRequest
-        For a name that is neither; with the shipped names closest to it.
-    BadRobotFile, LoopsNotClosed
-        For a file that is no assembled robot.
+        For a name that is neither; with the shipped names closest to it. For what has to be given, and for names given
+        that the file does not have.
+    BadRobotFile
+        With every defect of the file and its line.
+    LoopsNotClosed, RankUndecided
+        For a file whose loops stay open, or in which rounded numbers leave no gap between free and held.
     """
+    wishes = Given(base, platform, names(motors), names(close) or (), names(freeze) or (), names(observe))
     path = Path(robot)
     if isinstance(robot, str) and not path.suffix and len(path.parts) == 1:
+        robots = shipped()
         with contextlib.suppress(OSError, ValueError):
             if path.is_file():
-                return native.read(path)
-        robots = shipped()
+                return read(path, wishes)
         if robot in robots:
-            return native.read(robots[robot])
+            return read(robots[robot], wishes)
         if not os.path.exists(robot):
-            close = difflib.get_close_matches(robot, robots, n=5) or list(robots)
+            close_names = difflib.get_close_matches(robot, robots, n=5) or list(robots)
             raise BadRequest("neither a file nor a shipped robot", robot,
-                             "a file, or a name that `hrsynth robots` lists, such as " + ", ".join(close))
-    return native.read(path)
+                             "a file, or a name that `hrsynth robots` lists, such as " + ", ".join(close_names))
+    return read(path, wishes)
 
 
-def save(mechanism: Mechanism, path: str | Path) -> None:
-    """Write a robot file, whole or not at all.
+def save(mechanism: Mechanism, path: str | Path, dialect: str | None = None) -> tuple[Note, ...]:
+    """Write a robot file, whole or not at all; what the dialect cannot say is returned as warnings.
+
+    ``dialect`` is one of ``DIALECTS``; without it the file's ending decides: ``.xml`` and ``.mjcf`` MJCF, ``.sdf``
+    SDFormat, ``.yaml`` Gepetto (with a ``.urdf`` of the same name beside it), anything else the native dialect.
 
     Raises
     ------
     BadRequest
-        Where the file cannot be written, or the mechanism not be said in the native dialect.
+        For an unknown dialect; where the file cannot be written, or the mechanism not be said in the dialect.
     """
-    write_whole(path, native.write(mechanism).encode())
+    target = Path(path)
+    kind = dialect or ENDINGS.get(target.suffix.lower(), "native")
+    if kind == "native":
+        write_whole(path, native.write(mechanism).encode())
+        return ()
+    if kind == "gepetto":
+        tree, closures, lost = gepetto.write(mechanism)
+        write_whole(target.with_suffix(".urdf"), tree.encode())
+        write_whole(target.with_suffix(".yaml"), closures.encode())
+        return lost
+    if kind not in DIALECTS:
+        raise BadRequest("unknown dialect", kind, DIALECTS)
+    text, lost = (mjcf if kind == "mjcf" else sdf).write(mechanism)
+    write_whole(path, text.encode())
+    return lost

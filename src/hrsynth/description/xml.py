@@ -92,7 +92,7 @@ def children(element: Element) -> list[Element]:
 
 def kept(element: Element) -> str:
     """An element as one line of text that means the same; stable when written and read again."""
-    copy = etree.fromstring(etree.tostring(element, with_tail=False), _parser())
+    copy = etree.fromstring(etree.tostring(element, with_tail=False, encoding="utf-8"), _parser())
     for part in copy.iter():
         if part.text is not None and not part.text.strip():
             part.text = None

@@ -59,7 +59,7 @@ def kernel_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank
     columns = matrix.shape[1]
     if 0 in matrix.shape:
         return np.eye(columns), Rank(0, CLEAN)
-    _, s, Vt = np.linalg.svd(matrix, full_matrices=True)
+    _, s, Vt = np.linalg.svd(matrix, full_matrices=matrix.shape[0] < columns)
     rank = rank_of(s, scale)
     return Vt[rank.value :].T, rank
 

@@ -9,6 +9,8 @@ import numpy as np
 
 from ..errors import PoseNotReached
 from ..mechanism.pose import Grid, Pose
+from .batch.grids import ready
+from .batch.placing import Placer
 from .configuration import ClosedConfiguration
 from .misses import worst_leg
 from .parts import PlatformMotion
@@ -47,19 +49,26 @@ def reach(start: ClosedConfiguration, question: Question, pose: Pose,
 
 
 def sweep(start: ClosedConfiguration, question: Question, grid: Grid, motion: PlatformMotion | None = None,
-          progress: Callable[[], None] | None = None) -> tuple[ClosedConfiguration | None, ...]:
+          progress: Callable[[], None] | None = None, placer: Placer | None = None
+          ) -> tuple[ClosedConfiguration | None, ...]:
     """Configurations at the poses of a grid, in its order, each reached from a neighbour; None where that fails from
-    every neighbour. The first is the reachable one nearest to ``start``."""
+    every neighbour. The first is the reachable one nearest to ``start``.
+
+    A ``placer`` gives them at once where the legs are known subproblems and free parts can stay as they are at zero;
+    only the others are led there step by step."""
     motion = motion or generic_motion(start, question)
     goals = [motion.goal(pose, start.twin.mechanism.name) for pose in grid.poses()]
     home = motion.at_home()
     found: dict[int, ClosedConfiguration] = {}
     queue: deque[tuple[int, int]] = deque()
+    at_once, hopeless = ({}, set()) if placer is None else ready(placer, motion, goals)
 
     def settle(cell: int, origin: ClosedConfiguration, halvings: int) -> None:
-        there, came = led(origin, motion, goals[cell], halvings)
+        if cell in hopeless:
+            return
+        there, came = (at_once[cell], 1.0) if cell in at_once else led(origin, motion, goals[cell], halvings)
         if came == 1:
-            found[cell] = nearest(there, goals[cell], home)
+            found[cell] = there if cell in at_once else nearest(there, goals[cell], home)
             queue.extend((other, cell) for other in _neighbours(cell, grid.shape) if other not in found)
             if progress is not None:
                 progress()

@@ -30,6 +30,7 @@ class Twin:
         self._centre: dict[int, Array] = {0: np.zeros(3)}
         self.coordinates: dict[str, tuple[int, ...]] = {}
         """Velocity indices of each joint, in the order of its axes."""
+        self._parts: list[tuple[Joint, str, tuple[str, ...]]] = []
         tree, loops = self._span()
         for joint, parent in tree:
             self._add_tree(joint, parent)
@@ -106,9 +107,12 @@ class Twin:
         point = joint.point / self.length
         placement = pin.SE3(np.eye(3), point - self._centre[index])
         start = self.model.nv
+        names = []
         for number, model in enumerate(self._chain(joint, parent)):
-            index = self.model.addJoint(index, model, placement, f"{joint.name}{suffix}{number or ''}")
+            names.append(f"{joint.name}{suffix}{number or ''}")
+            index = self.model.addJoint(index, model, placement, names[-1])
             placement = pin.SE3.Identity()
+        self._parts.append((joint, parent, tuple(names)))
         self._centre[index] = point
         span = range(start, self.model.nv)
         swapped = turned and joint.type is JointType.UNIVERSAL
@@ -134,7 +138,7 @@ class Twin:
             self.model, half, offset, b, pin.SE3(np.eye(3), point - self._centre[b])))
 
     def _gear_rows(self) -> Array:
-        """One row a coupling: successor's rate − ratio × predecessor's rate."""
+        """One row a coupling: successor's rate − ratio × predecessor's rate (metres, radians)."""
         rows = np.zeros((len(self.mechanism.couplings), self.model.nv))
         for row, coupling in zip(rows, self.mechanism.couplings, strict=True):
             for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
@@ -142,8 +146,17 @@ class Twin:
                             if j.successor == link and j.in_tree and j.type.freedoms == 1]
                 if not carriers:
                     raise BadMechanism(f"coupling {coupling.name!r}: no single joint carries the link", link)
-                row[self.coordinates[carriers[0].name][0]] += factor
+                unit = self.length if carriers[0].type is JointType.PRISMATIC else 1.0
+                row[self.coordinates[carriers[0].name][0]] += factor * unit
         return rows
+
+    def parts(self) -> list[tuple[Joint, str, tuple[str, ...]]]:
+        """The joints of the tree and the cut ones: each with the link it is seen from and the names of its parts."""
+        return list(self._parts)
+
+    def start(self, part: str) -> int:
+        """Where the coordinates of a joint's part start in q."""
+        return int(self.model.joints[self.model.getJointId(part)].idx_q)
 
     def at(self, q: Array) -> None:
         """Bring poses, Jacobians and loop constraints up to date with ``q``."""

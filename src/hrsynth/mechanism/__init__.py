@@ -1,6 +1,7 @@
 """Joint graphs: links, joints, normal form, legs, notation, screws."""
 
-from .model import Coupling, Joint, JointType, Limits, Link, Mechanism, Motor
+from .model import Coupling, Joint, JointType, Limits, Link, Mechanism, Motor, Note
 from .observation import Direction, Observation
 
-__all__ = ["Coupling", "Direction", "Joint", "JointType", "Limits", "Link", "Mechanism", "Motor", "Observation"]
+__all__ = ["Coupling", "Direction", "Joint", "JointType", "Limits", "Link", "Mechanism", "Motor", "Note",
+           "Observation"]

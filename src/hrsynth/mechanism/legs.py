@@ -130,6 +130,8 @@ class Anatomy:
         mechanism = self.mechanism
         graph = WordGraph(mechanism, {mechanism.base, leg.attach}, {mechanism.base, leg.attach, *leg.links})
         graph.recognise()
+        graph.graph.remove_edges_from([(a, b, k) for a, b, k, data in graph.graph.edges(keys=True, data=True)
+                                       if not set(data["edge"].joints) <= set(leg.joints)])
         nodes = nx.shortest_path(graph.graph, mechanism.base, leg.attach)
         return [graph.between(a, b)[0][1] for a, b in pairwise(nodes)]
 

@@ -152,6 +152,18 @@ class Coupling:
     line: int | None = field(default=None, compare=False)
 
 
+@dataclass(frozen=True)
+class Note:
+    """Something that a file does not say and that was settled while it was read: a ``guess`` that an option overrides,
+    or what was ``solved``, ``merged``, ``ignored`` or left ``open``."""
+
+    kind: str
+    text: str
+
+    def __str__(self) -> str:
+        return f"{self.kind}: {self.text}"
+
+
 @dataclass(frozen=True, eq=False)
 class Mechanism:
     """Links, joints, a base, a platform, observations: a frozen value; every change returns a new one."""
@@ -167,6 +179,8 @@ class Mechanism:
     """The reference link, the one that carries the camera; None means the base."""
     xml: tuple[str, ...] = ()
     file: str | None = None
+    notes: tuple[Note, ...] = ()
+    """What reading the file had to settle."""
 
     def __post_init__(self) -> None:
         for key, joint in self.joints.items():

@@ -52,8 +52,8 @@ def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
     fixed = [j for j in mechanism.joints.values() if j.type is JointType.FIXED]
     if not fixed:
         return mechanism
-    rank = [mechanism.base, mechanism.platform, mechanism.reference, *(o.link for o in mechanism.observations)]
-    order = {name: i for i, name in enumerate([*dict.fromkeys(rank), *mechanism.links])}
+    first = (mechanism.base, mechanism.platform, mechanism.reference, *(o.link for o in mechanism.observations))
+    order = {name: i for i, name in enumerate(dict.fromkeys((*first, *mechanism.links)))}
     bonds = nx.Graph(j.links for j in fixed)
     gone: set[str] = set()
     kept_links = []

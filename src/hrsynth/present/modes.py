@@ -17,8 +17,8 @@ from ..mechanism.vectors import Array
 from .scenes import CLOSES, GOAL, NEAR, OPEN, Placed, Scene, scene
 from .sketch import Box, Sketch
 
-MARKS = {GOAL: ("*", 15.0, "the pose itself"), CLOSES: ("o", 8.0, "mode, reachable"),
-         OPEN: ("X", 9.0, "mode, not reachable"), NEAR: ("D", 7.0, "near mode")}
+MARKS = {GOAL: ("*", 15.0, "the pose itself"), CLOSES: ("o", 8.0, "mode, robot can be assembled"),
+         OPEN: ("X", 9.0, "mode, robot cannot be assembled"), NEAR: ("D", 7.0, "near mode")}
 COLOURS = ("tab:orange", "tab:green", "tab:red", "tab:purple", "saddlebrown", "deeppink", "darkcyan", "olive", "navy",
            "goldenrod", "maroon", "black")
 REACHES = ("black", "tab:brown", "tab:gray", "darkslateblue", "darkolivegreen", "teal")
@@ -60,12 +60,18 @@ def picture(found: AssemblyModes) -> bytes:
     return stream.getvalue()
 
 
-def shown(found: AssemblyModes) -> Scene:
-    """What there is to draw; raises ``BadRequest`` for a continuum of modes, or none at all."""
-    name = found.setting.robot.name
+def nothing(found: AssemblyModes) -> str | None:
+    """Why there is nothing to draw: a continuum of modes, or none at all."""
     if found.confined is None or found.found.continuum is not None or not (found.modes or found.near):
-        why = found.found.degenerate or "there is no mode"
-        raise BadRequest(f"{name}: there is nothing to draw: {why}", None, "isolated modes")
+        return found.found.degenerate or "there is no mode"
+    return None
+
+
+def shown(found: AssemblyModes) -> Scene:
+    """What there is to draw; raises ``BadRequest`` where there is nothing."""
+    why = nothing(found)
+    if why is not None:
+        raise BadRequest(f"{found.setting.robot.name}: there is nothing to draw: {why}", None, "isolated modes")
     return scene(found)
 
 

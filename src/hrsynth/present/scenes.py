@@ -108,9 +108,9 @@ def _placed(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) -
     if mode.goal:
         words = "the pose itself"
     elif mode.open:
-        words = "not reachable: " + ("legs " if len(mode.open) > 1 else "leg ") + ", ".join(mode.open)
+        words = "not assembled: " + ("legs " if len(mode.open) > 1 else "leg ") + ", ".join(mode.open)
     else:
-        words = "not reachable: beyond limits" if mode.beyond else "reachable"
+        words = "not assembled: beyond limits" if mode.beyond else "assembled"
     return Placed(label, state, words, plot.marked(mode), bodies, strokes)
 
 

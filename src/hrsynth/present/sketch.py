@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.freedoms import point_text
 from ..mechanism.vectors import Array, perpendicular
 from ..tolerances import SAME_DIRECTION
 from .plots import axis_label
@@ -49,7 +50,8 @@ class Sketch:
         if len(flat) == 2:
             return cls(np.eye(3)[flat], tuple("xyz"[i] for i in flat))
         first = perpendicular(normal, (1.0, 0.0, 0.0))
-        return cls(np.array([first, np.cross(normal, first)]), ("first axis of the plane", "second axis of the plane"))
+        axes = np.array([first, np.cross(normal, first)])
+        return cls(axes, tuple(f"along {point_text(axis)}" for axis in axes))
 
     @property
     def flat(self) -> bool:

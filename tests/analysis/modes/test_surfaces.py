@@ -54,7 +54,7 @@ def test_msolve_lists_the_same_poses(name: str):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", [*FAMILIES, *MEETING])
 def test_msolve_lists_the_same_poses_at_many_instances(name: str):
-    for seed in range(5 if name in SLOWEST else 200):
+    for seed in range(3 if name in SLOWEST else 25):
         check_agreement(name, 1000 + seed)
 
 
@@ -69,7 +69,7 @@ def test_tips_on_surfaces_have_their_number_of_poses(name: str):
 @pytest.mark.slow
 @pytest.mark.parametrize("name", SURFACES)
 def test_tips_on_surfaces_have_their_number_of_poses_at_many_instances(name: str):
-    for seed in range(5 if name in SLOWEST else 200):
+    for seed in range(3 if name in SLOWEST else 25):
         check_member(name, 1000 + seed)
 
 

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...errors import BadRequest
 from ...kinematics.assembly import Assembler, Assembly
 from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.reach import reach
@@ -50,6 +51,8 @@ class AssemblyMode:
     beyond: tuple[str, ...] = ()
     configuration: ClosedConfiguration | None = None
     multiplicity: int = 1
+    proved: bool = False
+    """Whether there is exactly one mode within the radius."""
     bodies: dict[str, Array] | None = None
     """Poses (4, 4) of the bodies on which legs end."""
 
@@ -58,7 +61,7 @@ class AssemblyMode:
         return {"pose": self.pose.to_dict(), "radius": self.radius if np.isfinite(self.radius) else None,
                 "residual": self.residual, "goal": self.goal, "reachable": self.reachable,
                 "type2_distance": self.type2_distance, "open": list(self.open), "beyond": list(self.beyond),
-                "multiplicity": self.multiplicity}
+                "multiplicity": self.multiplicity, "proved": self.proved}
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,7 +92,7 @@ class AssemblyModes:
         found = self.found
         return {"kind": self.kind, "at": self.pose.to_dict(), "within": self.within,
                 "observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
-                "complex": found.complex, "complete": found.complete, "proof": found.proof,
+                "complex": None if found.continuum else found.complex, "complete": found.complete, "proof": found.proof,
                 "modes": [each.to_dict() for each in self.modes], "near": [each.to_dict() for each in self.near],
                 "degenerate": found.degenerate, "continuum": found.continuum}
 
@@ -107,6 +110,8 @@ def modes(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
     Raises ``BadRequest`` for names that there are not, ``PoseNotReached`` for a pose out of reach, ``NotConfined``
     where the tips' paths are none of those known, ``MissingExtra`` where only an external solver could list the modes.
     """
+    if real and observe not in (None, "all", ["all"]):
+        raise BadRequest("the motors are held instead of directions", f"real with observe {observe}", "one of the two")
     progress("sampling")
     setting = prepare(robot, observe, camera, seed=seed)
     measured = Measured.driven(setting) if real else Measured.watched(setting)
@@ -126,8 +131,11 @@ def modes(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
     made = model(confined)
     found = solve(made.system)
     reader = _Reader(setting, measured.question, goal, made)
-    return AssemblyModes(setting, kind, goal, pose, found, tuple(map(reader.read, found.modes)),
-                         tuple(map(reader.read, found.near)), confined, made)
+    at_goal = min(found.modes, key=reader.away, default=None)
+    ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
+    return AssemblyModes(setting, kind, goal, pose, found,
+                         tuple(reader.read(mode, mode is at_goal) for mode in ordered),
+                         tuple(reader.read(mode, False) for mode in found.near), confined, made)
 
 
 class _Reader:
@@ -139,10 +147,15 @@ class _Reader:
         values = measure(goal.twin, goal.q, question.reference, question.observations)[2]
         self.measured = tuple(zip(question.observations, values, strict=True))
 
-    def read(self, mode: Mode) -> AssemblyMode:
-        """What a mode is for the robot."""
+    def away(self, mode: Mode) -> float:
+        """How far a mode is from the goal (characteristic lengths, differences of rotation matrices)."""
+        return max(_difference(X, self.goal.pose(body), self.goal.twin.length)
+                   for body, X in self.made.bodies(mode.q).items())
+
+    def read(self, mode: Mode, nearest: bool) -> AssemblyMode:
+        """What a mode is for the robot; of all modes the ``nearest`` to the goal can be it."""
         bodies, size = self.made.bodies(mode.q), self.goal.twin.length
-        at_goal = all(_alike(bodies[body], self.goal.pose(body), size) for body in bodies)
+        at_goal = nearest and self.away(mode) <= SAME_RELATION
         near = not np.isfinite(mode.radius)
         held = () if near else self.measured
         found = Assembly(self.goal) if at_goal and not near else self.assembler.at(bodies, held)
@@ -152,10 +165,9 @@ class _Reader:
             self.motion.pose(X), mode.radius * scale,
             mode.residual * scale, at_goal, found.reachable,
             None if found.configuration is None else weakest(found.configuration, self.question),
-            found.open, found.beyond, found.configuration, mode.multiplicity, bodies)
+            found.open, found.beyond, found.configuration, mode.multiplicity, mode.proved, bodies)
 
 
-def _alike(X: Array, other: Array, length: float) -> bool:
-    """Whether two poses are one."""
-    return bool(np.max(np.abs(X[:3, 3] - other[:3, 3])) <= SAME_RELATION * length
-                and np.max(np.abs(X[:3, :3] - other[:3, :3])) <= SAME_RELATION)
+def _difference(X: Array, other: Array, length: float) -> float:
+    """The largest difference of two poses."""
+    return float(max(np.max(np.abs(X[:3, 3] - other[:3, 3])) / length, np.max(np.abs(X[:3, :3] - other[:3, :3]))))

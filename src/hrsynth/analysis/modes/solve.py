@@ -43,6 +43,8 @@ class Mode:
     q: Array
     legs: tuple[int, ...] = ()
     multiplicity: int = 1
+    proved: bool = False
+    """Whether there is exactly one mode within the radius."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers."""
@@ -135,15 +137,17 @@ def continuum(text: str, size: int | None) -> Modes:
 def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[Part, Roots]]) -> Modes:
     """The modes among the solutions of a square part; near ones are looked for from those of others too."""
     found = [_mode(system, square, root) for root in roots.real]
+    complete = roots.complete and not (nearly_double(roots) and any(not root.thick for root in roots.real))
     if square.whole:
-        return Modes(roots.complex, tuple(found), roots.complete, _proof(roots), degenerate=_special(roots))
+        return Modes(roots.complex, tuple(found), complete, _proof(roots), degenerate=_special(roots))
     modes = tuple(mode for mode in found if mode.residual <= VANISHES)
     starts = [mode.q for mode in found]
     for other, found_there in others:
         starts += [_mode(system, other, root).q for root in found_there.real]
     near = tuple(_nearly(system, q) for q in stationary(system, starts, [mode.q for mode in modes]))
-    proof = f"{_proof(roots)}; of these, {len(modes)} put the other tips on their curves, to {VANISHES:g} of the size"
-    return Modes(len(modes), modes, roots.complete, proof, near, _special(roots))
+    proof = (f"from {len(square.legs)} of {len(system.curves)} legs: {_proof(roots)}; "
+             f"the other legs fit at {len(modes)} of these, to {VANISHES:g} of the robot's size")
+    return Modes(len(modes), modes, complete, proof, near, _special(roots))
 
 
 def _mode(system: System, square: Part, root: Root) -> Mode:
@@ -151,7 +155,7 @@ def _mode(system: System, square: Part, root: Root) -> Mode:
     q = square.place(parameters)
     own = parameters if isinstance(square, Square) else ()
     return Mode(own, root.radius, residual(system, q), frozen(system.pose(q)), frozen(q), square.legs,
-                root.multiplicity)
+                root.multiplicity, root.unique)
 
 
 def _nearly(system: System, q: Array) -> Mode:
@@ -161,16 +165,18 @@ def _nearly(system: System, q: Array) -> Mode:
 def _proof(roots: Roots) -> str:
     text = f"{roots.method} of degree {roots.degree}"
     if roots.extraneous:
-        text += f" ({roots.extraneous} more roots that are no poses left out)"
-    text += f", {roots.complex} roots isolated"
+        text += f" (besides {roots.extraneous} roots at infinity, which are no poses)"
+    text += f", {roots.complex} {'root' if roots.complex == 1 else 'roots'} isolated"
     if roots.real:
         thin = sum(root.unique and not root.thick for root in roots.real)
         double = sum(root.real and not root.unique for root in roots.real)
         almost = sum(not root.real for root in roots.real)
-        text += f", {len(roots.real) - almost} real, each enclosed with existence and uniqueness proved"
+        sure = len(roots.real) - almost
+        text += f", {sure} real" + (", each enclosed with existence and uniqueness proved" if sure else "")
         text += f" ({thin} for the rounded geometry only)" if thin else ""
         text += f" ({double} not: multiple)" if double else ""
-        text += f", {almost} pairs so close that rounding decides whether they are real" if almost else ""
+        pairs = "one pair" if almost == 1 else f"{almost} pairs"
+        text += f", {pairs} so close that rounding decides whether they are real" if almost else ""
     else:
         text += ", none real"
     return text

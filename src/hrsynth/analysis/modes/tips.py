@@ -82,6 +82,8 @@ def _tip(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfigu
     X = goal.pose(leg.body)
     place = X[:3, :3].T @ (B - X[:3, 3])
     paths = _held_paths(anatomy, question, leg, goal, place)
+    if not leg.fixed and not paths:
+        raise NotConfined(anatomy.mechanism.name, f"leg {leg.label} cannot be moved to see where its tip goes")
     worst = np.inf
     for curve in _candidates(anatomy, leg, B, goal):
         miss = max((float(np.linalg.norm(curve.miss(point))) for point in paths), default=0.0) / goal.twin.length

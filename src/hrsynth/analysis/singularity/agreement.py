@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...errors import Disagreement
+from ...kinematics.batch.placing import Placer
 from ...kinematics.configuration import ClosedConfiguration, closed
 from ...kinematics.ranks import kernel_basis, range_basis
 from ...kinematics.relation import Question, platform_motions, relation
@@ -20,6 +21,7 @@ from ...kinematics.sampling import WEAKEST, wander
 from ...mechanism.vectors import Array
 from ...tolerances import CLOSED, FOLLOWED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT, SHARP
 from .condition import Condition, Named
+from .quick import SPOTS, Quick
 from .structure import Scene, Structure
 
 CHUNK = 250
@@ -54,7 +56,8 @@ class Agreement:
 
 
 def agreement(start: ClosedConfiguration, question: Question, structure: Structure, condition: Condition,
-              count: int, *, seed: int = 0, progress: Callable[[], None] | None = None) -> Agreement:
+              count: int, *, seed: int = 0, progress: Callable[[], None] | None = None,
+              placer: Placer | None = None) -> Agreement:
     """Compare at ``count`` random reachable poses and at poses on the locus.
 
     Raises ``Disagreement`` where the rank, the rows behind the words and the expression do not agree. Poses near
@@ -67,9 +70,15 @@ def agreement(start: ClosedConfiguration, question: Question, structure: Structu
     signs: list[float] = []
     sizes: list[tuple[float, float]] = []
     low: list[tuple[float, ClosedConfiguration]] = []
-    for chunk in _chunks(wander(start, count, seed)):
+    quick = Quick.of(placer, question)
+    walks = wander(start, count, seed) if quick is None else quick.placer.wander(count, seed)
+    for number, chunk in enumerate(_chunks(walks)):
         scene = structure.scene(chunk)
-        ranks, apart = _weakest(scene, question, condition)
+        if quick is None:
+            ranks, apart = _weakest(scene, question, condition)
+        else:
+            ranks, _ = quick.spectrum(chunk, spectrum, seed + number)
+            apart = _weakest(structure.scene(chunk[:: CHUNK // SPOTS]), question, condition)[1]
         matrices = condition.rows(scene)
         rows, values = smallest_of(matrices), condition.expressed(scene)
         angle = max(angle, apart)

@@ -248,6 +248,9 @@ def _gram(structure: Structure) -> Condition:
 def _named(structure: Structure, words: str, expression: Any, signed: bool, *, never: bool = False,
            matrices: Mapping[str, str] | None = None) -> Named:
     """A condition with the meaning of its symbols and the factors that were split off."""
+    import sympy
+
+    expression = sympy.sympify(expression)
     used = {str(symbol) for symbol in expression.free_symbols}
     named = {f.symbol: f.meaning for f in structure.features if f.symbol in used or matrices}
     return Named(words.replace("tau", "τ"), expression, signed, tuple(_lengths(structure.legs)), never,

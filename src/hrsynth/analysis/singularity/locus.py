@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRequest, PlaneNotMet, PoseNotReached
+from ...kinematics.batch.placing import Placer
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.parts import PlatformMotion
 from ...kinematics.reach import reach, sweep
@@ -19,6 +20,7 @@ from ...mechanism.vectors import Array
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from .agreement import descend, spectrum, weakest
 from .measured import Measured
+from .quick import Quick
 
 COARSE = 25
 """Poses a side of the grid that finds how far a plane is reached."""
@@ -75,8 +77,9 @@ def locus(hidden: Measured, real: Measured | None, plane: Pose | None, steps: in
     Raises ``PlaneNotMet`` where no pose of it is reached, ``BadRequest`` where it does not leave two parts free.
     """
     question, motion, start = hidden.question, hidden.setting.motion, hidden.setting.everything.start
-    grid = _grid(start, question, motion, plane, steps, progress)
-    configurations = sweep(start, question, grid, motion, progress)
+    placer = hidden.setting.placer
+    grid = _grid(start, question, motion, plane, steps, progress, placer)
+    configurations = sweep(start, question, grid, motion, progress, placer)
     if not any(configurations):
         raise PlaneNotMet(start.twin.mechanism.name, str(grid.fixed), "none of its poses is reached")
 
@@ -84,7 +87,8 @@ def locus(hidden: Measured, real: Measured | None, plane: Pose | None, steps: in
         condition = measured.condition
         reached = [(i, at) for i, at in enumerate(configurations) if at is not None]
         places, here = [i for i, _ in reached], [at for _, at in reached]
-        smallest, largest = spectrum(here, measured.question)
+        quick = Quick.of(placer, measured.question)
+        smallest, largest = (spectrum(here, measured.question) if quick is None else quick.spectrum(here, spectrum))
         value = condition.expressed(measured.structure.scene(here))
         tables = []
         for column in (value, smallest, 1 / np.where(largest > 0, largest, np.nan)):
@@ -99,7 +103,7 @@ def locus(hidden: Measured, real: Measured | None, plane: Pose | None, steps: in
 
 
 def _grid(start: ClosedConfiguration, question: Question, motion: PlatformMotion, plane: Pose | None, steps: int,
-          progress: Callable[[], None] | None) -> Grid:
+          progress: Callable[[], None] | None, placer: Placer | None) -> Grid:
     plane, names = _axes(start, motion, plane)
     try:
         first = reach(start, question, plane, motion) if plane.given else start
@@ -110,7 +114,7 @@ def _grid(start: ClosedConfiguration, question: Question, motion: PlatformMotion
         half = [np.pi if name == "phi" else wide * start.twin.length for name in names]
         axes = [(name, np.linspace(c - h, c + h, COARSE)) for name, c, h in zip(names, centre, half, strict=True)]
         coarse = Grid(tuple(axes), plane)
-        found = [at is not None for at in sweep(first, question, coarse, motion, progress)]
+        found = [at is not None for at in sweep(first, question, coarse, motion, progress, placer)]
         cells = np.argwhere(np.array(found).reshape(coarse.shape))
         if not len(cells):
             cells = np.array([[COARSE // 2, COARSE // 2]])

@@ -107,7 +107,7 @@ def singular(robot: Mechanism, observe: Sequence[str] | str | None = None, camer
         return Singularity(setting, question, real, verdict, structure, None, words, None, ())
     found = measured.condition
     checked = agreement(setting.everything.start, question, structure, found, points, seed=seed,
-                        progress=lambda: tell("random poses"))
+                        progress=lambda: tell("random poses"), placer=setting.placer)
     tell("singular poses")
     examples = tuple(_example(setting, question, at) for at in checked.on_locus[:EXAMPLES])
     return Singularity(setting, question, real, verdict, structure, found, found.words, checked, examples)

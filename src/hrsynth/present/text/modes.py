@@ -24,24 +24,33 @@ def modes(found: AssemblyModes, file: str | None = None) -> str:
         rows.append(("special", count.degenerate))
     for number, mode in enumerate(found.modes, 1):
         rows += [("", ""), (f"mode {number}", f"{mode.pose}" + ("   (the pose itself)" if mode.goal else "")),
-                 ("", f"enclosed to {mode.radius:.1e}, residual {mode.residual:.1e}"), *_robot(mode)]
+                 ("", f"{_proved(mode)}, residual {mode.residual:.1e}"), *_robot(mode, found.kind)]
     for number, mode in enumerate(found.near, 1):
         rows += [("", ""), (f"near {number}", f"{mode.pose}   residual {mode.residual:.2e}: almost a mode, and none"),
-                 *_robot(mode)]
+                 *_robot(mode, found.kind)]
     if file is not None:
         rows += [("", ""), ("picture", file)]
     return listing(rows)
 
 
-def _robot(mode: AssemblyMode) -> list[tuple[str, str]]:
+def _proved(mode: AssemblyMode) -> str:
+    """What is proved of a mode's place."""
+    if mode.proved:
+        return f"enclosed to {mode.radius:.1e}"
+    return f"not proved, {'a multiple one' if mode.multiplicity > 1 else 'known'} to {mode.radius:.1e}"
+
+
+def _robot(mode: AssemblyMode, kind: str) -> list[tuple[str, str]]:
     """What the real robot does at a mode."""
     if mode.open:
-        return [("", f"the real robot does not close there: leg {', '.join(mode.open)}")]
+        legs = "legs" if len(mode.open) > 1 else "leg"
+        return [("", f"the real robot cannot be assembled there: {legs} {', '.join(mode.open)}")]
     rows = []
     if mode.beyond:
-        rows.append(("", f"the real robot closes there only beyond the limits of {', '.join(mode.beyond)}"))
+        rows.append(("", f"the real robot can be assembled there only beyond the limits of {', '.join(mode.beyond)}"))
     else:
-        rows.append(("", "the real robot closes there"))
+        rows.append(("", "the real robot can be assembled there"))
     if mode.type2_distance is not None:
-        rows.append(("", f"smallest singular value of Mᵀ {mode.type2_distance:.3g}"))
+        matrix = "Mᵀ" if kind == "hidden" else "the motors' Jacobian (motor rates by platform twist)"
+        rows.append(("", f"smallest singular value of {matrix} {mode.type2_distance:.3g}"))
     return rows

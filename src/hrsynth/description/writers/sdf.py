@@ -1,0 +1,77 @@
+"""A mechanism as SDFormat 1.9: its joint graph, axes in the model's frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from lxml import etree
+
+from ...errors import BadRequest
+from ...mechanism.model import Joint, JointType, Mechanism, Note
+from ...mechanism.vectors import Array, inverse
+from .. import numerals, xml
+from ..foreign import own
+from .plain import observed, plain, rotation_quaternion
+
+_SAID = {JointType.REVOLUTE: "revolute", JointType.PRISMATIC: "prismatic", JointType.SPHERICAL: "ball",
+         JointType.UNIVERSAL: "universal", JointType.FIXED: "fixed"}
+WORLD = "world"
+
+
+def write(mechanism: Mechanism) -> tuple[str, tuple[Note, ...]]:
+    """The SDFormat text of a mechanism, and warnings of what is lost."""
+    said = plain(mechanism, tuple(_SAID), tuple(_SAID), tuple(_SAID), content=False)
+    robot, lost = said.mechanism, said.lost
+    if WORLD in robot.links and robot.base != WORLD:
+        raise BadRequest(f"{robot.name}: SDFormat keeps this name for the base", WORLD, "another link name")
+    if robot.couplings:
+        lost = (*lost, Note("warning", "SDFormat has no coupling of joints on different bodies; not written: "
+                                       + ", ".join(coupling.name for coupling in robot.couplings)))
+    root = etree.Element("sdf", version="1.9")
+    model = etree.SubElement(root, "model", name=robot.name, nsmap={own.PREFIX: own.NAMESPACE})
+    for link in robot.links.values():
+        if link.name != WORLD:
+            element = etree.SubElement(model, "link", name=link.name)
+            _pose(element, link.pose)
+    if robot.base != WORLD:
+        weld = etree.SubElement(model, "joint", name=robot.fresh("to_world"), type="fixed")
+        etree.SubElement(weld, "parent").text = WORLD
+        etree.SubElement(weld, "child").text = robot.base
+    for joint in sorted(robot.joints.values(), key=lambda each: not each.in_tree):
+        _joint(model, robot, joint)
+    motors = tuple((joint.motor.name, joint.name) for joint in robot.joints.values() if joint.motor is not None)
+    for key, text in own.sayings(robot.platform, robot.camera, observed(robot), motors):
+        etree.SubElement(model, f"{{{own.NAMESPACE}}}{key}").text = text
+    return xml.text_of(root), lost
+
+
+def _pose(parent: xml.Element, X: Array, keep: bool = False) -> None:
+    """Append a ``<pose>`` unless it says nothing."""
+    position = [numerals.exact(float(value)) for value in X[:3, 3]]
+    if not np.array_equal(X[:3, :3], np.eye(3)):
+        w, x, y, z = (numerals.exact(float(value)) for value in rotation_quaternion(X[:3, :3]))
+        etree.SubElement(parent, "pose", rotation_format="quat_xyzw").text = " ".join([*position, x, y, z, w])
+    elif np.any(X[:3, 3]) or keep:
+        etree.SubElement(parent, "pose").text = " ".join([*position, "0", "0", "0"])
+
+
+def _joint(model: xml.Element, robot: Mechanism, joint: Joint) -> None:
+    bounded = joint.limits is not None and (joint.limits.lower is not None or joint.limits.upper is not None)
+    kind = "continuous" if joint.type is JointType.REVOLUTE and not bounded else _SAID[joint.type]
+    element = etree.SubElement(model, "joint", name=joint.name, type=kind)
+    etree.SubElement(element, "parent").text = joint.predecessor
+    child, host = joint.successor, joint.successor
+    if child == WORLD:
+        raise BadRequest(f"{robot.name}: joint {joint.name!r} has the world for its successor", WORLD, "a link")
+    etree.SubElement(element, "child").text = child
+    X = np.eye(4)
+    X[:3, 3] = (inverse(robot.links[host].pose) @ np.append(joint.point, 1.0))[:3]
+    _pose(element, X)
+    for tag, axis in zip(("axis", "axis2"), joint.axes, strict=False):
+        part = etree.SubElement(element, tag)
+        etree.SubElement(part, "xyz", expressed_in="__model__").text = numerals.axis(axis)
+        if joint.limits is not None and tag == "axis":
+            limit = etree.SubElement(part, "limit")
+            for key in ("lower", "upper", "effort", "velocity"):
+                value = getattr(joint.limits, key)
+                if value is not None:
+                    etree.SubElement(limit, key).text = numerals.exact(value)

@@ -1,0 +1,38 @@
+"""A part of a mechanism: all that lies between a base and a platform of one's own choice, nothing else."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import networkx as nx
+
+from ..errors import BadRequest
+from .model import Mechanism, Note
+
+
+def between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
+    """The links and joints on any way from ``base`` to ``platform`` that visits no link twice; the base rests.
+
+    Open branches and loops that hang on one link are left out: they do not hinder. Raises ``BadRequest`` for unknown
+    links and where no way joins the two.
+    """
+    for role, link in (("base", base), ("platform", platform)):
+        if link not in mechanism.links:
+            raise BadRequest(f"{mechanism.name}: no such {role} link", link, ", ".join(list(mechanism.links)[:20]))
+    if base == platform:
+        raise BadRequest(f"{mechanism.name}: base and platform are one link", base, "two links")
+    graph: nx.Graph[str] = nx.Graph(mechanism.graph)
+    if not nx.has_path(graph, base, platform):
+        raise BadRequest(f"{mechanism.name}: no chain of joints from {base!r} to", platform, "a link that is connected")
+    graph.add_edge(base, platform)
+    parts: list[set[str]] = list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
+    inside = next(part for part in parts if {base, platform} <= part)
+    gone = [link for link in mechanism.links if link not in inside]
+    camera = mechanism.camera if mechanism.camera in inside else None
+    observations = tuple(o for o in mechanism.observations if o.link in inside)
+    notes = mechanism.notes
+    if gone:
+        notes = (*notes, Note("ignored", f"{len(gone)} links that are not between {base!r} and {platform!r}: "
+                                         + ", ".join(gone[:5]) + (" …" if gone[5:] else "")))
+    kept = replace(mechanism, base=base, platform=platform, camera=camera, observations=observations, notes=notes)
+    return kept.changed(remove_links=gone)

@@ -1,0 +1,189 @@
+"""Hostile and broken files: refused in one line, exit status 2, within 5 s and 1 GB; nothing fetched or written."""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import time
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+
+from description.foreign.examples import FILES, MJCF, SDF, URDF
+from hrsynth.description import load
+from hrsynth.errors import HrsynthError
+
+SECONDS, BYTES = 5, 1_000_000_000
+
+
+def assert_refused(path: Path, *words: str) -> str:
+    start = time.process_time()
+    before = sorted(each.name for each in path.parent.iterdir())
+    with pytest.raises(HrsynthError) as caught:
+        load(path)
+    assert time.process_time() - start < SECONDS
+    assert sorted(each.name for each in path.parent.iterdir()) == before
+    assert caught.value.exit_status == 2
+    lines = caught.value.lines()
+    assert all("\n" not in line and len(line) < 1000 for line in lines)
+    assert all(word in lines[0] for word in words), lines[0]
+    return lines[0]
+
+
+def made(folder: Path, text: str | bytes, name: str = "robot.xml") -> Path:
+    (folder / name).write_bytes(text if isinstance(text, bytes) else text.encode())
+    return folder / name
+
+
+ONE = {"urdf": URDF["urdf+"], "mjcf": MJCF["connect"], "sdf": SDF["1.7"]}
+
+
+@pytest.mark.parametrize("dialect", ONE)
+def test_entities_are_not_expanded(dialect: str, tmp_path: Path):
+    names = "abcdefghij"
+    bomb = "".join(f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in pairwise(names))
+    for head in (f'<!DOCTYPE x [<!ENTITY a "ha">{bomb}]>', '<!DOCTYPE x SYSTEM "file:///etc/passwd">',
+                 '<!DOCTYPE x [<!ENTITY a SYSTEM "http://127.0.0.1:9/x">]>'):
+        assert_refused(made(tmp_path, head + ONE[dialect].replace("four_bar", "&a;", 1)), "a document type declaration")
+
+
+@pytest.mark.parametrize("dialect", ONE)
+def test_broken_text_is_refused_with_its_line(dialect: str, tmp_path: Path):
+    text = ONE[dialect]
+    assert_refused(made(tmp_path, text.encode("utf-16")), "not UTF-8")
+    assert_refused(made(tmp_path, text.encode().replace(b"four_bar", b"four\xff", 1)), "not UTF-8")
+    for cut in (10, 100, len(text) - 3):
+        assert_refused(made(tmp_path, text[:cut]), "malformed XML")
+    assert_refused(made(tmp_path, ""), "an empty file")
+
+
+@pytest.mark.parametrize("dialect", ONE)
+@pytest.mark.parametrize("number", ["nan", "inf", "-inf", "1e400", "1e10", "0x1", "1_0", "١"])
+def test_numbers_are_numbers(dialect: str, number: str, tmp_path: Path):
+    text = ONE[dialect].replace("0.0 0.0 0.0", f"0.0 {number} 0.0", 1)
+    assert number in text
+    assert_refused(made(tmp_path, text))
+
+
+def test_deep_nesting_is_assert_refused(tmp_path: Path):
+    deep = "<body><joint/>" * 5000 + "</body>" * 5000
+    assert_refused(made(tmp_path, f"<mujoco><worldbody>{deep}</worldbody></mujoco>"), "malformed XML")
+    assert_refused(made(tmp_path, '<sdf version="1.9">' + '<model name="m">' * 5000 + "</model>" * 5000 + "</sdf>"))
+    assert_refused(made(tmp_path, "<mujoco>" + '<default class="a">' * 250 + "</default>" * 250 + "</mujoco>"))
+    models = "".join(f'<model name="m{i}">' for i in range(100)) + "<link name='l'/>" + "</model>" * 100
+    assert_refused(made(tmp_path, f'<sdf version="1.9">{models}</sdf>'))
+
+
+LINK = "<link name='l{0}'/>"
+CHAIN = LINK + "<joint name='j{0}' type='fixed'><parent link='l{1}'/><child link='l{0}'/></joint>"
+MANY = {
+    "urdf": ("<robot name='r'>{}</robot>", LINK, 600_000),
+    "urdf chain": ("<robot name='r'><link name='l-1'/>{}</robot>", CHAIN, 100_000),
+    "mjcf": ("<mujoco><worldbody>{}</worldbody></mujoco>", "<body><joint/></body>", 500_000),
+    "sdf": ("<sdf version='1.9'><model name='m'>{}</model></sdf>", LINK, 500_000),
+    "just too many": ("<robot name='r'><link name='l-1'/>{}</robot>", CHAIN, 4_001),
+    "just not too many": ("<robot name='r'><link name='l-1'/>{}</robot>", CHAIN.replace("fixed", "continuous"), 1_990),
+}
+
+
+@pytest.mark.parametrize("name", [pytest.param(each, marks=pytest.mark.slow) if number > 1 else each
+                                  for number, each in enumerate(MANY)])
+def test_a_million_links_are_refused_in_time_and_memory(name: str, tmp_path: Path):
+    frame, part, count = MANY[name]
+    path = made(tmp_path, frame.format("".join(part.format(i, i - 1) for i in range(count))))
+    code = (f"import resource; resource.setrlimit(resource.RLIMIT_CPU, ({SECONDS}, {SECONDS}))\n"
+            f"from hrsynth.description import load\nfrom hrsynth.cli import main\n"
+            f"main(['convert', {str(path)!r}, {str(tmp_path / 'out.sdf')!r}])")
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    few = name == "just not too many"
+    assert run.returncode == (0 if few else 2), run.stderr[-500:]
+    assert (tmp_path / "out.sdf").exists() is few
+    assert len(run.stderr.splitlines()) == 1
+    assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 < BYTES
+
+
+def test_includes_stay_in_their_folder_and_come_once(tmp_path: Path):
+    (tmp_path / "secret.xml").write_text("<mujoco><worldbody><body name='s'><joint/></body></worldbody></mujoco>")
+    folder = tmp_path / "model"
+    (folder / "parts").mkdir(parents=True)
+    arm = "<body name='arm'><joint name='j'/></body>"
+    (folder / "parts" / "arm.xml").write_text(f"<mujocoinclude>{arm}</mujocoinclude>")
+    main = "<mujoco><worldbody>{}</worldbody></mujoco>"
+    robot = load(made(folder, main.format('<include file="parts/arm.xml"/>')))
+    assert list(robot.joints) == ["j"]
+    for name in ("../secret.xml", str(tmp_path / "secret.xml"), "", "parts", "none.xml", "\udcff", "a\0b"[:1]):
+        assert_refused(made(folder, main.format(f'<include file="{name}"/>'.encode("utf-8", "replace").decode())))
+    (folder / "link.xml").symlink_to(tmp_path / "secret.xml")
+    assert_refused(made(folder, main.format('<include file="link.xml"/>')), "outside of the model's folder")
+    assert_refused(made(folder, main.format('<include file="robot.xml"/>')), "included again")
+    (folder / "parts" / "a.xml").write_text('<mujocoinclude><include file="parts/b.xml"/></mujocoinclude>')
+    (folder / "parts" / "b.xml").write_text('<mujocoinclude><include file="parts/a.xml"/></mujocoinclude>')
+    assert_refused(made(folder, main.format('<include file="parts/a.xml"/>')), "included again")
+
+
+def test_sdf_includes_are_never_fetched(tmp_path: Path):
+    text = SDF["1.7"].replace("</model>", "<include><uri>http://127.0.0.1:9/model</uri></include></model>")
+    assert_refused(made(tmp_path, text, "robot.sdf"), "other files are not fetched")
+
+
+@pytest.mark.parametrize("frames", ['<frame name="f" attached_to="g"/><frame name="g" attached_to="f"/>',
+                                    '<frame name="f"><pose relative_to="g"/></frame><frame name="g"><pose '
+                                    'relative_to="f"/></frame>', '<frame name="f" attached_to="none"/>'])
+def test_frames_in_a_ring_or_nowhere(frames: str, tmp_path: Path):
+    joint = '<joint name="j" type="revolute"><parent>f</parent><child>crank</child></joint>'
+    assert_refused(made(tmp_path, SDF["1.7"].replace("</model>", frames + joint + "</model>"), "robot.sdf"))
+
+
+@pytest.mark.parametrize("yaml", [
+    "a: &a [1]\nclosed_loop: [*a]", "closed_loop: " + "[" * 3000 + "]" * 3000,
+    "closed_loop: !!python/object:os.system x",
+    "closed_loop: 3", "closed_loop: [['one', 'none']]", "closed_loop: [['one', 'one']]", "closed_loop: [[1, 2]]",
+    "name_mot: ['none']", "joint_name: ['a']\njoint_type: ['ODD']", "joint_name: ['a']", "closed_loop: ['one']",
+    "closed_loop: [\x01]", "name_mot: {a: b}"])
+def test_yaml_is_data(yaml: str, tmp_path: Path):
+    files = FILES["gepetto: 3d"]
+    (tmp_path / "robot.yaml").write_text(yaml)
+    assert_refused(made(tmp_path, files["robot.urdf"], "robot.urdf"))
+
+
+def test_what_is_no_robot_file_or_folder(tmp_path: Path):
+    assert_refused(made(tmp_path, "<html/>", "page.xml"))
+    assert_refused(made(tmp_path, "a: 1", "alone.yaml"), "no URDF file beside")
+    for text, name in ((ONE["urdf"], "a.urdf"), (ONE["sdf"], "b.sdf")):
+        made(tmp_path / "two" if (tmp_path / "two").is_dir() else _folder(tmp_path / "two"), text, name)
+    with pytest.raises(HrsynthError, match="a folder of 2 robot files"):
+        load(tmp_path / "two")
+
+
+def _folder(path: Path) -> Path:
+    path.mkdir()
+    return path
+
+
+def test_a_xacro_file_without_the_package_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    from hrsynth.description.foreign import xacro
+
+    monkeypatch.setattr(xacro.importlib.util, "find_spec", lambda name: None)
+    text = ONE["urdf"].replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"', 1).replace(
+        "</robot>", '<xacro:property name="x" value="1"/></robot>')
+    assert_refused(made(tmp_path, text), "the package xacro is not installed")
+
+
+def test_xacro_reads_nothing_elsewhere_and_comes_to_an_end(tmp_path: Path):
+    pytest.importorskip("xacro")
+    folder = _folder(tmp_path / "package")
+    inner = _folder(folder / "urdf")
+    head = '<robot name="r" xmlns:xacro="http://www.ros.org/wiki/xacro">'
+    (inner / "parts.xacro").write_text(head + '<xacro:property name="h" value="0.7"/></robot>')
+    (tmp_path / "secret.xacro").write_text(head + "</robot>")
+    tree = ONE["urdf"].split("\n", 1)[1].replace("</robot>", "")
+    good = head + '<xacro:include filename="$(find package)/urdf/parts.xacro"/>' + tree + "</robot>"
+    assert load(made(inner, good, "robot.xacro")).name == "r"
+    for name in ("../../secret.xacro", str(tmp_path / "secret.xacro"), "$(find package)/../../secret.xacro"):
+        other = good.replace("$(find package)/urdf/parts.xacro", name)
+        assert_refused(made(inner, other, "robot.xacro"), "xacro refuses it")
+    endless = head + '<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/></robot>'
+    assert_refused(made(inner, endless, "robot.xacro"), "xacro")
+    assert_refused(made(inner, head + "${(9**9**9)}</robot>", "robot.xacro"), "xacro")

@@ -1,0 +1,94 @@
+"""Written in any dialect and read back, a robot is the same; MuJoCo loads it and counts the same freedoms."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from description.foreign.test_traps import bars, full_mobility, origin, read
+from description.samples import every_joint
+from hrsynth.description import load, save, shipped, spanning
+from hrsynth.description.writers import mjcf
+from hrsynth.errors import BadRequest
+from hrsynth.kinematics.ranks import rank_of
+from hrsynth.mechanism import JointType, Mechanism
+
+ENDINGS = (".xml", ".sdf", ".yaml")
+SOME = ("3rps", "quattro", "rprpr_m1", "gough_stewart")
+ROBOTS = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in shipped()]
+KINDS = [kind for kind in JointType if kind is not JointType.FREE]
+
+
+def bare(robot: Mechanism) -> Mechanism:
+    """Without what only the native dialect keeps."""
+    links = {name: replace(link, xml=()) for name, link in robot.links.items()}
+    joints = {name: replace(joint, xml=(), limits=None) for name, joint in robot.joints.items()}
+    return replace(robot, xml=(), links=links, joints=joints)
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("name", ROBOTS)
+def test_a_shipped_robot_comes_back_the_same(name: str, ending: str, tmp_path: Path):
+    robot = load(name)
+    lost = save(robot, tmp_path / f"robot{ending}")
+    back = load(tmp_path / f"robot{ending}")
+    assert back.differences(spanning(robot)) == []
+    assert back.name == robot.name
+    assert back.notes == ()
+    assert lost == ()
+
+
+@pytest.mark.parametrize("ending", ENDINGS)
+@pytest.mark.parametrize("seed", [0, 2])
+def test_joints_of_every_type_come_back(seed: int, ending: str, tmp_path: Path):
+    robot = spanning(every_joint([*KINDS, *KINDS], KINDS, seed))
+    lost = save(robot, tmp_path / f"robot{ending}")
+    back = load(tmp_path / f"robot{ending}")
+    fixed = {name for name, joint in robot.joints.items() if joint.type is JointType.FIXED and joint.in_tree}
+    names = {name for name in fixed if name not in back.joints}
+    renamed = bare(robot).changed(remove_joints=names)
+    found = bare(back)
+    assert len(found.joints) == len(robot.joints)
+    found = found.changed(remove_joints=[name for name in found.joints if name not in robot.joints])
+    assert found.differences(renamed) == []
+    assert bool(names) is (ending == ".xml")
+    assert all(note.kind == "warning" for note in lost)
+    assert any("fixed joints" in note.text for note in lost) is bool(names)
+
+
+def test_gears_are_written_where_the_dialect_has_them(tmp_path: Path):
+    text = bars([("p", "one", "base", origin(0)), ("q", "two", "one", origin(1))], "").replace(
+        '<child link="two"/>', '<child link="two"/><mimic joint="p" multiplier="-2"/>')
+    robot = read(tmp_path, text)
+    for ending in (".xml", ".yaml"):
+        assert save(robot, tmp_path / f"out{ending}") == ()
+        back = load(tmp_path / f"out{ending}")
+        assert [(c.predecessor, c.successor, c.ratio) for c in back.couplings] == [("one", "two", -2.0)]
+        assert full_mobility(back) == 1
+    (lost,) = save(robot, tmp_path / "out.sdf")
+    assert "no coupling" in lost.text
+
+
+def test_an_unknown_dialect_is_refused_and_the_given_one_counts(tmp_path: Path):
+    with pytest.raises(BadRequest, match="native, gepetto, mjcf, sdf"):
+        save(load("3rps"), tmp_path / "a.urdf", "usd")
+    save(load("3rps"), tmp_path / "a.txt", "sdf")
+    assert load(tmp_path / "a.txt").differences(load("3rps")) == []
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_mujoco_loads_what_is_written_and_counts_the_same_freedoms(name: str):
+    mujoco = pytest.importorskip("mujoco")
+    robot = load(name)
+    model = mujoco.MjModel.from_xml_string(mjcf.write(robot)[0])
+    model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    J = data.efc_J.reshape(-1, model.nv)[: data.ne]
+    rank = rank_of(np.linalg.svd(J, compute_uv=False)).decided(name)
+    assert np.max(np.abs(data.efc_pos[: data.ne])) < 1e-12
+    assert model.nv - rank == full_mobility(robot)
+    assert model.nu >= sum(joint.actuated for joint in robot.joints.values())

@@ -1,0 +1,81 @@
+"""The command line over files of other tools: options, remarks on standard error, conversions."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from description.foreign.examples import FILES
+from description.foreign.test_dialects import written
+from description.foreign.test_traps import bars, origin
+from hrsynth.cli import _run
+
+COMMANDS = ("derive", "legs", "check", "singular", "advise", "modes", "path", "convert")
+
+
+@pytest.fixture
+def call(capfd: pytest.CaptureFixture[str]):
+    def run(*arguments: object) -> tuple[int, str, list[str]]:
+        capfd.readouterr()
+        status = _run([str(argument) for argument in arguments])
+        out, err = capfd.readouterr()
+        return status, out, err.splitlines()
+
+    return run
+
+
+def test_check_tells_what_was_guessed_and_json_stays_clean(call, tmp_path: Path):
+    path = written(tmp_path, FILES["sdf: 1.7"])
+    status, out, remarks = call("check", path, "--json")
+    assert status == 0
+    assert json.loads(out)["configurations"][0]["mobility"] == {"total": 1, "idle": 0}
+    (guess,) = remarks
+    assert guess.startswith("hrsynth: guess: the platform is link 'bar', the farthest from the base (--platform LINK")
+    status, out, remarks = call("check", path, "--platform", "bar", "--motors", "a", "--observe", "crank", "--json")
+    assert (status, remarks) == (0, [])
+    assert json.loads(out)["configurations"][0]["real"] is not None
+
+
+@pytest.mark.parametrize("command", COMMANDS)
+def test_every_command_takes_what_a_file_does_not_say(call, command: str):
+    status, out, _ = call(command, "--help")
+    assert status == 0
+    for option in ("--base", "--platform", "--motors", "--close", "--freeze"):
+        assert option in out
+
+
+def test_closures_parts_and_frozen_joints_from_the_command_line(call, tmp_path: Path):
+    links = [("p", "one", "base", origin(0)), ("q", "two", "one", origin(1)), ("r", "three", "two", origin(1))]
+    chain = bars(links, "")
+    path = written(tmp_path, {"robot.urdf": chain})
+    status, out, remarks = call("check", path, "--base", "one", "--platform", "three", "--json")
+    assert status == 0
+    assert json.loads(out)["configurations"][0]["dof"] == 2
+    assert remarks == ["hrsynth: ignored: 1 links that are not between 'one' and 'three': base"]
+    status, out, _ = call("check", path, "--freeze", "p", "--json")
+    assert json.loads(out)["configurations"][0]["dof"] == 2
+
+
+@pytest.mark.parametrize("arguments", [("--platform", "none"), ("--base", "none"), ("--motors", "none"),
+                                       ("--close", "x"), ("--freeze", "none")])
+def test_wrong_names_are_refused_in_one_line(call, arguments: tuple[str, str], tmp_path: Path):
+    status, out, lines = call("check", written(tmp_path, FILES["mjcf: connect"]), *arguments)
+    assert (status, out, len(lines)) == (2, "", 1)
+    assert lines[0].startswith("hrsynth: ")
+
+
+def test_convert_goes_between_all_dialects(call, tmp_path: Path):
+    source = written(tmp_path, FILES["urdf: urdf+"])
+    before = source
+    for name in ("a.xml", "b.sdf", "c.yaml", "d.urdf"):
+        status, out, _ = call("convert", before, tmp_path / name, "--platform", "bar", "--json")
+        assert status == 0
+        assert json.loads(out)["joints"] == 4
+        before = tmp_path / name
+    assert (tmp_path / "c.urdf").is_file()
+    assert call("check", tmp_path / "d.urdf")[2] == []
+    status, _, lines = call("convert", source, tmp_path / "e.xml", "--to", "usd")
+    assert (status, len([line for line in lines if "unknown dialect" in line])) == (2, 1)
+    assert not (tmp_path / "e.xml").exists()
