@@ -46,7 +46,7 @@ def test_the_table_has_every_replay():
     assert len(readme.block(TEXT, replays.START).splitlines()) == 2 + len(REPLAYS)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_the_replays_are_fresh():
     pytest.importorskip("mujoco")
     assert readme.block(TEXT, replays.START) == replays.table(), "the README is stale: make readme"

@@ -125,7 +125,7 @@ def test_far_runs_end_as_they_are_named():
         check_sides(found, aspects)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", CONTROLLABLE)
 def test_more_far_runs_end_as_they_are_named(name: str):
     aspects = Aspects.of(load(name))
