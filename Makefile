@@ -52,7 +52,7 @@ readme: setup  ## regenerate the README's tables
 bench: setup-all  ## run the benchmarks and write their table in the README (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py README.md
 
-pictures: setup  ## draw the pictures in docs/pictures again
+pictures: setup-all  ## draw the pictures in docs/pictures again
 	@mkdir -p docs/pictures
 	@$(BIN)/hrsynth modes rrrrr_m1 -o docs/pictures/modes_rrrrr.png > /dev/null
 	@$(BIN)/hrsynth modes 3rrr_m1 -o docs/pictures/modes_3rrr.png > /dev/null
@@ -63,6 +63,7 @@ pictures: setup  ## draw the pictures in docs/pictures again
 	@$(BIN)/hrsynth modes delta --real -o docs/pictures/modes_delta_real.png > /dev/null
 	@$(BIN)/hrsynth servo quattro --observe 1,4 --from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0 -o docs/pictures/servo_quattro.png > /dev/null
 	@$(BIN)/hrsynth servo 3rpr_m1 --from x=-0.08,y=-0.06,phi=-10deg --to x=0.034,y=0.23,phi=23deg -o docs/pictures/servo_3rpr.png > /dev/null
+	@$(BIN)/hrsynth servo quattro --observe 1,4 --from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0 -o docs/pictures/servo_quattro.gif > /dev/null
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt

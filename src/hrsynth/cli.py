@@ -312,7 +312,8 @@ def servo(
     = False,
     sense: Annotated[str, typer.Option(metavar="SENSE", help="exact, edges (of the legs before a camera) or pictures "
                                        "(rendered).")] = "exact",
-    output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Draw the run (.png).")] = None,
+    output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Draw the run: curves (.png) or "
+                                               "an animation (.gif).")] = None,
     json: Json = False,
     seed: Seed = 0,
 ) -> None:

@@ -10,7 +10,9 @@ import numpy as np
 from ..description.files import require_folder, write_whole
 from ..errors import BadRequest
 from ..mechanism.vectors import Array
+from ..servo.pictures import drawing
 from ..servo.result import Servo
+from .films import film
 from .plots import panels, png
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
@@ -23,17 +25,20 @@ SHOWN = 1e-3
 
 
 def writable(output: str | None) -> None:
-    """Raise ``BadRequest`` where the file's ending is no format, or its folder is not there."""
+    """Raise ``BadRequest`` where the file's ending is no format, or its folder is not there, and ``MissingExtra``."""
     if output is None:
         return
-    if Path(output).suffix.lower() != ".png":
-        raise BadRequest("cannot draw the run: unknown ending", output, ".png")
+    ending = Path(output).suffix.lower()
+    if ending not in (".png", ".gif"):
+        raise BadRequest("cannot draw the run: unknown ending", output, ".png (curves) or .gif (what a camera sees)")
+    if ending == ".gif":
+        drawing()
     require_folder(output)
 
 
 def write(found: Servo, file: str) -> None:
-    """Draw the run in a file, whole or not at all."""
-    write_whole(file, picture(found))
+    """Draw the run in a file, whole or not at all: curves (.png), or what a camera sees (.gif)."""
+    write_whole(file, film(found) if Path(file).suffix.lower() == ".gif" else picture(found))
 
 
 def picture(found: Servo) -> bytes:

@@ -137,22 +137,32 @@ def _moved(normal: Array, ends: Array, shift: Array) -> Array:
 def placed(rods: Sequence[Rod], reference: str, poses: Sequence[Poses], blank: Camera | None = None) -> Camera:
     """A camera on the reference link from which all rods lie in the picture at all given poses, where the rebuilt
     directions suffer least from errors of pixels: among places on a sphere of directions around them."""
-    blank = Camera(np.eye(4)) if blank is None else blank
-    sets = [np.array([inverse(X(reference)) @ X(rod.link) for rod in rods]) for X in poses]
-    ends = np.array([[rod.ends @ X[:3, :3].T + X[:3, 3] for rod, X in zip(rods, each, strict=True)] for each in sets])
-    middle = ends.reshape(-1, 3).mean(axis=0)
-    best, place = np.inf, np.eye(4)
+    ends = np.array([seen(rods, reference, X) for X in poses])
+    best, found = np.inf, Camera(np.eye(4))
     for ahead in _sphere(VIEWS):
-        right = perpendicular(ahead)
-        R = np.column_stack([right, np.cross(ahead, right), ahead])
-        local = (ends - middle) @ R
-        half = MARGIN * np.array([blank.width, blank.height]) / 2 / blank.focal
-        back = float(np.max(np.abs(local[..., :2]) / half - local[..., 2:]))
-        local[..., 2] += back
+        camera = facing(ends, ahead, perpendicular(ahead), blank)
+        local = (ends - camera.place[:3, 3]) @ camera.place[:3, :3]
         score = max(sensitivity(segment, rod.radius) for each in local for segment, rod in zip(each, rods, strict=True))
         if score < best:
-            best, place = score, pose(middle - back * ahead, R)
-    return Camera(place, blank.focal, blank.width, blank.height)
+            best, found = score, camera
+    return found
+
+
+def seen(rods: Sequence[Rod], reference: str, poses: Poses) -> Array:
+    """The ends of rods (rods, 2, 3) in the frame of the reference link."""
+    frames = [inverse(poses(reference)) @ poses(rod.link) for rod in rods]
+    return np.array([rod.ends @ X[:3, :3].T + X[:3, 3] for rod, X in zip(rods, frames, strict=True)])
+
+
+def facing(points: Array, ahead: Array, right: Array, blank: Camera | None = None) -> Camera:
+    """The camera that looks along ``ahead``, so far back that all points (…, 3) lie in its picture."""
+    blank = Camera(np.eye(4)) if blank is None else blank
+    middle = points.reshape(-1, 3).mean(axis=0)
+    R = np.column_stack([right, np.cross(ahead, right), ahead])
+    local = (points - middle) @ R
+    half = MARGIN * np.array([blank.width, blank.height]) / 2 / blank.focal
+    back = float(np.max(np.abs(local[..., :2]) / half - local[..., 2:]))
+    return Camera(pose(middle - back * ahead, R), blank.focal, blank.width, blank.height)
 
 
 def sensitivity(ends: Array, radius: float) -> float:
