@@ -13,6 +13,7 @@ from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest, HrsynthError, MissingExtra, NotConfined, PoseNotReached
 from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.pose import Pose
 from hrsynth.mechanism.vectors import Array, pose
 from kinematics.robots import state_of
@@ -244,3 +245,23 @@ def test_a_robot_is_closed_where_its_modes_are():
     assert len(compared(found, FEW).met) == len(found.modes) == 2
     poses = [bodies_of(found, mode.configuration)["platform"] for mode in found.modes]
     assert np.abs(poses[0] - poses[1]).max() > 1e-2
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_four_bar_has_two_modes_with_one_link_watched_and_one_with_both(seed: int):
+    """With one crank held the coupler turns over; with both held, legs at rest, only the pose itself is left."""
+    rng = np.random.default_rng(seed)
+    corners = np.array([[0, 0, 0], [0.1, 0, 0.4], [0.6, 0, 0.5], [0.5, 0, 0]]) + rng.normal(scale=0.03, size=(4, 3))
+    corners[:, 1] = 0
+    built = Builder("four_bar")
+    for name, corner in (("base", corners[0]), ("crank", corners[0]), ("coupler", corners[1]), ("rocker", corners[3])):
+        built.link(name, corner)
+    for number, (one, other) in enumerate([("base", "crank"), ("crank", "coupler"), ("coupler", "rocker"),
+                                           ("rocker", "base")]):
+        built.joint(f"hinge_{number}", "R", one, other, corners[number], axis=(0, 1, 0), motor=number == 0)
+    robot = built.build("coupler")
+    for observe, count in ((["1"], 2), (["2"], 2), (None, 1)):
+        found = modes(robot, observe)
+        assert (found.found.complex, len(found.modes), found.found.complete) == (count, count, True)
+        assert found.modes[0].goal
+        assert all(mode.reachable for mode in found.modes)

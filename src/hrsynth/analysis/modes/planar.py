@@ -18,7 +18,7 @@ from .certify import Equation
 from .conics import Conic, Frame, Numbers, direction, planar_frame
 from .curves import Circle, Curve, Line, Point, Surface, cross, extent, length
 from .quadrics import Chart, Moving, on_circle, shifting
-from .squares import Square, distance, on_sphere, single
+from .squares import Square, distance, on_sphere, resting, single
 from .systems import System
 
 
@@ -82,10 +82,13 @@ class Planar(System):
         return Chart(frame, 4, self.curves, tips, (on_circle(4, 3, 4),), place)
 
     def squares(self) -> Iterator[Square]:
-        """A pivot and a curve, or three curves in each order that two tips apart allow."""
+        """Two pivots, a pivot and a curve, or three curves in each order that two tips apart allow."""
         points = [k for k, curve in enumerate(self.curves) if isinstance(curve, Point)]
         moving = [k for k in range(len(self.curves)) if k not in points]
         apart = SAME_POINT * self.size
+        for i, j in combinations(points, 2):
+            if length(self.tips[i] - self.tips[j]) > apart:
+                yield resting((i, j), self._square((i, j), False).place(()), False)
         for i, j in ((i, j) for i in points for j in moving):
             if length(self.tips[i] - self.tips[j]) > apart:
                 yield self._square((i, j), len(self.curves) == 2)

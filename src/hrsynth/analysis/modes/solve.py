@@ -163,6 +163,8 @@ def _nearly(system: System, q: Array) -> Mode:
 
 
 def _proof(roots: Roots) -> str:
+    if not roots.degree and roots.complex:
+        return "tips at rest, which leave one pose"
     text = f"{roots.method} of degree {roots.degree}"
     if roots.extraneous:
         text += f" (besides {roots.extraneous} roots at infinity, which are no poses)"

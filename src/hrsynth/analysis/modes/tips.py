@@ -97,14 +97,15 @@ def _tip(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfigu
 
 def _candidates(anatomy: Anatomy, leg: HeldLeg, tip: Array, goal: ClosedConfiguration) -> Iterator[Reach]:
     """Curves with the tangent that the pattern names: a circle about the axis with the tip on it, or with the tip
-    carried along by the end of the link that turns. Surfaces with the normal that it names: a plane, or a sphere with
-    the radius of a link that lies along the normal."""
+    carried along by the end of the link that turns, whichever of the two bodies its axis is fixed in. Surfaces with
+    the normal that it names: a plane, or a sphere with the radius of a link that lies along the normal."""
     if leg.fixed:
         yield Point(tip)
     elif isinstance(leg.line, Carried):
         yield Line(tip, _value(leg.line, goal))
     elif isinstance(leg.line, Tangent):
-        yield _circle(leg.line, tip, goal)
+        turning = _circle(leg.line, tip, goal)
+        yield from (turning, _opposite(turning, tip))
         axis, on = _value(leg.line.axis, goal), _value(leg.line.start, goal) * goal.twin.length
         spoke = tip - on - axis * float(axis @ (tip - on))
         if np.linalg.norm(spoke) > SAME_POINT * goal.twin.length:
@@ -135,13 +136,18 @@ def _circle(tangent: Tangent, tip: Array, goal: ClosedConfiguration) -> Circle:
     return Circle(tip - spoke, axis, float(np.linalg.norm(spoke)), spoke)
 
 
+def _opposite(circle: Circle, tip: Array) -> Circle:
+    """The circle with the same tangent at ``tip`` and its centre on the other side."""
+    return Circle(2 * tip - circle.centre, circle.axis, circle.radius, circle.centre - tip)
+
+
 def _slide(structure: Structure, goal: ClosedConfiguration) -> Circle:
     """The circle of the second body's origin relative to the first's: of the two with the tangent that the pattern
     names (whichever of the bodies its link turns about) the one that nearby configurations keep to."""
     assert isinstance(structure.slide, Tangent)
     at, moving = _apart(structure, goal, goal.q)
     one = _circle(structure.slide, at, goal)
-    other = Circle(2 * at - one.centre, one.axis, one.radius, one.centre - at)
+    other = _opposite(one, at)
     kernel, _ = goal.kernel()
     step = kernel @ np.linalg.svd(moving @ kernel)[2][0]
     nearby, _ = closed(goal.twin, goal.twin.moved(goal.q, MOVES[-1] * step), tolerance=SOLVED)
@@ -163,6 +169,8 @@ class _Held:
     measured: Sequence[tuple[Observation, Array]]
 
     def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+        if not self.measured:
+            return np.zeros(0), np.zeros((0, twin.nv))
         _, _, values, rates = measure(twin, q, self.reference, [o for o, _ in self.measured])
         errors = [value - wanted for value, (_, wanted) in zip(values, self.measured, strict=True)]
         return np.concatenate(errors), np.vstack(rates)
@@ -175,7 +183,7 @@ def _held_paths(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: Closed
     own = [o for o in question.observations if o.leg == leg.label]
     rest = dissect(rezeroed(goal))
     twin = Twin(alone(rest, rest.leg(leg.label)), goal.twin.length)
-    _, _, values, _ = measure(twin, twin.q0, question.reference, own)
+    values = measure(twin, twin.q0, question.reference, own)[2] if own else []
     held = _Held(question.reference, tuple(zip(own, values, strict=True)))
     start = ClosedConfiguration.of(twin, twin.q0, SAME_RELATION)
     free, _ = kernel_basis(np.vstack([twin.jacobian(start.q), held.rows(twin, start.q)[1]]))

@@ -6,7 +6,7 @@ from collections import Counter
 
 from ...analysis.check import Check
 from ...analysis.posture import CONSTRAINT, REGULAR, UNDECIDED, Kinds, Posture
-from ...tolerances import RANK_GAP
+from ...tolerances import NOISE, RANK_GAP
 from .tables import listing
 
 _STATES = {REGULAR: "regular", "type1": "Type 1 singularity", "type2": "Type 2 singularity",
@@ -43,6 +43,8 @@ def _posture(posture: Posture) -> list[tuple[str, str]]:
         rows += [("", f"singular values of Mᵀ {far.type2:.3g} to {1 / far.type1:.3g}, condition {far.condition:.3g}"),
                  ("", f"one degree of error in the directions, to first order: {_small(far.millimetres)} mm and "
                       f"{_small(far.degrees)} degrees along the weakest freedom that they show")]
+        if far.condition > 1 / NOISE:
+            rows.append(("", f"nearly singular: dimensions that are known to {NOISE:g} cannot tell it from a singularity"))
     elif far.type2 is None:
         rows.append(("", "there is no interaction matrix: observed links move while the platform rests"))
     if posture.real is None:
