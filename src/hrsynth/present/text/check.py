@@ -44,7 +44,7 @@ def _posture(posture: Posture) -> list[tuple[str, str]]:
                  ("", f"one degree of error in the directions, to first order: {_small(far.millimetres)} mm and "
                       f"{_small(far.degrees)} degrees along the weakest freedom that they show")]
         if far.condition > 1 / NOISE:
-            rows.append(("", f"nearly singular: dimensions that are known to {NOISE:g} cannot tell it from a singularity"))
+            rows.append(("", f"nearly singular: dimensions known to {NOISE:g} cannot tell it from a singularity"))
     elif far.type2 is None:
         rows.append(("", "there is no interaction matrix: observed links move while the platform rests"))
     if posture.real is None:
