@@ -58,6 +58,7 @@ pictures: setup  ## draw the pictures in docs/pictures again
 	@$(BIN)/hrsynth modes quattro --observe 1,4 -o docs/pictures/modes_quattro.png > /dev/null
 	@$(BIN)/hrsynth modes delta -o docs/pictures/modes_delta.png > /dev/null
 	@$(BIN)/hrsynth modes delta --real -o docs/pictures/modes_delta_real.png > /dev/null
+	@$(BIN)/hrsynth accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7 -o docs/pictures/accuracy_quattro.png > /dev/null
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt

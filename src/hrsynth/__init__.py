@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from .analysis.accuracy.accuracy import accuracy
     from .analysis.advice import advise
     from .analysis.aspects.path import path
     from .analysis.check import check
@@ -13,9 +14,11 @@ if TYPE_CHECKING:
     from .description import load, save, shipped
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "advise", "check", "derive", "legs", "load", "modes", "path", "save", "shipped", "singular"]
+__all__ = ["__version__", "accuracy", "advise", "check", "derive", "legs", "load", "modes", "path", "save", "shipped",
+           "singular"]
 
 _HOME = {
+    "accuracy": ".analysis.accuracy.accuracy",
     "advise": ".analysis.advice",
     "check": ".analysis.check",
     "derive": ".analysis.derive",
