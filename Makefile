@@ -13,7 +13,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all fuzz bounds bench lint types robots readme pictures lock setup setup-dev setup-all clean
+.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme pictures lock setup setup-dev setup-all clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -23,10 +23,13 @@ demo: setup  ## derive the hidden robot of a Quattro of which legs 1 and 4 are o
 	@$(BIN)/hrsynth derive robots/quattro.urdf --observe 1,4
 
 test: setup-dev  ## the tests, without the slow ones
-	@$(PYTEST) -m "not slow and not browser" tests
+	@$(PYTEST) -m "not slow and not long and not browser" tests
 
-test-all: setup-all  ## all tests
-	@$(PYTEST) tests
+test-all: setup-all  ## all tests but the longest
+	@$(PYTEST) -m "not long" tests
+
+test-long: setup-all  ## the longest tests: many instances, all robots; more than an hour
+	@$(PYTEST) -m long tests
 
 fuzz: setup-dev  ## 100,000 mutations of robot files (MUTATIONS=, SEED=): each is read or refused
 	@$(BIN)/python tests/description/foreign/fuzz.py --count $(MUTATIONS) --seed $(SEED)
@@ -58,6 +61,8 @@ pictures: setup  ## draw the pictures in docs/pictures again
 	@$(BIN)/hrsynth modes quattro --observe 1,4 -o docs/pictures/modes_quattro.png > /dev/null
 	@$(BIN)/hrsynth modes delta -o docs/pictures/modes_delta.png > /dev/null
 	@$(BIN)/hrsynth modes delta --real -o docs/pictures/modes_delta_real.png > /dev/null
+	@$(BIN)/hrsynth servo quattro --observe 1,4 --from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0 -o docs/pictures/servo_quattro.png > /dev/null
+	@$(BIN)/hrsynth servo 3rpr_m1 --from x=-0.08,y=-0.06,phi=-10deg --to x=0.034,y=0.23,phi=23deg -o docs/pictures/servo_3rpr.png > /dev/null
 	@$(BIN)/hrsynth accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7 -o docs/pictures/accuracy_quattro.png > /dev/null
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)

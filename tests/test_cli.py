@@ -27,6 +27,8 @@ FIELDS = {
                  "characteristic_length", "checked", "examples", "locus", "file"},
     "modes": {"kind", "at", "observed", "complex", "complete", "proof", "modes", "near", "degenerate", "continuum"},
     "path": {"verdict", "certified", "path", "margin", "boxes", "start", "goal", "reason", "value", "point"},
+    "servo": {"observed", "from", "to", "gain", "sense", "noise", "ended", "reason", "pose", "matched_mode", "modes",
+              "type2", "notes", "spread", "error", "times", "poses", "file"},
     "robots": {"robots"},
     "convert": {"file"},
 }
@@ -539,6 +541,56 @@ def test_modes_text_numbers_them_and_says_what_is_proved(run):
 def test_modes_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
     (line,) = run("modes", *arguments).refused(status)
     assert all(word in line for word in words)
+
+
+# ---- servo
+
+
+def test_servo_json_is_the_contract(run, tmp_path: Path):
+    picture = tmp_path / "run.png"
+    data = run("servo", "rrrrr_m1", "--from", "x=0,y=0.2", "--to", "x=0.02,y=0.22", "-o", picture, "--json").data
+    check_record(data, "servo", "rrrrr_m1")
+    assert (data["ended"], data["matched_mode"], data["noise"]) == ("goal", None, None)
+    assert data["pose"]["x"] == pytest.approx(0.02, abs=1e-8)
+    assert len(data["times"]) == len(data["poses"]) == len(data["error"])
+    assert all(len(errors) == len(data["observed"]) for errors in data["error"])
+    assert data["times"] == sorted(data["times"])
+    assert data["error"][0][0] > 1e-3 > 1e-9 > data["error"][-1][0]
+    assert data["type2"]["smallest"] > 0
+    assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_servo_text_names_the_mode_and_how_far_it_is(run):
+    answer = run("servo", "quattro_rigid", "--observe", "1,2", "--from", "x=0.1,y=0.04,z=-0.93", "--to",
+                 "x=0,y=-0.25,z=-0.7", "--gain", "5")
+    assert (answer.status, answer.err) == (0, "")
+    assert re.search(r"^ended +mode after", answer.out, re.MULTILINE)
+    assert "its assembly mode 2 of 2" in answer.out
+    assert "mm and 0 degrees from the goal" in answer.out
+    assert answer.out.count("(the goal)") == 1
+
+
+@pytest.mark.parametrize(("arguments", "words"), [
+    (["--to", "x=9"], ["x=9", "is not reached"]),
+    (["--to", "x=0.1", "--observe", "1"], ["do not see", "hrsynth legs"]),
+    (["--to", "x=0.1", "--observe", "7"], ["no leg or link", "'7'"]),
+    (["--to", "x=0.1", "--noise", "90deg"], ["noise", "90deg", "less than 90deg"]),
+    (["--to", "x=0.1", "--noise", "1px"], ["1px", "an angle"]),
+    (["--to", "x=0.1", "--sense", "edges", "--noise", "1deg"], ["1deg", "pixels"]),
+    (["--to", "x=0.1", "--sense", "touch"], ["touch", "exact, edges, pictures"]),
+    (["--to", "x=0.1", "--gain", "0"], ["gain", "positive"]),
+    (["--to", "x=0.1", "--time", "nan"], ["time", "positive"]),
+    (["--to", "x=0.1", "-o", "run.svg"], ["run.svg", ".png"])])
+def test_servo_refuses_what_does_not_fit(run, arguments: list[str], words: list[str]):
+    (line,) = run("servo", "delta", "--from", "x=0,y=0", *arguments).refused(2)
+    assert all(word in line for word in words)
+
+
+@pytest.mark.parametrize(("module", "arguments"), [("mujoco", ["--physics"]), ("cv2", ["--sense", "pictures"])])
+def test_servo_names_the_extra_that_is_missing(run, monkeypatch: pytest.MonkeyPatch, module: str, arguments: list[str]):
+    monkeypatch.setitem(sys.modules, module, None)
+    (line,) = run("servo", "delta", "--from", "x=0,y=0", "--to", "x=0.05,y=0", *arguments).refused(3)
+    assert "hrsynth[bench]" in line
 
 
 # ---- legs, robots, convert

@@ -38,3 +38,10 @@ def test_the_names_survive_the_import_of_their_modules():
     code = "import hrsynth.analysis.derive; from hrsynth import derive, legs; print(derive.__name__, legs.__name__)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.split() == ["derive", "legs"]
+
+
+def test_the_folder_named_as_its_function_is_called_like_it():
+    for first in ("", "import hrsynth.servo.law; "):
+        code = first + "import hrsynth; from hrsynth import servo; print(servo is hrsynth.servo and callable(servo))"
+        run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+        assert run.stdout.split() == ["True"]

@@ -11,7 +11,8 @@ import pytest
 
 from hrsynth.cli import _run
 from hrsynth.description import shipped
-from hrsynth.present import readme
+from hrsynth.families.replays import REPLAYS, SIMULATED
+from hrsynth.present import readme, replays
 
 README = Path(__file__).resolve().parent.parent / "README.md"
 TEXT = README.read_text(encoding="utf-8")
@@ -34,6 +35,21 @@ def test_some_rows_are_fresh(name: str):
 @pytest.mark.slow
 def test_the_table_is_fresh():
     assert readme.block(TEXT) == readme.table(), "the README is stale: make readme"
+
+
+@pytest.mark.parametrize("replay", [SIMULATED[0], SIMULATED[5]], ids=lambda each: each.source)
+def test_some_replays_are_fresh(replay):
+    assert replays.row(replay) in readme.block(TEXT, replays.START).splitlines(), "the README is stale: make readme"
+
+
+def test_the_table_has_every_replay():
+    assert len(readme.block(TEXT, replays.START).splitlines()) == 2 + len(REPLAYS)
+
+
+@pytest.mark.long
+def test_the_replays_are_fresh():
+    pytest.importorskip("mujoco")
+    assert readme.block(TEXT, replays.START) == replays.table(), "the README is stale: make readme"
 
 
 def test_the_text_outside_the_marks_is_kept():

@@ -12,10 +12,11 @@ if TYPE_CHECKING:
     from .analysis.modes.modes import modes
     from .analysis.singularity.singular import singular
     from .description import load, save, shipped
+    from .servo.servo import servo
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "accuracy", "advise", "check", "derive", "legs", "load", "modes", "path", "save", "shipped",
-           "singular"]
+__all__ = ["__version__", "accuracy", "advise", "check", "derive", "legs", "load", "modes", "path", "save", "servo",
+           "shipped", "singular"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
@@ -27,6 +28,7 @@ _HOME = {
     "modes": ".analysis.modes.modes",
     "path": ".analysis.aspects.path",
     "save": ".description",
+    "servo": ".servo.servo",
     "shipped": ".description",
     "singular": ".analysis.singularity.singular",
 }
@@ -38,8 +40,7 @@ def __getattr__(name: str) -> object:
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
-    value: object = getattr(import_module(_HOME[name], __name__), name)
-    globals()[name] = value
+    value: object = globals().setdefault(name, getattr(import_module(_HOME[name], __name__), name))
     return value
 
 

@@ -296,6 +296,45 @@ def path(
 
 @app.command()
 @_of_robot
+def servo(
+    robot: Source,
+    start: Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")],
+    goal: Annotated[str, typer.Option("--to", metavar="POSE", help="Pose whose directions are desired.")],
+    observe: Observe = "all",
+    camera: Camera = None,
+    gain: Annotated[float, typer.Option(help="λ of the control law (1/s).")] = 0.8,
+    noise: Annotated[str | None, typer.Option(metavar="AMOUNT", help="Error of measured directions, as 0.1deg; of "
+                                              "edges, as 0.3px.")] = None,
+    duration: Annotated[float | None, typer.Option(metavar="SECONDS", help="Lead the desired directions along the "
+                                                   "straight way in this time (default: at once).")] = None,
+    time: Annotated[float | None, typer.Option(metavar="SECONDS", help="Longest run.")] = None,
+    physics: Annotated[bool, typer.Option("--physics", help="Drive a mock-up with rods, masses and velocity servos.")]
+    = False,
+    sense: Annotated[str, typer.Option(metavar="SENSE", help="exact, edges (of the legs before a camera) or pictures "
+                                       "(rendered).")] = "exact",
+    output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Draw the run (.png).")] = None,
+    json: Json = False,
+    seed: Seed = 0,
+) -> None:
+    """A servo run on the directions of legs, simulated: where it ends, and what it passes on the way."""
+    from .present import records, runs
+    from .present.text.servo import servo as written
+    from .servo.servo import servo as run
+
+    runs.writable(output)
+    with Progress() as progress:
+        found = run(robot.load(), _list(observe), camera, start=start, goal=goal, gain=gain, noise=noise,
+                    physics=physics, sense=sense, duration=duration, time=time, seed=seed, progress=progress.tell)
+    if output is not None:
+        runs.write(found, output)
+    if json:
+        typer.echo(records.record("servo", found.setting.robot.name, {**found.to_dict(), "file": output}))
+    else:
+        typer.echo(written(found, output))
+
+
+@app.command()
+@_of_robot
 def accuracy(
     robot: Source,
     cone: Annotated[str, typer.Option(metavar="ANGLE", help="Half-angle of the cone about each observed direction, "

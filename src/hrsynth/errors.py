@@ -183,3 +183,13 @@ class Unsolved(HrsynthError):
     def __init__(self, solver: str, reason: str) -> None:
         self.solver, self.reason = solver, reason
         super().__init__(f"{solver} did not solve the system: {reason}")
+
+
+class NotRendered(HrsynthError):
+    """Pictures that cannot be rendered on this machine: why."""
+
+    exit_status = 3
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(f"pictures cannot be rendered here: {reason} (MUJOCO_GL chooses between egl, osmesa and glfw)")

@@ -96,3 +96,13 @@ NEAR_MODE = 1e-2
 
 NEARLY_DOUBLE = 1e-6
 """Distance between two solutions, in their parameters, below which the pose counts as singular."""
+
+DAMPED = 1e-3
+"""Singular values of the rows that a controller inverts (characteristic lengths, radians) below which it damps them."""
+
+SERVED = 1e-10
+"""Norm of the error of the directions at which a servo loop has ended."""
+
+AT_REST = 1e-8
+"""Speed (characteristic lengths, radians) for each unit of error and gain below which a servo loop is at a local
+minimum."""

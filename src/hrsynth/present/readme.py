@@ -11,7 +11,7 @@ from ..analysis.controllability import legs
 from ..analysis.derive import derive
 from ..analysis.singularity.singular import singular
 from ..description import load, shipped
-from . import printed
+from . import printed, replays
 
 START, END = "<!-- generated: robots -->", "<!-- end -->"
 HEADS = ("robot", "architecture", "dof", "hidden robot, all legs watched", "verdict", "exact", "lost",
@@ -82,4 +82,5 @@ if __name__ == "__main__":
     for argument in sys.argv[1:]:
         file = Path(argument)
         text = replaced(file.read_text(encoding="utf-8"), table())
-        file.write_text(replaced(text, printed.table(), printed.START), encoding="utf-8", newline="\n")
+        text = replaced(text, printed.table(), printed.START)
+        file.write_text(replaced(text, replays.table(), replays.START), encoding="utf-8", newline="\n")

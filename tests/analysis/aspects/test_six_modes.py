@@ -103,7 +103,7 @@ def test_modes_of_one_sign_are_joined_and_of_opposite_signs_separated():
     assert np.all(counts[:, 1] >= 0.9 * counts[:, 0])
 
 
-@pytest.mark.slow
+@pytest.mark.long
 def test_fifty_robots_with_six_modes():
     counts = np.array([check_instance(instance, 300, 1) for instance in islice(six_modes(0), 50)])
     equal, decided = counts.sum(axis=0)

@@ -100,7 +100,7 @@ def test_random_planar_robots_reach_their_bounds(word: str):
     assert most >= (4 if word == "RRR" else 2)
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", sorted(FAMILIES))
 def test_no_instance_passes_the_bound_or_misses_its_goal(name: str):
     """Other instances than those of the law over families; ``make bounds`` takes 10,000."""

@@ -92,7 +92,7 @@ def sets_of(name: str) -> list[Legs | None]:
     return [None, *(tuple(each) for each in legs(load(shipped()[name])).minimal[:3])]
 
 
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("real", [False, True])
 @pytest.mark.parametrize("name", shipped())
 def test_what_closes_is_listed_for_all_robots_and_leg_sets(name: str, real: bool):

@@ -51,7 +51,7 @@ def test_msolve_lists_the_same_poses(name: str):
 
 
 @needs_msolve
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", [*FAMILIES, *MEETING])
 def test_msolve_lists_the_same_poses_at_many_instances(name: str):
     for seed in range(3 if name in SLOWEST else 25):
@@ -66,7 +66,7 @@ def test_tips_on_surfaces_have_their_number_of_poses(name: str):
 
 
 @needs_msolve
-@pytest.mark.slow
+@pytest.mark.long
 @pytest.mark.parametrize("name", SURFACES)
 def test_tips_on_surfaces_have_their_number_of_poses_at_many_instances(name: str):
     for seed in range(3 if name in SLOWEST else 25):

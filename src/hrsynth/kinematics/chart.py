@@ -1,0 +1,67 @@
+"""Coordinates on the closed configurations around one of them, in which an integrator works without drift.
+
+A configuration q near q₀ has the coordinates y = Bᵀ (q ⊖ q₀), B an orthonormal basis of the tangent space at q₀ without
+its idle motions. Going back, the loops are solved together with these n equations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+
+from ..errors import LoopsNotClosed
+from ..mechanism.vectors import Array
+from ..tolerances import CLOSED, SOLVED
+from .configuration import ClosedConfiguration, closed
+from .ranks import range_basis
+from .relation import Question
+from .twin import Twin
+
+WIDE = 0.5
+"""Length of y (characteristic lengths, radians) beyond which another chart should take over."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Coordinates:
+    """The coordinates y that are wanted."""
+
+    chart: Chart
+    y: Array
+
+    def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+        """Error (reached − wanted) and its Jacobian."""
+        basis = self.chart.basis
+        return basis.T @ twin.difference(self.chart.centre.q, q) - self.y, self.chart.slope(q)
+
+
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """Coordinates y (n,) around ``centre``; ``basis`` is B (nv, n)."""
+
+    centre: ClosedConfiguration
+    basis: Array
+
+    @classmethod
+    def around(cls, centre: ClosedConfiguration, question: Question) -> Chart:
+        """The chart whose directions are those that move the platform or anything that is observed."""
+        kernel, _ = centre.kernel()
+        image = question.rows(centre) @ kernel
+        return cls(centre, kernel @ range_basis(image.T, 1.0)[0])
+
+    def at(self, y: Array, near: Array) -> ClosedConfiguration:
+        """The configuration with the coordinates y that lies next to the configuration ``near`` (nq,); raises
+        ``LoopsNotClosed``."""
+        twin = self.centre.twin
+        q, residual = closed(twin, near, _Coordinates(self, y), tolerance=SOLVED, iterations=15)
+        if not residual <= CLOSED:
+            raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, twin.worst_loop(q)[0])
+        return ClosedConfiguration.of(twin, q)
+
+    def slope(self, q: Array) -> Array:
+        """The map from joint velocities at q to ẏ, (n, nv)."""
+        model = self.centre.twin.model
+        if model.nq == model.nv:
+            return self.basis.T
+        return np.asarray(self.basis.T @ pin.dDifference(model, self.centre.q, q, pin.ARG1))

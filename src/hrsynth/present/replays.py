@@ -1,0 +1,83 @@
+"""The README's table of servo runs that the papers print, beside what the same runs do here."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cache
+
+from ..description import load, shipped
+from ..families.replays import REPLAYS, Replay
+from ..mechanism.pose import Pose
+from ..servo.result import Servo
+from ..servo.servo import servo
+
+START = "<!-- generated: replays -->"
+HEADS = ("source", "robot", "legs", "noise", "printed", "computed", "agree?", "word")
+BENCH_LASTS = 8.0
+"""Time constants 1 / λ of a run on the physics bench."""
+ALIKE = 1.5
+"""Ratio of root mean square errors up to which two accuracies are about the same."""
+
+
+@cache
+def computed(replay: Replay) -> Servo:
+    """The run."""
+    return servo(load(shipped()[replay.robot]), replay.legs, start=replay.way[0], goal=replay.way[1], gain=replay.gain,
+                 noise=replay.noise, physics=replay.physics,
+                 time=BENCH_LASTS / replay.gain if replay.physics else None)
+
+
+def table(replays: Sequence[Replay] = REPLAYS) -> str:
+    """The Markdown table of all replays."""
+    rule = "|".join(["", *(" --- " for _ in HEADS), ""])
+    return "\n".join([_line(HEADS), rule, *map(row, replays)]) + "\n"
+
+
+def row(replay: Replay) -> str:
+    """One run's line."""
+    found = computed(replay)
+    here = found.ended
+    if found.spread is not None:
+        s = found.spread
+        here += f" ± {1e3 * s.rms_metres:.2g} mm, {s.rms_radians:.1g} rad" if found.setting.motion.spins.shape[1] else (
+            f" ± {1e3 * s.rms_metres:.2g} mm")
+        if s.aside:
+            here += f", about {_place(Pose(*s.mean))}"
+    else:
+        here += f" {_place(found.pose)}"
+    noise = "–" if replay.noise is None else replay.noise if "deg" in replay.noise else f"{replay.noise} rad, bench"
+    return _line((replay.source, f"`{replay.robot}`", ", ".join(replay.legs), noise, f"{replay.ended} {replay.said}",
+                  here, _agrees(replay, found), replay.remark))
+
+
+def _agrees(replay: Replay, found: Servo) -> str:
+    """Whether the ending is the printed one, and for accuracies whether their order is."""
+    same = "yes" if found.ended == replay.ended else "no"
+    if not replay.order:
+        return same
+    mine = _error(replay)
+    for other in REPLAYS:
+        if other.order != replay.order or other is replay:
+            continue
+        theirs = _error(other)
+        if other.place == replay.place:
+            fits = max(mine, theirs) / min(mine, theirs) <= ALIKE
+        else:
+            fits = (mine < theirs) == (replay.place < other.place)
+        if not fits:
+            return f"{same}; order of errors no"
+    return f"{same}; order of errors yes"
+
+
+def _error(replay: Replay) -> float:
+    spread = computed(replay).spread
+    assert spread is not None
+    return spread.rms_metres
+
+
+def _place(pose: Pose) -> str:
+    return f"({', '.join(f'{round(v or 0.0, 3) + 0.0:g}' for v in (pose.x, pose.y, pose.z))})".replace("-", "−")
+
+
+def _line(cells: Sequence[str]) -> str:
+    return f"| {' | '.join(cells)} |"
