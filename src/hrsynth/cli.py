@@ -374,6 +374,37 @@ def accuracy(
 
 
 @app.command()
+@_of_robot
+def select(
+    robot: Source,
+    start: Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")],
+    goal: Annotated[str, typer.Option("--to", metavar="POSE", help="Where it is to end.")],
+    cone: Annotated[str, typer.Option(metavar="ANGLE", help="Half-angle of the cone about each direction, or one a "
+                                      "leg: 1=0.1deg,2=0.2deg,…")] = "0.1deg",
+    camera: Camera = None,
+    size: Annotated[int, typer.Option(min=1, help="Legs of the largest sets.")] = 4,
+    runs: Annotated[int, typer.Option(min=0, help="Sets that a simulated run is to lead to the goal, best first.")] = 3,
+    sight: Annotated[str | None, typer.Option(metavar="POSE", help="Pose of the camera on the link that carries it (x "
+                                              "right, y down, z ahead), as x=0,y=0,z=0.5,rpy=180deg/0/0; or auto.")]
+    = None,
+    focal: Annotated[float, typer.Option(metavar="PIXELS", help="Focal length of the camera, of 640 by 480 pixels.")]
+    = 800.0,
+    seconds: Annotated[float, typer.Option(help="Time after which nothing more is asked.")] = 45.0,
+    json: Json = False,
+    seed: Seed = 0,
+) -> None:
+    """Which legs to watch for a displacement: all sets, ranked by accuracy, and why the others are discarded."""
+    from .present import records
+    from .present.text.selection import selection as written
+    from .selection.select import select as run
+
+    with Progress() as progress:
+        found = run(robot.load(), camera, start=start, goal=goal, cones=cone, size=size, runs=runs, sight=sight,
+                    focal=focal, seconds=seconds, seed=seed, progress=progress.tell)
+    typer.echo(records.record("select", found.setting.robot.name, found.to_dict()) if json else written(found))
+
+
+@app.command()
 def robots(json: Json = False) -> None:
     """The shipped robots."""
     from .description import shipped
