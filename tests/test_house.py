@@ -26,13 +26,14 @@ FOLDERS = [
     {"rewrite"},
     {"analysis"},
     {"servo"},
+    {"selection"},
     {"present"},
     {"catalog"},
     {"cli", "__main__"},
 ]
 LEVEL = {name: level for level, names in enumerate(FOLDERS) for name in names}
 
-ENGINE = {"mechanism", "description", "kinematics", "rewrite", "analysis", "servo", "present"}
+ENGINE = {"mechanism", "description", "kinematics", "rewrite", "analysis", "servo", "selection", "present"}
 ROBOTS = re.compile(
     r"(?<![a-z])(quattro|delta|orthoglide|gough|stewart|hexaglide|uranesx|i4l|tsai)(?![a-z])", re.IGNORECASE
 )

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from .analysis.accuracy.accuracy import accuracy
     from .analysis.advice import advise
     from .analysis.aspects.path import path
     from .analysis.check import check
@@ -11,13 +12,15 @@ if TYPE_CHECKING:
     from .analysis.modes.modes import modes
     from .analysis.singularity.singular import singular
     from .description import load, save, shipped
+    from .selection.select import select
     from .servo.servo import servo
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "advise", "check", "derive", "legs", "load", "modes", "path", "save", "servo", "shipped",
-           "singular"]
+__all__ = ["__version__", "accuracy", "advise", "check", "derive", "legs", "load", "modes", "path", "save", "select",
+           "servo", "shipped", "singular"]
 
 _HOME = {
+    "accuracy": ".analysis.accuracy.accuracy",
     "advise": ".analysis.advice",
     "check": ".analysis.check",
     "derive": ".analysis.derive",
@@ -26,6 +29,7 @@ _HOME = {
     "modes": ".analysis.modes.modes",
     "path": ".analysis.aspects.path",
     "save": ".description",
+    "select": ".selection.select",
     "servo": ".servo.servo",
     "shipped": ".description",
     "singular": ".analysis.singularity.singular",

@@ -335,6 +335,77 @@ def servo(
 
 
 @app.command()
+@_of_robot
+def accuracy(
+    robot: Source,
+    cone: Annotated[str, typer.Option(metavar="ANGLE", help="Half-angle of the cone about each observed direction, "
+                                      "as 0.1deg; or one a leg: 1=0.1deg,2=0.2deg.")],
+    observe: Observe = "all",
+    camera: Camera = None,
+    at: Annotated[list[str] | None, typer.Option(metavar="POSE", help="A pose, as x=0.02,y=0.1,z=-0.7; again for more "
+                                                 "(default: the zero configuration).")] = None,
+    plane: Annotated[str | None, typer.Option(metavar="PART=VALUE", help="Plane of poses, as z=-0.7: all of it that is "
+                                              "reached.")] = None,
+    grid: Annotated[str | None, typer.Option(metavar="GRID", help="A line, plane or box of poses, such as "
+                                             "x=-0.3:0.3:21,y=0,z=-0.7 (from:to:count).")] = None,
+    steps: Annotated[int | None, typer.Option(min=5, max=300, help="Poses a side of the plane.")] = None,
+    samples: Annotated[int, typer.Option("--nonlinear", min=0, metavar="COUNT", help="Try so many true errors at each "
+                                         "pose, of a plane or grid at its worst ones.")] = 0,
+    output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Write the plane or grid: "
+                                               "map.png, map.csv.")] = None,
+    json: Json = False,
+    seed: Seed = 0,
+) -> None:
+    """How far the platform can be off where the observed directions are off by up to given angles."""
+    from .analysis.accuracy.accuracy import accuracy as run
+    from .present import accuracy as pictures
+    from .present import records
+    from .present.text.accuracy import accuracy as written
+
+    pictures.writable(output, plane or grid)
+    with Progress() as progress:
+        found = run(robot.load(), _list(observe), camera, cones=cone, at=at or (), plane=plane, grid=grid, steps=steps,
+                    samples=samples, seed=seed, progress=progress.tell)
+        if output is not None:
+            pictures.write(found, output)
+    if json:
+        typer.echo(records.record("accuracy", found.setting.robot.name, {**found.to_dict(), "file": output}))
+    else:
+        typer.echo(written(found, output))
+
+
+@app.command()
+@_of_robot
+def select(
+    robot: Source,
+    start: Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")],
+    goal: Annotated[str, typer.Option("--to", metavar="POSE", help="Where it is to end.")],
+    cone: Annotated[str, typer.Option(metavar="ANGLE", help="Half-angle of the cone about each direction, or one a "
+                                      "leg: 1=0.1deg,2=0.2deg,…")] = "0.1deg",
+    camera: Camera = None,
+    size: Annotated[int, typer.Option(min=1, help="Legs of the largest sets.")] = 4,
+    runs: Annotated[int, typer.Option(min=0, help="Sets that a simulated run is to lead to the goal, best first.")] = 3,
+    sight: Annotated[str | None, typer.Option(metavar="POSE", help="Pose of the camera on the link that carries it (x "
+                                              "right, y down, z ahead), as x=0,y=0,z=0.5,rpy=180deg/0/0; or auto.")]
+    = None,
+    focal: Annotated[float, typer.Option(metavar="PIXELS", help="Focal length of the camera, of 640 by 480 pixels.")]
+    = 800.0,
+    seconds: Annotated[float, typer.Option(help="Time after which nothing more is asked.")] = 45.0,
+    json: Json = False,
+    seed: Seed = 0,
+) -> None:
+    """Which legs to watch for a displacement: all sets, ranked by accuracy, and why the others are discarded."""
+    from .present import records
+    from .present.text.selection import selection as written
+    from .selection.select import select as run
+
+    with Progress() as progress:
+        found = run(robot.load(), camera, start=start, goal=goal, cones=cone, size=size, runs=runs, sight=sight,
+                    focal=focal, seconds=seconds, seed=seed, progress=progress.tell)
+    typer.echo(records.record("select", found.setting.robot.name, found.to_dict()) if json else written(found))
+
+
+@app.command()
 def robots(json: Json = False) -> None:
     """The shipped robots."""
     from .description import shipped

@@ -6,7 +6,7 @@ The platform's frame in the base frame, metres and radians.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from typing import Any
@@ -125,9 +125,14 @@ class Grid:
 
     def poses(self) -> tuple[Pose, ...]:
         """The poses of all cells, the last axis running fastest."""
+        return self.poses_at(product(*(range(size) for size in self.shape)))
+
+    def poses_at(self, cells: Iterable[Sequence[int]]) -> tuple[Pose, ...]:
+        """The poses of cells, each given by its place on every axis."""
         fixed = {name: getattr(self.fixed, name) for name in PARTS}
-        return tuple(Pose(**{**fixed, **dict(zip(self.names, map(float, values), strict=True))})
-                     for values in product(*(values for _, values in self.axes)))
+        return tuple(Pose(**{**fixed, **{name: float(values[i]) for (name, values), i in zip(self.axes, cell,
+                                                                                            strict=True)}})
+                     for cell in cells)
 
 
 def rpy_of(R: Array) -> tuple[float, float, float]:

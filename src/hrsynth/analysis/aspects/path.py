@@ -47,7 +47,11 @@ class Aspects:
     def of(cls, robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
            seed: int = 0) -> Aspects:
         """The condition of a robot from random samples of its motion."""
-        setting = prepare(robot, observe, camera, seed=seed)
+        return cls.about(prepare(robot, observe, camera, seed=seed))
+
+    @classmethod
+    def about(cls, setting: Setting) -> Aspects:
+        """The condition of a robot from the samples of a setting."""
         seen = Measured.watched(setting)
         return cls(setting, setting.motion, seen.structure, seen.condition,
                    tuple(freedom.name for freedom in seen.verdict.lost))

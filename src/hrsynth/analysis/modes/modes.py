@@ -114,11 +114,18 @@ def modes(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
         raise BadRequest("the motors are held instead of directions", f"real with observe {observe}", "one of the two")
     progress("sampling")
     setting = prepare(robot, observe, camera, seed=seed)
-    measured = Measured.driven(setting) if real else Measured.watched(setting)
-    everything, motion = setting.everything, setting.motion
-    goal = everything.start
+    goal = setting.everything.start
     if at is not None:
-        goal = reach(goal, everything.question, Pose.parse(at) if isinstance(at, str) else at, motion)
+        pose = Pose.parse(at) if isinstance(at, str) else at
+        goal = reach(goal, setting.everything.question, pose, setting.motion)
+    return modes_at(setting, goal, real=real, progress=progress)
+
+
+def modes_at(setting: Setting, goal: ClosedConfiguration, *, real: bool = False,
+             progress: Callable[[str], None] = silent) -> AssemblyModes:
+    """All assembly modes with the measurements of a configuration of a setting, as :func:`modes`."""
+    measured = Measured.driven(setting) if real else Measured.watched(setting)
+    motion = setting.motion
     pose = motion.pose(goal.pose(motion.link))
     kind = "real" if real else "hidden"
     free = setting.dof - measured.rank

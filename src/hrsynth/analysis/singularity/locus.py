@@ -8,9 +8,9 @@ from itertools import combinations
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...errors import BadRequest, PlaneNotMet, PoseNotReached
-from ...kinematics.batch.placing import Placer
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.parts import PlatformMotion
 from ...kinematics.reach import reach, sweep
@@ -78,7 +78,11 @@ def locus(hidden: Measured, real: Measured | None, plane: Pose | None, steps: in
     """
     question, motion, start = hidden.question, hidden.setting.motion, hidden.setting.everything.start
     placer = hidden.setting.placer
-    grid = _grid(start, question, motion, plane, steps, progress, placer)
+
+    def met(first: ClosedConfiguration, coarse: Grid) -> NDArray[np.bool_]:
+        return np.array([at is not None for at in sweep(first, question, coarse, motion, progress, placer)])
+
+    grid = framed(start, question, motion, plane, steps, met)
     configurations = sweep(start, question, grid, motion, progress, placer)
     if not any(configurations):
         raise PlaneNotMet(start.twin.mechanism.name, str(grid.fixed), "none of its poses is reached")
@@ -102,8 +106,11 @@ def locus(hidden: Measured, real: Measured | None, plane: Pose | None, steps: in
     return Locus(grid, field(hidden), None if real is None else field(real))
 
 
-def _grid(start: ClosedConfiguration, question: Question, motion: PlatformMotion, plane: Pose | None, steps: int,
-          progress: Callable[[], None] | None, placer: Placer | None) -> Grid:
+def framed(start: ClosedConfiguration, question: Question, motion: PlatformMotion, plane: Pose | None, steps: int,
+           met: Callable[[ClosedConfiguration, Grid], NDArray[np.bool_]]) -> Grid:
+    """The grid that just holds what is reached of a plane; ``met`` says which cells of a coarse one are, (n,).
+
+    Raises ``PlaneNotMet`` where the plane's own parts are out of reach, ``BadRequest`` where not two parts are free."""
     plane, names = _axes(start, motion, plane)
     try:
         first = reach(start, question, plane, motion) if plane.given else start
@@ -114,8 +121,7 @@ def _grid(start: ClosedConfiguration, question: Question, motion: PlatformMotion
         half = [np.pi if name == "phi" else wide * start.twin.length for name in names]
         axes = [(name, np.linspace(c - h, c + h, COARSE)) for name, c, h in zip(names, centre, half, strict=True)]
         coarse = Grid(tuple(axes), plane)
-        found = [at is not None for at in sweep(first, question, coarse, motion, progress, placer)]
-        cells = np.argwhere(np.array(found).reshape(coarse.shape))
+        cells = np.argwhere(met(first, coarse).reshape(coarse.shape))
         if not len(cells):
             cells = np.array([[COARSE // 2, COARSE // 2]])
         if cells.min() > 0 and cells.max() < COARSE - 1:

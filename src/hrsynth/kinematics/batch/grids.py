@@ -6,8 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ...mechanism.pose import Grid
 from ...mechanism.vectors import Array
-from ...tolerances import RANK_CUTOFF
+from ...tolerances import FOLLOWED, RANK_CUTOFF
 from ..configuration import ClosedConfiguration
 from ..parts import Goal, PlatformMotion, exponential
 from .chain import exponentials
@@ -44,6 +45,28 @@ def pose_of(motion: PlatformMotion, goal: Goal) -> Array:
                                           rcond=RANK_CUTOFF)[0]
     X[:3, 3] = home + way - X[:3, :3] @ motion.point
     return X
+
+
+def poses_over(motion: PlatformMotion, grid: Grid, robot: str, places: Array | None = None) -> tuple[Array, Flags]:
+    """The platform poses (n, 4, 4) over a grid, in its order, or at other values (n, ndim) of its parts; free parts are
+    as at home. Also which of them the platform can have at all. Raises ``BadRequest`` for parts that it cannot
+    change."""
+    first = motion.goal(grid.poses_at([(0,) * grid.ndim])[0], robot)
+    if places is None:
+        places = np.stack(np.meshgrid(*(values for _, values in grid.axes), indexing="ij"), -1).reshape(-1, grid.ndim)
+    columns = dict(zip(grid.names, places.T, strict=True))
+    X = np.tile(pose_of(motion, first), (len(places), 1, 1))
+    if "phi" in columns:
+        X[:, :3, :3] = exponentials(columns["phi"][:, None] * motion.normal) @ motion.home[:3, :3]
+    values = np.tile(first.values, (len(places), 1))
+    for row, direction in enumerate(first.directions):
+        values[:, row] = columns.get("xyz"[int(np.argmax(direction))], values[:, row])
+    home, rows = motion.position(motion.home), first.directions @ motion.shifts
+    missing = (values - first.directions @ home).T
+    way = np.linalg.lstsq(rows, missing, rcond=RANK_CUTOFF)[0]
+    met = np.linalg.norm(rows @ way - missing, axis=0) <= FOLLOWED
+    X[:, :3, 3] = home + (motion.shifts @ way).T - X[:, :3, :3] @ motion.point
+    return X, met
 
 
 def _freedoms_left(motion: PlatformMotion, goal: Goal) -> int:

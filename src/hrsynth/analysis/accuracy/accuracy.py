@@ -1,0 +1,114 @@
+"""How far the platform can be off: the error maxima at poses, or over a plane, line or box of poses (MMT A.1)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...errors import BadRequest
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.reach import reach
+from ...mechanism import Mechanism
+from ...mechanism.observation import Direction
+from ...mechanism.pose import Grid, Pose
+from ...mechanism.vectors import Array
+from ..controllability import verdict_of
+from ..setting import Setting, prepare, silent
+from .cones import Cones, half_angles
+from .field import Field, Mapper
+from .gauge import PoseErrors, measured
+from .sampled import Sampled, sampled
+
+WORST = 3
+"""Poses of a grid, those of the largest errors, at which the linear law is checked by samples."""
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """The error maxima for cones about the observed directions: at single poses, over a grid, and where asked for what
+    samples of true errors give (None otherwise)."""
+
+    setting: Setting
+    cones: Array
+    """Half-angles (k,) of the observed directions (rad)."""
+    poses: tuple[PoseErrors, ...]
+    sampled: tuple[Sampled | None, ...]
+    field: Field | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line, without the command's own fields."""
+        poses = [{"pose": each.pose.to_dict(), "position_mm": each.position.to_dict(1e3),
+                  "orientation_deg": each.orientation.to_dict(180 / np.pi), "sampled": true and true.to_dict()}
+                 for each, true in zip(self.poses, self.sampled, strict=True)]
+        cones = [{"leg": o.leg, "link": o.link, "cone_deg": float(np.degrees(cone))}
+                 for o, cone in zip(self.setting.observed, self.cones, strict=True)]
+        return {**self.setting.to_dict(), "cones": cones, **({} if self.field is None else self.field.to_dict()),
+                "poses": poses}
+
+
+def accuracy(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+             cones: Cones, at: Sequence[Pose | str] = (), plane: Pose | str | None = None,
+             grid: Grid | str | None = None, steps: int | None = None, samples: int = 0, seed: int = 0,
+             progress: Callable[[str], None] | None = None) -> Accuracy:
+    """The largest position and orientation error of the platform over all errors of the directions inside ``cones``
+    (theory 6; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
+
+    At the poses ``at``, over ``plane`` (what is reached of it, ``steps`` poses a side), or over ``grid``; default: the
+    zero configuration. In a grid free parts stay as at the zero configuration where legs are known subproblems.
+    ``samples`` true errors are tried at each single pose, of a grid at its worst ones. ``observe`` and ``camera`` as
+    for ``derive``.
+
+    Raises ``BadRequest`` for names that there are not, cones that are none, legs that do not see every freedom (their
+    error is infinite everywhere), ``PoseNotReached``, ``PlaneNotMet``.
+    """
+    tell = progress or silent
+    wanted = [Pose.parse(each) if isinstance(each, str) else each for each in at]
+    if plane is not None and grid is not None:
+        raise BadRequest("both a plane and a grid are given", f"{plane} and {grid}", "one of them")
+    if steps is not None and plane is None:
+        raise BadRequest("poses a side", steps, "only of a plane")
+    if samples < 0:
+        raise BadRequest("number of samples", samples, "none or more")
+    held = Pose.parse(plane) if isinstance(plane, str) else plane
+    cells = Grid.parse(grid) if isinstance(grid, str) else grid
+    tell("sampling")
+    setting = prepare(robot, observe, camera, seed=seed)
+    if not all(isinstance(o, Direction) for o in setting.observed):
+        raise BadRequest("cones are about directions", ", ".join(setting.labels), "directions of legs")
+    half = half_angles(cones, setting.observed)
+    sees_all(setting)
+    mapper = Mapper(setting, half, tell)
+    field = None
+    if held is not None:
+        cells = mapper.plane(held, steps)
+    if cells is not None:
+        field = mapper.over(cells, seed)
+    if field is not None and samples and not wanted:
+        wanted = field.worst(WORST)
+    start, question, motion = setting.everything.start, setting.everything.question, setting.motion
+    configurations = [reach(start, question, pose, motion) for pose in wanted]
+    if not configurations and field is None:
+        configurations = [start]
+    tell("errors")
+    poses = tuple(errors_at(setting, half, each) for each in configurations)
+    true = tuple(sampled(each, mapper.question, motion, half, errors, samples, seed, lambda: tell("samples"))
+                 if samples else None for each, errors in zip(configurations, poses, strict=True))
+    return Accuracy(setting, half, poses, true, field)
+
+
+def errors_at(setting: Setting, cones: Array, at: ClosedConfiguration) -> PoseErrors:
+    """The error maxima at a closed configuration for half-angles (k,)."""
+    motion = setting.motion
+    return measured(at, setting.samples.question, cones, motion.pose(at.pose(motion.link)))
+
+
+def sees_all(setting: Setting) -> None:
+    """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms."""
+    verdict = verdict_of(setting, setting.labels, setting.samples)
+    if verdict.lost:
+        lost = "; ".join(freedom.name for freedom in verdict.lost)
+        raise BadRequest(f"{setting.robot.name}: the error is infinite at every pose, the legs do not see {lost}",
+                         ", ".join(setting.labels), "legs that make it controllable (hrsynth legs lists them)")

@@ -1,0 +1,259 @@
+"""The error maxima over a grid of poses: by the batch where it knows all legs, else from one pose to the next."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...errors import Disagreement, HrsynthError, PlaneNotMet
+from ...kinematics.batch.engine import Batch, Evaluation
+from ...kinematics.batch.grids import poses_over
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.reach import reach, sweep
+from ...kinematics.relation import Question
+from ...mechanism.pose import SCALARS, Grid, Pose
+from ...mechanism.vectors import Array
+from ...tolerances import SAME_RELATION
+from ..setting import Setting
+from ..singularity.locus import framed
+from .gauge import maxima, reading
+
+Flags = NDArray[np.bool_]
+PART = 25_000
+"""Poses, at least, that are evaluated between two signs of progress."""
+SPOTS = 10
+"""Poses of a grid at which the batch is held against Pinocchio."""
+USUAL = 100.0
+"""Multiple of the median error up to which a pose serves for that: nearer to singularities rounding grows."""
+FINE, COARSE = 201, 41
+"""Poses a side of a plane by the batch, and one by one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """Poses of a sweep, in any number: whether each is reached, the largest position (m) and orientation error (rad),
+    the determinant of the directions' rates (None where they are not as many as freedoms), the smallest singular value
+    of Mᵀ; NaN where not reached, all (n,). ``gap`` bounds how much too large an error may be, relative."""
+
+    reached: Flags
+    position: Array
+    orientation: Array
+    determinant: Callable[[], Array | None]
+    smallest: Callable[[], Array]
+    gap: float
+
+
+@dataclass(frozen=True, eq=False)
+class Spots:
+    """Random poses of a grid at which Pinocchio's relation gave the same error maxima: how many, and the largest
+    difference (relative)."""
+
+    count: int
+    difference: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"poses": self.count, "difference": self.difference}
+
+
+@dataclass(frozen=True, eq=False)
+class Field:
+    """The error maxima over a grid, in its shape: position (m) and orientation (rad), NaN where no pose is reached,
+    infinite where a freedom is lost. ``again`` evaluates other poses of the same grid (values of its axes (n, ndim));
+    None where poses are found one by one."""
+
+    grid: Grid
+    reached: Flags
+    position: Array
+    orientation: Array
+    gap: float
+    seen: Seen
+    spots: Spots | None
+    again: Callable[[Array], Seen] | None
+
+    @cached_property
+    def determinant(self) -> Array | None:
+        """The determinant whose sign changes at a Type 2 singularity, in the grid's shape; None where there is none."""
+        found = self.seen.determinant()
+        return None if found is None else found.reshape(self.grid.shape)
+
+    @cached_property
+    def smallest(self) -> Array:
+        """The smallest singular value of Mᵀ, in the grid's shape."""
+        return self.seen.smallest().reshape(self.grid.shape)
+
+    def worst(self, count: int) -> list[Pose]:
+        """The poses of the largest finite position errors (orientation errors where there are no others)."""
+        errors = self.position if np.nanmax(self.position, initial=0.0) > 0 else self.orientation
+        flat = np.where(np.isfinite(errors), errors, -1.0).ravel()
+        cells = [int(i) for i in np.argsort(-flat, kind="stable")[:count] if flat[i] > 0]
+        return list(self.grid.poses_at([tuple(map(int, np.unravel_index(i, self.grid.shape))) for i in cells]))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line: arrays nested in the order of ``axes``, null where not finite."""
+        fixed = {name: values[0] for name, values in self.grid.fixed.given.items() if name in SCALARS}
+        rpy = {} if self.grid.fixed.rpy is None else {"rpy": list(self.grid.fixed.rpy)}
+        return {"axes": list(self.grid.names), **{name: values.tolist() for name, values in self.grid.axes},
+                "fixed": {**fixed, **rpy}, "reached": self.reached.tolist(),
+                "position_mm": nested(1e3 * self.position), "orientation_deg": nested(np.degrees(self.orientation)),
+                "gap": self.gap, "checked": self.spots and self.spots.to_dict()}
+
+
+def nested(values: Array) -> list[Any]:
+    """Nested lists of numbers, None where they are not finite."""
+    found = values.astype(object)
+    found[~np.isfinite(values)] = None
+    return list(found.tolist())
+
+
+@dataclass(frozen=True, eq=False)
+class Mapper:
+    """What evaluates grids for observed legs and half-angles (k,)."""
+
+    setting: Setting
+    cones: Array
+    progress: Callable[[str], None]
+
+    @property
+    def question(self) -> Question:
+        """What is asked at each pose."""
+        return self.setting.samples.question
+
+    @cached_property
+    def batch(self) -> Batch | None:
+        """The batch, where it knows all legs, all observed directions are its own, and any pose is one of the
+        platform's."""
+        defaults = set(map(id, self.setting.segments))
+        if not all(id(o) in defaults for o in self.setting.observed):
+            return None
+        batch = self.setting.batch
+        return batch if batch is not None and batch.complete and batch.stage.constant else None
+
+    def plane(self, plane: Pose, steps: int | None) -> Grid:
+        """The grid over what is reached of a plane."""
+        everything, motion = self.setting.everything, self.setting.motion
+
+        def met(first: ClosedConfiguration, coarse: Grid) -> Flags:
+            if self.batch is not None:
+                X, possible = poses_over(motion, coarse, self.setting.robot.name)
+                return possible & self.batch.evaluate(X).reached
+            return np.array([at is not None for at in sweep(first, everything.question, coarse, motion,
+                                                            lambda: self.progress("how far the plane is reached"))])
+
+        count = steps or (FINE if self.batch is not None else COARSE)
+        return framed(everything.start, everything.question, motion, plane, count, met)
+
+    def over(self, grid: Grid, seed: int) -> Field:
+        """The error maxima over a grid; raises ``PlaneNotMet`` where no pose of it is reached."""
+        seen = self._one_by_one(grid) if self.batch is None else self._together(grid)
+        if not seen.reached.any():
+            raise PlaneNotMet(self.setting.robot.name, str(grid.fixed), "none of the grid's poses is")
+        spots = again = None
+        if self.batch is not None:
+            spots = self._spots(grid, seen, seed)
+
+            def again(places: Array) -> Seen:
+                return self._at(*poses_over(self.setting.motion, grid, self.setting.robot.name, places))
+
+        shape = grid.shape
+        return Field(grid, seen.reached.reshape(shape), seen.position.reshape(shape), seen.orientation.reshape(shape),
+                     seen.gap, seen, spots, again)
+
+    def _together(self, grid: Grid) -> Seen:
+        return self._at(*poses_over(self.setting.motion, grid, self.setting.robot.name))
+
+    def _at(self, X: Array, possible: Flags) -> Seen:
+        assert self.batch is not None
+        parts: list[Evaluation] = []
+        size = -(-len(X) // max(1, len(X) // PART))
+        for start in range(0, len(X), size):
+            self.progress("poses")
+            parts.append(self.batch.evaluate(X[start : start + size], self.setting.labels, self.cones))
+        reached = possible & np.concatenate([part.reached for part in parts])
+        position, orientation = (np.where(reached, np.concatenate(column), np.nan) for column in (
+            [part.position.largest for part in parts if part.position is not None],
+            [part.orientation.largest for part in parts if part.orientation is not None]))
+        gaps = [_gap(spread.largest, spread.lower) for part in parts for spread in (part.position, part.orientation)
+                if spread is not None]
+
+        def determinant() -> Array | None:
+            with np.errstate(invalid="ignore"):
+                found = [part.determinant for part in parts]
+            known = [np.where(part.reached, each, np.nan) for part, each in zip(parts, found, strict=True)
+                     if each is not None]
+            return np.where(possible, np.concatenate(known), np.nan) if len(known) == len(parts) else None
+
+        def smallest() -> Array:
+            return np.where(possible, np.concatenate([part.singular_values[:, -1] for part in parts]), np.nan)
+
+        return Seen(reached, position, orientation, determinant, smallest, max(gaps))
+
+    def _one_by_one(self, grid: Grid) -> Seen:
+        everything = self.setting.everything
+        found = sweep(everything.start, everything.question, grid, self.setting.motion,
+                      lambda: self.progress("poses"), self.setting.placer)
+        table = np.full((3, len(found)), np.nan)
+        for i, at in enumerate(found):
+            if at is not None:
+                self.progress("errors")
+                rates, twists = reading(at, self.question)
+                table[:2, i] = maxima(at, self.question, self.cones)
+                table[2, i] = _weakest(rates, twists, at.twin.length)
+        return Seen(np.isfinite(table[2]), table[0], table[1], lambda: None, lambda: table[2], 0.0)
+
+    def _spots(self, grid: Grid, seen: Seen, seed: int) -> Spots:
+        """Hold the batch against Pinocchio at random poses; raises ``Disagreement``."""
+        sizes = [np.where(np.isfinite(each), each, 0.0) for each in (seen.position, seen.orientation)]
+        limits = [USUAL * np.median(each[each > 0]) if (each > 0).any() else np.inf for each in sizes]
+        finite = np.isfinite(seen.position) & np.isfinite(seen.orientation)
+        usual = np.flatnonzero(seen.reached & finite & (sizes[0] <= limits[0]) & (sizes[1] <= limits[1]))
+        chosen = np.random.default_rng(seed).choice(usual, min(SPOTS, len(usual)), replace=False)
+        count, largest = 0, 0.0
+        for i, at in zip(chosen, self._configurations(grid, chosen), strict=True):
+            if at is None:
+                continue
+            count += 1
+            for mine, theirs, all_of in zip((seen.position[i], seen.orientation[i]),
+                                            maxima(at, self.question, self.cones), sizes, strict=True):
+                scale = max(mine, float(np.median(all_of[all_of > 0])) if (all_of > 0).any() else 1.0)
+                largest = max(largest, abs(mine - theirs) / scale)
+        if largest > SAME_RELATION + seen.gap:
+            raise Disagreement(self.setting.robot.name, count, largest)
+        return Spots(count, float(largest))
+
+    def _configurations(self, grid: Grid, chosen: NDArray[np.int64]) -> list[ClosedConfiguration | None]:
+        """The closed configurations at cells of a grid."""
+        setting = self.setting
+        cells = np.unravel_index(chosen, grid.shape)
+        places = np.stack([values[cell] for (_, values), cell in zip(grid.axes, cells, strict=True)], axis=1)
+        X, _ = poses_over(setting.motion, grid, setting.robot.name, places)
+        if setting.placer is not None:
+            return setting.placer.configurations(X)
+        found: list[ClosedConfiguration | None] = []
+        for each in X:
+            try:
+                found.append(reach(setting.everything.start, setting.everything.question, setting.motion.pose(each),
+                                   setting.motion))
+            except HrsynthError:
+                found.append(None)
+        return found
+
+
+def _gap(largest: Array, lower: Array) -> float:
+    """The largest gap between the bounds, relative."""
+    here = np.isfinite(largest) & (largest > 0)
+    return float(np.max((largest[here] - lower[here]) / largest[here], initial=0.0))
+
+
+def _weakest(rates: Array, twists: Array, length: float) -> float:
+    """The smallest change of the directions for a unit twist (characteristic lengths, radians)."""
+    scaled = twists / np.repeat([length, 1.0], 3)[:, None]
+    _, values, right = np.linalg.svd(scaled, full_matrices=False)
+    kept = values > SAME_RELATION
+    M = rates @ right[kept].T / values[kept]
+    return float(np.linalg.svd(M, compute_uv=False)[-1]) if M.shape[0] >= M.shape[1] else 0.0

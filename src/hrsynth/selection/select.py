@@ -1,0 +1,224 @@
+"""Which legs to watch for one displacement (MMT A.2): all sets, ranked by the accuracy at the goal."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from ..analysis.accuracy.accuracy import errors_at
+from ..analysis.accuracy.cones import Cones, half_angles
+from ..analysis.aspects.answer import SEPARATED
+from ..analysis.aspects.path import Aspects
+from ..analysis.controllability import CONTROLLABLE, verdict_of
+from ..analysis.modes.modes import modes_at
+from ..analysis.posture import Examiner
+from ..analysis.setting import Setting, prepare, silent
+from ..errors import BadRequest, HrsynthError
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.reach import reach
+from ..mechanism import Mechanism
+from ..mechanism.observation import Direction
+from ..mechanism.pose import Pose
+from ..mechanism.vectors import Array
+from ..servo.camera import cylinders, placed
+from ..servo.ending import GOAL
+from ..servo.servo import servo
+from .candidate import Candidate, Decision, Modes, singular_at
+from .sight import ENOUGH, Sight, camera_at
+
+SIZE = 4
+"""Legs of the largest sets."""
+RUNS = 3
+"""Sets that a simulated run is to lead to the goal."""
+SECONDS = 45.0
+"""Time after which no further set is examined."""
+BUDGET = 2_000
+"""Intervals that a path's certificate may take."""
+CONE = "0.1deg"
+FOCAL = 800.0
+"""Focal length of the camera (pixels)."""
+AUTO = "auto"
+
+
+@dataclass(frozen=True, eq=False)
+class Selection:
+    """All sets of legs up to a size for one displacement: the kept ones first, the most accurate at the goal before
+    the others, then the discarded ones."""
+
+    setting: Setting
+    start: Pose
+    goal: Pose
+    candidates: tuple[Candidate, ...]
+    cones: Array
+    """Half-angles (rad) of all legs' cones."""
+    sight: Sight | None
+
+    @property
+    def kept(self) -> tuple[Candidate, ...]:
+        """The sets that are not discarded."""
+        return tuple(each for each in self.candidates if each.discarded is None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line, without the command's own fields."""
+        best = next(iter(self.kept), None)
+        eye = self.sight
+        camera = None if eye is None else {"link": eye.reference, "pose": eye.camera.place.tolist(),
+                                           "focal": eye.camera.focal}
+        return {"from": self.start.to_dict(), "to": self.goal.to_dict(), "camera": self.setting.mechanism.reference,
+                "cones": {o.leg: float(np.degrees(cone))
+                          for o, cone in zip(self.setting.observed, self.cones, strict=True)},
+                "sight": camera, "best": None if best is None else list(best.legs),
+                "sets": [each.to_dict() for each in self.candidates]}
+
+
+def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, goal: Pose | str, cones: Cones = CONE,
+           size: int = SIZE, runs: int = RUNS, sight: str | None = None, focal: float = FOCAL,
+           seconds: float = SECONDS, seed: int = 0, progress: Callable[[str], None] | None = None) -> Selection:
+    """All sets of up to ``size`` legs for the displacement from ``start`` to ``goal``, ranked by the largest position
+    error at the goal for ``cones`` about the directions (MMT A.2).
+
+    A set is discarded where it does not see every freedom, where an end is singular, where a camera (``sight``: its
+    pose on the link that carries it, or ``auto`` for one that sees all legs well) sees too little of a leg, where start
+    and goal are proved to lie in different aspects, and where a simulated run ends elsewhere. Runs are made from the
+    best set on, until ``runs`` of them ended at the goal. After ``seconds`` nothing more is asked about any set.
+
+    Raises ``BadRequest``, ``PoseNotReached``.
+    """
+    wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
+    for what, value, least in (("legs of the largest sets", size, 1), ("number of runs", runs, 0)):
+        if value < least:
+            raise BadRequest(what, value, f"at least {least}")
+    if not seconds > 0:
+        raise BadRequest("seconds", seconds, "a positive number")
+    tell = progress or silent
+    tell("sampling")
+    setting = prepare(robot, None, camera, seed=seed)
+    directions = tuple(o for o in setting.segments if isinstance(o, Direction))
+    setting = replace(setting, observed=directions)
+    half = half_angles(cones, directions)
+    everything = setting.everything
+    ends = [reach(everything.start, everything.question, pose, setting.motion) for pose in wanted]
+    work = _Work(setting, ends[0], ends[1], half, _sight(setting, ends, sight, focal), time.monotonic() + seconds, seed,
+                 tell)
+    sets = [legs for count in range(1, min(size, len(directions)) + 1) for legs in combinations(directions, count)]
+    found = sorted((work.first(legs) for legs in sets), key=lambda each: each.order)
+    found = [work.decided(each) for each in found]
+    found = work.run(found, runs)
+    found.sort(key=lambda each: (each.discarded is not None, each.order if each.discarded is None else (0, 0, 0)))
+    poses = [setting.motion.pose(at.pose(setting.motion.link)) for at in ends]
+    return Selection(setting, poses[0], poses[1], tuple(found), half, work.sight)
+
+
+def _sight(setting: Setting, ends: Sequence[ClosedConfiguration], text: str | None, focal: float) -> Sight | None:
+    if text is None:
+        return None
+    rods = cylinders(setting.mechanism, setting.observed)
+    reference = setting.mechanism.reference
+    camera = placed(rods, reference, [at.pose for at in ends]) if text == AUTO else camera_at(text, focal)
+    return Sight(camera, reference, {o.leg: rod for o, rod in zip(setting.observed, rods, strict=True)})
+
+
+@dataclass(frozen=True, eq=False)
+class _Work:
+    """What examines sets of legs between two configurations, until a point in time."""
+
+    setting: Setting
+    start: ClosedConfiguration
+    goal: ClosedConfiguration
+    cones: Array
+    sight: Sight | None
+    until: float
+    seed: int
+    tell: Callable[[str], None]
+
+    @property
+    def over(self) -> bool:
+        """Whether the time is over."""
+        return time.monotonic() > self.until
+
+    def watching(self, legs: Sequence[str]) -> Setting:
+        """The setting with some legs watched."""
+        return replace(self.setting, observed=tuple(o for o in self.setting.observed if o.leg in legs))
+
+    def first(self, observations: Sequence[Direction]) -> Candidate:
+        """What is quickly said of a set: verdict, singular ends, sight, accuracy."""
+        self.tell("sets of legs")
+        legs = tuple(o.leg for o in observations)
+        setting = self.watching(legs)
+        try:
+            verdict = verdict_of(setting, legs, setting.samples)
+            if verdict.verdict != CONTROLLABLE:
+                lost = "; ".join(freedom.name for freedom in verdict.lost)
+                return Candidate(legs, verdict.verdict, f"{verdict.verdict}, not seen: {lost}")
+            examiner = Examiner(setting)
+            reasons = [singular_at(name, examiner.glance(at))
+                       for name, at in (("start", self.start), ("goal", self.goal))]
+        except HrsynthError as error:
+            return Candidate(legs, "undecided", str(error))
+        cones = np.array([cone for o, cone in zip(self.setting.observed, self.cones, strict=True) if o.leg in legs])
+        found = Candidate(legs, verdict.verdict, next((reason for reason in reasons if reason), None),
+                          errors_at(setting, cones, self.goal))
+        return self.looked(found, (self.start, self.goal))
+
+    def looked(self, candidate: Candidate, configurations: Sequence[ClosedConfiguration]) -> Candidate:
+        """The candidate with what the camera sees of its legs."""
+        if self.sight is None or candidate.discarded:
+            return candidate
+        least = self.sight.least(configurations)
+        seen = {leg: least[leg] for leg in candidate.legs}
+        worst = min(seen, key=lambda leg: seen[leg])
+        why = None if seen[worst] >= ENOUGH else f"the camera sees {100 * seen[worst]:.0f} % of leg {worst}"
+        return replace(candidate, seen=seen, discarded=why)
+
+    def decided(self, candidate: Candidate) -> Candidate:
+        """The candidate with its modes and whether start and goal lie in one aspect."""
+        if candidate.discarded or self.over:
+            return candidate
+        setting = self.watching(candidate.legs)
+        self.tell("modes")
+        start_modes, goal_modes = self._modes(setting, self.start), self._modes(setting, self.goal)
+        self.tell("aspects")
+        try:
+            answer = Aspects.about(setting).join(self.start, self.goal, seed=self.seed, budget=BUDGET,
+                                                 progress=lambda: self.tell("aspects"))
+            aspect = Decision(answer.verdict, answer.reason)
+        except HrsynthError as error:
+            aspect = Decision("undecided", str(error))
+        why = f"start and goal lie in different aspects: {aspect.reason}" if aspect.verdict == SEPARATED else None
+        return replace(candidate, start_modes=start_modes, goal_modes=goal_modes, aspect=aspect, discarded=why)
+
+    @staticmethod
+    def _modes(setting: Setting, at: ClosedConfiguration) -> Modes:
+        try:
+            return Modes.of(modes_at(setting, at))
+        except HrsynthError as error:
+            return Modes(None, None, False, str(error))
+
+    def run(self, candidates: Sequence[Candidate], runs: int) -> list[Candidate]:
+        """The candidates, best first, with simulated runs until ``runs`` of them ended at the goal."""
+        found, arrived = [], 0
+        for candidate in candidates:
+            if not candidate.discarded and arrived < runs and not self.over:
+                self.tell("runs")
+                candidate = self._ran(candidate)
+                arrived += candidate.discarded is None
+            found.append(candidate)
+        return found
+
+    def _ran(self, candidate: Candidate) -> Candidate:
+        motion, mechanism = self.setting.motion, self.setting.mechanism
+        start, goal = (motion.pose(at.pose(motion.link)) for at in (self.start, self.goal))
+        camera = None if mechanism.reference == mechanism.base else mechanism.reference
+        try:
+            found = servo(self.setting.robot, candidate.legs, camera, start=start, goal=goal, seed=self.seed)
+        except HrsynthError as error:
+            return replace(candidate, run=Decision("refused", str(error)), discarded=f"the run is refused: {error}")
+        run = Decision(found.ended, found.ending.reason)
+        if found.ended != GOAL:
+            return replace(candidate, run=run, discarded=f"the simulated run ends in: {found.ended} ({run.reason})")
+        return self.looked(replace(candidate, run=run), found.run.configurations)

@@ -1,0 +1,86 @@
+"""What a camera sees of the legs: how much of each lies in its picture, hidden by no other leg (MMT A.2)."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import BadRequest
+from ..kinematics.configuration import ClosedConfiguration
+from ..mechanism.pose import Pose
+from ..mechanism.vectors import Array, pose
+from ..servo.camera import Camera, Rod
+
+Flags = NDArray[np.bool_]
+PLACES = 101
+"""Points of a leg's axis that are looked at."""
+ENOUGH = 0.5
+"""Part of a leg's axis that is to be seen: its direction is rebuilt from what is seen of its edges."""
+
+
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """A camera carried by ``reference``, and the rods of all legs by their labels: those of the default segments."""
+
+    camera: Camera
+    reference: str
+    rods: Mapping[str, Rod]
+
+    def seen(self, at: ClosedConfiguration) -> dict[str, float]:
+        """The part (0 to 1) of each rod's axis that lies in the picture and is not hidden by another rod."""
+        X = at.pose(self.reference)
+        ends = {leg: self.camera.seen(X, at.pose, rod) for leg, rod in self.rods.items()}
+        found = {}
+        for leg, (first, last) in ends.items():
+            points = first + np.linspace(0.0, 1.0, PLACES)[:, None] * (last - first)
+            clear = self._pictured(points)
+            for other, segment in ends.items():
+                if other != leg:
+                    clear &= ~hidden(points, segment, self.rods[other].radius)
+            found[leg] = float(clear.mean())
+        return found
+
+    def least(self, configurations: Sequence[ClosedConfiguration]) -> dict[str, float]:
+        """The least part of each rod that is seen at some configurations."""
+        found = [self.seen(at) for at in configurations]
+        return {leg: min(each[leg] for each in found) for leg in self.rods}
+
+    def _pictured(self, points: Array) -> Flags:
+        """Which points (n, 3) of the camera's frame lie in the picture."""
+        ahead = points[:, 2] > 0
+        pixels = self.camera.pixels(np.where(ahead[:, None], points, 1.0))
+        inside = np.all((pixels >= 0) & (pixels <= [self.camera.width, self.camera.height]), axis=1)
+        return np.asarray(ahead & inside, dtype=bool)
+
+
+def hidden(points: Array, segment: Array, radius: float) -> Flags:
+    """Which points (n, 3) a cylinder about a segment (2, 3) hides from the origin: the ray to the point comes nearer to
+    the segment than ``radius``, before the point."""
+    a, d = segment[0], segment[1] - segment[0]
+    length = float(d @ d)
+    square = np.sum(points * points, axis=1)
+    along, across = points @ d, points @ a
+    start = float(a @ d)
+    level = square * length - along**2
+    safe = np.where(level > 0, level, 1.0)
+    s = np.where(level > 1e-12 * square * length, np.clip((across * length - along * start) / safe, 0.0, 1.0), 0.0)
+    t = (s * along - start) / length
+    t = np.clip(t, 0.0, 1.0)
+    s = np.clip((across + t * along) / np.where(square > 0, square, 1.0), 0.0, 1.0)
+    apart = np.linalg.norm(s[:, None] * points - (a + t[:, None] * d), axis=1)
+    before = (1 - s) * np.sqrt(square) > radius
+    return np.asarray((apart < radius) & before, dtype=bool)
+
+
+def camera_at(text: str, focal: float) -> Camera:
+    """The camera at a pose in the frame of the link that carries it: x right in the picture, y down, z ahead; 640 by
+    480 pixels, focal length in pixels. Raises ``BadRequest``."""
+    wanted = Pose.parse(text)
+    if None in (wanted.x, wanted.y, wanted.z) or wanted.rotation is None:
+        raise BadRequest("pose of the camera: a part is missing", text, "x, y, z and rpy")
+    if not 0 < focal < np.inf:
+        raise BadRequest("focal length (pixels)", focal, "a positive number")
+    return Camera(pose([float(wanted.x or 0), float(wanted.y or 0), float(wanted.z or 0)], wanted.rotation), focal)

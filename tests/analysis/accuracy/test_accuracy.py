@@ -1,0 +1,237 @@
+"""The error maxima: against a closed form, against Pinocchio's relation and a search, against true errors; requests."""
+
+from __future__ import annotations
+
+import math
+from functools import cache
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, assume, given, settings
+
+from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy, errors_at, sees_all
+from hrsynth.analysis.accuracy.cones import half_angles
+from hrsynth.analysis.accuracy.field import Mapper
+from hrsynth.analysis.accuracy.gauge import reading
+from hrsynth.analysis.accuracy.sampled import sampled
+from hrsynth.analysis.accuracy.spots import singular_poses
+from hrsynth.analysis.setting import Setting, prepare, silent
+from hrsynth.description import load
+from hrsynth.errors import BadRequest, HrsynthError, PlaneNotMet, PoseNotReached
+from hrsynth.mechanism.pose import Grid
+from hrsynth.mechanism.vectors import Array
+from kinematics.robots import ROBOTS
+from strategies import parallel_robots
+
+CONE = math.radians(0.1)
+ANGLES = np.array([-3, -1, 1, 3]) * math.pi / 4
+"""θ_i of the Quattro, IROS IV-A."""
+BASE, PLATE, PROXIMAL, DISTAL = 0.296, 0.102, 0.380, 0.825
+
+
+def inverse_interaction(P: Array, legs: list[int]) -> Array:
+    """M^{T+} (n, 3, 3 k) of the rigid Quattro at positions (n, 3) by MMT (B.5), (B.12) and (B.14), b_i with a minus."""
+    blocks = []
+    for leg in legs:
+        x_i = np.array([math.cos(ANGLES[leg]), math.sin(ANGLES[leg]), 0.0])
+        AC = P + (PLATE - BASE) * x_i
+        x, z = AC @ x_i, AC[:, 2]
+        alpha, beta = -2 * PROXIMAL * x, -2 * PROXIMAL * z
+        gamma = np.sum(AC**2, axis=1) + PROXIMAL**2 - DISTAL**2
+        root = np.sqrt(alpha**2 + beta**2 - gamma**2)
+        q = np.stack([2 * np.arctan2(-beta + sign * root, gamma - alpha) for sign in (1, -1)])
+        q = np.where(np.cos(q[0]) > np.cos(q[1]), q[0], q[1])
+        level, up = x_i, np.array([0.0, 0.0, 1.0])
+        u = (AC - PROXIMAL * (np.cos(q)[:, None] * level + np.sin(q)[:, None] * up)) / DISTAL
+        v = -np.sin(q)[:, None] * level + np.cos(q)[:, None] * up
+        slip = np.einsum("ni,nj->nij", v, u) / np.sum(u * v, axis=1)[:, None, None]
+        blocks.append((np.eye(3) - slip) / DISTAL)
+    return np.linalg.pinv(np.concatenate(blocks, axis=1))
+
+
+def largest(J: Array, cones: Array) -> Array:
+    """max over unit w of Σ ψ_i ‖J_iᵀ w‖ for J (n, 3, 3 k), by ascent from many starts."""
+    A = J.reshape(len(J), 3, len(cones), 3).transpose(2, 0, 1, 3) * cones[:, None, None, None]
+    squares = A @ A.transpose(0, 1, 3, 2)
+    starts = np.array([w for w in np.ndindex(3, 3, 3) if w > (1, 1, 1)], dtype=float) - 1
+    best, value = np.zeros((len(J), 3)), np.zeros(len(J))
+
+    def climbed(w: Array, steps: int) -> tuple[Array, Array]:
+        for _ in range(steps):
+            pulls = np.einsum("knij,nj->kni", squares, w)
+            sizes = np.sqrt(np.maximum(np.einsum("kni,ni->kn", pulls, w), 1e-300))
+            w = np.sum(pulls / sizes[..., None], axis=0)
+            w /= np.linalg.norm(w, axis=1, keepdims=True)
+        return w, np.sqrt(np.maximum(np.einsum("knij,ni,nj->kn", squares, w, w), 0.0)).sum(axis=0)
+
+    for start in starts:
+        w, found = climbed(np.tile(start / np.linalg.norm(start), (len(J), 1)), 8)
+        best, value = np.where((found > value)[:, None], w, best), np.maximum(found, value)
+    return climbed(best, 250)[1]
+
+
+@cache
+def rigid(legs: str) -> Accuracy:
+    return accuracy(load("quattro_rigid"), legs, cones=CONE, grid="x=-0.3:0.3:100,y=-0.29:0.31:100,z=-0.75")
+
+
+@pytest.mark.parametrize("legs", ["1,2", "1,3", "2,4"])
+def test_a_map_is_the_closed_form(legs: str) -> None:
+    field = rigid(legs).field
+    assert field is not None
+    assert field.reached.sum() == 10_000
+    x, y = np.meshgrid(*(values for _, values in field.grid.axes), indexing="ij")
+    P = np.stack([x.ravel(), y.ravel(), np.full(x.size, -0.75)], axis=1)
+    J = inverse_interaction(P, [int(leg) - 1 for leg in legs.split(",")])
+    expected = largest(J, np.full(2, CONE))
+    assert np.max(np.abs(field.position.ravel() - expected) / expected) < 1e-9
+    assert not field.orientation.any()
+    assert field.spots is not None
+    assert field.spots.count == 10
+    assert field.spots.difference < 1e-8
+
+
+def check_extents(setting: Setting, cones: Array) -> None:
+    """The extremes are attained by the directions that are told, and no random errors in the cones do worse."""
+    for at in setting.configurations[:2]:
+        errors = errors_at(setting, cones, at)
+        rates, twists = reading(at, setting.samples.question)
+        inverse = np.linalg.pinv(rates, rcond=1e-7)
+        rng = np.random.default_rng(1)
+        tries = rng.normal(size=(400, len(cones), 3))
+        tries *= cones[:, None] / np.linalg.norm(tries, axis=2, keepdims=True)
+        for extent, part in ((errors.position, twists[:3]), (errors.orientation, twists[3:])):
+            J = part @ inverse
+            if extent.errors is None or extent.direction is None:
+                continue
+            assert np.all(np.linalg.norm(extent.errors, axis=1) <= cones * (1 + 1e-12))
+            reached = float(np.linalg.norm(J @ extent.errors.ravel()))
+            assert extent.largest * (1 - extent.gap) <= reached * (1 + 1e-7)
+            assert reached <= extent.largest * (1 + 1e-7)
+            sizes = np.linalg.norm(J @ tries.reshape(400, -1).T, axis=0)
+            assert sizes.max() <= extent.largest * (1 + 1e-9)
+            assert extent.least_direction is not None
+            blocks = J.reshape(3, -1, 3).transpose(1, 2, 0)
+            least = cones @ np.linalg.norm(blocks @ extent.least_direction, axis=1)
+            assert least == pytest.approx(extent.least, rel=1e-9)
+            span = np.linalg.svd(J)[0][:, : np.linalg.matrix_rank(J, tol=1e-9 * np.linalg.norm(J))]
+            views = span @ rng.normal(size=(span.shape[1], 300))
+            views /= np.linalg.norm(views, axis=0)
+            widths = np.einsum("k,kn->n", cones, np.linalg.norm(blocks @ views, axis=1))
+            assert extent.least <= widths.min() * (1 + 1e-9)
+            assert widths.max() <= extent.largest * (1 + 1e-9)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_extremes_are_attained_and_not_exceeded(robot: str) -> None:
+    setting = prepare(load(robot), samples=3)
+    cones = CONE * (1 + np.arange(len(setting.observed)) / 3)
+    check_extents(setting, cones)
+
+
+@settings(max_examples=8, deadline=None, suppress_health_check=list(HealthCheck))
+@given(parallel_robots())
+def test_extremes_of_random_robots(robot) -> None:
+    try:
+        setting = prepare(robot, samples=3)
+    except HrsynthError:
+        assume(False)
+    check_extents(setting, np.full(len(setting.observed), CONE))
+
+
+@pytest.mark.parametrize("robot", ["quattro", "3rrr_m1", "gough_stewart", "orthoglide", "delta"])
+def test_samples_approach_the_linear_maxima_as_cones_shrink(robot: str) -> None:
+    setting = prepare(load(robot), samples=3)
+    question, start = setting.samples.question, setting.everything.start
+    away = []
+    for cone in (2e-3, 1e-3):
+        cones = np.full(len(setting.observed), cone)
+        errors = errors_at(setting, cones, start)
+        true = sampled(start, question, setting.motion, cones, errors, 8)
+        assert true.missed == 0
+        away.append(abs(true.position - errors.position.largest) / errors.position.largest)
+    assert away[1] < 0.02
+    assert away[1] < 0.75 * away[0] or away[1] < 1e-4
+
+
+def test_near_a_singularity_samples_do_not_follow_the_linear_law() -> None:
+    found = accuracy(load("quattro"), "1,4", cones="0.5deg", at=["x=-0.17,y=0,z=-0.7,phi=0"], samples=12)
+    (true,), (linear,) = found.sampled, found.poses
+    assert true is not None
+    assert true.missed or true.position < 0.5 * linear.position.largest
+
+
+def test_cones_of_their_own_scale_their_legs() -> None:
+    robot = load("quattro_rigid")
+    one, two, both = (accuracy(robot, "1,3", cones=cones).poses[0].position.largest
+                      for cones in (f"{CONE}", f"{2 * CONE}", f"1={CONE},3={2 * CONE}"))
+    assert two == pytest.approx(2 * one, rel=1e-12)
+    assert one < both < two
+
+
+def test_a_grid_by_the_batch_is_that_by_pinocchio() -> None:
+    setting = prepare(load("quattro"), "1,3,4")
+    mapper = Mapper(setting, np.full(3, CONE), silent)
+    grid = Grid.parse("x=-0.2:0.2:4,phi=-10deg:20deg:3,y=0.05,z=-0.7")
+    quick, slow = mapper.over(grid, 0), mapper._one_by_one(grid)
+    assert quick.position.ravel() == pytest.approx(slow.position, rel=1e-8)
+    assert quick.orientation.ravel() == pytest.approx(slow.orientation, rel=1e-8)
+    assert quick.smallest.ravel() == pytest.approx(slow.smallest(), rel=1e-8)
+
+
+def test_a_plane_of_a_robot_whose_legs_are_iterated() -> None:
+    field = accuracy(load("3rps"), cones=CONE, grid="z=0.4:0.5:4").field
+    assert field is not None
+    assert field.spots is None
+    assert field.reached.all()
+    assert (field.position > 0).all()
+
+
+def test_singular_poses_of_a_plane_are_singular() -> None:
+    found = accuracy(load("quattro_rigid"), "1,3", cones=CONE, plane="z=-0.7", steps=61)
+    assert found.field is not None
+    spots = singular_poses(found.field)
+    assert len(spots) > 10
+    x, y = map(float, spots[len(spots) // 2])
+    near = accuracy(load("quattro_rigid"), "1,3", cones=CONE, at=[f"x={x!r},y={y!r},z=-0.7"])
+    assert near.poses[0].position.largest > 1.0
+
+
+@pytest.mark.parametrize(("legs", "cones", "options", "word"), [
+    ("1", "0.1deg", {}, "infinite"),
+    ("1,4", "0", {}, "half-angle"),
+    ("1,4", "90deg", {}, "half-angle"),
+    ("1,4", "-1deg", {}, "half-angle"),
+    ("1,4", "wide", {}, "not a number"),
+    ("1,4", "nan", {}, "half-angle"),
+    ("1,4", "1=0.1deg", {}, "leg 4 has no cone"),
+    ("1,4", "1=0.1deg,2=0.1deg", {}, "nothing that is observed"),
+    ("1,4", "1=0.1deg,1=0.1deg", {}, "twice"),
+    ("1,4", "0.1deg,0.2deg", {}, "not leg=angle"),
+    ("1,9", "0.1deg", {}, "no leg or link"),
+    ("1,4", "0.1deg", {"plane": "z=-0.7", "grid": "x=0:1:2"}, "both"),
+    ("1,4", "0.1deg", {"steps": 5}, "poses a side"),
+    ("1,4", "0.1deg", {"samples": -1}, "samples"),
+    ("1,4", "0.1deg", {"plane": "w=1"}, "unknown part"),
+])
+def test_bad_requests(legs: str, cones: str, options: dict, word: str) -> None:
+    with pytest.raises(BadRequest) as caught:
+        accuracy(load("quattro"), legs, cones=cones, **options)
+    assert word in str(caught.value)
+    assert len(caught.value.lines()) == 1
+
+
+def test_poses_and_planes_out_of_reach() -> None:
+    with pytest.raises(PoseNotReached):
+        accuracy(load("quattro"), "1,4", cones=CONE, at=["x=3"])
+    with pytest.raises(PlaneNotMet):
+        accuracy(load("quattro"), "1,4", cones=CONE, plane="z=3")
+    with pytest.raises(PlaneNotMet):
+        accuracy(load("quattro"), "1,4", cones=CONE, grid="x=3:4:3,y=0,z=-0.7")
+
+
+def test_cones_by_link_and_by_leg() -> None:
+    setting = prepare(load("quattro"), "1,4", samples=2)
+    sees_all(setting)
+    link = setting.observed[0].link
+    assert half_angles({link: 0.1, "4": 0.2}, setting.observed).tolist() == [0.1, 0.2]

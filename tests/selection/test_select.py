@@ -1,0 +1,176 @@
+"""Selection agrees with the commands that answer each question alone; what a camera sees; refusals."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hrsynth.analysis.accuracy.accuracy import accuracy
+from hrsynth.analysis.aspects.path import path
+from hrsynth.analysis.controllability import legs
+from hrsynth.analysis.modes.modes import modes
+from hrsynth.analysis.setting import prepare
+from hrsynth.cli import _run
+from hrsynth.description import load
+from hrsynth.errors import BadRequest, PoseNotReached
+from hrsynth.mechanism.vectors import pose, rotation_from_rpy
+from hrsynth.selection.select import Selection, select
+from hrsynth.selection.sight import Sight, camera_at, hidden
+from hrsynth.servo.camera import Camera, cylinders
+
+START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
+
+
+@cache
+def found(robot: str = "quattro", start: str = START, goal: str = GOAL, size: int = 2, runs: int = 1) -> Selection:
+    return select(load(robot), start=start, goal=goal, cones="0.1deg", size=size, runs=runs, seconds=1000)
+
+
+def test_every_set_is_told_once_the_kept_ones_first_by_accuracy() -> None:
+    sets = [each.legs for each in found().candidates]
+    assert len(set(sets)) == len(sets) == 4 + 6
+    assert found().candidates[: len(found().kept)] == found().kept
+    errors = [each.errors.position.largest for each in found().kept if each.errors is not None]
+    assert len(errors) == len(found().kept)
+    assert errors == sorted(errors)
+
+
+def test_verdicts_are_those_of_legs() -> None:
+    known = {each.legs: each.verdict for each in legs(load("quattro")).sets}
+    assert {each.legs: each.verdict for each in found().candidates} == {each.legs: known[each.legs]
+                                                                       for each in found().candidates}
+    for each in found().candidates:
+        assert each.verdict == "controllable" or (each.discarded or "").startswith(each.verdict)
+
+
+@pytest.mark.parametrize("watched", ["1,4", "2,3"])
+def test_answers_are_those_of_the_single_commands(watched: str) -> None:
+    robot = load("quattro")
+    mine = next(each for each in found().candidates if each.legs == tuple(watched.split(",")))
+    theirs = accuracy(robot, watched, cones="0.1deg", at=[GOAL]).poses[0]
+    assert mine.errors is not None
+    assert mine.errors.position.largest == pytest.approx(theirs.position.largest, rel=1e-7)
+    assert mine.errors.orientation.largest == pytest.approx(theirs.orientation.largest, rel=1e-7)
+    assert mine.aspect is not None
+    assert mine.aspect.verdict == path(robot, watched, start=START, goal=GOAL).verdict
+    assert (mine.aspect.verdict == "separated") is (mine.discarded is not None)
+    for counted, at in ((mine.start_modes, START), (mine.goal_modes, GOAL)):
+        listed = modes(robot, watched, at=at)
+        assert counted is not None
+        assert (counted.count, counted.reachable) == (len(listed.modes), sum(m.reachable for m in listed.modes))
+
+
+def test_the_best_set_is_run_to_the_goal() -> None:
+    best = found().kept[0]
+    assert best.run is not None
+    assert best.run.verdict == "goal"
+    assert all(each.run is None for each in found().kept[1:])
+
+
+@pytest.mark.slow
+def test_a_run_that_ends_elsewhere_discards_its_set() -> None:
+    """Without the test of aspects legs 1, 4 of MMT 5.1.3 would be kept: their run ends in another mode."""
+    from hrsynth.analysis.accuracy.cones import half_angles
+    from hrsynth.kinematics.reach import reach
+    from hrsynth.mechanism.pose import Pose
+    from hrsynth.selection.select import _Work
+
+    setting = prepare(load("quattro"))
+    everything = setting.everything
+    ends = [reach(everything.start, everything.question, Pose.parse(text), setting.motion) for text in (START, GOAL)]
+    work = _Work(setting, ends[0], ends[1], half_angles(0.001, setting.observed), None, math.inf, 0, lambda _: None)
+    first = work.first([o for o in setting.observed if o.leg in "14"])
+    assert first.discarded is None
+    (ran,) = work.run([first], 1)
+    assert ran.run is not None
+    assert ran.run.verdict == "mode"
+    assert "ends in: mode" in str(ran.discarded)
+    late = replace(work, until=0.0)
+    assert late.decided(first) is first
+    assert late.run([first], 1) == [first]
+
+
+def test_a_singular_goal_discards() -> None:
+    here = select(load("3rpr_m1"), start="x=0.05,y=0.04,phi=0", goal="x=0,y=0.02,phi=0.1", runs=0)
+    assert {each.verdict for each in here.candidates if len(each.legs) == 3} == {"controllable"}
+    assert all(each.discarded for each in here.candidates if len(each.legs) < 2)
+
+
+def test_hidden_is_what_a_fine_search_finds() -> None:
+    rng = np.random.default_rng(0)
+    for _ in range(200):
+        point, segment, radius = rng.normal(size=3), rng.normal(size=(2, 3)), rng.uniform(0.02, 0.6)
+        s, t = (values.ravel() for values in np.meshgrid(np.linspace(0, 1, 201), np.linspace(0, 1, 201)))
+        apart = np.linalg.norm(s[:, None] * point - segment[0] - t[:, None] * (segment[1] - segment[0]), axis=1)
+        nearest = int(np.argmin(apart))
+        if abs(apart[nearest] - radius) < 0.02 or abs((1 - s[nearest]) * np.linalg.norm(point) - radius) < 0.03:
+            continue
+        expected = apart[nearest] < radius and (1 - s[nearest]) * np.linalg.norm(point) > radius
+        assert hidden(point[None], segment, radius)[0] == expected
+
+
+def test_sight_sees_what_is_ahead_in_the_picture_and_not_hidden() -> None:
+    setting = prepare(load("quattro"), samples=2)
+    at = setting.everything.start
+    rods = dict(zip(setting.labels, cylinders(setting.mechanism, setting.observed), strict=True))
+    below = rotation_from_rpy(0.0, 0.0, 0.0)
+    sight = Sight(Camera(pose([0, 0, -3.0], below)), "base", rods)
+    assert all(part == 1.0 for part in sight.seen(at).values())
+    away = Sight(Camera(pose([0, 0, -3.0], rotation_from_rpy(math.pi, 0, 0))), "base", rods)
+    assert all(part == 0.0 for part in away.seen(at).values())
+    level = Camera(pose([-3.0, -3.0, -0.35], rotation_from_rpy(-math.pi / 2, 0, -math.pi / 4)))
+    assert all(part == 1.0 for part in Sight(level, "base", rods).seen(at).values())
+    fat = Sight(level, "base", {leg: replace(rod, radius=0.12) for leg, rod in rods.items()})
+    seen = fat.seen(at)
+    assert seen["1"] > 0.9
+    assert seen["3"] < 0.2
+    assert fat.least([at, at]) == seen
+
+
+def test_a_blind_camera_discards_every_set() -> None:
+    here = select(load("quattro"), start=START, goal=GOAL, size=2, runs=0, sight="x=0,y=0,z=-3,rpy=180deg/0/0")
+    assert not here.kept
+    controllable = [each for each in here.candidates if each.verdict == "controllable"]
+    assert controllable
+    assert all("camera sees 0 %" in str(each.discarded) for each in controllable)
+
+
+@pytest.mark.parametrize(("options", "word"), [
+    ({"cones": "90deg"}, "half-angle"), ({"cones": "1=0.1deg"}, "no cone"), ({"size": 0}, "largest sets"),
+    ({"runs": -1}, "runs"), ({"sight": "x=0"}, "camera"), ({"sight": "x=0,y=0,z=0,rpy=0/0/0", "focal": 0.0}, "focal"),
+    ({"seconds": 0.0}, "seconds"), ({"start": "w=1"}, "unknown part")])
+def test_bad_requests(options: dict, word: str) -> None:
+    with pytest.raises(BadRequest) as caught:
+        select(load("quattro"), **{"start": START, "goal": GOAL, **options})
+    assert word in str(caught.value)
+
+
+@pytest.mark.parametrize("ends", [("x=4", GOAL), (START, "z=4")])
+def test_ends_out_of_reach(ends: tuple[str, str]) -> None:
+    with pytest.raises(PoseNotReached):
+        select(load("quattro"), start=ends[0], goal=ends[1])
+
+
+def test_a_camera_has_a_whole_pose() -> None:
+    assert camera_at("x=0,y=0,z=1,rpy=180deg/0/0", 500.0).focal == 500.0
+    assert camera_at("x=0,y=0,z=1,rpy=180deg/0/0", 500.0).place[2, 2] == pytest.approx(-1)
+
+
+def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
+    arguments = ["select", "quattro_rigid", "--from", "x=0", "--to", "x=0.1,y=0.05", "--size", "2", "--runs", "1"]
+    assert _run([*arguments, "--sight", "auto", "--json"]) == 0
+    data = json.loads(capsys.readouterr().out)
+    assert data["command"] == "select"
+    assert data["best"] == next(each["legs"] for each in data["sets"] if each["discarded"] is None)
+    assert {"legs", "verdict", "discarded", "position_mm", "modes", "aspect", "run", "seen"} <= data["sets"][0].keys()
+    assert _run([*arguments, "--size", "1"]) == 0
+    out, err = capsys.readouterr()
+    assert "partially controllable" in out
+    assert err == ""
+    assert _run(["select", "quattro", "--from", "x=9", "--to", "x=0"]) == 3
+    assert len(capsys.readouterr().err.splitlines()) == 1

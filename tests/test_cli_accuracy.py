@@ -1,0 +1,63 @@
+"""`accuracy` on the command line: JSON, pictures, tables, refusals."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from hrsynth.cli import _run
+
+QUATTRO = ("accuracy", "quattro", "--observe", "1,4", "--cone", "0.1deg")
+
+
+def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    status = _run(list(arguments))
+    out, err = capsys.readouterr()
+    return status, out, err
+
+
+def test_json_of_a_plane_is_the_contract(capsys: pytest.CaptureFixture[str]) -> None:
+    status, out, _ = told(capsys, *QUATTRO, "--plane", "z=-0.7", "--steps", "9", "--json")
+    data = json.loads(out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+    assert status == 0
+    assert (data["robot"], data["command"], len(data["x"]), len(data["y"])) == ("quattro", "accuracy", 9, 9)
+    for name in ("position_mm", "orientation_deg", "reached"):
+        assert [len(row) for row in data[name]] == [9] * 9
+    cells = list(zip(*([value for row in data[name] for value in row]
+                       for name in ("reached", "position_mm", "orientation_deg")), strict=True))
+    for reached, *values in cells:
+        assert all((value is not None and value > 0) is reached for value in values)
+    assert {reached for reached, *_ in cells} == {True, False}
+    assert data["checked"]["poses"] > 0
+
+
+def test_files_and_text(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    for grid, name in ((("--plane", "z=-0.7", "--steps", "15"), "map.png"),
+                       (("--grid", "x=-0.9:0.9:5,y=0,z=-0.7"), "line.png"),
+                       (("--grid", "x=-0.3:0.3:4,y=-0.3:0.3:4,z=-0.8:-0.6:2"), "box.png"),
+                       (("--grid", "x=-0.9:0.9:5,y=0,z=-0.7"), "line.csv")):
+        status, out, err = told(capsys, *QUATTRO, *grid, "-o", str(tmp_path / name))
+        assert (status, err) == (0, "")
+        assert "against Pinocchio" in out
+        assert name in out
+    assert (tmp_path / "map.png").read_bytes().startswith(b"\x89PNG")
+    lines = (tmp_path / "line.csv").read_text().splitlines()
+    assert lines[0] == "x,position_mm,orientation_deg"
+    assert [line.endswith(",,") for line in lines[1:]] == [True, False, False, False, True]
+
+
+@pytest.mark.parametrize(("arguments", "status", "word"), [
+    (("--cone", "90deg"), 2, "less than 90deg"), (("--cone", "0"), 2, "more than 0"),
+    (("--observe", "1"), 2, "do not see"), (("--observe", "7"), 2, "no leg or link"),
+    (("--at", "x=5"), 3, "is not reached"), (("--plane", "z=5"), 3, "no pose of the plane"),
+    (("-o", "map.png"), 2, "--plane or --grid"), (("--plane", "z=-0.7", "-o", "map.txt"), 2, "unknown ending"),
+    (("--plane", "z=-0.7", "-o", "/nowhere/map.png"), 2, "nowhere")])
+def test_refusals_are_one_line(capsys: pytest.CaptureFixture[str], arguments: tuple[str, ...], status: int, word: str
+                               ) -> None:
+    found, out, err = told(capsys, *QUATTRO, *arguments)
+    assert (found, out) == (status, "")
+    (line,) = err.splitlines()
+    assert line.startswith("hrsynth: ")
+    assert word in line
