@@ -8,12 +8,11 @@ welded to the other link.
 
 from __future__ import annotations
 
-import networkx as nx
 import numpy as np
 import pinocchio as pin
 
 from ..errors import BadMechanism
-from ..mechanism import Joint, JointType, Mechanism
+from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..mechanism.vectors import Array, inverse, pose
 
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
@@ -56,18 +55,11 @@ class Twin:
 
     def _span(self) -> tuple[list[tuple[Joint, str]], list[Joint]]:
         mechanism = self.mechanism
-        graph: nx.Graph[str] = nx.Graph()
-        graph.add_nodes_from(mechanism.links)
         geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
-        for joint in mechanism.joints.values():
-            weight = _WEIGHT[joint.type.value] - (0.5 if joint.successor in geared else 0)
-            old = graph.get_edge_data(*joint.links)
-            if old is None or weight < old["weight"]:
-                graph.add_edge(*joint.links, weight=weight, joint=joint)
-        tree = nx.minimum_spanning_tree(graph)
-        ordered: list[tuple[Joint, str]] = []
-        for parent, child in nx.bfs_edges(tree, mechanism.base):
-            ordered.append((tree.edges[parent, child]["joint"], parent))
+        joints = list(mechanism.joints.values())
+        weights = [_WEIGHT[joint.type.value] - (0.5 if joint.successor in geared else 0) for joint in joints]
+        tree = graphs.spanning_forest(mechanism.links, joints, weights)
+        ordered = [(joint, parent) for joint, parent, _ in graphs.outward(mechanism.base, tree)]
         if len(ordered) != len(mechanism.links) - 1:
             reached = {mechanism.base, *(child.other(parent) for child, parent in ordered)}
             missing = sorted(set(mechanism.links) - reached)
