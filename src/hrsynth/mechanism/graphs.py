@@ -77,8 +77,8 @@ def shortest_path(graph: Adjacency, start: str, end: str) -> list[str]:
     """A way from ``start`` to ``end`` with the fewest edges; raises ``KeyError`` where there is none."""
     left = distances(graph, end)
     way = [start]
-    while way[-1] != end:
-        way.append(next(node for node in graph[way[-1]] if left[node] == left[way[-1]] - 1))
+    for remaining in range(left[start] - 1, -1, -1):
+        way.append(next(node for node in graph[way[-1]] if left[node] == remaining))
     return way
 
 
