@@ -24,8 +24,8 @@ edges = st.lists(pairs, max_size=14)
 some = st.one_of(st.none(), st.sets(st.sampled_from(NODES)).map(lambda within: within | {"n0", "n1"}))
 
 
-def both(joined: list[tuple[str, str]], within: set[str] | None) -> tuple[graphs.Adjacency, nx.Graph]:
-    graph = nx.Graph()
+def both(joined: list[tuple[str, str]], within: set[str] | None) -> tuple[graphs.Adjacency, nx.Graph[str]]:
+    graph: nx.Graph[str] = nx.Graph()
     graph.add_nodes_from(NODES)
     graph.add_edges_from(joined)
     return graphs.adjacency(NODES, joined), graph if within is None else graph.subgraph(within)
@@ -63,14 +63,14 @@ def test_a_shortest_path(joined):
 def test_the_same_spanning_tree_and_the_same_order(weighted):
     """Among equal weights too: files and twins do not depend on which of the two chooses."""
     bonds = [Bond(pair, number) for number, (pair, _) in enumerate(weighted)]
-    graph = nx.MultiGraph()
+    graph: nx.MultiGraph[str] = nx.MultiGraph()
     graph.add_nodes_from(NODES)
     for bond, (_, weight) in zip(bonds, weighted, strict=True):
         graph.add_edge(*bond.links, key=bond.number, weight=weight)
     chosen = graphs.spanning_forest(NODES, bonds, [weight for _, weight in weighted])
     theirs = [key for _, _, key in nx.minimum_spanning_edges(graph, keys=True, data=False)]
     assert [bond.number for bond in chosen] == theirs
-    tree = nx.Graph()
+    tree: nx.Graph[str] = nx.Graph()
     tree.add_nodes_from(NODES)
     tree.add_edges_from(bond.links for bond in chosen)
     assert [(near, far) for _, near, far in graphs.outward("n0", chosen)] == list(nx.bfs_edges(tree, "n0"))

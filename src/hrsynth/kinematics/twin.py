@@ -208,14 +208,18 @@ class Twin:
 
     def frames(self, q: Array, links: tuple[str, ...]) -> tuple[Array, Array]:
         """Poses (k, 4, 4) and velocities (k, 6, nv) of several links at once."""
-        self.at(q)
-        bodies, offsets, masks = self._several.get(links) or self._together(links)
-        X = np.array([self._placements[body].homogeneous for body in bodies])
-        X[:, :3, 3] *= self.length
-        X = X @ offsets
-        V = self.data.J * masks
+        X = self.poses(q, links)
+        V = self.data.J * self._several[links][2]
         V[:, :3] += _cross_rows(V[:, 3:], X[:, :3, 3] / self.length)
         return X, V
+
+    def poses(self, q: Array, links: tuple[str, ...]) -> Array:
+        """X_BL (k, 4, 4) of several links at once, metres."""
+        self.at(q)
+        bodies, offsets, _ = self._several.get(links) or self._together(links)
+        X = np.array([self._placements[body].homogeneous for body in bodies])
+        X[:, :3, 3] *= self.length
+        return np.asarray(X @ offsets)
 
     def _together(self, links: tuple[str, ...]) -> tuple[list[int], Array, Array]:
         """Of several links: the bodies that carry them, where (k, 4, 4), and what moves them (k, 1, nv)."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 import sys
 from pathlib import Path
 
@@ -20,9 +21,8 @@ def needed(root: xml.Element) -> bool:
 def expanded(path: Path) -> xml.Element:
     """The document that a xacro file stands for; raises ``BadRobotFile``."""
     import subprocess
-    from importlib.util import find_spec
 
-    if find_spec("xacro") is None:
+    if importlib.util.find_spec("xacro") is None:
         raise _refused(path, "a xacro file, and the package xacro is not installed",
                        "the extra hrsynth[xacro], or the URDF that it expands to")
     command = [sys.executable, "-P", str(Path(__file__).with_name("xacro_process.py")), str(path.resolve())]
