@@ -16,7 +16,6 @@ from .files import write_whole
 from .foreign.given import Given, names
 from .foreign.reading import read
 from .tree import spanning
-from .writers import gepetto, mjcf, sdf
 
 DIALECTS = ("native", "gepetto", "mjcf", "sdf")
 ENDINGS = {".xml": "mjcf", ".mjcf": "mjcf", ".sdf": "sdf", ".yaml": "gepetto", ".yml": "gepetto"}
@@ -84,12 +83,16 @@ def save(mechanism: Mechanism, path: str | Path, dialect: str | None = None) -> 
         write_whole(path, native.write(mechanism).encode())
         return ()
     if kind == "gepetto":
+        from .writers import gepetto
+
         tree, closures, lost = gepetto.write(mechanism)
         write_whole(target.with_suffix(".urdf"), tree.encode())
         write_whole(target.with_suffix(".yaml"), closures.encode())
         return lost
     if kind not in DIALECTS:
         raise BadRequest("unknown dialect", kind, DIALECTS)
+    from .writers import mjcf, sdf
+
     text, lost = (mjcf if kind == "mjcf" else sdf).write(mechanism)
     write_whole(path, text.encode())
     return lost

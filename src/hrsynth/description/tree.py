@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import networkx as nx
 import numpy as np
 
 from ..errors import BadMechanism
+from ..mechanism import graphs
 from ..mechanism.model import Joint, JointType, Link, Mechanism
 from ..mechanism.vectors import inverse
 from . import chains
@@ -40,14 +40,11 @@ def spanning(mechanism: Mechanism) -> Mechanism:
 
 def _cut(mechanism: Mechanism) -> Mechanism:
     """The mechanism with a new spanning tree."""
-    graph: nx.MultiGraph[object] = nx.MultiGraph()
-    graph.add_nodes_from(mechanism.links)
-    for joint in mechanism.joints.values():
-        graph.add_edge(*joint.links, key=joint.name, weight=_cost(joint))
-    lost = set(mechanism.links) - nx.node_connected_component(graph, mechanism.base)
+    lost = set(mechanism.links) - graphs.component(mechanism.adjacency, mechanism.base)
     if lost:
         raise BadMechanism("a link that no chain of joints joins to the base", min(lost))
-    chosen = {key for _, _, key in nx.minimum_spanning_edges(graph, keys=True, data=False)}
+    joints = list(mechanism.joints.values())
+    chosen = {joint.name for joint in graphs.spanning_forest(mechanism.links, joints, [_cost(j) for j in joints])}
 
     links: dict[str, Link] = {}
     tree: dict[str, Joint] = {}

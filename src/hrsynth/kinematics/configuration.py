@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Protocol
 
 import numpy as np
@@ -32,10 +32,11 @@ class ClosedConfiguration:
     @classmethod
     def of(cls, twin: Twin, q: Array, tolerance: float = CLOSED) -> ClosedConfiguration:
         """``q`` itself, if it is closed; raises ``LoopsNotClosed`` with the loop that misses most."""
+        q = frozen(q)
         residual = float(np.linalg.norm(twin.residual(q)))
         if not residual <= tolerance:
             raise LoopsNotClosed(twin.mechanism.name, residual, tolerance, twin.worst_loop(q)[0])
-        return cls(twin, frozen(q), residual)
+        return cls(twin, q, residual)
 
     def pose(self, link: str) -> Array:
         """X_BL (4, 4), metres."""
@@ -92,24 +93,48 @@ def measure(twin: Twin, q: Array, reference: str, observations: Sequence[Observa
             ) -> tuple[Array, Array, list[Array], list[Array]]:
     """Poses (k, 4, 4) and velocities (k, 6, nv) of ``links``; the value (size,) and the rates (size, nv) of each
     observation, seen from ``reference`` where it names no link of its own, lengths in characteristic lengths."""
-    seen = [o.seen_from or reference for o in observations]
-    names = tuple(dict.fromkeys((*links, *seen, *(o.link for o in observations))))
+    names, groups = _grouped(reference, tuple(observations), tuple(links))
     X, V = twin.frames(q, names)
-    place = {name: i for i, name in enumerate(names)}
-    metric = V * np.repeat([twin.length, 1.0], 3)[:, None]
+    metric = V.copy()
+    metric[:, :3] *= twin.length
     values: list[Array] = [np.zeros(0)] * len(observations)
     rates: list[Array] = [np.zeros((0, twin.nv))] * len(observations)
+    for group in groups:
+        kind, view, at = group.kind, group.view, group.at
+        found, moving = kind.together(group.observations, X[view], X[at], metric[view], metric[at])
+        unit = twin.length**kind.dimension
+        if unit != 1.0:
+            found, moving = found / unit, moving / unit
+        for number, i in enumerate(group.members):
+            rows = slice(number * kind.size, (number + 1) * kind.size)
+            values[i], rates[i] = found[rows], moving[rows]
+    return X[: len(links)], V[: len(links)], values, rates
+
+
+@dataclass(frozen=True, eq=False)
+class _Group:
+    """Observations of one kind, seen from one link: their places among all, the places of the links."""
+
+    kind: type[Observation]
+    view: int
+    members: list[int]
+    observations: list[Observation]
+    at: list[int]
+
+
+@lru_cache(maxsize=512)
+def _grouped(reference: str, observations: tuple[Observation, ...], links: tuple[str, ...]
+             ) -> tuple[tuple[str, ...], list[_Group]]:
+    """All links that matter, ``links`` first, and the observations that are evaluated together."""
+    seen = [o.seen_from or reference for o in observations]
+    names = (*links, *dict.fromkeys(name for name in (*seen, *(o.link for o in observations)) if name not in links))
+    place = {name: i for i, name in enumerate(names)}
+    groups = []
     for kind, view in dict.fromkeys((type(o), name) for o, name in zip(observations, seen, strict=True)):
         members = [i for i, o in enumerate(observations) if (type(o), seen[i]) == (kind, view)]
-        at = [place[observations[i].link] for i in members]
-        found, moving = kind.together([observations[i] for i in members], X[place[view]], X[at],
-                                      metric[place[view]], metric[at])
-        unit = twin.length**kind.dimension
-        for number, i in enumerate(members):
-            rows = slice(number * kind.size, (number + 1) * kind.size)
-            values[i], rates[i] = found[rows] / unit, moving[rows] / unit
-    first = [place[name] for name in links]
-    return X[first], V[first], values, rates
+        chosen = [observations[i] for i in members]
+        groups.append(_Group(kind, place[view], members, chosen, [place[o.link] for o in chosen]))
+    return names, groups
 
 
 def point_velocity(V: Array, X: Array, point: Array, length: float) -> Array:
@@ -124,14 +149,15 @@ def closed(twin: Twin, q: Array, target: Wanted | None = None, *, tolerance: flo
     The damping is the square of the residual: off closure a redundant or idle direction has singular values of the
     residual's own size, which must not be followed; near closure the convergence stays fast.
     """
-    identity = np.eye(twin.nv)
     error, J = system(twin, q, target)
     size = float(np.linalg.norm(error))
     factor = 1.0
     for _ in range(iterations):
         if size <= tolerance or factor > 1e8:
             break
-        step = np.asarray(np.linalg.solve(J.T @ J + max(factor * size**2, 1e-14) * identity, -(J.T @ error)))
+        normal = J.T @ J
+        normal.flat[:: twin.nv + 1] += max(factor * size**2, 1e-14)
+        step = np.linalg.solve(normal, -(J.T @ error))
         trial = twin.moved(q, limited(step, 0.5))
         trial_error, trial_J = system(twin, trial, target)
         trial_size = float(np.linalg.norm(trial_error))

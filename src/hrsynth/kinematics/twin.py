@@ -8,14 +8,14 @@ welded to the other link.
 
 from __future__ import annotations
 
-import networkx as nx
 import numpy as np
 import pinocchio as pin
 
 from ..errors import BadMechanism
-from ..mechanism import Joint, JointType, Mechanism
+from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..mechanism.vectors import Array, inverse, pose
 
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
 
 
@@ -51,23 +51,17 @@ class Twin:
         self._links = {
             name: (self._body[name], inverse(pose(self._centre[self._body[name]] * self.length)) @ link.pose)
             for name, link in mechanism.links.items()}
-        self._masks: dict[tuple[str, ...], Array] = {}
+        self._placements = self.data.oMi
+        self._several: dict[tuple[str, ...], tuple[list[int], Array, Array]] = {}
         self._q: Array | None = None
 
     def _span(self) -> tuple[list[tuple[Joint, str]], list[Joint]]:
         mechanism = self.mechanism
-        graph: nx.Graph[str] = nx.Graph()
-        graph.add_nodes_from(mechanism.links)
         geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
-        for joint in mechanism.joints.values():
-            weight = _WEIGHT[joint.type.value] - (0.5 if joint.successor in geared else 0)
-            old = graph.get_edge_data(*joint.links)
-            if old is None or weight < old["weight"]:
-                graph.add_edge(*joint.links, weight=weight, joint=joint)
-        tree = nx.minimum_spanning_tree(graph)
-        ordered: list[tuple[Joint, str]] = []
-        for parent, child in nx.bfs_edges(tree, mechanism.base):
-            ordered.append((tree.edges[parent, child]["joint"], parent))
+        joints = list(mechanism.joints.values())
+        weights = [_WEIGHT[joint.type.value] - (0.5 if joint.successor in geared else 0) for joint in joints]
+        tree = graphs.spanning_forest(mechanism.links, joints, weights)
+        ordered = [(joint, parent) for joint, parent, _ in graphs.outward(mechanism.base, tree)]
         if len(ordered) != len(mechanism.links) - 1:
             reached = {mechanism.base, *(child.other(parent) for child, parent in ordered)}
             missing = sorted(set(mechanism.links) - reached)
@@ -214,14 +208,26 @@ class Twin:
 
     def frames(self, q: Array, links: tuple[str, ...]) -> tuple[Array, Array]:
         """Poses (k, 4, 4) and velocities (k, 6, nv) of several links at once."""
-        X = np.array([self.pose(q, link) for link in links])
-        masks = self._masks.get(links)
-        if masks is None:
-            masks = np.array([self._supports(self._links[link][0]) for link in links])[:, None, :]
-            self._masks[links] = masks
-        V = self.data.J * masks
+        X = self.poses(q, links)
+        V = self.data.J * self._several[links][2]
         V[:, :3] += _cross_rows(V[:, 3:], X[:, :3, 3] / self.length)
         return X, V
+
+    def poses(self, q: Array, links: tuple[str, ...]) -> Array:
+        """X_BL (k, 4, 4) of several links at once, metres."""
+        self.at(q)
+        bodies, offsets, _ = self._several.get(links) or self._together(links)
+        X = np.array([self._placements[body].homogeneous for body in bodies])
+        X[:, :3, 3] *= self.length
+        return np.asarray(X @ offsets)
+
+    def _together(self, links: tuple[str, ...]) -> tuple[list[int], Array, Array]:
+        """Of several links: the bodies that carry them, where (k, 4, 4), and what moves them (k, 1, nv)."""
+        bodies = [self._links[link][0] for link in links]
+        offsets = np.array([self._links[link][1] for link in links])
+        masks = np.array([self._supports(body) for body in bodies])[:, None, :]
+        self._several[links] = bodies, offsets, masks
+        return self._several[links]
 
     def _supports(self, body: int) -> Array:
         """1 for the velocity indices that move a body, 0 for the others, (nv,)."""
@@ -246,6 +252,4 @@ class Twin:
 
 def _cross_rows(omega: Array, arms: Array) -> Array:
     """ω × r for each column of ω (k, 3, n) and each arm r (k, 3)."""
-    x, y, z = arms[:, 0, None], arms[:, 1, None], arms[:, 2, None]
-    wx, wy, wz = omega[:, 0], omega[:, 1], omega[:, 2]
-    return np.stack([wy * z - wz * y, wz * x - wx * z, wx * y - wy * x], axis=1)
+    return omega[:, _NEXT] * arms[:, _LAST, None] - omega[:, _LAST] * arms[:, _NEXT, None]

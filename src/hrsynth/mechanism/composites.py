@@ -10,11 +10,10 @@ from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass
 from itertools import combinations
 
-import networkx as nx
 import numpy as np
 
 from ..tolerances import SAME_POINT
-from . import lines
+from . import graphs, lines
 from .model import JointType, Mechanism
 from .normal import centre_pair
 from .notation import Bar, Carrier, Letter, Rods, Word
@@ -55,9 +54,8 @@ class WordGraph:
     def __init__(self, mechanism: Mechanism, kept: Collection[str], links: Iterable[str] | None = None) -> None:
         self.mechanism = mechanism
         self.kept = set(kept)
-        self.graph: nx.MultiGraph[str] = nx.MultiGraph()
         inside = set(mechanism.links if links is None else links)
-        self.graph.add_nodes_from(name for name in mechanism.links if name in inside)
+        self._at: dict[str, dict[int, Edge]] = {name: {} for name in mechanism.links if name in inside}
         self._links = inside
         self._number = 0
         self._carriers: list[Edge] = []
@@ -68,27 +66,51 @@ class WordGraph:
 
     def _add(self, edge: Edge) -> None:
         self._number += 1
-        self.graph.add_edge(edge.tail, edge.head, key=self._number, edge=edge)
+        for link in (edge.tail, edge.head):
+            self._at[link][self._number] = edge
+
+    def _remove(self, key: int, edge: Edge) -> None:
+        for link in (edge.tail, edge.head):
+            del self._at[link][key]
+
+    def _remove_links(self, links: Iterable[str]) -> None:
+        for link in links:
+            for key, edge in self.edges_at(link):
+                self._remove(key, edge)
+            del self._at[link]
+
+    def __len__(self) -> int:
+        """The number of links that are left."""
+        return len(self._at)
 
     def edges_at(self, link: str) -> list[tuple[int, Edge]]:
         """Keys and edges at a link, oldest first."""
-        return sorted(((key, data["edge"]) for _, _, key, data in self.graph.edges(link, keys=True, data=True)),
-                      key=lambda pair: pair[0])
+        return list(self._at[link].items())
 
     def edges(self) -> list[Edge]:
         """All edges, oldest first."""
-        return [edge for _, edge in sorted((key, data["edge"]) for _, _, key, data
-                                           in self.graph.edges(keys=True, data=True))]
+        table = {key: edge for edges in self._at.values() for key, edge in edges.items()}
+        return [table[key] for key in sorted(table)]
 
     def between(self, a: str, b: str) -> list[tuple[int, Edge]]:
         """Keys and edges between two links."""
-        return [(key, edge) for key, edge in self.edges_at(a) if edge.other(a) == b] if a in self.graph else []
+        return [(key, edge) for key, edge in self.edges_at(a) if edge.other(a) == b] if a in self._at else []
+
+    def adjacency(self) -> graphs.Adjacency:
+        """The links that are left, each with those an edge joins it to."""
+        return graphs.adjacency(self._at, ((edge.tail, edge.head) for edge in self.edges()))
+
+    def keep(self, joints: Collection[str]) -> None:
+        """Remove the edges that stand for other joints than these."""
+        for edges in self._at.values():
+            for key in [key for key, edge in edges.items() if not set(edge.joints) <= set(joints)]:
+                del edges[key]
 
     def recognise(self) -> WordGraph:
         """Contract planar parallelograms and equal parallel rods, nothing else."""
         for found in iter(lambda: next(self._rods(), None) or next(self._parallelograms(), None), None):
             edge, links = found
-            self.graph.remove_nodes_from(links)
+            self._remove_links(links)
             self._add(edge)
         return self
 
@@ -98,10 +120,10 @@ class WordGraph:
         while probe.recognise() and (probe._series() or probe._carrier()):
             pass
         for edge in probe._carriers:
-            self.graph.remove_nodes_from(edge.inside)
+            self._remove_links(link for link in edge.inside if link in self._at)
             for key, old in self.between(edge.tail, edge.head):
                 if set(old.joints) <= set(edge.joints):
-                    self.graph.remove_edge(edge.tail, edge.head, key=key)
+                    self._remove(key, old)
             self._add(edge)
         return self
 
@@ -114,7 +136,7 @@ class WordGraph:
 
     def _binary(self) -> Iterator[tuple[str, Edge, Edge]]:
         for link in self.mechanism.links:
-            if link in self.graph and link not in self.kept:
+            if link in self._at and link not in self.kept:
                 edges = self.edges_at(link)
                 if len(edges) == 2 and edges[0][1].other(link) != edges[1][1].other(link):
                     yield link, edges[0][1], edges[1][1]
@@ -189,7 +211,7 @@ class WordGraph:
 
     def _series(self) -> bool:
         for link, first, second in self._binary():
-            self.graph.remove_node(link)
+            self._remove_links((link,))
             a, b = first.other(link), second.other(link)
             self._add(Edge(a, b, first.word_from(a) + second.word_from(link), first.joints + second.joints,
                            (*first.inside, link, *second.inside)))
@@ -197,13 +219,13 @@ class WordGraph:
         return False
 
     def _parallel(self) -> bool:
-        for a, b in {tuple(sorted(pair[:2])) for pair in self.graph.edges(keys=True)}:
+        for a, b in dict.fromkeys((edge.tail, edge.head) for edge in self.edges()):
             edges = self.between(a, b)
             if len(edges) > 1:
                 tail, head = edges[0][1].tail, edges[0][1].head
                 branches: list[Word] = []
                 for key, edge in edges:
-                    self.graph.remove_edge(a, b, key=key)
+                    self._remove(key, edge)
                     word = edge.word_from(tail)
                     bar = word.items[0]
                     branches.extend(bar.branches if isinstance(bar, Bar) and len(word.items) == 1 else (word,))
@@ -216,7 +238,7 @@ class WordGraph:
     def _carrier(self) -> bool:
         """{chain-sliders}: a link held by P joints from another, and carried by the end of a chain from it."""
         for link in self.mechanism.links:
-            if link not in self.graph or link in self.kept:
+            if link not in self._at or link in self.kept:
                 continue
             for key, sliders in self.edges_at(link):
                 foot = sliders.other(link)
@@ -231,8 +253,8 @@ class WordGraph:
                     follower = path.items[-1]
                     if (len(path.items) >= 2 and isinstance(follower, Letter) and follower.letter in "RS"
                             and not follower.actuated and len(self.edges_at(link)) >= 3):
-                        self.graph.remove_edge(foot, link, key=key)
-                        self.graph.remove_edge(foot, link, key=other)
+                        self._remove(key, sliders)
+                        self._remove(other, chain)
                         self._carriers.append(Edge(foot, link, Word((Carrier(Word(path.items[:-1]), word),)),
                                                    chain.joints + sliders.joints, chain.inside + sliders.inside))
                         self._add(self._carriers[-1])

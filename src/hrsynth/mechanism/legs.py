@@ -11,14 +11,12 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, pairwise
-from typing import cast
 
-import networkx as nx
 import numpy as np
 
 from ..errors import BadMechanism, BadRequest, BadRobotFile, Defect
 from ..tolerances import SAME_POINT
-from . import lines
+from . import graphs, lines
 from .composites import Edge, WordGraph
 from .model import Joint, JointType, Mechanism
 from .normal import centre_pair
@@ -100,11 +98,10 @@ class Anatomy:
                     if j.name in leg.joints]
             mechanism = mechanism.changed(joints=hung)
         graph = WordGraph(mechanism, kept, links)
-        graph.graph.remove_edges_from([(a, b, k) for a, b, k, data in graph.graph.edges(keys=True, data=True)
-                                       if not set(data["edge"].joints) <= set(leg.joints)])
+        graph.keep(leg.joints)
         graph.reduce()
         edges = [edge for _, edge in graph.between(mechanism.base, leg.attach)]
-        if len(graph.graph) == 2 and len(edges) == 1:
+        if len(graph) == 2 and len(edges) == 1:
             return edges[0].word_from(mechanism.base)
         return _paths_word(graph, mechanism.base, leg.attach)
 
@@ -130,22 +127,18 @@ class Anatomy:
         mechanism = self.mechanism
         graph = WordGraph(mechanism, {mechanism.base, leg.attach}, {mechanism.base, leg.attach, *leg.links})
         graph.recognise()
-        graph.graph.remove_edges_from([(a, b, k) for a, b, k, data in graph.graph.edges(keys=True, data=True)
-                                       if not set(data["edge"].joints) <= set(leg.joints)])
-        nodes = nx.shortest_path(graph.graph, mechanism.base, leg.attach)
+        graph.keep(leg.joints)
+        nodes = graphs.shortest_path(graph.adjacency(), mechanism.base, leg.attach)
         return [graph.between(a, b)[0][1] for a, b in pairwise(nodes)]
 
 
 def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
     """What neither series nor parallel reduces: its simple paths side by side."""
     words = []
-    for path in nx.all_simple_edge_paths(graph.graph, start, end):
+    for path in graphs.paths(graph.adjacency(), start, end):
         word = Word(())
-        here = start
-        for a, b, key in cast("list[tuple[str, str, int]]", path):
-            edge: Edge = graph.graph.edges[a, b, key]["edge"]
-            word += edge.word_from(here)
-            here = edge.other(here)
+        for here, there in pairwise(path):
+            word += graph.between(here, there)[0][1].word_from(here)
         words.append(word)
     branches = tuple(dict.fromkeys(words))
     return Word((Bar(branches),)) if len(branches) > 1 else branches[0]
@@ -154,15 +147,15 @@ def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
 def dissect(mechanism: Mechanism) -> Anatomy:
     """Platform and legs of a mechanism in normal form; raises ``BadMechanism`` where there is no leg, ``BadRobotFile``
     where the observations contradict the legs."""
-    graph = WordGraph(mechanism, {mechanism.base, mechanism.platform}).recognise().recognise_carriers().graph
+    graph = WordGraph(mechanism, {mechanism.base, mechanism.platform}).recognise().recognise_carriers().adjacency()
     platform = _platform(mechanism, graph)
     order = {name: i for i, name in enumerate(mechanism.links)}
     legs: list[Leg] = []
-    moving: nx.MultiGraph[str] = nx.MultiGraph()
-    moving.add_nodes_from(name for name in mechanism.links if name != mechanism.base and name not in platform)
+    moving = {name for name in mechanism.links if name != mechanism.base and name not in platform}
     live = [j for j in mechanism.joints.values() if j.type is not JointType.FREE]
-    moving.add_edges_from(j.links for j in live if set(j.links) <= set(moving))
-    for part in nx.connected_components(moving):
+    joined = graphs.adjacency((name for name in mechanism.links if name in moving),
+                              (j.links for j in live if moving.issuperset(j.links)))
+    for part in graphs.components(joined):
         joints = [j for j in live if part & set(j.links)]
         ends = {j.other(link) for j in joints for link in j.links if link in part} - part
         if mechanism.base in ends and len(ends) == 2:
@@ -180,23 +173,22 @@ def dissect(mechanism: Mechanism) -> Anatomy:
     return _labelled(Anatomy(mechanism, tuple(sorted(platform, key=order.__getitem__)), tuple(legs)))
 
 
-def _platform(mechanism: Mechanism, graph: nx.MultiGraph[str]) -> set[str]:
+def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
     """The smallest set around the platform link that leaves the most legs (articulated platforms)."""
     base, root = mechanism.base, mechanism.platform
     if base not in graph or root not in graph:
         return {root}
-    rest: nx.Graph[str] = nx.Graph(graph)
-    rest.remove_node(base)
+    rest = {node: [other for other in graph[node] if other != base] for node in graph if node != base}
     contacts = set(graph[base])
     order = {name: i for i, name in enumerate(mechanism.links)}
-    reachable = nx.node_connected_component(rest, root)
-    branching = sorted((n for n in reachable - {root} if rest.degree(n) >= 3 and n not in contacts),
-                       key=lambda n: (nx.shortest_path_length(rest, root, n), order[n]))[:12]
+    distance = graphs.distances(rest, root)
+    reachable = set(distance)
+    branching = sorted((n for n in reachable - {root} if len(rest[n]) >= 3 and n not in contacts),
+                       key=lambda n: (distance[n], order[n]))[:12]
 
     def legs_of(members: set[str]) -> int:
-        others = rest.subgraph(set(rest) - members)
         count = sum(1 for part in graph[base] if part in members)
-        for part in nx.connected_components(others):
+        for part in graphs.components(rest, set(rest) - members):
             if not part & contacts:
                 continue
             ends = {n for link in part for n in rest[link] if n in members}
@@ -210,8 +202,8 @@ def _platform(mechanism: Mechanism, graph: nx.MultiGraph[str]) -> set[str]:
         for chosen in combinations(branching, size):
             members = {root, *chosen}
             members |= {n for n in reachable - members - contacts
-                        if rest.degree(n) == 2 and all(m in members for m in rest[n])}
-            if nx.is_connected(rest.subgraph(members)) and (found := legs_of(members)) > score:
+                        if len(rest[n]) == 2 and all(m in members for m in rest[n])}
+            if graphs.component(rest, root, members) == members and (found := legs_of(members)) > score:
                 best, score = members, found
     return best
 
@@ -366,12 +358,8 @@ def _segment(mechanism: Mechanism, leg: Leg, link: str) -> Direction:
     if len(joints) != 2:
         raise BadRequest(f"link {link!r} of leg {leg.label} has {len(joints)} joints: it has no direction of its own",
                          None, "an observe element with an axis")
-    far: nx.Graph[str] = nx.Graph(mechanism.graph)
-    far.remove_node(link)
-    if link != mechanism.platform and mechanism.platform in far:
-        far.remove_node(mechanism.platform)
-    own = {mechanism.base, *leg.links}
-    distance = nx.single_source_shortest_path_length(far.subgraph(own), mechanism.base)
+    own = {mechanism.base, *leg.links} - {link, mechanism.platform}
+    distance = graphs.distances(mechanism.adjacency, mechanism.base, own)
     a, b = sorted(joints, key=lambda j: distance.get(j.other(link), len(mechanism.links)))
     for joint in (b, a):
         if joint.type.slides:

@@ -10,14 +10,18 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
+from typing import TYPE_CHECKING
 
-import networkx as nx
 import numpy as np
 
 from ..errors import BadMechanism
 from ..tolerances import SAME_GEOMETRY
+from .graphs import Adjacency, adjacency
 from .observation import Observation
 from .vectors import Array, frozen, unit
+
+if TYPE_CHECKING:
+    import networkx as nx
 
 
 class JointType(StrEnum):
@@ -210,11 +214,18 @@ class Mechanism:
     @cached_property
     def graph(self) -> nx.MultiGraph[str]:
         """The joint graph: nodes are link names, edges are keyed by joint names; read-only."""
+        import networkx as nx
+
         graph: nx.MultiGraph[str] = nx.MultiGraph()
         graph.add_nodes_from(self.links)
         for joint in self.joints.values():
             graph.add_edge(joint.predecessor, joint.successor, key=joint.name, joint=joint)
         return nx.freeze(graph)
+
+    @cached_property
+    def adjacency(self) -> Adjacency:
+        """The links in order, each with those that a joint joins it to."""
+        return adjacency(self.links, (joint.links for joint in self.joints.values()))
 
     @cached_property
     def length(self) -> float:

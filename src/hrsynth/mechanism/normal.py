@@ -13,12 +13,11 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import networkx as nx
 import numpy as np
 
 from ..errors import BadMechanism
 from ..tolerances import SAME_POINT
-from . import lines
+from . import graphs, lines
 from .model import Joint, JointType, Mechanism
 from .observation import Direction
 from .vectors import Array
@@ -54,10 +53,10 @@ def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
         return mechanism
     first = (mechanism.base, mechanism.platform, mechanism.reference, *(o.link for o in mechanism.observations))
     order = {name: i for i, name in enumerate(dict.fromkeys((*first, *mechanism.links)))}
-    bonds = nx.Graph(j.links for j in fixed)
+    bonds = graphs.adjacency((), (j.links for j in fixed))
     gone: set[str] = set()
     kept_links = []
-    for group in nx.connected_components(bonds):
+    for group in graphs.components(bonds):
         kept = min(group, key=order.__getitem__)
         if kept == mechanism.base and mechanism.platform in group:
             raise BadMechanism("the platform is fixed to the base", mechanism.platform, "a platform that moves")

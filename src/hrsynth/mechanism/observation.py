@@ -98,8 +98,9 @@ class Direction(Observation):
         directions = np.array([o.direction for o in observations if isinstance(o, Direction)])
         seen = X_reference[:3, :3].T
         u = np.matmul(X_links[:, :3, :3], directions[:, :, None])[:, :, 0]
-        zero = np.zeros(len(u))
-        crosses = np.array([[zero, u[:, 2], -u[:, 1]], [-u[:, 2], zero, u[:, 0]], [u[:, 1], -u[:, 0], zero]])
+        crosses = np.zeros((3, 3, len(u)))
+        crosses[1, 2], crosses[2, 0], crosses[0, 1] = u.T
+        crosses -= crosses.transpose(1, 0, 2)
         rates = (seen @ crosses.transpose(2, 0, 1)) @ (V_links[:, 3:] - V_reference[3:])
         return (u @ seen.T).ravel(), rates.reshape(-1, rates.shape[2])
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import networkx as nx
-
 from ..errors import BadRequest
 from .model import Mechanism, Note
 
@@ -21,6 +19,8 @@ def between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
             raise BadRequest(f"{mechanism.name}: no such {role} link", link, ", ".join(list(mechanism.links)[:20]))
     if base == platform:
         raise BadRequest(f"{mechanism.name}: base and platform are one link", base, "two links")
+    import networkx as nx
+
     graph: nx.Graph[str] = nx.Graph(mechanism.graph)
     if not nx.has_path(graph, base, platform):
         raise BadRequest(f"{mechanism.name}: no chain of joints from {base!r} to", platform, "a link that is connected")

@@ -13,12 +13,11 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Literal
 
-import networkx as nx
 import numpy as np
 from numpy.typing import NDArray
 
 from ..tolerances import SAME_DIRECTION, SAME_PLANE, SAME_POINT
-from . import lines
+from . import graphs, lines
 from .incidences import Incidence, choices, held, incidences, triple
 from .model import Joint, JointType, Mechanism
 from .observation import Direction
@@ -163,10 +162,9 @@ class _Drawing:
 
     def together(self) -> NDArray[np.bool_]:
         """Which centres lie on one link, or on links that only slide along each other (n, n)."""
-        slides: nx.Graph[str] = nx.Graph()
-        slides.add_nodes_from(self.mechanism.links)
-        slides.add_edges_from(j.links for j in self.mechanism.joints.values() if j.type is JointType.PRISMATIC)
-        bodies = list(nx.connected_components(slides))
+        slides = graphs.adjacency(self.mechanism.links, (j.links for j in self.mechanism.joints.values()
+                                                         if j.type is JointType.PRISMATIC))
+        bodies = list(graphs.components(slides))
         on = np.array([[not body.isdisjoint(links) for body in bodies] for links in self.hosts], dtype=bool)
         return np.asarray(on @ on.T) if len(on) else np.zeros((0, 0), dtype=bool)
 

@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
-import networkx as nx
 import numpy as np
 
 from ..kinematics.configuration import ClosedConfiguration, closed
 from ..kinematics.ranks import kernel_basis
 from ..kinematics.sampling import Samples
 from ..kinematics.twin import Twin
-from ..mechanism import Joint, JointType, Mechanism
+from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..mechanism.legs import Anatomy
 from ..mechanism.normal import centre_pair
 from ..mechanism.vectors import Array, unit
@@ -142,8 +141,7 @@ class Evidence:
         mechanism, leg = self.mechanism, self.anatomy.leg_of(link)
         if leg is None or self.reference not in (mechanism.base, mechanism.platform) or link == self.reference:
             return []
-        side = mechanism.graph.subgraph({self.reference, *leg.links} - {link})
-        near = nx.node_connected_component(side, self.reference)
+        near = graphs.component(mechanism.adjacency, self.reference, {*leg.links} - {link})
         return [j for j in mechanism.joints_of(link) if j.other(link) in near and j.type is not JointType.FREE]
 
     def _find_proximal(self, link: str) -> Proximal | None:
@@ -157,10 +155,9 @@ class Evidence:
             anchor = centre_pair(knee, onward[0])[0]
         leg = self.anatomy.leg_of(link)
         assert leg is not None
-        side: nx.Graph[str] = nx.Graph(self.mechanism.graph.subgraph({self.reference, *leg.links} - {link}))
         nodes = {self.reference}
         if before != self.reference:
-            for path in nx.all_simple_paths(side, self.reference, before):
+            for path in graphs.paths(self.mechanism.adjacency, self.reference, before, {*leg.links} - {link}):
                 nodes.update(path)
         joints = tuple(j for j in self.mechanism.joints.values() if set(j.links) <= nodes)
         rotations, anchors = _moved(self.mechanism, self.reference, nodes, joints, before, anchor)

@@ -42,10 +42,11 @@ class Quick:
         is in another working mode than the batch's, or on the edge between two.
 
         Raises ``Disagreement`` where Pinocchio differs."""
-        X = np.array([at.pose(self.question.platform) for at in configurations])
-        found = self.placer.batch.evaluate(X, [o.leg for o in self.question.observations])
-        u = np.array([[at.pose(o.link)[:3, :3] @ o.direction for o in self.question.observations
-                       if isinstance(o, Direction)] for at in configurations])
+        seen = [o for o in self.question.observations if isinstance(o, Direction)]
+        links = (self.question.platform, *(o.link for o in seen))
+        X = np.array([at.twin.poses(at.q, links) for at in configurations])
+        found = self.placer.batch.evaluate(X[:, 0], [o.leg for o in self.question.observations])
+        u = np.stack([X[:, i, :3, :3] @ o.direction for i, o in enumerate(seen, 1)], axis=1)
         away = np.where(found.reached, np.max(np.abs(u - found.directions), axis=(1, 2)), np.inf)
         same = away <= SAME_RELATION
         d = found.matrix.shape[2]

@@ -17,8 +17,6 @@ from .given import Given
 from .graph import Gear, Graph, listed
 from .solving import Solution, solve, unlocked
 
-LINKS = 2000
-"""Links above which a foreign file is refused."""
 SIZE = 240
 """Coordinates of joints in loops above which loops are not solved."""
 

@@ -6,10 +6,9 @@ from collections import defaultdict
 from dataclasses import replace
 from itertools import pairwise
 
-import networkx as nx
 import numpy as np
 
-from ...mechanism import lines
+from ...mechanism import graphs, lines
 from ...mechanism.model import Joint, JointType, Mechanism, Motor, Note
 from ...mechanism.vectors import Array, frozen, inverse, perpendicular, pose, unit
 from ...tolerances import NOISE
@@ -81,16 +80,12 @@ def points_in_planes(mechanism: Mechanism) -> Mechanism:
 
 def _plane_of(joint: Joint, joints: list[Joint]) -> Array | None:
     """The normal of the plane in which the joint's two links move relative to each other, or None."""
-    bonds: nx.Graph[str] = nx.Graph()
-    bonds.add_nodes_from(joint.links)
-    bonds.add_edges_from(j.links for j in joints if j.type is JointType.FIXED)
-    bodies = {link for end in joint.links for link in nx.node_connected_component(bonds, end)}
+    bonds = graphs.adjacency(joint.links, (j.links for j in joints if j.type is JointType.FIXED))
+    bodies = {link for end in joint.links for link in graphs.component(bonds, end)}
     for candidate in [j for j in joints if j.type is JointType.REVOLUTE and bodies & set(j.links)]:
         normal = candidate.axis
-        flat: nx.Graph[str] = nx.Graph()
-        flat.add_nodes_from(joint.links)
-        flat.add_edges_from(j.links for j in joints if j.name != joint.name and _flat(j, normal))
-        if nx.has_path(flat, *joint.links):
+        flat = graphs.adjacency(joint.links, (j.links for j in joints if j.name != joint.name and _flat(j, normal)))
+        if joint.links[1] in graphs.component(flat, joint.links[0]):
             return normal
     return None
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass, field
 
-import networkx as nx
-
+from ...mechanism import graphs
 from ...mechanism.model import JointType, Link, Note
 from ...mechanism.observation import Direction
 from ..draft import Edge
@@ -15,6 +14,8 @@ _COST = {JointType.FIXED: 0, JointType.REVOLUTE: 1, JointType.PRISMATIC: 1, Join
          JointType.CYLINDRICAL: 2, JointType.PLANAR: 3, JointType.SPHERICAL: 3, JointType.FREE: 5}
 _OUTSIDE = 20
 """Added to the cost of a joint that the file does not write as part of its tree."""
+LINKS = 2000
+"""Links above which a foreign file is refused."""
 
 
 @dataclass(frozen=True)
@@ -71,10 +72,7 @@ class Graph:
 
     def connected(self, base: str) -> set[str]:
         """The links that chains of joints join to ``base``."""
-        graph: nx.Graph[str] = nx.Graph()
-        graph.add_nodes_from(self.links)
-        graph.add_edges_from(edge.links for edge in self.edges.values())
-        return set(nx.node_connected_component(graph, base))
+        return graphs.component(graphs.adjacency(self.links, (e.links for e in self.edges.values())), base)
 
 
 def listed(names: Iterable[str], most: int = 8) -> str:
@@ -86,12 +84,7 @@ def listed(names: Iterable[str], most: int = 8) -> str:
 def spanning_tree(base: str, edges: Iterable[Edge]) -> list[tuple[Edge, str, str]]:
     """The edges of a tree that hangs on ``base``: (edge, parent, child), parents first; those that the file writes as
     tree joints before others, few freedoms before many."""
-    graph: nx.Graph[str] = nx.Graph()
-    graph.add_node(base)
-    for edge in edges:
-        weight = _COST[edge.type or JointType.FIXED] + (0 if edge.in_tree else _OUTSIDE)
-        old = graph.get_edge_data(*edge.links)
-        if old is None or weight < old["weight"]:
-            graph.add_edge(*edge.links, weight=weight, edge=edge)
-    tree = nx.minimum_spanning_tree(graph)
-    return [(tree.edges[parent, child]["edge"], parent, child) for parent, child in nx.bfs_edges(tree, base)]
+    bonds = list(edges)
+    links = dict.fromkeys([base, *(link for edge in bonds for link in edge.links)])
+    weights = [_COST[edge.type or JointType.FIXED] + (0 if edge.in_tree else _OUTSIDE) for edge in bonds]
+    return graphs.outward(base, graphs.spanning_forest(links, bonds, weights))

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
-import networkx as nx
-
 from ...errors import BadRequest
+from ...mechanism import graphs
 from ...mechanism.model import JointType
 from ..draft import Edge
 from .graph import Graph
@@ -47,12 +46,12 @@ class _Bodies:
     """Links held together by fixed joints are one body, named by its first link."""
 
     def __init__(self, graph: Graph, base: str) -> None:
-        bonds: nx.Graph[str] = nx.Graph()
-        bonds.add_nodes_from(graph.links)
-        bonds.add_edges_from(e.links for e in graph.edges.values() if e.type is JointType.FIXED)
+        import networkx as nx
+
+        bonds = graphs.adjacency(graph.links, (e.links for e in graph.edges.values() if e.type is JointType.FIXED))
         order = {link: i for i, link in enumerate(graph.links)}
         self.members = {min(group, key=order.__getitem__): sorted(group, key=order.__getitem__)
-                        for group in nx.connected_components(bonds)}
+                        for group in graphs.components(bonds)}
         self.into = {link: name for name, group in self.members.items() for link in group}
         self.base = self.into[base]
         self.graph: nx.Graph[str] = nx.Graph()
@@ -67,6 +66,8 @@ class _Bodies:
 
     def platform(self) -> tuple[str | None, str, Sequence[str]]:
         """The platform's body and why, or None and the candidates."""
+        import networkx as nx
+
         others = [body for body in self.graph if body != self.base]
         if not others:
             return None, "", []
@@ -98,6 +99,8 @@ class _Bodies:
 
     def _ways(self, others: Collection[str]) -> dict[str, int]:
         """The number of ways from each body to the base that share no body."""
+        import networkx as nx
+
         if len(self.graph) > LARGEST:
             return {}
         found = {}

@@ -1,4 +1,4 @@
-"""Which dialect a file is in, by its content."""
+"""Which dialect a file is in, by its content; the reader of a foreign one is imported when a file needs it."""
 
 from __future__ import annotations
 
@@ -11,11 +11,9 @@ from ...mechanism.part import between
 from .. import xml
 from ..reader import native
 from ..tree import spanning
-from . import gepetto, mjcf, sdf, urdf, xacro
-from .build import LINKS, build
+from . import xacro
 from .given import Given, observing
-from .graph import Graph
-from .mjcf_defaults import with_includes
+from .graph import LINKS, Graph
 
 _FOLDER = ("robot.yaml", "robot.yml")
 
@@ -30,6 +28,8 @@ def read(path: Path, wishes: Given) -> Mechanism:
     if isinstance(found, Graph):
         if len(found.links) > LINKS or len(found.edges) > 2 * LINKS:
             raise _refused(path, f"{len(found.links)} links and {len(found.edges)} joints", f"up to {LINKS} links")
+        from .build import build
+
         found = build(found, wishes)
     if wishes.base is not None:
         found = spanning(between(found, wishes.base, wishes.platform or found.platform))
@@ -48,17 +48,30 @@ def said(path: Path, *, strict: bool = True) -> Graph | Mechanism:
         _require_few(path, root)
     match root.tag:
         case "mujoco":
+            from . import mjcf
+            from .mjcf_defaults import with_includes
+
             return mjcf.read(with_includes(root, str(path)), str(path))
         case "sdf" | "gazebo":
+            from . import sdf
+
             return sdf.read(root, str(path))
     if xacro.needed(root):
         root = xacro.expanded(path)
     settings = _settings(path, root)
     if settings is not None:
-        return gepetto.read(path, settings)
+        return _told_beside(path, settings)
     if root.tag != "robot" or (strict and root.find("hrsynth") is not None):
         return native(root, str(path))
+    from . import urdf
+
     return urdf.read(root, str(path))
+
+
+def _told_beside(path: Path, settings: Path) -> Graph:
+    from . import gepetto
+
+    return gepetto.read(path, settings)
 
 
 def _require_few(path: Path, root: xml.Element) -> None:
@@ -74,15 +87,18 @@ def _settings(path: Path, root: xml.Element) -> Path | None:
         return None
     for name in dict.fromkeys((path.with_suffix(".yaml").name, *(_FOLDER if path.stem == "robot" else ()))):
         beside = path.with_name(name)
-        if beside != path and os.path.isfile(beside) and gepetto.sayings(beside) is not None:
-            return beside
+        if beside != path and os.path.isfile(beside):
+            from . import gepetto
+
+            if gepetto.sayings(beside) is not None:
+                return beside
     return None
 
 
 def _with_urdf(settings: Path) -> Graph:
     for name in (settings.with_suffix(".urdf").name, "robot.urdf"):
         if settings.with_name(name).is_file():
-            return gepetto.read(settings.with_name(name), settings)
+            return _told_beside(settings.with_name(name), settings)
     raise _refused(settings, "no URDF file beside the YAML file", settings.with_suffix(".urdf").name)
 
 

@@ -12,9 +12,9 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from itertools import combinations
 
-import networkx as nx
 import numpy as np
 
+from ...mechanism import graphs
 from ...mechanism.model import Joint, JointType, Mechanism
 from ...mechanism.vectors import Array
 from ...tolerances import EXACT, NOISE
@@ -89,10 +89,8 @@ def exact(mechanism: Mechanism) -> Exact | None:
 
 def _relations(mechanism: Mechanism, at: _Coordinates) -> Iterator[Relation]:
     """Relations that links could be meant to have, held or not."""
-    bonds: nx.Graph[str] = nx.Graph()
-    bonds.add_nodes_from(mechanism.links)
-    bonds.add_edges_from(j.links for j in mechanism.joints.values() if j.type is JointType.FIXED)
-    body = {link: number for number, group in enumerate(nx.connected_components(bonds)) for link in group}
+    bonds = graphs.adjacency(mechanism.links, (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED))
+    body = {link: number for number, group in enumerate(graphs.components(bonds)) for link in group}
     on: dict[int, list[Joint]] = defaultdict(list)
     for joint in mechanism.joints.values():
         if joint.type not in (JointType.FIXED, JointType.FREE):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import importlib.util
-import subprocess
 import sys
 from pathlib import Path
 
@@ -21,6 +20,8 @@ def needed(root: xml.Element) -> bool:
 
 def expanded(path: Path) -> xml.Element:
     """The document that a xacro file stands for; raises ``BadRobotFile``."""
+    import subprocess
+
     if importlib.util.find_spec("xacro") is None:
         raise _refused(path, "a xacro file, and the package xacro is not installed",
                        "the extra hrsynth[xacro], or the URDF that it expands to")

@@ -16,7 +16,7 @@ from ...errors import NotSampled
 from ...mechanism import Joint, JointType, Mechanism
 from ...mechanism.legs import Anatomy, Leg
 from ...mechanism.observation import Direction
-from ...mechanism.vectors import Array, inverse
+from ...mechanism.vectors import Array, frozen, inverse
 from ...tolerances import CLOSED
 from ..configuration import ClosedConfiguration
 from ..twin import Twin
@@ -62,10 +62,10 @@ class Placer:
         found: list[ClosedConfiguration | None] = []
         for start in range(0, len(X), CHUNK):
             frames, reached = self.frames(X[start : start + CHUNK])
-            q = coordinates(self.twin, frames)
+            q = frozen(coordinates(self.twin, frames))
             for here, there in zip(q, reached, strict=True):
                 residual = float(np.linalg.norm(self.twin.residual(here))) if there else np.inf
-                found.append(ClosedConfiguration.of(self.twin, here) if residual <= CLOSED else None)
+                found.append(ClosedConfiguration(self.twin, here, residual) if residual <= CLOSED else None)
         return found
 
     def wander(self, count: int, seed: int = 0, steps: int = 40) -> Iterator[ClosedConfiguration]:

@@ -95,5 +95,5 @@ def _body(p: Array, R: Array, X: Array, length: float) -> Body | None:
 def frames_at(configurations: Sequence[ClosedConfiguration]) -> dict[str, Array]:
     """Poses (m, 4, 4) of all links at closed configurations."""
     names = tuple(configurations[0].twin.mechanism.links)
-    X = np.array([at.twin.frames(at.q, names)[0] for at in configurations])
+    X = np.array([at.twin.poses(at.q, names) for at in configurations])
     return {name: X[:, i] for i, name in enumerate(names)}

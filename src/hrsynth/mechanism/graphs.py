@@ -1,0 +1,124 @@
+"""Small undirected graphs: what a few dozen links need, without the import of a graph library.
+
+A graph is its adjacency: node to the nodes next to it. The order of both is kept, so that every answer is the same
+from run to run. ``within`` restricts a question to some of the nodes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Container, Iterable, Iterator, Mapping, Sequence
+from typing import Protocol, TypeVar
+
+Adjacency = Mapping[str, Collection[str]]
+
+
+class Bond(Protocol):
+    """An edge: anything that names the two links it joins."""
+
+    @property
+    def links(self) -> tuple[str, str]: ...
+
+
+B = TypeVar("B", bound=Bond)
+
+
+def adjacency(nodes: Iterable[str], pairs: Iterable[Iterable[str]]) -> dict[str, dict[str, None]]:
+    """The graph with these nodes and edges; ends of edges that are no nodes yet become nodes."""
+    graph: dict[str, dict[str, None]] = {node: {} for node in nodes}
+    for a, b in pairs:
+        graph.setdefault(a, {})[b] = None
+        graph.setdefault(b, {})[a] = None
+    return graph
+
+
+def distances(graph: Adjacency, start: str, within: Container[str] | None = None) -> dict[str, int]:
+    """The number of edges from ``start`` to each node that can be reached, nearest first."""
+    found = {start: 0}
+    pending = [start]
+    for node in pending:
+        for other in graph[node]:
+            if other not in found and (within is None or other in within):
+                found[other] = found[node] + 1
+                pending.append(other)
+    return found
+
+
+def component(graph: Adjacency, start: str, within: Container[str] | None = None) -> set[str]:
+    """The nodes that can be reached from ``start``, itself included."""
+    return set(distances(graph, start, within))
+
+
+def components(graph: Adjacency, within: Container[str] | None = None) -> Iterator[set[str]]:
+    """The connected parts, in the order of their first nodes."""
+    seen: set[str] = set()
+    for node in graph:
+        if node not in seen and (within is None or node in within):
+            part = component(graph, node, within)
+            seen |= part
+            yield part
+
+
+def paths(graph: Adjacency, start: str, end: str, within: Container[str] | None = None) -> Iterator[list[str]]:
+    """All ways from ``start`` to ``end`` that visit no node twice, depth first."""
+    way, ahead = [start], [iter(graph[start])]
+    while ahead:
+        node = next(ahead[-1], None)
+        if node is None:
+            way.pop()
+            ahead.pop()
+        elif node == end:
+            yield [*way, end]
+        elif node not in way and (within is None or node in within):
+            way.append(node)
+            ahead.append(iter(graph[node]))
+
+
+def shortest_path(graph: Adjacency, start: str, end: str) -> list[str]:
+    """A way from ``start`` to ``end`` with the fewest edges; raises ``KeyError`` where there is none."""
+    left = distances(graph, end)
+    way = [start]
+    for remaining in range(left[start] - 1, -1, -1):
+        way.append(next(node for node in graph[way[-1]] if left[node] == remaining))
+    return way
+
+
+def spanning_forest(nodes: Iterable[str], bonds: Sequence[B], weights: Sequence[float]) -> list[B]:
+    """The bonds of a minimum spanning forest, lightest first (Kruskal); of equal ones that of the earlier node, then of
+    the pair that is joined first."""
+    place = {node: i for i, node in enumerate(nodes)}
+    pairs: dict[frozenset[str], int] = {}
+    for bond in bonds:
+        pairs.setdefault(frozenset(bond.links), len(pairs))
+    order = sorted(range(len(bonds)), key=lambda i: (weights[i], min(place[link] for link in bonds[i].links),
+                                                     pairs[frozenset(bonds[i].links)]))
+    tree = {node: node for node in place}
+    chosen = []
+    for i in order:
+        a, b = (_root(tree, link) for link in bonds[i].links)
+        if a != b:
+            tree[b] = a
+            chosen.append(bonds[i])
+    return chosen
+
+
+def _root(tree: dict[str, str], node: str) -> str:
+    while tree[node] != node:
+        node = tree[node]
+    return node
+
+
+def outward(root: str, bonds: Iterable[B]) -> list[tuple[B, str, str]]:
+    """The bonds of a tree breadth first from ``root``: each with its near and its far link."""
+    table: dict[str, list[B]] = {}
+    for bond in bonds:
+        for link in bond.links:
+            table.setdefault(link, []).append(bond)
+    found: list[tuple[B, str, str]] = []
+    pending = [root]
+    for near in pending:
+        for bond in table.get(near, ()):
+            far = bond.links[1] if bond.links[0] == near else bond.links[0]
+            if far not in pending:
+                found.append((bond, near, far))
+                pending.append(far)
+    return found
