@@ -375,11 +375,11 @@ def convert(
     lost = save(mechanism, target, to)
     for warning in lost:
         typer.echo(f"hrsynth: {warning}", err=True)
-    fields: dict[str, Any] = {"file": target, "files": files, "links": len(mechanism.links), "joints": len(mechanism.joints),
-                              "warnings": [str(warning) for warning in lost]}
+    fields: dict[str, Any] = {"file": target, "files": files, "links": len(mechanism.links),
+                              "joints": len(mechanism.joints), "warnings": [str(warning) for warning in lost]}
     typer.echo(records.record("convert", mechanism.name, fields) if json
                else f"{mechanism.name}: {fields['links']} links, {fields['joints']} joints, "
-                                   f"written to {' and '.join(files)}")
+                    f"written to {' and '.join(files)}")
 
 
 def _other_than(robot: Source, mechanism: Mechanism, *files: str) -> None:

@@ -81,8 +81,8 @@ def save(mechanism: Mechanism, path: str | Path, dialect: str | None = None) -> 
     """Write a robot file, whole or not at all; what the dialect cannot say is returned as warnings.
 
     ``dialect`` is one of ``DIALECTS``; without it the file's ending decides: ``.urdf`` the native dialect, ``.xml`` and
-    ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.yaml`` Gepetto (with a ``.urdf`` of the same name beside it). A file beside the
-    one named is not replaced by other content.
+    ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.yaml`` Gepetto (with a ``.urdf`` of the same name beside it). A file beside
+    the one named is not replaced by other content.
 
     Raises
     ------
