@@ -30,7 +30,7 @@ FIELDS = {
     "servo": {"observed", "from", "to", "gain", "sense", "noise", "ended", "reason", "pose", "matched_mode", "modes",
               "type2", "notes", "spread", "error", "times", "poses", "file"},
     "robots": {"robots"},
-    "convert": {"file"},
+    "convert": {"file", "files"},
 }
 VERDICTS = {"controllable", "partially controllable", "uncontrollable"}
 
@@ -152,7 +152,7 @@ def test_a_file_that_cannot_be_written_leaves_nothing(run, tmp_path: Path):
 
 
 def test_a_device_or_pipe_is_never_replaced(run, tmp_path: Path):
-    pipe = tmp_path / "pipe"
+    pipe = tmp_path / "pipe.urdf"
     os.mkfifo(pipe)
     assert "not a regular file" in run("convert", "3prp", pipe).refused()[0]
     assert pipe.is_fifo()
@@ -630,12 +630,39 @@ def test_convert_is_stable(run, tmp_path: Path, name: str):
     assert first.read_bytes() == second.read_bytes() == shipped()[name].read_bytes()
 
 
-def test_convert_onto_itself_keeps_the_robot(run, robot):
+def test_nothing_is_written_over_the_file_that_is_read(run, robot):
     file = robot(FOUR_BAR)
-    assert run("convert", file, file).status == 0
     once = file.read_bytes()
-    assert run("convert", file, file).status == 0
+    link = file.with_name("link.urdf")
+    link.symlink_to(file)
+    for arguments in (("convert", file, file), ("convert", file, link), ("convert", link, file),
+                      ("convert", file.with_name("..") / file.parent.name / file.name, file),
+                      ("convert", file, file, "--to", "sdf"), ("derive", file, "-o", file)):
+        assert "it is the one that is read" in run(*arguments).refused()[0]
     assert file.read_bytes() == once
+
+
+def test_every_written_file_is_told_and_none_beside_is_replaced(run, robot):
+    file = robot(FOUR_BAR)
+    once = file.read_bytes()
+    settings = file.with_suffix(".yaml")
+    assert len(run("convert", file, settings).refused()) == 1
+    assert run("convert", "3prp", settings).refused()[0].count(str(file)) == 1
+    assert not settings.exists()
+    assert file.read_bytes() == once
+    other = file.with_name("other.yaml")
+    files = [str(other.with_suffix(".urdf")), str(other)]
+    for _ in range(2):
+        assert run("convert", file, other, "--json").data["files"] == files
+        assert all(name in run("convert", file, other).out for name in files)
+    assert "with other content" in run("convert", "3prp", other).refused()[0]
+
+
+def test_an_ending_of_no_dialect_is_refused(run, tmp_path: Path):
+    for name in ("x.foo", "x"):
+        assert ".urdf, .xml" in run("convert", "3prp", tmp_path / name).refused()[0]
+    assert list(tmp_path.iterdir()) == []
+    assert run("convert", "3prp", tmp_path / "x.foo", "--to", "native").status == 0
 
 
 # ---- bad files

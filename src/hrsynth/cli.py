@@ -117,14 +117,17 @@ def derive(
 ) -> None:
     """The hidden robot of a robot, how it is derived, its certificate, and what the controller can see."""
     from .analysis.derive import derive as run
-    from .description import save
+    from .description import save, targets
     from .present import records
     from .present.text.verdicts import derivation
 
+    if output is not None:
+        targets(output)
     with Progress() as progress:
         found = run(robot.load(), _list(observe), camera, form=form, seed=seed, progress=progress.tell)
     written = None
     if output is not None and found.hidden is not None:
+        _other_than(robot, found.robot, output)
         save(found.hidden, output)
         written = output
     if json:
@@ -434,17 +437,28 @@ def convert(
     json: Json = False,
 ) -> None:
     """Read a robot in any dialect and write it in another: .urdf native, .yaml Gepetto, .xml MJCF, .sdf SDFormat."""
-    from .description import save
+    from .description import save, targets
     from .present import records
 
+    files = [str(file) for file in targets(target, to)]
     mechanism = robot.load()
+    _other_than(robot, mechanism, *files)
     lost = save(mechanism, target, to)
     for warning in lost:
         typer.echo(f"hrsynth: {warning}", err=True)
-    fields: dict[str, Any] = {"file": target, "links": len(mechanism.links), "joints": len(mechanism.joints),
-                              "warnings": [str(warning) for warning in lost]}
+    fields: dict[str, Any] = {"file": target, "files": files, "links": len(mechanism.links),
+                              "joints": len(mechanism.joints), "warnings": [str(warning) for warning in lost]}
     typer.echo(records.record("convert", mechanism.name, fields) if json
-               else f"{mechanism.name}: {fields['links']} links, {fields['joints']} joints, written to {target}")
+               else f"{mechanism.name}: {fields['links']} links, {fields['joints']} joints, "
+                    f"written to {' and '.join(files)}")
+
+
+def _other_than(robot: Source, mechanism: Mechanism, *files: str) -> None:
+    """Refuse to write over a file that is read."""
+    from .description.files import require_other
+
+    for file in files:
+        require_other(file, robot.robot, mechanism.file)
 
 
 def _list(text: str) -> list[str]:

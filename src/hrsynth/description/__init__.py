@@ -12,15 +12,16 @@ from pathlib import Path
 from ..errors import BadRequest
 from ..mechanism.model import Mechanism, Note
 from . import native
-from .files import write_whole
+from .files import require_same, write_whole
 from .foreign.given import Given, names
 from .foreign.reading import read
 from .tree import spanning
 
 DIALECTS = ("native", "gepetto", "mjcf", "sdf")
-ENDINGS = {".xml": "mjcf", ".mjcf": "mjcf", ".sdf": "sdf", ".yaml": "gepetto", ".yml": "gepetto"}
+ENDINGS = {".urdf": "native", ".xml": "mjcf", ".mjcf": "mjcf", ".sdf": "sdf", ".yaml": "gepetto",
+           ".yml": "gepetto"}
 
-__all__ = ["load", "native", "save", "shipped", "spanning"]
+__all__ = ["load", "native", "save", "shipped", "spanning", "targets"]
 
 
 def shipped() -> dict[str, Path]:
@@ -66,19 +67,28 @@ def load(robot: str | Path, *, base: str | None = None, platform: str | None = N
     return read(path, wishes)
 
 
+def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
+    """The files that :func:`save` writes, the tree first; raises ``BadRequest`` for an unknown dialect or ending."""
+    target = Path(path)
+    if _kind(target, dialect) != "gepetto":
+        return (target,)
+    settings = target if target.suffix.lower() in (".yaml", ".yml") else target.with_suffix(".yaml")
+    return target.with_suffix(".urdf"), settings
+
+
 def save(mechanism: Mechanism, path: str | Path, dialect: str | None = None) -> tuple[Note, ...]:
     """Write a robot file, whole or not at all; what the dialect cannot say is returned as warnings.
 
-    ``dialect`` is one of ``DIALECTS``; without it the file's ending decides: ``.xml`` and ``.mjcf`` MJCF, ``.sdf``
-    SDFormat, ``.yaml`` Gepetto (with a ``.urdf`` of the same name beside it), anything else the native dialect.
+    ``dialect`` is one of ``DIALECTS``; without it the file's ending decides: ``.urdf`` the native dialect, ``.xml`` and
+    ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.yaml`` Gepetto (with a ``.urdf`` of the same name beside it). A file beside
+    the one named is not replaced by other content.
 
     Raises
     ------
     BadRequest
-        For an unknown dialect; where the file cannot be written, or the mechanism not be said in the dialect.
+        For an unknown dialect or ending; where the file cannot be written, or the mechanism not be said in the dialect.
     """
-    target = Path(path)
-    kind = dialect or ENDINGS.get(target.suffix.lower(), "native")
+    kind, files = _kind(Path(path), dialect), targets(path, dialect)
     if kind == "native":
         write_whole(path, native.write(mechanism).encode())
         return ()
@@ -86,13 +96,24 @@ def save(mechanism: Mechanism, path: str | Path, dialect: str | None = None) -> 
         from .writers import gepetto
 
         tree, closures, lost = gepetto.write(mechanism)
-        write_whole(target.with_suffix(".urdf"), tree.encode())
-        write_whole(target.with_suffix(".yaml"), closures.encode())
+        contents = dict(zip(files, (tree.encode(), closures.encode()), strict=True))
+        for file in set(files) - {Path(path)}:
+            require_same(file, contents[file])
+        for file, content in contents.items():
+            write_whole(file, content)
         return lost
-    if kind not in DIALECTS:
-        raise BadRequest("unknown dialect", kind, DIALECTS)
     from .writers import mjcf, sdf
 
     text, lost = (mjcf if kind == "mjcf" else sdf).write(mechanism)
     write_whole(path, text.encode())
     return lost
+
+
+def _kind(target: Path, dialect: str | None) -> str:
+    if dialect is None and target.suffix.lower() not in ENDINGS:
+        raise BadRequest("cannot write the file: its ending says no dialect", str(target),
+                         ", ".join(ENDINGS) + "; or the dialect given")
+    kind = dialect or ENDINGS[target.suffix.lower()]
+    if kind not in DIALECTS:
+        raise BadRequest("unknown dialect", kind, DIALECTS)
+    return kind

@@ -16,6 +16,24 @@ def require_folder(path: str | Path) -> None:
         raise BadRequest("cannot write the file: no such folder", str(folder))
 
 
+def require_other(path: str | Path, *sources: str | Path | None) -> None:
+    """Raise ``BadRequest`` where a file to write is one that was read."""
+    real = os.path.realpath(path)
+    if any(source is not None and os.path.realpath(source) == real for source in sources):
+        raise BadRequest("cannot write the file: it is the one that is read", str(path), "another file")
+
+
+def require_same(path: Path, content: bytes) -> None:
+    """Raise ``BadRequest`` where a file that nobody named would be replaced by other content."""
+    try:
+        same = not path.exists() or (path.stat().st_size == len(content) and path.read_bytes() == content)
+    except (OSError, ValueError) as error:
+        raise BadRequest(f"cannot write the file: {getattr(error, 'strerror', None) or error}", str(path)) from None
+    if not same:
+        raise BadRequest("cannot write the file beside: it is there already, with other content", str(path),
+                         "another name, or that file moved away")
+
+
 def write_whole(path: str | Path, content: bytes) -> None:
     """Write a file under a temporary name, then rename it; raises ``BadRequest`` where it cannot be written."""
     try:

@@ -50,7 +50,7 @@ def read(description: Path, settings: Path) -> Graph:
     if said is None:
         raise _refused(settings, "none of the keys of this dialect", ", ".join(KEYS))
     root = xml.document(xml.content(description), str(description))
-    graph = urdf.read(root, str(description))
+    graph = urdf.read(root, str(description), frames=not said.get("closed_loop"))
     graph.dialect = "Gepetto"
     return _Sayings(graph, settings, said).applied()
 
@@ -98,18 +98,29 @@ class _Sayings:
             if len(pairs) % 2:
                 raise _refused(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
             pairs = [pairs[i : i + 2] for i in range(0, len(pairs), 2)]
+        words = self._kinds(kinds, len(pairs))
         for number, pair in enumerate(pairs):
             if not isinstance(pair, list) or len(pair) != 2:
                 raise _refused(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
             links = [self._link(self._name("closed_loop", name)) for name in pair]
             if links[0] == links[1]:
                 raise _refused(self.path, f"closed_loop: {pair[0]!r} and {pair[1]!r} are one link", "two links")
-            point = number < len(kinds) and str(kinds[number]).lower() == "3d"
+            point = words[number] == "3d"
             stems = [str(frame).removesuffix(suffix) for frame, suffix in zip(pair, (CUT, END), strict=True)]
             name = self.graph.fresh(f"loop_{number + 1}" if stems[0] != stems[1] else stems[0] if point or
                                     stems[0] not in self.graph.edges else stems[0] + WELD)
             kind = JointType.SPHERICAL if point else JointType.FIXED
             self.graph.edges[name] = Edge(name, kind, (End(links[0], ORIGIN), End(links[1], ORIGIN)), in_tree=False)
+            if words[number] not in ("3d", "6d"):
+                given = "without a type" if words[number] is None else f"of type {words[number]!r}"
+                self.graph.note("guess", f"closure {name!r} {given} is read as rigid (6d; a point is 3d)")
+
+    def _kinds(self, kinds: list[Any], count: int) -> list[str | None]:
+        """The closures' types in small letters, None where there is none: this dialect takes all but ``3d`` for 6d."""
+        if len(kinds) > count:
+            raise _refused(self.path, f"type: {len(kinds)} types of {count} closures", "one each")
+        words = [self._name("type", kind).lower() for kind in kinds]
+        return [*words, *[None] * (count - len(words))]
 
     def _link(self, frame: str) -> str:
         """A frame is a link's, or that of a joint, which moves with the joint's child."""

@@ -18,15 +18,18 @@ TYPES = {**TREE_TYPES, "spherical": JointType.SPHERICAL, "ball": JointType.SPHER
 _LIMITS = ("lower", "upper", "velocity", "effort")
 
 
-def read(root: xml.Element, file: str) -> Graph:
-    """The joint graph of a URDF document; raises ``BadRobotFile`` with all its defects."""
-    return Reader(file, root).graph()
+def read(root: xml.Element, file: str, *, frames: bool = True) -> Graph:
+    """The joint graph of a URDF document; raises ``BadRobotFile`` with all its defects.
+
+    ``frames`` says whether links may be closing frames by their names: not where loops are given in other words.
+    """
+    return Reader(file, root).graph(frames and root.find("hrsynth") is None)
 
 
 class Reader(Urdf):
     """The tolerant reader."""
 
-    def graph(self) -> Graph:
+    def graph(self, frames: bool) -> Graph:
         """All links, joints and closures."""
         root = self.root
         graph = Graph(root.get("name") or "robot", self.file, "URDF")
@@ -50,7 +53,7 @@ class Reader(Urdf):
         graph.rest = list(xml.unknown(root, ["name"], ["link", "joint", "loop", "coupling", "transmission", "gazebo",
                                                         "constraint", "loop_joint", "hrsynth"]))
         self._gears()
-        for closures in (gazebo, urdfdom, isaac, onshape):
+        for closures in (gazebo, urdfdom, isaac, *((onshape,) if frames else ())):
             closures.read(self, graph)
         self._own()
         if self.defects:
