@@ -157,7 +157,7 @@ def closed(twin: Twin, q: Array, target: Wanted | None = None, *, tolerance: flo
             break
         normal = J.T @ J
         normal.flat[:: twin.nv + 1] += max(factor * size**2, 1e-14)
-        step = np.linalg.solve(normal, -(J.T @ error))
+        step: Array = np.asarray(np.linalg.solve(normal, -(J.T @ error)), dtype=float)
         trial = twin.moved(q, limited(step, 0.5))
         trial_error, trial_J = system(twin, trial, target)
         trial_size = float(np.linalg.norm(trial_error))
