@@ -38,3 +38,11 @@ def test_the_names_survive_the_import_of_their_modules():
     code = "import hrsynth.analysis.derive; from hrsynth import derive, legs; print(derive.__name__, legs.__name__)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout.split() == ["derive", "legs"]
+
+
+def test_a_derivation_of_a_native_file_imports_only_what_it_uses():
+    code = "import sys, hrsynth; hrsynth.derive(hrsynth.load('3rpr_m1')); print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    readers = {f"hrsynth.description.foreign.{name}" for name in ("build", "gepetto", "mjcf", "sdf", "urdf")}
+    writers = {f"hrsynth.description.writers.{name}" for name in ("gepetto", "mjcf", "sdf")}
+    assert not {"networkx", "sympy", "scipy", "matplotlib", *readers, *writers} & set(run.stdout.split())
