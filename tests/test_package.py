@@ -45,3 +45,11 @@ def test_the_folder_named_as_its_function_is_called_like_it():
         code = first + "import hrsynth; from hrsynth import servo; print(servo is hrsynth.servo and callable(servo))"
         run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
         assert run.stdout.split() == ["True"]
+
+
+def test_a_derivation_of_a_native_file_imports_only_what_it_uses():
+    code = "import sys, hrsynth; hrsynth.derive(hrsynth.load('3rpr_m1')); print(*sys.modules)"
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    readers = {f"hrsynth.description.foreign.{name}" for name in ("build", "gepetto", "mjcf", "sdf", "urdf")}
+    writers = {f"hrsynth.description.writers.{name}" for name in ("gepetto", "mjcf", "sdf")}
+    assert not {"networkx", "sympy", "scipy", "matplotlib", *readers, *writers} & set(run.stdout.split())

@@ -6,6 +6,7 @@ with the loops.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -86,7 +87,7 @@ class Target:
             errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length, vee(X[:3, :3] @ self.pose[:3, :3].T)]
             blocks = [V]
         errors += [value - wanted for value, (_, wanted) in zip(values, self.measured, strict=True)]
-        return np.concatenate(errors), np.vstack([*blocks, *rates])
+        return np.concatenate(errors), np.concatenate([*blocks, *rates])
 
 
 def measure(twin: Twin, q: Array, reference: str, observations: Sequence[Observation], links: Sequence[str] = ()
@@ -150,7 +151,7 @@ def closed(twin: Twin, q: Array, target: Wanted | None = None, *, tolerance: flo
     residual's own size, which must not be followed; near closure the convergence stays fast.
     """
     error, J = system(twin, q, target)
-    size = float(np.linalg.norm(error))
+    size = math.sqrt(error @ error)
     factor = 1.0
     for _ in range(iterations):
         if size <= tolerance or factor > 1e8:
@@ -160,7 +161,7 @@ def closed(twin: Twin, q: Array, target: Wanted | None = None, *, tolerance: flo
         step: Array = np.asarray(np.linalg.solve(normal, -(J.T @ error)), dtype=float)
         trial = twin.moved(q, limited(step, 0.5))
         trial_error, trial_J = system(twin, trial, target)
-        trial_size = float(np.linalg.norm(trial_error))
+        trial_size = math.sqrt(trial_error @ trial_error)
         if trial_size < size:
             q, error, J, size = trial, trial_error, trial_J, trial_size
             factor = max(0.1 * factor, 0.1)
@@ -171,7 +172,7 @@ def closed(twin: Twin, q: Array, target: Wanted | None = None, *, tolerance: flo
 
 def limited(step: Array, longest: float) -> Array:
     """A step (nv,), shortened where a coordinate would change by more than ``longest``."""
-    largest = float(np.max(np.abs(step), initial=0.0))
+    largest = float(np.abs(step).max(initial=0.0))
     return step * (longest / largest) if largest > longest else step
 
 
@@ -181,4 +182,4 @@ def system(twin: Twin, q: Array, target: Wanted | None) -> tuple[Array, Array]:
     if target is None:
         return error, J
     extra, rows = target.rows(twin, q)
-    return np.concatenate([error, extra]), np.vstack([J, rows])
+    return np.concatenate([error, extra]), np.concatenate([J, rows])

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from ..errors import BadMechanism
 from ..mechanism import Joint, JointType, Mechanism, graphs
-from ..mechanism.vectors import Array, inverse, pose
+from ..mechanism.vectors import Array
 
 _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
@@ -48,12 +48,15 @@ class Twin:
         self._views = [data.extract() for data in self._datas]
         self.nv: int = self.model.nv
         self.q0: Array = pin.neutral(self.model)
-        self._links = {
-            name: (self._body[name], inverse(pose(self._centre[self._body[name]] * self.length)) @ link.pose)
-            for name, link in mechanism.links.items()}
+        self._links = {name: (self._body[name], self._seen_from_body(name)) for name in mechanism.links}
         self._placements = self.data.oMi
         self._several: dict[tuple[str, ...], tuple[list[int], Array, Array]] = {}
         self._q: Array | None = None
+
+    def _seen_from_body(self, link: str) -> Array:
+        X = self.mechanism.links[link].pose.copy()
+        X[:3, 3] -= self._centre[self._body[link]] * self.length
+        return X
 
     def _span(self) -> tuple[list[tuple[Joint, str]], list[Joint]]:
         mechanism = self.mechanism
