@@ -33,7 +33,7 @@ START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 @cache
 def found() -> Selection:
     return select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65",
-                  cones="1=0.1deg,2=0.1deg,3=0.2deg", size=2, runs=1, seconds=1000)
+                  cones="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1, seconds=1000)
 
 
 @cache
