@@ -107,8 +107,7 @@ def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, go
                  tell)
     sets = [legs for count in range(1, min(size, len(directions)) + 1) for legs in combinations(directions, count)]
     found = sorted((work.first(legs) for legs in sets), key=lambda each: each.order)
-    found = [work.decided(each) for each in found]
-    found = work.run(found, runs)
+    found = work.examined(found, runs)
     found.sort(key=lambda each: (each.discarded is not None, each.order if each.discarded is None else (0, 0, 0)))
     poses = [setting.motion.pose(at.pose(setting.motion.link)) for at in ends]
     return Selection(setting, poses[0], poses[1], tuple(found), half, work.sight)
@@ -199,18 +198,20 @@ class _Work:
         except HrsynthError as error:
             return Modes(None, None, False, str(error))
 
-    def run(self, candidates: Sequence[Candidate], runs: int) -> list[Candidate]:
-        """The candidates, best first, with simulated runs until ``runs`` of them ended at the goal."""
+    def examined(self, candidates: Sequence[Candidate], runs: int) -> list[Candidate]:
+        """The candidates, best first, with their modes and aspects, and with simulated runs until ``runs`` of them
+        ended at the goal."""
         found, arrived = [], 0
-        for candidate in candidates:
+        for candidate in map(self.decided, candidates):
             if not candidate.discarded and arrived < runs and not self.over:
                 self.tell("runs")
-                candidate = self._ran(candidate)
+                candidate = self.ran(candidate)
                 arrived += candidate.discarded is None
             found.append(candidate)
         return found
 
-    def _ran(self, candidate: Candidate) -> Candidate:
+    def ran(self, candidate: Candidate) -> Candidate:
+        """The candidate with where its simulated run ends, and what the camera sees along it."""
         motion, mechanism = self.setting.motion, self.setting.mechanism
         start, goal = (motion.pose(at.pose(motion.link)) for at in (self.start, self.goal))
         camera = None if mechanism.reference == mechanism.base else mechanism.reference

@@ -168,12 +168,13 @@ class Mapper:
         return self._at(*poses_over(self.setting.motion, grid, self.setting.robot.name))
 
     def _at(self, X: Array, possible: Flags) -> Seen:
+        """Poses by the batch in NumPy: no grid is so large that it makes up for numba's start."""
         assert self.batch is not None
         parts: list[Evaluation] = []
         size = -(-len(X) // max(1, len(X) // PART))
         for start in range(0, len(X), size):
             self.progress("poses")
-            parts.append(self.batch.evaluate(X[start : start + size], self.setting.labels, self.cones))
+            parts.append(self.batch.evaluate(X[start : start + size], self.setting.labels, self.cones, compiled=False))
         reached = possible & np.concatenate([part.reached for part in parts])
         position, orientation = (np.where(reached, np.concatenate(column), np.nan) for column in (
             [part.position.largest for part in parts if part.position is not None],
