@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import dataclasses
+import re
 from pathlib import Path
 
 import numpy as np
@@ -9,10 +11,13 @@ import pytest
 
 from description.foreign.examples import FILES
 from description.foreign.test_dialects import lines, mobility, written
+from description.foreign.test_traps import full_mobility
 from hrsynth.description import load, save
 from hrsynth.errors import BadRobotFile
-from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism import Joint, JointType, Link, Mechanism, Motor
+from hrsynth.mechanism.legs import dissect
 from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.vectors import rotation_from_rpy
 
 
 def moving(robot: Mechanism) -> list[str]:
@@ -68,3 +73,94 @@ def test_what_is_no_type_of_a_closure_is_refused(types: str, tmp_path: Path):
     settings = next(name for name in files if name.endswith(".yaml"))
     files[settings] = files[settings].replace("['6d']", types)
     assert "type: " in refused(written(tmp_path, files))
+
+
+TILT = rotation_from_rpy(0.3, -0.4, 0.5)
+SPACE = [["P", "P", "P", "S"], ["P", "P", "P", "R", "R", "R"], ["S", "P", "P", "P"]]
+
+
+def placed(robot: Mechanism, word: list[str], axes: np.ndarray, driven: bool = False) -> Mechanism:
+    """The robot with a chain of joints in front of all others that places its platform."""
+    point = robot.links[robot.platform].pose[:3, 3]
+    names = [f"place_{k}" for k in range(len(word))]
+    links = {name: Link(name, robot.links[robot.platform].pose) for name in names[:-1]}
+    ends = [robot.base, *links, robot.platform]
+    joints = {name: Joint(name, JointType(kind), ends[k], ends[k + 1], point,
+                          (axes[k % 3],) * JointType(kind).axes, Motor("extra") if driven and k == 0 else None)
+              for k, (name, kind) in enumerate(zip(names, word, strict=True))}
+    return dataclasses.replace(robot, links={**robot.links, **links}, joints={**joints, **robot.joints},
+                               observations=())
+
+
+def foreign(robot: Mechanism, path: Path) -> Path:
+    """A file that does not say what our writers add."""
+    save(robot, path)
+    text = re.sub(r"\s*<(text name=.hrsynth_platform|text name=.hrsynth_observe|hrsynth:platform|hrsynth:observe).*",
+                  "", path.read_text())
+    assert "platform_1" not in text
+    path.write_text(text)
+    return path
+
+
+def words(robot: Mechanism) -> list[str]:
+    normal = normal_form(robot).mechanism
+    return sorted("".join(sorted(str(normal.joints[name].type) for name in leg.joints))
+                  for leg in dissect(normal).legs)
+
+
+@pytest.mark.parametrize("ending", [".xml", ".sdf"])
+@pytest.mark.parametrize("word", SPACE, ids="".join)
+@pytest.mark.parametrize("name", ["gough_stewart", "3rps"])
+def test_a_chain_that_places_the_platform_in_space_is_no_leg(name: str, word: list[str], ending: str, tmp_path: Path):
+    robot = load(name)
+    back = load(foreign(placed(robot, word, TILT.T), tmp_path / f"robot{ending}"), platform=robot.platform)
+    assert words(back) == words(robot)
+    assert full_mobility(back) == full_mobility(robot)
+    (free,) = [joint for joint in back.joints.values() if joint.type is JointType.FREE]
+    assert set(free.links) == {robot.base, robot.platform}
+    assert sum("place_0" in note.text and "a free joint" in note.text for note in back.notes) == 1
+    save(back, tmp_path / "again.xml")
+    assert (tmp_path / "again.xml").read_text().count("<freejoint") == 1
+    mujoco = pytest.importorskip("mujoco")
+    assert mujoco.MjModel.from_xml_path(str(tmp_path / "again.xml")).nv >= 6
+    for ending_again in (".xml", ".sdf", ".urdf", ".yaml"):
+        save(back, tmp_path / f"again{ending_again}", None)
+        again = load(tmp_path / f"again{ending_again}")
+        assert words(again) == words(robot)
+        assert again.base == robot.base
+        assert full_mobility(again) == full_mobility(robot)
+        for leftover in tmp_path.glob("again*"):
+            leftover.unlink()
+
+
+@pytest.mark.parametrize("word", [["P", "P", "R"], ["R", "P", "P"]], ids="".join)
+@pytest.mark.parametrize("ending", [".xml", ".sdf"])
+def test_a_chain_that_places_the_platform_in_its_plane_is_no_leg(ending: str, word: list[str], tmp_path: Path):
+    robot = load("3rrr_m1")
+    axes = np.eye(3) if word[0] == "P" else np.roll(np.eye(3), 1, axis=0)
+    back = load(foreign(placed(robot, word, axes), tmp_path / f"robot{ending}"), platform=robot.platform)
+    assert words(back) == words(robot)
+    assert not {f"place_{k}" for k in range(3)} & {*back.joints, *back.links}
+    assert sum("read as no leg" in note.text for note in back.notes) == 1
+
+
+@pytest.mark.parametrize(("name", "word", "driven"), [("3rps", "PPR", False), ("gough_stewart", "PPPS", True),
+                                                      ("gough_stewart", "PPR", False)])
+def test_a_chain_that_is_driven_or_forbids_something_stays_a_leg(name: str, word: str, driven: bool, tmp_path: Path):
+    robot = load(name)
+    chain = placed(robot, list(word), np.eye(3), driven)
+    back = load(foreign(chain, tmp_path / "robot.xml"), platform=robot.platform)
+    assert {f"place_{k}" for k in range(len(word))} <= set(back.joints)
+    assert not any("place_0" in note.text for note in back.notes if note.kind == "merged")
+
+
+def test_legs_that_would_be_coordinates_alone_stay_legs(tmp_path: Path):
+    robot = load("3rrr_m1")
+    chain = placed(robot, ["P", "P", "R"], np.eye(3))
+    two = {name.replace("place", "other"): dataclasses.replace(
+        joint, name=name.replace("place", "other"), predecessor=joint.predecessor.replace("place", "other"),
+        successor=joint.successor.replace("place", "other")) for name, joint in chain.joints.items() if "place" in name}
+    links = {f"other_{k}": Link(f"other_{k}", chain.links[f"place_{k}"].pose) for k in (0, 1)}
+    both = chain.changed(joints=two.values(), links=links.values())
+    back = load(foreign(both, tmp_path / "robot.xml"), platform=robot.platform)
+    assert {"place_0", "other_0"} <= set(back.joints)

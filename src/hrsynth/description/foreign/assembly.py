@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...mechanism.model import JointType
-from ...mechanism.vectors import Array, inverse
+from ...mechanism.model import JointType, Mechanism
+from ...mechanism.vectors import Array, inverse, pose
 from ...tolerances import FAINT, NOISE, RANK_CUTOFF, SOLVED
 from ..draft import Edge, End
 from .graph import Gear, spanning_tree
@@ -206,6 +206,18 @@ class Assembly:
                   for gear in self.gears]
         miss, name = max(found, default=(0.0, "none"))
         return name, miss
+
+
+def assembly_of(mechanism: Mechanism) -> Assembly:
+    """The assembly of a mechanism's own joints: closed at zero."""
+    edges = []
+    for joint in mechanism.joints.values():
+        one, two = (End(link, inverse(mechanism.links[link].pose) @ pose(joint.point)) for link in joint.links)
+        edges.append(Edge(joint.name, joint.type, (one, two), joint.axes, in_tree=joint.in_tree))
+    carrier = {joint.successor: joint.name for joint in mechanism.joints.values() if joint.in_tree}
+    gears = [Gear(each.name, carrier[each.predecessor], carrier[each.successor], each.ratio)
+             for each in mechanism.couplings]
+    return Assembly(mechanism.base, edges, gears)
 
 
 def _scaled(edge: Edge, length: float) -> Edge:

@@ -7,14 +7,15 @@ from dataclasses import replace
 
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed, RankUndecided
 from ...mechanism.model import Coupling, Joint, JointType, Limits, Mechanism, Note
-from ...mechanism.vectors import Array, inverse, pose, unit
+from ...mechanism.vectors import Array, inverse, unit
 from ...tolerances import FAINT, NOISE, RANK_CUTOFF, RANK_GAP, SAME_GEOMETRY
-from ..draft import Edge, End
+from ..draft import Edge
 from ..tree import spanning
 from . import closures, given, guess, relations
-from .assembly import Assembly, State
+from .assembly import Assembly, State, assembly_of
+from .coordinates import coordinates_freed, mobility
 from .given import Given
-from .graph import Gear, Graph, listed
+from .graph import Graph, listed
 from .solving import Solution, solve, unlocked
 
 SIZE = 240
@@ -55,7 +56,8 @@ def build(graph: Graph, wishes: Given) -> Mechanism:
     _tell_solution(graph, assembly, solution)
     mechanism = _mechanism(graph, base, platform, assembly, solution.state)
     meant = _as_meant(closures.points_in_planes(mechanism), solution.residual)
-    return _motors_weighed(_away_from_singular(meant))
+    regular = _away_from_singular(meant)
+    return _motors_weighed(coordinates_freed(regular) if graph.platform is None else regular)
 
 
 def _pruned(graph: Graph, base: str) -> None:
@@ -140,18 +142,6 @@ def _couplings(graph: Graph, mechanism: Mechanism) -> list[Coupling]:
     return found
 
 
-def assembly_of(mechanism: Mechanism) -> Assembly:
-    """The assembly of a mechanism's own joints: closed at zero."""
-    edges = []
-    for joint in mechanism.joints.values():
-        one, two = (End(link, inverse(mechanism.links[link].pose) @ pose(joint.point)) for link in joint.links)
-        edges.append(Edge(joint.name, joint.type, (one, two), joint.axes, in_tree=joint.in_tree))
-    carrier = {joint.successor: joint.name for joint in mechanism.joints.values() if joint.in_tree}
-    gears = [Gear(each.name, carrier[each.predecessor], carrier[each.successor], each.ratio)
-             for each in mechanism.couplings]
-    return Assembly(mechanism.base, edges, gears)
-
-
 def _as_meant(mechanism: Mechanism, residual: float) -> Mechanism:
     """Geometry that nearly keeps relations keeps them; the gap of the singular values is the evidence."""
     if all(joint.in_tree for joint in mechanism.joints.values()):
@@ -194,11 +184,9 @@ def _away_from_singular(mechanism: Mechanism) -> Mechanism:
 def _motors_weighed(mechanism: Mechanism) -> Mechanism:
     """A note where more coordinates are driven than there are freedoms: files put actuators on passive joints too."""
     driven = sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.actuated)
-    inside = sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.in_tree)
     if driven == 0 or all(joint.in_tree for joint in mechanism.joints.values()):
         return mechanism
-    assembly = assembly_of(mechanism)
-    free = inside - assembly.size + assembly.freedom(assembly.zero()).value
+    free = mobility(mechanism)
     if driven <= free:
         return mechanism
     note = Note("open", f"{driven} coordinates are driven, but there are {free} freedoms: some motors may stand on "

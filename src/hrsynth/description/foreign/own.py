@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import TYPE_CHECKING
 from urllib.parse import quote, unquote
 
@@ -9,8 +10,9 @@ import numpy as np
 
 from ...mechanism.model import JointType, Motor
 from ...mechanism.observation import Direction
+from ...mechanism.vectors import frozen, inverse
 from .. import numerals, xml
-from ..draft import Edge
+from ..draft import Edge, End
 from .graph import Graph
 
 if TYPE_CHECKING:
@@ -21,14 +23,21 @@ PREFIX = "hrsynth"
 
 
 def world_dropped(graph: Graph) -> Graph:
-    """The graph, based on the one link that a fixed joint holds in the world where nothing else hangs on the world."""
+    """The graph, based on the one link that a fixed joint holds in the world where nothing else hangs on the world, or
+    only free joints do, which then hang on that link."""
     at_world = [edge for edge in graph.edges.values() if graph.base in edge.links]
-    if graph.base is None or len(at_world) != 1 or at_world[0].type is not JointType.FIXED:
+    welds = [edge for edge in at_world if edge.type is JointType.FIXED]
+    floating = [edge for edge in at_world if edge.type is JointType.FREE]
+    if graph.base is None or len(welds) != 1 or len(at_world) != 1 + len(floating) or len(graph.links) <= 2:
         return graph
-    weld, world = at_world[0], graph.base
-    if len(graph.links) > 2:
-        del graph.edges[weld.name], graph.links[world]
-        graph.base = next(link for link in weld.links if link != world)
+    weld, world = welds[0], graph.base
+    del graph.edges[weld.name], graph.links[world]
+    here = weld.links.index(world)
+    graph.base = weld.links[1 - here]
+    X_BW = weld.ends[1 - here].X @ inverse(weld.ends[here].X)
+    for edge in floating:
+        ends = [End(graph.base, frozen(X_BW @ end.X), end.line) if end.link == world else end for end in edge.ends]
+        graph.edges[edge.name] = replace(edge, ends=(ends[0], ends[1]))
     return graph
 
 

@@ -29,7 +29,9 @@ def write(mechanism: Mechanism) -> tuple[str, tuple[Note, ...]]:
     A revolute loop is two points on its axis; other loops are cut through the joint. Raises ``BadRequest`` for what
     cannot be said.
     """
-    said = plain(mechanism, _TREE, _LOOPS, content=False)
+    floats = all(joint.predecessor == mechanism.base for joint in mechanism.joints.values()
+                 if joint.type is JointType.FREE)
+    said = plain(mechanism, (*_TREE, JointType.FREE) if floats else _TREE, _LOOPS, content=False)
     robot = said.mechanism
     if WORLD in robot.links and robot.base != WORLD:
         raise BadRequest(f"{robot.name}: MJCF keeps this name for the base", WORLD, "another link name")
@@ -77,7 +79,8 @@ def _bodies(root: xml.Element, robot: Mechanism) -> None:
         elements[robot.base] = etree.SubElement(world, "body", name=robot.base)
     for joint in outward(robot):
         X = inverse(robot.links[joint.predecessor].pose) @ robot.links[joint.successor].pose
-        body = etree.SubElement(elements[joint.predecessor], "body", {"name": joint.successor, **_pose(X)})
+        parent = world if joint.type is JointType.FREE else elements[joint.predecessor]
+        body = etree.SubElement(parent, "body", {"name": joint.successor, **_pose(X)})
         elements[joint.successor] = body
         if joint.type is not JointType.FIXED:
             body.append(_joint(robot, joint))
@@ -97,6 +100,8 @@ def _text(values: Array | tuple[float, ...]) -> str:
 
 
 def _joint(robot: Mechanism, joint: Joint) -> xml.Element:
+    if joint.type is JointType.FREE:
+        return etree.Element("freejoint", name=joint.name)
     X = inverse(robot.links[joint.successor].pose)
     element = etree.Element("joint", name=joint.name, type=_NAMES[joint.type],
                             pos=_text(X[:3, :3] @ joint.point + X[:3, 3]))

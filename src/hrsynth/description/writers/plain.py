@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from dataclasses import dataclass, replace
 
+import networkx as nx
 import numpy as np
 
 from ...errors import BadRequest
@@ -36,7 +37,7 @@ def plain(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[J
     ``content`` says whether the dialect keeps what links hold besides. Raises ``BadRequest`` where a link in between
     would take the name of another.
     """
-    given = spanning(mechanism)
+    given = spanning(_held(mechanism) if JointType.FREE not in tree else mechanism)
     links, joints = dict(given.links), {}
 
     def link(name: str, joint: Joint) -> str:
@@ -74,6 +75,17 @@ def plain(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[J
         joints[weld.name] = weld
     lost = _lost(given, content)
     return Plain(replace(given, links=links, joints=joints, couplings=given.couplings), tuple(lost))
+
+
+def _held(mechanism: Mechanism) -> Mechanism:
+    """Without the free joints of links that other joints hold: they say nothing."""
+    for joint in [each for each in mechanism.joints.values() if each.type is JointType.FREE]:
+        rest = mechanism.changed(remove_joints=[joint.name])
+        graph: nx.Graph[str] = nx.Graph()
+        graph.add_nodes_from(rest.links)
+        graph.add_edges_from(each.links for each in rest.joints.values())
+        mechanism = rest if nx.is_connected(graph) else mechanism
+    return mechanism
 
 
 def _parts(joint: Joint) -> list[tuple[JointType, np.ndarray]]:
