@@ -29,6 +29,8 @@ FIELDS = {
     "path": {"verdict", "certified", "path", "margin", "boxes", "start", "goal", "reason", "value", "point"},
     "servo": {"observed", "from", "to", "gain", "sense", "noise", "ended", "reason", "pose", "matched_mode", "modes",
               "type2", "notes", "spread", "error", "times", "poses", "file"},
+    "accuracy": {"observed", "cones", "axes", "fixed", "reached", "position_mm", "orientation_deg", "checked"},
+    "select": {"from", "to", "cones", "best", "sets"},
     "robots": {"robots"},
     "convert": {"file", "files"},
 }
