@@ -18,7 +18,7 @@ from .given import Given
 from .graph import Graph, listed
 from .solving import Solution, solve, unlocked
 
-LINKS = 2000
+LINKS = 1000
 """Links above which a foreign file is refused."""
 SIZE = 240
 """Coordinates of joints in loops above which loops are not solved."""
