@@ -40,10 +40,10 @@ class Defect:
 
 
 class BadRobotFile(HrsynthError):
-    """A robot file with defects, all of them, in the order of their lines."""
+    """A robot file with defects, all of them once, in the order of their lines."""
 
     def __init__(self, defects: Iterable[Defect]) -> None:
-        self.defects = tuple(sorted(defects, key=lambda d: (d.line is None, d.line or 0)))
+        self.defects = tuple(sorted(dict.fromkeys(defects), key=lambda d: (d.line is None, d.line or 0)))
         super().__init__("; ".join(map(str, self.defects)))
 
     def lines(self) -> list[str]:

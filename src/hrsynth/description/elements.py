@@ -27,7 +27,8 @@ class Elements:
     def defect(self, line: int | None, what: str, value: str | None = None, allowed: str | None = None) -> None:
         if value is not None and len(value) > 80:
             value = value[:77] + "..."
-        self.defects.append(Defect(self.file, line, what, value, allowed))
+        file = line.file if isinstance(line, xml.Line) else self.file
+        self.defects.append(Defect(file, line, what, value, allowed))
 
     def attribute(self, element: xml.Element, name: str) -> str | None:
         """An attribute that must be there and not be empty."""

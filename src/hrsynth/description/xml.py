@@ -16,6 +16,8 @@ Element: TypeAlias = etree._Element
 
 LARGEST_FILE = 20_000_000
 """Bytes above which a file is not read at all."""
+MOST_ELEMENTS = 100_000
+"""Elements above which a document is not parsed."""
 
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _DECLARATION = re.compile(rb"<!\s*(DOCTYPE|ENTITY)")
@@ -58,18 +60,21 @@ def document(text: bytes | str, file: str) -> Element:
     """The root element of an XML document; raises :class:`BadRobotFile` with the line where it stops being one."""
     data = text.encode() if isinstance(text, str) else text
 
-    def refuse(line: int | None, what: str, value: str | None = None) -> BadRobotFile:
-        return BadRobotFile([Defect(file, line, what, value)])
+    def refuse(line: int | None, what: str, value: str | None = None, allowed: str | None = None) -> BadRobotFile:
+        return BadRobotFile([Defect(file, line, what, value, allowed)])
 
     if not data.strip():
         raise refuse(1, "an empty file")
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise refuse(data.count(b"\n", 0, error.start) + 1, "not UTF-8 text", hex(data[error.start])) from None
+        raise refuse(data.count(b"\n", 0, error.start) + 1, "not UTF-8 text", hex(data[error.start]),
+                     "a file in UTF-8") from None
+    if (count := data.count(b"<") - data.count(b"</")) > MOST_ELEMENTS:
+        raise refuse(None, "too many elements", str(count), f"up to {MOST_ELEMENTS}")
     bare = _COMMENT.sub(lambda match: b"\n" * match[0].count(b"\n"), data)
     if declaration := _DECLARATION.search(bare):
-        raise refuse(bare.count(b"\n", 0, declaration.start()) + 1, "a document type declaration")
+        raise refuse(bare.count(b"\n", 0, declaration.start()) + 1, "a document type declaration, which is not allowed")
     try:
         return etree.fromstring(data, _parser())
     except etree.XMLSyntaxError as error:
@@ -79,10 +84,20 @@ def document(text: bytes | str, file: str) -> Element:
         raise refuse(1, "malformed XML", str(error)) from None
 
 
+class Line(int):
+    """A line of a file that a document includes."""
+
+    file: str
+
+
 def line(element: Element) -> int | None:
-    """The line of its file that an element starts in."""
+    """The line of its file that an element starts in; a :class:`Line` where the document includes that file."""
     number: object = element.sourceline
-    return number if isinstance(number, int) else None
+    if not isinstance(number, int) or element.base is None:
+        return number if isinstance(number, int) else None
+    found = Line(number)
+    found.file = element.base
+    return found
 
 
 def children(element: Element) -> list[Element]:

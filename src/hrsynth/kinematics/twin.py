@@ -11,12 +11,14 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
-from ..errors import BadMechanism
+from ..errors import BadMechanism, BadRequest
 from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..mechanism.vectors import Array
 
 _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
+LARGEST = 256
+"""Coordinates above which a mechanism is refused: Pinocchio's data hold several cubes of their number."""
 
 
 class Twin:
@@ -37,6 +39,8 @@ class Twin:
         constraints = [self._loop(joint) for joint in loops]
         self.loops = tuple(joint.name for joint in loops)
         self._gears = self._gear_rows()
+        if self.model.nv > LARGEST:
+            raise BadRequest(f"{mechanism.name}: joints with {self.model.nv} coordinates", None, f"up to {LARGEST}")
         self.data = self.model.createData()
         self._models = pin.StdVec_ConstraintModel()
         self._datas = pin.StdVec_ConstraintData()

@@ -210,13 +210,15 @@ class WordGraph:
                     yield Edge(tail, head, Word((Letter("Pi", motor),)), names, tuple(links)), links
 
     def _series(self) -> bool:
+        """All links in series: what is contracted has several joints, so no rod or crank is made or lost by it."""
+        found = False
         for link, first, second in self._binary():
             self._remove_links((link,))
             a, b = first.other(link), second.other(link)
             self._add(Edge(a, b, first.word_from(a) + second.word_from(link), first.joints + second.joints,
                            (*first.inside, link, *second.inside)))
-            return True
-        return False
+            found = True
+        return found
 
     def _parallel(self) -> bool:
         for a, b in dict.fromkeys((edge.tail, edge.head) for edge in self.edges()):

@@ -46,13 +46,14 @@ def test_entities_are_not_expanded(dialect: str, tmp_path: Path):
     bomb = "".join(f'<!ENTITY {b} "{f"&{a};" * 10}">' for a, b in pairwise(names))
     for head in (f'<!DOCTYPE x [<!ENTITY a "ha">{bomb}]>', '<!DOCTYPE x SYSTEM "file:///etc/passwd">',
                  '<!DOCTYPE x [<!ENTITY a SYSTEM "http://127.0.0.1:9/x">]>'):
-        assert_refused(made(tmp_path, head + ONE[dialect].replace("four_bar", "&a;", 1)), "a document type declaration")
+        assert_refused(made(tmp_path, head + ONE[dialect].replace("four_bar", "&a;", 1)),
+                       "a document type declaration", "not allowed")
 
 
 @pytest.mark.parametrize("dialect", ONE)
 def test_broken_text_is_refused_with_its_line(dialect: str, tmp_path: Path):
     text = ONE[dialect]
-    assert_refused(made(tmp_path, text.encode("utf-16")), "not UTF-8")
+    assert_refused(made(tmp_path, text.encode("utf-16")), "not UTF-8", "a file in UTF-8")
     assert_refused(made(tmp_path, text.encode().replace(b"four_bar", b"four\xff", 1)), "not UTF-8")
     for cut in (10, 100, len(text) - 3):
         assert_refused(made(tmp_path, text[:cut]), "malformed XML")
@@ -83,8 +84,10 @@ MANY = {
     "urdf chain": ("<robot name='r'><link name='l-1'/>{}</robot>", CHAIN, 100_000),
     "mjcf": ("<mujoco><worldbody>{}</worldbody></mujoco>", "<body><joint/></body>", 500_000),
     "sdf": ("<sdf version='1.9'><model name='m'>{}</model></sdf>", LINK, 500_000),
-    "just too many": ("<robot name='r'><link name='l-1'/>{}</robot>", CHAIN, 4_001),
-    "just not too many": ("<robot name='r'><link name='l-1'/>{}</robot>", CHAIN.replace("fixed", "continuous"), 1_990),
+    "unknown elements": ("<robot name='r'><link name='l'/>{}</robot>", "<a b='1'/>", 1_500_000),
+    "just too many unknown ones": ("<robot name='r'><link name='l'/>{}</robot>", "<a b='1'/>", 100_000),
+    "just too many": ("<robot name='r'><link name='l-1'/>{}</robot>", CHAIN, 2_001),
+    "just not too many": ("<robot name='r'><link name='l-1'/>{}</robot>", CHAIN.replace("fixed", "continuous"), 990),
 }
 
 
@@ -102,6 +105,19 @@ def test_a_million_links_are_refused_in_time_and_memory(name: str, tmp_path: Pat
     assert (tmp_path / "out.sdf").exists() is few
     assert len(run.stderr.splitlines()) == 1
     assert resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * 1024 < BYTES
+
+
+TURN = "<origin xyz='0.1 0 0'/><axis xyz='0 0 1'/></joint>"
+
+
+def test_a_long_chain_is_refused_in_time_where_its_twin_would_be_too_large(tmp_path: Path):
+    links = "".join(CHAIN.replace("fixed", "continuous").format(i, i - 1) for i in range(990)).replace("</joint>", TURN)
+    path = made(tmp_path, f"<robot name='r'><link name='l-1'/>{links}</robot>", "robot.urdf")
+    code = (f"import resource; resource.setrlimit(resource.RLIMIT_CPU, ({SECONDS}, {SECONDS}))\n"
+            f"from hrsynth.cli import main\nmain(['check', {str(path)!r}])")
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert run.returncode == 2, run.stderr[-500:]
+    assert "joints with 990 coordinates, allowed: up to 256" in run.stderr.splitlines()[-1]
 
 
 def test_includes_stay_in_their_folder_and_come_once(tmp_path: Path):

@@ -164,3 +164,53 @@ def test_legs_that_would_be_coordinates_alone_stay_legs(tmp_path: Path):
     both = chain.changed(joints=two.values(), links=links.values())
     back = load(foreign(both, tmp_path / "robot.xml"), platform=robot.platform)
     assert {"place_0", "other_0"} <= set(back.joints)
+
+
+MESSAGES = {
+    "ring": ("urdf", "<robot name='r'><link name='o'/><link name='a'/><link name='b'/>\n"
+             "<joint name='j1' type='continuous'><parent link='a'/><child link='b'/></joint>\n"
+             "<joint name='j2' type='continuous'><parent link='b'/><child link='a'/></joint></robot>",
+             ["robot.urdf:3: joints that carry each other in a ring, found j2, j1, allowed: a tree"]),
+    "gearbox": ("urdf", FILES["urdf: gazebo"]["robot.urdf"].replace("</robot>",
+                "<gazebo><joint name='g' type='gearbox'>"
+                "<parent>rocker</parent><child>bar</child></joint></gazebo></robot>"),
+                ["gearbox 'g': one revolute joint from its reference body, found "]),
+    "second link": ("urdf", "<robot name='r'><link name='a'/><link name='a'/>"
+                    "<joint name='j' type='continuous'><parent link='a'/><child link='b'/></joint></robot>",
+                    ["robot.urdf:1: second link of the same name, found a"]),
+    "second body": ("xml", "<mujoco><worldbody><body name='a'><joint/><body name='a'><joint/></body></body></worldbody>"
+                    "<equality><connect body1='b' body2='a' anchor='0 0 0'/></equality></mujoco>",
+                    ["robot.xml:1: second body of the same name, found a"]),
+    "ring of frames": ("sdf", "<sdf version='1.9'><model name='m'><link name='a'><pose relative_to='b'/></link>"
+                       "<link name='b'><pose relative_to='a'/></link><joint name='j' type='ball'><parent>a</parent>"
+                       "<child>b</child></joint></model></sdf>", None),
+    **{f"version {number}": ("sdf", FILES["sdf: 1.7"]["robot.sdf"].replace('"1.7"', f'"{number}"'),
+                             [f"version of <sdf>, found {number}, allowed: 1.4 to 1.12"])
+       for number in ("1.13", "9.9", "1.3", "abc")},
+}
+
+
+@pytest.mark.parametrize("name", MESSAGES)
+def test_what_is_wrong_is_said_once_and_in_the_words_of_the_file(name: str, tmp_path: Path):
+    ending, text, expected = MESSAGES[name]
+    with pytest.raises(BadRobotFile) as caught:
+        load(written(tmp_path, {f"robot.{ending}": text}))
+    found = caught.value.lines()
+    assert len(set(found)) == len(found)
+    assert not any("None" in line or "\\n" in line for line in found)
+    if expected is not None:
+        assert len(found) == len(expected)
+        assert all(words in line for words, line in zip(expected, found, strict=True))
+
+
+def test_a_defect_of_an_included_file_is_told_with_that_file(tmp_path: Path):
+    (tmp_path / "parts.xml").write_text("<mujocoinclude>\n<equality>\n<connect body1='nix' body2='a' anchor='0 0 0'/>"
+                                        "</equality></mujocoinclude>")
+    main = "<mujoco><worldbody><body name='a'><joint/></body></worldbody>\n<include file='{}'/></mujoco>"
+    assert refused(written(tmp_path, {"robot.xml": main.format("parts.xml")})).startswith(
+        f"{tmp_path / 'parts.xml'}:3: connect of an unknown body, found nix")
+    line = refused(written(tmp_path, {"robot.xml": main.format("none.xml")}))
+    assert line.startswith(f"{tmp_path / 'robot.xml'}:2: an include of what is no such file, found none.xml")
+    (tmp_path / "parts.xml").write_text("<mujocoinclude>\n<include file='none.xml'/></mujocoinclude>")
+    assert refused(written(tmp_path, {"robot.xml": main.format("parts.xml")})).startswith(
+        f"{tmp_path / 'parts.xml'}:2: an include of what is no such file")

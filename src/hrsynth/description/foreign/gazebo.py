@@ -42,4 +42,5 @@ def read(reader: Reader, graph: Graph) -> None:
         X_MJ = poses[child] @ sdf_joint.pose_of(reader, element.find("pose"))
         places = sdf_joint.Places(inverse(poses[parent]) @ X_MJ, inverse(poses[child]) @ X_MJ, X_MJ, np.eye(3))
         sdf_joint.add(reader, graph, element, (parent, child), places, VERSION, in_tree=False)
+    sdf_joint.gears_named(reader, graph)
     graph.note_assumed()

@@ -14,7 +14,7 @@ _COST = {JointType.FIXED: 0, JointType.REVOLUTE: 1, JointType.PRISMATIC: 1, Join
          JointType.CYLINDRICAL: 2, JointType.PLANAR: 3, JointType.SPHERICAL: 3, JointType.FREE: 5}
 _OUTSIDE = 20
 """Added to the cost of a joint that the file does not write as part of its tree."""
-LINKS = 2000
+LINKS = 1000
 """Links above which a foreign file is refused."""
 
 

@@ -50,6 +50,8 @@ class Reader(Elements):
             self._children(world, WORLD, None, np.eye(4))
         if len(graph.links) == 1:
             self.defect(xml.line(root), "no bodies")
+        if self.defects:
+            raise BadRobotFile(self.defects)
         for section in root.findall("equality"):
             for element in xml.children(section):
                 self._equality(element)

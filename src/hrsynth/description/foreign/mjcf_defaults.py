@@ -57,7 +57,7 @@ def with_includes(root: xml.Element, file: str) -> xml.Element:
         name = element.get("file") or ""
 
         def refuse(what: str, allowed: str, at: xml.Element = element, value: str = name) -> BadRobotFile:
-            return BadRobotFile([Defect(file, xml.line(at), what, value, allowed)])
+            return BadRobotFile([Defect(at.base or file, xml.line(at), what, value, allowed)])
 
         try:
             path = (folder / name).resolve()
@@ -68,7 +68,10 @@ def with_includes(root: xml.Element, file: str) -> xml.Element:
         if path in seen or len(seen) > FILES:
             raise refuse("a file that is included again, or too many of them", f"each once, up to {FILES}")
         seen.add(path)
-        content = xml.content(path)
+        try:
+            content = xml.content(path)
+        except BadRobotFile as error:
+            raise refuse(f"an include of what is {error.defects[0].what}", "a file in the model's folder") from None
         size += len(content)
         if size > xml.LARGEST_FILE:
             raise refuse("included files too large", f"up to {xml.LARGEST_FILE} bytes together")
@@ -77,6 +80,7 @@ def with_includes(root: xml.Element, file: str) -> xml.Element:
             raise refuse("an include in place of the model", "<mujoco>")
         place = parent.index(element)
         parent.remove(element)
-        for child in reversed(list(included)):
+        for child in reversed(xml.children(included)):
+            child.base = str(path)
             parent.insert(place, child)
     return root

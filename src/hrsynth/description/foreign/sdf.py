@@ -1,4 +1,4 @@
-"""SDFormat 1.4 to 1.11: the joint graph itself, with frames, poses and axes in the conventions of each version."""
+"""SDFormat 1.4 to 1.12: the joint graph itself, with frames, poses and axes in the conventions of each version."""
 
 from __future__ import annotations
 
@@ -16,6 +16,7 @@ from . import own, sdf_joint
 from .graph import Graph
 
 MODEL, WORLD = "__model__", "world"
+VERSIONS = "1.4 to 1.12"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,8 +72,9 @@ class Reader(Elements):
     def _version(self) -> tuple[int, int]:
         text = self.root.get("version", "1.6")
         parts = text.split(".")
-        if len(parts) != 2 or not all(part.isascii() and part.isdigit() for part in parts) or len(text) > 8:
-            self.defect(xml.line(self.root), "version of <sdf>", text, "1.4 to 1.11")
+        if len(parts) != 2 or not all(part.isascii() and part.isdigit() for part in parts) or len(text) > 8 or not (
+                (1, 4) <= (int(parts[0]), int(parts[1])) <= (1, 12)):
+            self.defect(xml.line(self.root), "version of <sdf>", text, VERSIONS)
             raise BadRobotFile(self.defects)
         return int(parts[0]), int(parts[1])
 

@@ -184,7 +184,7 @@ def gears_named(reader: Elements, graph: Graph) -> None:
                    and edge.type is JointType.REVOLUTE]
             if len(own) != 1:
                 reader.defect(gear.line, f"gearbox {gear.name!r}: one revolute joint from its reference body", link)
-                continue
+                break
             names.append(own[0])
         if len(names) == 2:
             found.append(Gear(gear.name, names[0], names[1], gear.ratio, gear.offset, gear.line))

@@ -12,7 +12,7 @@ from .. import numerals, xml
 from ..draft import ORIGIN, Edge, End
 from ..urdf import TREE_TYPES, Urdf
 from . import gazebo, isaac, onshape, urdfdom
-from .graph import Gear, Graph
+from .graph import Gear, Graph, listed
 
 TYPES = {**TREE_TYPES, "spherical": JointType.SPHERICAL, "ball": JointType.SPHERICAL}
 _LIMITS = ("lower", "upper", "velocity", "effort")
@@ -122,7 +122,9 @@ class Reader(Urdf):
                 self.result.note("ignored", f"transmission {name!r}: no joint {target!r} that moves")
 
     def _complete(self) -> None:
-        """Every end of every joint is a link that is there; links that only joints name are added."""
+        """Every end of every joint is a link that is there, and no joints carry each other in a ring."""
+        if self.defects and len(self.links) < len(self.root.findall("link")):
+            raise BadRobotFile(self.defects)
         for edge in (*self.tree.values(), *self.loops.values()):
             for end in edge.ends:
                 self.known(end.link, end.line, f"joint {edge.name!r}: unknown link")
@@ -130,8 +132,24 @@ class Reader(Urdf):
                 self.defect(edge.line, f"{edge.name!r} joins a link to itself", edge.ends[0].link)
         if not self.links:
             self.defect(xml.line(self.root), "no links")
+        self._no_ring()
         if self.defects:
             raise BadRobotFile(self.defects)
+
+    def _no_ring(self) -> None:
+        carrier = {edge.ends[1].link: edge for edge in self.tree.values()}
+        clear: set[str | None] = set()
+        for start in carrier:
+            way: list[str | None] = []
+            link = start
+            while link in carrier and link not in clear and link not in way:
+                way.append(link)
+                link = carrier[link].ends[0].link
+            if link in way and len(way) - way.index(link) > 1:
+                ring = [carrier[each] for each in reversed(way[way.index(link):])]
+                self.defect(ring[0].line, "joints that carry each other in a ring",
+                            listed(str(edge.name) for edge in ring), "a tree that hangs on one link")
+            clear.update(way)
 
     def _edges(self) -> dict[str, Edge]:
         edges = {}
