@@ -13,7 +13,7 @@ def _angle(angle: float | None) -> str:
     return "" if angle is None else f"{angle:.1e}"
 
 
-def derivation(found: Derivation, hidden_file: str | None) -> str:
+def derivation(found: Derivation, hidden_file: str | None, report: str | None = None) -> str:
     """The hidden robot first, the proof next, the trace last."""
     mobility, certificate = found.mobility, found.certificate
     observed = ", ".join(f"{o.leg} ({o.link})" for o in found.setting.observed)
@@ -28,7 +28,7 @@ def derivation(found: Derivation, hidden_file: str | None) -> str:
         *([("camera on", reference)] if reference != found.setting.mechanism.base else []),
         ("hidden robot", str(hidden) if hidden else "none: every observed direction is constant"),
         ("verdict", found.verdict.verdict),
-        ("architecture", _exact(found.exact, found.verdict.rank)),
+        ("architecture", exact_words(found.exact, found.verdict.rank)),
         *[("lost at zero" if i == 0 else "", freedom.name) for i, freedom in enumerate(found.verdict.lost)],
         *([] if found.verdict.graph else
           [("", "there is no interaction matrix: observed links move while the platform rests")]),
@@ -45,12 +45,14 @@ def derivation(found: Derivation, hidden_file: str | None) -> str:
         rows += [("", f"loses {freedom.name}") for freedom in paper.loses]
     if hidden_file is not None:
         rows.append(("written to", hidden_file))
+    if report is not None:
+        rows.append(("report", report))
     steps = [(step.rule, step.leg or "all", "yes" if step.accepted else "no", _angle(step.largest_angle), step.reason)
              for step in found.steps]
     return "\n".join([listing(rows), "", table(steps, ("rule", "leg", "taken", "angle", "why"))])
 
 
-def _exact(exact: ExactVerdict, rank: int) -> str:
+def exact_words(exact: ExactVerdict, rank: int) -> str:
     """The architecture's verdict beside the ``rank`` that the robot itself shows."""
     if exact.rank is None:
         return f"not decided: {exact.reason}"
@@ -61,7 +63,7 @@ def _exact(exact: ExactVerdict, rank: int) -> str:
             "dimensions")
 
 
-def _exactly(exact: ExactVerdict, rank: int) -> str:
+def exact_cell(exact: ExactVerdict, rank: int) -> str:
     """The same in a cell of a table."""
     if exact.rank is None:
         return "not decided"
@@ -71,7 +73,7 @@ def _exactly(exact: ExactVerdict, rank: int) -> str:
 
 def legs(found: Legs) -> str:
     """One line a set of legs, the smallest sets of the best rank last."""
-    rows = [(", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", _exactly(exact, each.rank),
+    rows = [(", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", exact_cell(exact, each.rank),
              "; ".join(freedom.name for freedom in each.lost))
             for each, exact in zip(found.sets, found.exact, strict=True)]
     smallest = "  ".join("{" + ", ".join(each) + "}" for each in found.minimal)
