@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Mapping
 from functools import cache
 from typing import Any
 from xml.sax.saxutils import escape
 
-_INDEXED = re.compile(r"\b(tau|[BJNnpu]|τ)(\d+)\b")
+_INDEXED = re.compile(r"\b(tau|[BJNnpu]|τ)(\d+|i)\b")
+_NUMBERED = re.compile(r"(.*?\D)(\d+)")
 _BARRED = re.compile("(.)\u0332")
 
 
@@ -49,6 +51,19 @@ def indexed(text: str) -> str:
     """Words with the indices of points and directions set low, as HTML."""
     found = _INDEXED.sub(lambda m: f"{'τ' if m[1] == 'tau' else m[1]}<sub>{m[2]}</sub>", escape(text))
     return found.replace("]x", "]<sub>×</sub>").replace("^T", "<sup>T</sup>")
+
+
+def collected(where: Mapping[str, str]) -> list[tuple[str, str]]:
+    """What symbols mean, those that differ in their index alone as one: ``Bi``, with i = 1, 2, 3."""
+    kinds: dict[tuple[str, str], list[str]] = {}
+    for symbol, meaning in where.items():
+        match = _NUMBERED.fullmatch(symbol)
+        head, number = (match[1], match[2]) if match else (symbol, "")
+        pattern = re.sub(rf"(?<!\d){number}(?!\d)", "i", meaning) if number else meaning
+        kinds.setdefault((head, pattern), []).append(number)
+    return [(f"{head}i", f"{pattern} (i = {', '.join(numbers)})") if len(numbers) > 1
+            else (head + numbers[0], pattern if not numbers[0] else where[head + numbers[0]])
+            for (head, pattern), numbers in kinds.items()]
 
 
 def barred(text: str) -> str:

@@ -27,9 +27,9 @@ from ..modes import picture as modes_picture
 from ..text.accuracy import field_rows
 from ..text.modes import at_mode, proved
 from ..text.verdicts import exact_cell, exact_words
-from .formulas import barred, formula, indexed
+from .formulas import barred, collected, formula, indexed
 from .legs import actuators, pairs
-from .parts import Parts, Refused, parts, sentence
+from .parts import Parts, Refused, parts, reason
 from .steps import SOURCES, scenes
 
 ENDINGS = (".html", ".htm")
@@ -87,10 +87,11 @@ def _robot(found: Derivation) -> dict[str, Any]:
     facts = [
         ("Degrees of freedom", f"{found.dof} (mobility {mobility.total}, of which {mobility.idle} idle)"),
         ("Observed", ", ".join(f"leg {o.leg} ({o.link})" for o in setting.observed)),
-        ("Camera on", reference if reference != setting.mechanism.base else f"the base, {reference}"),
         ("Verdict", found.verdict.verdict),
         ("Architecture", exact_words(found.exact, found.verdict.rank)),
     ]
+    if reference != setting.mechanism.base:
+        facts.insert(2, ("Camera on", reference))
     if setting.anatomy.point is not None:
         facts.insert(1, ("Platform", "a point: its velocity is what is controlled, its turn is idle"))
     if found.verdict.lost:
@@ -153,7 +154,7 @@ def _singularity(found: Singularity) -> dict[str, Any]:
                             "never": condition is not None and condition.never}
     if condition is not None and not condition.never:
         told["formula"] = _drawing(formula(condition.expression, f"{condition.expression} = 0"))
-        told["where"] = list(condition.where.items())
+        told["where"] = collected(condition.where)
     if checked is not None:
         told["checked"] = (f"Compared with the rank at {checked.points} random poses and {len(checked.on_locus)} poses "
                            f"on the locus: {checked.disagreements} disagreements.")
@@ -171,7 +172,7 @@ def _modes(found: AssemblyModes) -> dict[str, Any]:
     if count.continuum is None:
         among = f"proved to be all among {found.within}" if count.complete else "not proved to be all"
         words = f"{len(found.modes)} real of {count.complex} complex, {among}."
-    return {"pose": str(found.pose), "words": words, "proof": count.proof, "special": count.degenerate, "rows": rows,
+    return {"pose": str(found.pose), "words": words, "proof": words and count.proof, "special": count.degenerate, "rows": rows,
             "near": [(str(mode.pose), f"{mode.residual:.2e}") for mode in found.near],
             "picture": None if why is not None else _png(modes_picture(found)),
             "alt": "On the left the curves whose meeting points are the modes, on the right "
@@ -184,7 +185,7 @@ def _accuracy(found: Accuracy) -> dict[str, Any]:
     try:
         picture = _png(error_map(found))
     except BadRequest as error:
-        return {"refused": sentence(error)}
+        return {"refused": reason(error, found.setting.robot.name)}
     rows = field_rows(found.field)
     return {"rows": [(key.capitalize() or "Also", value) for key, value in rows], "picture": picture,
             "cone": f"{np.degrees(found.cones[0]):.3g}°",

@@ -53,23 +53,23 @@ def parts(found: Derivation, observe: Sequence[str] | None, camera: str | None, 
     """Ask for each part of a derivation's report; ``observe``, ``camera`` and ``seed`` are those of the derivation."""
     setting, robot = found.setting, found.robot
     return Parts(
-        asked(lambda: legs(robot, camera, seed=seed, progress=lambda: tell("sets of legs"))),
-        asked(lambda: singular(robot, observe, camera, points=POINTS, seed=seed, progress=tell)),
-        asked(lambda: modes_at(setting, setting.everything.start, progress=tell)),
-        asked(lambda: mapped(setting, seed, tell)))
+        asked(robot.name, lambda: legs(robot, camera, seed=seed, progress=lambda: tell("sets of legs"))),
+        asked(robot.name, lambda: singular(robot, observe, camera, points=POINTS, seed=seed, progress=tell)),
+        asked(robot.name, lambda: modes_at(setting, setting.everything.start, progress=tell)),
+        asked(robot.name, lambda: mapped(setting, seed, tell)))
 
 
-def asked(question: Callable[[], Answer]) -> Answer | Refused:
-    """The answer, or why it was refused."""
+def asked(robot: str, question: Callable[[], Answer]) -> Answer | Refused:
+    """The answer about a robot, or why it was refused."""
     try:
         return question()
     except HrsynthError as error:
-        return Refused(sentence(error))
+        return Refused(reason(error, robot))
 
 
-def sentence(error: HrsynthError) -> str:
-    """An error in words, without what a command line would add."""
-    return error.what if isinstance(error, BadRequest) else str(error)
+def reason(error: HrsynthError, robot: str) -> str:
+    """An error in words, without the robot's name before it and what a command line would add."""
+    return (error.what if isinstance(error, BadRequest) else str(error)).removeprefix(f"{robot}: ")
 
 
 def mapped(setting: Setting, seed: int, tell: Callable[[str], None]) -> Accuracy:
