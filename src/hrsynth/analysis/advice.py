@@ -97,7 +97,11 @@ def advise(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     """
     tell = progress or silent
     tell("sampling")
-    setting = prepare(robot, observe, camera, seed=seed)
+    return advised(prepare(robot, observe, camera, seed=seed), tell)
+
+
+def advised(setting: Setting, tell: Callable[[str], None] = silent) -> Advice:
+    """What is missing in a setting, as :func:`advise`."""
     now = verdict_of(setting, setting.labels, setting.samples)
     if now.verdict == CONTROLLABLE:
         return Advice(setting, now, (), 0, True)

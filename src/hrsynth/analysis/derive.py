@@ -118,10 +118,14 @@ def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     """
     if form not in FORMS:
         raise BadRequest("unknown form", form, FORMS)
-
     tell = progress or silent
     tell("sampling")
-    setting = prepare(robot, observe, camera, seed=seed)
+    return derived(prepare(robot, observe, camera, seed=seed), form=form, progress=tell)
+
+
+def derived(setting: Setting, *, form: str = "simplified", progress: Callable[[str], None] = silent) -> Derivation:
+    """The certified hidden robot of a setting, as :func:`derive`."""
+    tell, robot = progress, setting.robot
     anatomy, samples = setting.anatomy, setting.samples
     verdict = verdict_of(setting, setting.labels, samples)
     exact = exact_architecture(setting).verdict(setting.observed)
