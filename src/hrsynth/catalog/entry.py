@@ -85,7 +85,7 @@ def _study(word: Word, attempt: int) -> _Study:
     setting = prepare(mechanism(word.driven, attempt), samples=SAMPLES)
     if not setting.dof:
         raise NotConfirmed(setting.robot.name, "its platform does not move")
-    derivation = derived(setting)
+    derivation = derived(setting, beside=False)
     exact = architecture(setting)
     _agree(exact, setting.samples, derivation.verdict)
     fewest = _smallest(setting, exact, _kinds(word), derivation.verdict)
@@ -101,7 +101,7 @@ def _study(word: Word, attempt: int) -> _Study:
     if derivation.verdict.verdict == CONTROLLABLE:
         facts.update(_singular(setting), **_modes(setting, fewest[0]))
     else:
-        facts["cure"] = _cure(advised(setting))
+        facts["cure"] = _cure(advised(setting, most=1))
     return _Study(facts, attempt, *_encoders(setting))
 
 
@@ -186,13 +186,12 @@ def _modes(setting: Setting, legs: Sequence[str]) -> dict[str, Any]:
 
 
 def _cure(found: Advice) -> str:
-    """The smallest sets of further measurements, counted, and the first of them."""
+    """The first of the smallest sets of further measurements that see what is lost."""
     if not found.sets:
         return "none of up to four measurements"
     first = " and ".join(f"{each.kind} {each.of}" + (f" ({each.axis})" if each.axis else "")
                          for each in found.sets[0].measurements)
-    helps = "" if found.cured else ", not enough"
-    return f"{first} ({len(found.sets)} of size {found.size}{helps})"
+    return first if found.cured else f"not all by {first}"
 
 
 def _encoders(setting: Setting) -> tuple[Relation, tuple[str, ...]]:
