@@ -59,6 +59,16 @@ def died(word: str) -> dict[str, Any]:
     return entry(word)
 
 
+def broken(word: str) -> dict[str, Any]:
+    """A defect."""
+    return entry(word) if word != "(c05)" else {"word": word, "dof": [][0]}
+
+
+def slowly(word: str) -> dict[str, Any]:
+    time.sleep(0.1)
+    return entry(word)
+
+
 def source(sizes: tuple[int, ...] = (12, 9)) -> Source:
     """Groups ``c`` and ``d`` with so many pairs of words."""
     return Source({name: _Words(name, size) for name, size in zip("cd", sizes, strict=True)}, entry, kin)

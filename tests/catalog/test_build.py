@@ -16,7 +16,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from catalog.stub import REFUSED, died, entry, source
+from catalog.stub import REFUSED, broken, died, entry, source
 from hrsynth.catalog import load
 from hrsynth.catalog.build import build
 from hrsynth.catalog.journal import Journal
@@ -207,6 +207,13 @@ def test_a_worker_that_dies_stops_the_build_in_one_line(tmp_path: Path, whole: d
     (first, _) = build(tmp_path, source=source())
     assert (first.now, first.before) == (0, 24)
     assert content(tmp_path) == whole
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_defect_names_its_word_and_loses_nothing(workers: int, tmp_path: Path):
+    with pytest.raises(BuildStopped, match=r"\(c05\): a defect .*IndexError: list index.*; what was built is kept in"):
+        build(tmp_path, source=replace(source(), entry=broken), workers=workers)
+    assert (tmp_path / "c.jsonl.part").exists()
 
 
 @pytest.mark.parametrize("room", [10, 700, 3000])

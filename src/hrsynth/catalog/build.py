@@ -14,9 +14,9 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BuildStopped
-from .crews import Crew, CrewLost, crew
+from .crews import Crew, crew
 from .journal import Journal
-from .source import Made, Source, architectures, made
+from .source import Made, Source, Stopped, architectures, made
 from .store import Store, store
 
 CHUNK = 8
@@ -98,10 +98,10 @@ def _write(kept: Store, group: str, journal: Journal, words: Sequence[str]) -> N
 
 def made_by(team: Crew, source: Source, group: str, words: Sequence[str], kept: str | None = None
             ) -> Iterator[Made]:
-    """The records of words in parts, in any order; raises ``BuildStopped`` where the crew is lost."""
+    """The records of words in parts, in any order; raises ``BuildStopped`` where they cannot be made."""
     try:
         yield from team(partial(made, source.entry, group), source.chunks(words, CHUNK))
-    except CrewLost as lost:
-        raise BuildStopped(str(lost), kept) from None
+    except Stopped as stopped:
+        raise BuildStopped(str(stopped), kept) from stopped
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from .. import __version__
 from ..errors import BadRequest, MissingExtra
-from .source import Made
+from .source import Made, Stopped
 
 Task = Callable[[list[str]], Made]
 Crew = Callable[[Task, Iterable[list[str]]], Iterator[Made]]
@@ -19,10 +19,6 @@ PATIENCE = 10.0
 """Seconds within which a cluster has to answer."""
 AHEAD = 3
 """Parts that wait for each thread of a cluster."""
-
-
-class CrewLost(Exception):
-    """Those who made the records are gone: why."""
 
 
 def crew(workers: int = 1, cluster: str | None = None) -> Crew:
@@ -61,14 +57,13 @@ def _together(task: Task, parts: Iterable[list[str]], workers: int) -> Iterator[
     try:
         yield from pool(delayed(task)(part) for part in parts)
     except TerminatedWorkerError:
-        raise CrewLost("a worker process died") from None
+        raise Stopped("a worker process died") from None
     except BrokenProcessPool as error:
-        raise CrewLost(f"the worker processes cannot be used: {str(error).splitlines()[0]}") from None
+        raise Stopped(f"the worker processes cannot be used: {str(error).splitlines()[0]}") from None
 
 
 def _clustered(task: Task, parts: Iterable[list[str]], address: str) -> Iterator[Made]:
     from distributed import Client
-    from distributed.scheduler import KilledWorker
 
     logging.getLogger("distributed").setLevel(logging.CRITICAL)
     try:
@@ -76,11 +71,9 @@ def _clustered(task: Task, parts: Iterable[list[str]], address: str) -> Iterator
     except (ValueError, TypeError) as error:
         raise BadRequest("address of a cluster", address, f"such as tcp://host:8786 ({error})") from None
     except (OSError, ImportError):
-        raise CrewLost(f"no cluster answers at {address} within {PATIENCE:g} s") from None
+        raise Stopped(f"no cluster answers at {address} within {PATIENCE:g} s") from None
     try:
         yield from _served(client, task, iter(parts))
-    except KilledWorker:
-        raise CrewLost("the cluster's workers died one after the other on the same words") from None
     finally:
         client.close(timeout=1)
 
@@ -97,32 +90,48 @@ def _served(client: Any, task: Task, parts: Iterator[list[str]]) -> Iterator[Mad
     waiting = submitted(AHEAD * max(2, sum(client.nthreads().values())))
     while waiting:
         try:
-            done, waiting = wait(waiting, timeout=PATIENCE, return_when="FIRST_COMPLETED")
+            with client.as_current():
+                done, waiting = wait(waiting, timeout=PATIENCE, return_when="FIRST_COMPLETED")
         except TimeoutError:
             _require_alive(client)
             continue
         except CancelledError:
-            raise CrewLost("the cluster is gone") from None
+            raise Stopped("the cluster is gone") from None
         for future in done:
             if future.cancelled():
-                raise CrewLost("the cluster is gone")
-            version, found = future.result()
-            if version != __version__:
-                raise CrewLost(f"a worker of the cluster has hrsynth {version}, not {__version__}")
-            yield found
+                raise Stopped("the cluster is gone")
+            yield _result(future)
         waiting |= submitted(len(done))
 
 
+def _result(future: Any) -> Made:
+    """What a part gave; anything but our own ``Stopped`` comes from the cluster."""
+    from distributed.scheduler import KilledWorker
+
+    try:
+        version, found = future.result()
+    except Stopped:
+        raise
+    except KilledWorker:
+        raise Stopped("the cluster's workers died one after the other on the same words") from None
+    except Exception as error:
+        raise Stopped(f"the cluster cannot do the work, needed there: hrsynth {__version__} "
+                      f"({str(error).splitlines()[0]})") from None
+    if version != __version__:
+        raise Stopped(f"a worker of the cluster has hrsynth {version}, needed: {__version__}")
+    return list(found)
+
+
 def _require_alive(client: Any) -> None:
-    """Raise ``CrewLost`` where the cluster no longer answers, or has no workers left."""
+    """Raise ``Stopped`` where the cluster no longer answers, or has no workers left."""
     try:
         workers = client.scheduler_info()["workers"] if client.status == "running" else None
     except (OSError, RuntimeError, ValueError):
         workers = None
     if workers is None:
-        raise CrewLost("the cluster is gone")
+        raise Stopped("the cluster is gone")
     if not workers:
-        raise CrewLost("the cluster has no workers left")
+        raise Stopped("the cluster has no workers left")
 
 
 def _versioned(task: Task, part: list[str]) -> tuple[str, Made]:

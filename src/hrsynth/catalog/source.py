@@ -16,6 +16,10 @@ Made = list[tuple[str, str]]
 """Words with the lines of their records."""
 
 
+class Stopped(Exception):
+    """A record that cannot be made, or those who make them are gone: why."""
+
+
 @dataclass(frozen=True)
 class Source:
     """Groups of canonical words; ``entry`` gives the record of one, and can be sent to other processes.
@@ -66,7 +70,7 @@ def unmoved(word: str) -> str:
 
 
 def made(entry: Callable[[str], dict[str, Any]], group: str, words: Iterable[str]) -> Made:
-    """The records of words; one that is refused says why, in one line."""
+    """The records of words; one that is refused says why, in one line. Raises ``Stopped`` for a defect of our own."""
     return [(word, line({**_record(entry, word), "word": word, "group": group})) for word in words]
 
 
@@ -75,3 +79,6 @@ def _record(entry: Callable[[str], dict[str, Any]], word: str) -> dict[str, Any]
         return entry(word)
     except HrsynthError as error:
         return {"refused": "; ".join(error.lines())}
+    except Exception as error:
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        raise Stopped(f"{word}: a defect of hrsynth itself, please report it: {what}") from error
