@@ -121,7 +121,7 @@ def show(
     if output is not None:
         from .catalog.geometry import mechanism
 
-        for warning in save(mechanism(architecture), output):
+        for warning in save(mechanism(architecture, record.get("attempt", 0)), output):
             typer.echo(f"hrsynth: {warning}", err=True)
     drawn = drawing(architecture)
     if json:
@@ -169,29 +169,33 @@ class Meter:
     SPEED_OVER = 600.0
     """Seconds over which the speed is averaged: words differ much."""
 
-    def __init__(self) -> None:
-        self._start = time.monotonic()
+    def __init__(self, wait: float = 1.0) -> None:
+        self._start = time.monotonic() + wait
         self._bar: Any = None
-        self._tasks: dict[str, Any] = {}
+        self._groups: dict[str, tuple[int, int]] = {}
 
     def __enter__(self) -> Meter:
         return self
 
     def tell(self, group: str, done: int, total: int) -> None:
         """So many records of a group are there."""
-        if self._bar is None and time.monotonic() - self._start > 1.0 and sys.stderr.isatty():
-            from rich.console import Console
-            from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+        self._groups[group] = done, total
+        if self._bar is None and time.monotonic() > self._start and sys.stderr.isatty():
+            self._bar = self._started()
+        if self._bar is not None:
+            there, every = map(sum, zip(*self._groups.values(), strict=True))
+            self._bar.update(self._bar.task_ids[0], description=group, completed=there, total=every)
 
-            self._bar = Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(),
-                                 TimeRemainingColumn(), TextColumn("left"), console=Console(stderr=True),
-                                 transient=True, speed_estimate_period=self.SPEED_OVER)
-            self._bar.start()
-        if self._bar is None:
-            return
-        if group not in self._tasks:
-            self._tasks[group] = self._bar.add_task(group, total=total, completed=done)
-        self._bar.update(self._tasks[group], completed=done)
+    def _started(self) -> Any:
+        from rich.console import Console
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+        bar = Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
+                       TextColumn("left"), console=Console(stderr=True), transient=True,
+                       speed_estimate_period=self.SPEED_OVER)
+        bar.start()
+        bar.add_task("", total=None, completed=sum(done for done, _ in self._groups.values()))
+        return bar
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:

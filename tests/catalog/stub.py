@@ -11,6 +11,7 @@ import random
 import signal
 import sys
 import time
+from importlib.util import find_spec
 from typing import Any
 
 from hrsynth.catalog.build import build
@@ -21,6 +22,8 @@ DELAY = float(os.environ.get("STUB_DELAY", "0"))
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
 CHAINS = ("R*RR", "RR*R", "UP*S", "P*US", "R*-{2-SS}", "RRR")
 REFUSED = "(c07*)"
+WORKERS = 2 if find_spec("joblib") else 1
+"""The extra with joblib may be missing."""
 
 
 class Refused(HrsynthError):

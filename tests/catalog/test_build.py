@@ -85,7 +85,7 @@ def test_what_a_build_says_is_what_it_did(tmp_path: Path):
     assert told == [("d", i, 18) for i in range(19)]
 
 
-@pytest.mark.parametrize("seed", [0, 1])
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
 def test_a_build_killed_again_and_again_gives_the_same_bytes(seed: int, tmp_path: Path, whole: dict[str, bytes]):
     draw, kills = random.Random(seed), 0
     for _ in range(4):
@@ -175,13 +175,14 @@ def test_one_build_at_a_time(tmp_path: Path):
         build(tmp_path, ["c"], source=source())
 
 
-@pytest.mark.parametrize("workers", [2, 3])
+@pytest.mark.parametrize("workers", [2, pytest.param(3, marks=pytest.mark.slow)])
 def test_any_number_of_workers_gives_the_same_bytes(workers: int, tmp_path: Path, whole: dict[str, bytes]):
     pytest.importorskip("joblib")
     build(tmp_path, source=source(), workers=workers)
     assert content(tmp_path) == whole
 
 
+@pytest.mark.slow
 def test_a_build_with_workers_is_killed_and_goes_on(tmp_path: Path, whole: dict[str, bytes]):
     pytest.importorskip("joblib")
     process = started(tmp_path, delay=0.05, workers=2)
@@ -211,6 +212,8 @@ def test_a_worker_that_dies_stops_the_build_in_one_line(tmp_path: Path, whole: d
 
 @pytest.mark.parametrize("workers", [1, 2])
 def test_a_defect_names_its_word_and_loses_nothing(workers: int, tmp_path: Path):
+    if workers > 1:
+        pytest.importorskip("joblib")
     with pytest.raises(BuildStopped, match=r"\(c05\): a defect .*IndexError: list index.*; what was built is kept in"):
         build(tmp_path, source=replace(source(), entry=broken), workers=workers)
     assert (tmp_path / "c.jsonl.part").exists()

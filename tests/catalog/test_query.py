@@ -12,7 +12,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import hrsynth
-from catalog.stub import CHAINS, REFUSED, VERDICTS, source
+from catalog.stub import CHAINS, REFUSED, VERDICTS, WORKERS, source
 from hrsynth.catalog import Catalog, load
 from hrsynth.catalog.build import build
 from hrsynth.catalog.check import check
@@ -88,7 +88,7 @@ def test_sqlite_has_the_same_bytes_however_it_was_built(stores: tuple[Path, Path
     other = tmp_path / "big.sqlite"
     build(other, source=source((30, 20)), limit=13)
     build(other, ["d"], source=source((30, 20)))
-    build(other, source=source((30, 20)), workers=2)
+    build(other, source=source((30, 20)), workers=WORKERS)
     assert other.read_bytes() == stores[1].read_bytes()
     assert [file.name for file in tmp_path.iterdir()] == ["big.sqlite"]
 
@@ -148,7 +148,7 @@ def test_what_cannot_be_asked_or_read_is_refused(stores: tuple[Path, Path], tmp_
 def test_a_fresh_catalog_is_not_stale(stores: tuple[Path, Path]):
     for path in stores:
         assert check(path, source=source((30, 20))) == ()
-        assert check(path, source=source((30, 20)), sample=3, workers=2) == ()
+        assert check(path, source=source((30, 20)), sample=3, workers=WORKERS) == ()
 
 
 @pytest.mark.parametrize(("old", "new", "said"), [

@@ -23,7 +23,7 @@ CHUNK = 8
 """Least number of words that a worker is given at a time."""
 
 Tell = Callable[[str, int, int], None]
-"""Is told the group, how many of its records are there, and of how many."""
+"""Is told a group, how many of its records are there, and of how many: first of all groups, then of the one at work."""
 
 
 @dataclass(frozen=True)
@@ -59,26 +59,26 @@ def build(target: str | Path, groups: Sequence[str] = (), *, source: Source | No
     MissingExtra
         Where joblib or dask is not installed.
     """
-    source = source or architectures()
+    source, tell = source or architectures(), tell or (lambda *_: None)
     kept, team, done = store(target), crew(workers, cluster), list[Built]()
     with ExitStack() as stack:
         journals = {group: stack.enter_context(kept.journal(group, anew=anew)) for group in source.chosen(groups)}
+        words = {group: source.words(group) for group in journals}
         for group, journal in journals.items():
-            built = _group(kept, group, source, journal, team, limit, tell or (lambda *_: None))
-            done.append(built)
-            limit = None if limit is None else limit - built.now
+            tell(group, sum(word in journal for word in words[group]), len(words[group]))
+        for group, journal in journals.items():
+            done.append(_group(kept, group, words[group], source, journal, team, limit, tell))
+            limit = None if limit is None else limit - done[-1].now
         if all(built.file is not None for built in done):
             for journal in journals.values():
                 journal.remove()
     return tuple(done)
 
 
-def _group(kept: Store, group: str, source: Source, journal: Journal, team: Crew, limit: int | None, tell: Tell
-           ) -> Built:
-    words = source.words(group)
+def _group(kept: Store, group: str, words: Sequence[str], source: Source, journal: Journal, team: Crew,
+           limit: int | None, tell: Tell) -> Built:
     wanted = [word for word in words if word not in journal]
     before, now = len(words) - len(wanted), 0
-    tell(group, before, len(words))
     for part in made_by(team, source, group, wanted[:limit], str(journal.path)):
         journal.add(part)
         now += len(part)

@@ -80,37 +80,50 @@ def _clustered(task: Task, parts: Iterable[list[str]], address: str) -> Iterator
 
 def _served(client: Any, task: Task, parts: Iterator[list[str]]) -> Iterator[Made]:
     """Keeps some parts waiting on the cluster; a worker that is lost leaves its parts to the others."""
-    from concurrent.futures import CancelledError
+    from asyncio import CancelledError
+    from concurrent.futures import CancelledError as FutureCancelled
 
+    waiting: set[Any] = set()
+    ahead = AHEAD * max(2, sum(client.nthreads().values()))
+    try:
+        while waiting := waiting | _submitted(client, task, islice(parts, ahead - len(waiting))):
+            done, waiting = _finished(client, waiting)
+            for future in done:
+                yield _result(future)
+    except (OSError, CancelledError, FutureCancelled):
+        raise Stopped("the cluster is gone") from None
+
+
+def _submitted(client: Any, task: Task, parts: Iterable[list[str]]) -> set[Any]:
+    if client.status != "running":
+        raise Stopped("the cluster is gone")
+    return {client.submit(_versioned, task, part, pure=False) for part in parts}
+
+
+def _finished(client: Any, waiting: set[Any]) -> tuple[set[Any], set[Any]]:
+    """Parts that are done, at least one of them unless time has passed, and those that are not."""
     from distributed import wait
 
-    def submitted(count: int) -> set[Any]:
-        return {client.submit(_versioned, task, part, pure=False) for part in islice(parts, count)}
-
-    waiting = submitted(AHEAD * max(2, sum(client.nthreads().values())))
-    while waiting:
-        try:
-            with client.as_current():
-                done, waiting = wait(waiting, timeout=PATIENCE, return_when="FIRST_COMPLETED")
-        except TimeoutError:
-            _require_alive(client)
-            continue
-        except CancelledError:
-            raise Stopped("the cluster is gone") from None
-        for future in done:
-            if future.cancelled():
-                raise Stopped("the cluster is gone")
-            yield _result(future)
-        waiting |= submitted(len(done))
+    try:
+        with client.as_current():
+            done, rest = wait(waiting, timeout=PATIENCE, return_when="FIRST_COMPLETED")
+    except TimeoutError:
+        _require_alive(client)
+        return set(), waiting
+    return done, rest
 
 
 def _result(future: Any) -> Made:
-    """What a part gave; anything but our own ``Stopped`` comes from the cluster."""
+    """What a part gave; what is neither our own ``Stopped`` nor a lost line is wrong with the cluster's workers."""
+    from concurrent.futures import CancelledError
+
     from distributed.scheduler import KilledWorker
 
+    if future.cancelled():
+        raise Stopped("the cluster is gone")
     try:
         version, found = future.result()
-    except Stopped:
+    except (Stopped, OSError, CancelledError):
         raise
     except KilledWorker:
         raise Stopped("the cluster's workers died one after the other on the same words") from None
@@ -125,11 +138,9 @@ def _result(future: Any) -> Made:
 def _require_alive(client: Any) -> None:
     """Raise ``Stopped`` where the cluster no longer answers, or has no workers left."""
     try:
-        workers = client.scheduler_info()["workers"] if client.status == "running" else None
-    except (OSError, RuntimeError, ValueError):
-        workers = None
-    if workers is None:
-        raise Stopped("the cluster is gone")
+        workers = client.nthreads()
+    except (RuntimeError, ValueError):
+        raise Stopped("the cluster is gone") from None
     if not workers:
         raise Stopped("the cluster has no workers left")
 
