@@ -153,6 +153,16 @@ class NotConfined(HrsynthError):
         super().__init__(f"{robot}: its assembly modes cannot be listed, which is not supported here: {reason}")
 
 
+class NotConfirmed(HrsynthError):
+    """An architecture without a verdict that is exact and that closed configurations confirm: why."""
+
+    exit_status = 3
+
+    def __init__(self, robot: str, what: str) -> None:
+        self.robot, self.what = robot, what
+        super().__init__(f"{robot}: no confirmed verdict: {what}")
+
+
 class NotCertified(HrsynthError):
     """No hidden robot passed the certificate: the best angle seen."""
 
