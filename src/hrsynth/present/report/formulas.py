@@ -25,6 +25,15 @@ def _printer() -> Any:
         def _print_cross(self, expression: Any) -> Any:
             return self._joined(expression, "×")
 
+        def _print_Transpose(self, expression: Any) -> Any:
+            base, mark = self._print(expression.arg), self.dom.createElement("mi")
+            mark.appendChild(self.dom.createTextNode("T"))
+            low = base.nodeName == "msub"
+            found = self.dom.createElement("msubsup" if low else "msup")
+            for part in (*(base.childNodes[:] if low else [base]), mark):
+                found.appendChild(part)
+            return found
+
         def _joined(self, expression: Any, sign: str) -> Any:
             row = self.dom.createElement("mrow")
             for number, each in enumerate(expression.args):

@@ -172,8 +172,8 @@ def _modes(found: AssemblyModes) -> dict[str, Any]:
     if count.continuum is None:
         among = f"proved to be all among {found.within}" if count.complete else "not proved to be all"
         words = f"{len(found.modes)} real of {count.complex} complex, {among}."
-    return {"pose": str(found.pose), "words": words, "proof": words and count.proof, "special": count.degenerate, "rows": rows,
-            "near": [(str(mode.pose), f"{mode.residual:.2e}") for mode in found.near],
+    return {"pose": str(found.pose), "words": words, "proof": words and count.proof, "special": count.degenerate,
+            "rows": rows, "near": [(str(mode.pose), f"{mode.residual:.2e}") for mode in found.near],
             "picture": None if why is not None else _png(modes_picture(found)),
             "alt": "On the left the curves whose meeting points are the modes, on the right "
                    f"{found.setting.robot.name} at each of its {len(found.modes)} assembly modes, numbered as in the "
