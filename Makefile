@@ -56,8 +56,8 @@ catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS=
 bench: setup-all  ## run the benchmarks and write their table in the README (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py README.md
 
-pictures: setup-all  ## draw the pictures in docs/pictures again
-	@mkdir -p docs/pictures
+pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again
+	@mkdir -p build docs/pictures
 	@$(BIN)/hrsynth modes rrrrr_m1 -o docs/pictures/modes_rrrrr.png > /dev/null
 	@$(BIN)/hrsynth modes 3rrr_m1 -o docs/pictures/modes_3rrr.png > /dev/null
 	@$(BIN)/hrsynth modes gough_stewart --observe 1,3,5 --at x=-0.03,y=-0.06,z=0.37,rpy=-0.1/0.5/0.1 -o docs/pictures/modes_gough_stewart.png > /dev/null
@@ -69,6 +69,16 @@ pictures: setup-all  ## draw the pictures in docs/pictures again
 	@$(BIN)/hrsynth servo 3rpr_m1 --from x=-0.08,y=-0.06,phi=-10deg --to x=0.034,y=0.23,phi=23deg -o docs/pictures/servo_3rpr.png > /dev/null
 	@$(BIN)/hrsynth servo quattro --observe 1,4 --from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0 -o docs/pictures/servo_quattro.gif > /dev/null
 	@$(BIN)/hrsynth accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7 -o docs/pictures/accuracy_quattro.png > /dev/null
+	@$(BIN)/hrsynth derive rrrrr_m1 --report build/rrrrr_m1.html > /dev/null
+	@$(BIN)/python tests/browser.py build/rrrrr_m1.html docs/pictures/report_rrrrr_m1.png 1200 1500
+	@$(BIN)/hrsynth derive 3rrr_m1 --report build/3rrr_m1.html > /dev/null
+	@$(BIN)/python tests/browser.py build/3rrr_m1.html docs/pictures/report_3rrr_m1.png 1200 1500
+	@$(BIN)/hrsynth derive gough_stewart --report build/gough_stewart.html > /dev/null
+	@$(BIN)/python tests/browser.py build/gough_stewart.html docs/pictures/report_gough_stewart.png 1200 1500
+	@$(BIN)/hrsynth derive quattro --observe 1,4 --report build/quattro.html > /dev/null
+	@$(BIN)/python tests/browser.py build/quattro.html docs/pictures/report_quattro.png 1200 1500
+	@$(BIN)/hrsynth derive uranesx --report build/uranesx.html > /dev/null
+	@$(BIN)/python tests/browser.py build/uranesx.html docs/pictures/report_uranesx.png 1200 1500
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt
