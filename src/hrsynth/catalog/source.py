@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import groupby
 from typing import Any
 
 from ..errors import BadRequest, HrsynthError
 from .lines import line
 
-Group = Callable[[], Iterable[object]]
-"""Gives words, as text or as what is written so."""
+Group = Callable[[], Iterable[str]]
 Made = list[tuple[str, str]]
 """Words with the lines of their records."""
 
@@ -40,7 +40,7 @@ class Source:
 
     def words(self, group: str) -> list[str]:
         """The words of a group, sorted."""
-        return sorted({str(word) for word in self.groups[group]()})
+        return sorted(set(self.groups[group]()))
 
     def chunks(self, words: Iterable[str], size: int) -> Iterator[list[str]]:
         """The words in parts of at least ``size`` (but for the last); kin stay together."""
@@ -57,9 +57,9 @@ class Source:
 def architectures() -> Source:
     """The catalog itself."""
     from .entry import entry
-    from .groups import GROUPS
+    from .groups import GROUPS, words
 
-    return Source(GROUPS, entry, unmoved)
+    return Source({name: partial(words, name) for name in GROUPS}, entry, unmoved)
 
 
 def unmoved(word: str) -> str:
