@@ -137,7 +137,8 @@ def test_drawings_show_motors_and_watched_links(word: str, legs: list[str]):
 def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.chdir(tmp_path)
     check_refused(run("build"), "nowhere to build")
-    check_refused(run("build", "-o", Path(hrsynth.__file__).parent / "catalog" / "new"), "cannot build into the package")
+    package = Path(hrsynth.__file__).parent
+    check_refused(run("build", "-o", package / "catalog" / "new"), "cannot build into the package")
     check_refused(run("build", "nothing", "-o", tmp_path / "new"), "unknown group, found 'nothing', allowed: c, d")
     check_refused(run("build", "-o", tmp_path / "new", "--workers", 0), "--workers")
     check_refused(run("build", "-o", tmp_path / "no" / "where"), "No such file or directory")
