@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from itertools import combinations
+from itertools import combinations, groupby
 from typing import Any
 
 from ..analysis.advice import Advice, advised
@@ -23,6 +23,7 @@ from ..kinematics.sampling import Samples
 from ..mechanism.legs import dissect
 from ..mechanism.normal import normal_form
 from ..mechanism.sensors import encoders
+from ..rewrite.strategy import Step
 from .geometry import mechanism
 from .groups import group
 from .words import Word, parse
@@ -91,7 +92,7 @@ def _study(word: Word, attempt: int) -> _Study:
     fewest = _smallest(setting, exact, _kinds(word), derivation.verdict)
     facts = {
         "hidden": derivation.hidden_architecture and derivation.hidden_architecture.ascii,
-        "legs": len(word.legs), "dof": setting.dof, "motion": _motion(setting),
+        "steps": _steps(derivation.steps), "legs": len(word.legs), "dof": setting.dof, "motion": _motion(setting),
         "mobility": setting.mobility.total, "idle": setting.mobility.idle,
         "verdict": derivation.verdict.verdict, "rank": derivation.verdict.rank, "exact": derivation.exact.exact,
         "instances": derivation.exact.instances, "confirmed": len(setting.configurations),
@@ -148,6 +149,13 @@ def _choices(kinds: Sequence[str], size: int) -> Iterator[tuple[int, ...]]:
         if key not in known:
             known.add(key)
             yield places
+
+
+def _steps(steps: Sequence[Step]) -> list[str]:
+    """The rules that were applied, in order, each with the legs to which it was in a row: "takeover 1,2,3"."""
+    taken = [(step.rule, step.leg) for step in steps if step.accepted]
+    return [" ".join([rule, ",".join(str(leg) for _, leg in part if leg)]).strip()
+            for rule, part in ((rule, list(part)) for rule, part in groupby(taken, key=lambda step: step[0]))]
 
 
 def _motion(setting: Setting) -> str:

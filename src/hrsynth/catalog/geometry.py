@@ -155,7 +155,7 @@ class _Limb:
             loop = i == last and self.number > 1
             if joint.letter in COMPOSITE:
                 inside = self._rods(joint, i, before, after, starts[i], ends[i], axes[0], loop)
-                if joint.watched or (marked is None and i == last):
+                if joint.watched or (marked is None and i >= last - 1):
                     marked = Direction(str(k), inside, ends[i] - starts[i])
             else:
                 b.joint(f"joint_{k}_{i + 1}", joint.letter, before, after, starts[i], axis=axes[0] if axes else None,

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import groupby
 from typing import Any
 
@@ -57,9 +56,9 @@ class Source:
 def architectures() -> Source:
     """The catalog itself."""
     from .entry import entry
-    from .groups import GROUPS, words
+    from .groups import GROUPS
 
-    return Source({name: partial(words, name) for name in GROUPS}, entry, unmoved)
+    return Source(GROUPS, entry, unmoved)
 
 
 def unmoved(word: str) -> str:

@@ -10,8 +10,8 @@ A word says what stays so in motion and nothing else, no lengths::
     letter   = R P C (one axis), U (two, at right angles), S (none), Pi (the normal of a parallelogram), 2SS (two equal
                parallel rods between S joints, the axis along their distance), 2US (the same with U at the upper ends)
 
-``*`` marks a motor, ``!`` the joint after which the observed link follows, where it is not the default segment. Axes
-are directions at the zero configuration, named by
+``*`` marks a motor, ``!`` the joint after which the observed link follows (of two rods, the first of them), where it is
+not the default segment. Axes are directions at the zero configuration, named by
 
 =======  ==============================================================================================================
 x y z    the base's axes: the same direction for all legs; z is the normal of a planar robot
@@ -114,8 +114,9 @@ class Leg:
         axes = ["".join(names.get(name, name) for name in joint.axes) for joint in self.joints]
         mark = self.observed
         if mark is not None:
-            mark = self._along(mark)
-            mark = None if mark == self._default() else mark
+            inside = self.joints[mark].letter in COMPOSITE and mark + 1 < len(self.joints)
+            mark = mark if inside else self._along(mark)
+            mark = None if mark == self._default() and not inside else mark
         return Leg(tuple(replace(joint, axes=own, watched=i == mark)
                          for i, (joint, own) in enumerate(zip(self.joints, axes, strict=True))))
 

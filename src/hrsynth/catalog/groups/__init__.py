@@ -6,13 +6,14 @@ A group is a law over words, so that a word alone says where it belongs; what :d
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
+from functools import partial
 
 from ..words import Word
 from . import deltas, planar, pods, spatial
 
-GROUPS: Mapping[str, Callable[[], Iterable[Word]]] = {
+_LISTED: Mapping[str, Callable[[], Iterable[Word]]] = {
     "planar": planar.words, "pods": pods.words, "deltas": deltas.words, "spatial": spatial.words}
-"""The words of each group, in no order, some of them twice."""
+"""What each module lists, in no order, some of it twice or of another group."""
 
 
 def group(word: Word) -> str:
@@ -23,5 +24,9 @@ def group(word: Word) -> str:
 
 
 def words(name: str) -> list[str]:
-    """All canonical words that are listed in a group, sorted, each once; the words of other groups are left out."""
-    return sorted({str(word) for word in GROUPS[name]() if group(word) == name})
+    """All canonical words that are listed in a group, sorted, each once."""
+    return sorted({str(word) for word in _LISTED[name]() if group(word) == name})
+
+
+GROUPS: Mapping[str, Callable[[], list[str]]] = {name: partial(words, name) for name in _LISTED}
+"""The words of each group."""

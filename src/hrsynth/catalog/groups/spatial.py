@@ -60,7 +60,8 @@ def words() -> Iterator[Word]:
     for chain in (*translational(), *spherical()):
         for seen in watched(chain):
             yield from (Word.of([each] * 3) for each in driven(seen, range(2)))
-    yield from (Word.of([leg(text)] * 3) for text in ("Utn-Pl*-Unt", "Rt*-Rt-Pin-Rt", "Pk*-Rt-Pin-Rt", "Pz*-Rt-Pin-Rt"))
+    for text in ("Rt*-Rt-Pin-Rt", "Pk*-Rt-Pin-Rt", "Pz*-Rt-Pin-Rt"):
+        yield from (Word.of([seen] * 3) for seen in watched(leg(text)))
     tilting = zero_torsion()
     yield from robots([base_driven(chain) for chain in tilting], 3)
     for chain in tilting:
