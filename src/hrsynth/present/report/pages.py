@@ -100,7 +100,6 @@ def _robot(found: Derivation) -> dict[str, Any]:
         facts.append(("Interaction matrix", "there is none: observed links move while the platform rests"))
     return {
         "name": found.robot.name, "facts": facts, "real": str(found.architecture), "hidden": hidden and str(hidden),
-        "controllable": not found.verdict.lost,
         "real_graph": _drawing(graph_svg(setting.anatomy, observed=observed,
                                          title=f"Joint graph of the real robot {found.robot.name}")),
         "hidden_graph": None if found.hidden is None else _drawing(
