@@ -160,6 +160,17 @@ def test_a_torn_journal_is_read_up_to_where_it_is_whole(cut: int, tail: bytes, b
         assert list(journal.lines(["(new)"])) == ['{"word":"(new)"}']
 
 
+def test_a_record_is_on_the_disk_before_the_next_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    safe: list[int] = []
+    monkeypatch.setattr(os, "fsync", lambda file: safe.append(os.fstat(file).st_size))
+    sizes: list[int] = []
+    with Journal(tmp_path / "x.part", "x") as journal:
+        for word in source().groups["c"]():
+            journal.add([(word, line({"word": word, "group": "x"}))])
+            sizes.append((tmp_path / "x.part").stat().st_size)
+    assert safe[1:] == sizes == sorted(set(sizes))
+
+
 def test_a_journal_of_something_else_is_refused(tmp_path: Path):
     path = tmp_path / "c.jsonl.part"
     for text, said in [("a list\nof words\n", "not a head"), ('{"format":1,"catalog":99}\n', "another version")]:
