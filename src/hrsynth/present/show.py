@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import html as markup
+import re
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
@@ -57,8 +58,10 @@ def text(result: Result) -> str:
 
 
 def html(result: Result) -> str:
-    """The same text for a notebook: in columns, with lines that are not broken."""
-    return f'<pre style="white-space: pre; overflow-x: auto">{markup.escape(text(result))}</pre>'
+    """The same text for a notebook: in columns, with lines that are not broken; motors underlined by markup, which any
+    font can."""
+    shown = re.sub("(.)\u0332", r"<u>\1</u>", markup.escape(text(result)))
+    return f'<pre style="white-space: pre; overflow-x: auto">{shown}</pre>'
 
 
 def draw(result: Result, *, plane: Pose | str | None = None, steps: int = 51) -> Picture:
