@@ -92,10 +92,11 @@ def folded(parts: list[str]) -> str:
 def public() -> str:
     """What ``import hrsynth`` offers, in the order of its table of names."""
     tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
-    table = next(node.value for node in tree.body if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOME")
+    table = next(node.value for node in tree.body
+                 if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOME")
     home: dict[str, str] = ast.literal_eval(table)
-    rows = [f"::: hrsynth{module}.{name}" for name, module in home.items()]
-    return "# Public functions\n\n`import hrsynth` offers these names; each is imported when it is first used.\n\n" + "\n\n".join(rows)
+    head = "# Public functions\n\n`import hrsynth` offers these names; each is imported when it is first used."
+    return "\n\n".join([head, *(f"::: hrsynth{module}.{name}" for name, module in home.items())])
 
 
 def modules(folder: str) -> str:

@@ -5,9 +5,9 @@
 # checks each of their steps by numbers. The rules work on one leg after another, so a single leg shows them all.
 #
 # Take a leg of a six-legged robot: a motor turns a crank about a fixed axis, a rod hangs on the crank by a universal
-# joint, and the platform hangs on the rod by a ball. Read from the base to the platform this is R̲US, with a line under the
-# driven joint. Our robot has no other leg. Its platform hangs on one ball, so what is controlled is the ball's centre: a point,
-# with three freedoms.
+# joint, and the platform hangs on the rod by a ball. Read from the base to the platform this is R̲US, with a line
+# under the driven joint. Our robot has no other leg. Its platform hangs on one ball, so what is controlled is the
+# ball's centre: a point, with three freedoms.
 
 # %%
 from dataclasses import replace
@@ -41,13 +41,13 @@ leg
 # %% [markdown]
 # ## What must stay the same
 #
-# The camera sees the direction u of the rod. At each configuration the joint rates that the mechanism allows make certain pairs
-# possible: a velocity t of the platform, together with a rate u̇ of the direction. All these pairs form a linear
-# space ρ, the *relation* between what is controlled and what is seen. Two robots with the same ρ, at the same pose and with the
-# same direction, are the same to a controller that sees u. So ρ is what no rule may change.
+# The camera sees the direction u of the rod. At each configuration the joint rates that the mechanism allows make
+# certain pairs possible: a velocity t of the platform, together with a rate u̇ of the direction. All these pairs form
+# a linear space ρ, the *relation* between what is controlled and what is seen. Two robots with the same ρ, at the
+# same pose and with the same direction, are the same to a controller that sees u. So ρ is what no rule may change.
 #
-# Numbers check it: at random configurations, an orthonormal basis of ρ of the one robot and of the other, and
-# the largest angle between the two spaces. It is zero up to rounding, or it is not. In between there is a wide gap.
+# Numbers check it: at random configurations, an orthonormal basis of ρ of the one robot and of the other, and the
+# largest angle between the two spaces. It is zero up to rounding, or it is not. In between there is a wide gap.
 
 # %%
 setting = prepare(leg)
@@ -69,7 +69,8 @@ def step(state, module, trust=False):
             continue
         found = compared(proposal.state)
         print(f"   {proposal.reason}")
-        print(f"   {state.architecture()}  →  {proposal.state.architecture()}    angle {found.largest_angle:.1e}", found.reason)
+        change = f"{state.architecture()}  →  {proposal.state.architecture()}"
+        print(f"   {change}    angle {found.largest_angle:.1e}", found.reason)
         if found.passed or trust:
             return proposal.state
     return state
@@ -78,8 +79,8 @@ def step(state, module, trust=False):
 # %% [markdown]
 # ## Motors off
 #
-# The hidden robot is driven by what the camera sees. The real motors become passive joints. They do not appear in ρ, which
-# speaks of all motions that the loops allow, whoever drives them.
+# The hidden robot is driven by what the camera sees. The real motors become passive joints. They do not appear in ρ,
+# which speaks of all motions that the loops allow, whoever drives them.
 
 # %%
 state = step(start, motors_off)
@@ -87,12 +88,12 @@ state = step(start, motors_off)
 # %% [markdown]
 # ## The lift
 #
-# Now the rod's direction needs a motor. Two angles describe a direction, so this motor is a universal joint U̲. Its first axis must not turn
-# with the leg: it belongs to a link T that only translates. Three sliders PPP carry T from the base to the rod's end A,
-# and behind U̲ a last joint R lets the rod turn about itself, which no camera sees.
+# Now the rod's direction needs a motor. Two angles describe a direction, so this motor is a universal joint U̲. Its
+# first axis must not turn with the leg: it belongs to a link T that only translates. Three sliders PPP carry T from
+# the base to the rod's end A, and behind U̲ a last joint R lets the rod turn about itself, which no camera sees.
 #
-# The chain PPP-U̲-R has six freedoms. A chain with six freedoms constrains nothing. That is the whole proof that the lift
-# is a hidden robot of *any* robot: nothing has changed but that two of the chain's angles are the direction.
+# The chain PPP-U̲-R has six freedoms. A chain with six freedoms constrains nothing. That is the whole proof that the
+# lift is a hidden robot of *any* robot: nothing has changed but that two of the chain's angles are the direction.
 
 # %%
 state = step(state, lift)
@@ -103,8 +104,8 @@ state = step(state, lift)
 #
 # ## Where does the direction go?
 #
-# If u kept to a plane, as in a planar robot, one driven R would do. If u were constant, the camera would see nothing at all in this leg.
-# Neither is so here:
+# If u kept to a plane, as in a planar robot, one driven R would do. If u were constant, the camera would see nothing
+# at all in this leg. Neither is so here:
 
 # %%
 state = step(state, direction_locus)
@@ -120,9 +121,10 @@ state = step(state, anchor_locus)
 # %% [markdown]
 # ## Takeover
 #
-# The rod is now held twice: by the real joint between crank and rod, and by U̲ with its bearing. One of them can go if the
-# other can do its work. The U joint of this leg has its first axis parallel to the crank's axis. That axis keeps its
-# direction, just as the first axis of U̲ must, so U̲ takes the place of the real joint, axes and all (MMT Fig. 2(b)).
+# The rod is now held twice: by the real joint between crank and rod, and by U̲ with its bearing. One of them can go
+# if the other can do its work. The U joint of this leg has its first axis parallel to the crank's axis. That axis
+# keeps its direction, just as the first axis of U̲ must, so U̲ takes the place of the real joint, axes and all (MMT
+# Fig. 2(b)).
 
 # %%
 state = step(state, takeover)
@@ -130,16 +132,16 @@ state = step(state, takeover)
 # %% [markdown]
 # ## The parallelogram
 #
-# {R-PP} is a crank with a link at its end that two sliders keep from turning. A planar parallelogram Π does the same with less
-# (MMT Fig. 4). The leg is finished:
+# {R-PP} is a crank with a link at its end that two sliders keep from turning. A planar parallelogram Π does the same
+# with less (MMT Fig. 4). The leg is finished:
 
 # %%
 state = step(state, pi_form)
 
 # %% [markdown]
-# `derive` does all this, then compares the result at 20 configurations and not at three. It also says that this one leg
-# is not enough: one direction is two numbers, and the platform has three freedoms. The motion that nobody sees is that of
-# the tip with the direction held, along the tangent of its circle.
+# `derive` does all this, then compares the result at 20 configurations and not at three. It also says that this one
+# leg is not enough: one direction is two numbers, and the platform has three freedoms. The motion that nobody sees is
+# that of the tip with the direction held, along the tangent of its circle.
 
 # %%
 hidden = hrsynth.derive(leg)
@@ -148,17 +150,18 @@ hidden
 # %% [markdown]
 # ## When a rule must not be used
 #
-# The papers draw the usual legs, in which axes are parallel or meet. What if they do not? Below the first axis of the U joint is
-# oblique. The crank turns it, so its direction changes, and U̲ cannot take its place.
+# The papers draw the usual legs, in which axes are parallel or meet. What if they do not? Below the first axis of the
+# U joint is oblique. The crank turns it, so its direction changes, and U̲ cannot take its place.
 
 # %%
 oblique = rus("oblique", axis=(0.5, 0.5, 0.7))
 print(hrsynth.derive(oblique))
 
 # %% [markdown]
-# The takeover is refused, and the result is less pretty and right. The paper's own form ΠU̲S, printed below the certificate, is
-# equivalent all the same: in both robots the tip is the anchor plus the rod along u, the anchor goes round the same circle, and u can go
-# anywhere. The rule's condition is sufficient, not necessary. A leg with an R in place of the U shows what trust can lead to:
+# The takeover is refused, and the result is less pretty and right. The paper's own form ΠU̲S, printed below the
+# certificate, is equivalent all the same: in both robots the tip is the anchor plus the rod along u, the anchor goes
+# round the same circle, and u can go anywhere. The rule's condition is sufficient, not necessary. A leg with an R in
+# place of the U shows what trust can lead to:
 
 # %%
 b = Builder("RRS")
@@ -190,19 +193,19 @@ trusted = step(state, takeover, trust=True)
 
 # %% [markdown]
 # This is the division of labour: *rules propose, the certificate disposes*. A rule may be too bold. The result is
-# certified all the same, because a step that changes ρ is taken back. A robot that no rule fits keeps its lift, which is
-# always right.
+# certified all the same, because a step that changes ρ is taken back. A robot that no rule fits keeps its lift, which
+# is always right.
 #
 # Two more rules need more than one leg: the removal of legs that are not watched, and the change of joints at the
 # platform that may go with it. Notebook 4 and notebook 5 meet them.
 #
 # ## Exercises
 #
-# 1. Build a UP̲S leg (a universal joint on the base, a driven slide, a ball). Which rule replaces the takeover, and what
-#    is the hidden leg?
+# 1. Build a UP̲S leg (a universal joint on the base, a driven slide, a ball). Which rule replaces the takeover, and
+#    what is the hidden leg?
 # 2. Build a P̲US leg: the crank is replaced by a slide. Why is there no parallelogram?
-# 3. `derive(…, form="general")` stops before the last rules. Compare both forms for the leg of this notebook. Are the certificates of both
-#    as good?
+# 3. `derive(…, form="general")` stops before the last rules. Compare both forms for the leg of this notebook. Are the
+#    certificates of both as good?
 
 # %% [markdown]
 # ## Solutions

@@ -1,9 +1,9 @@
 # %% [markdown]
 # # 3. The planar table
 #
-# MMT's Table 1 lists the planar robots with three equal legs, each leg with three joints of type R (it turns) or P (it slides),
-# one of them driven. Its question for each: what becomes of the leg when the camera watches its direction? This notebook
-# computes that table and adds three columns.
+# MMT's Table 1 lists the planar robots with three equal legs, each leg with three joints of type R (it turns) or P
+# (it slides), one of them driven. Its question for each: what becomes of the leg when the camera watches its
+# direction? This notebook computes that table and adds three columns.
 #
 # In a planar robot a direction is one angle. The virtual motor is an R̲, not a U̲.
 
@@ -49,9 +49,9 @@ print("the same hidden legs as in MMT Table 1, each certified")
 # **Which joint is driven does not matter.** The two robots of a kind differ in their motors and share their hidden
 # robot. The hidden robot forgets the real motors.
 #
-# **Not every robot can be controlled like this.** In 3-PPR robots the last segment only slides: its direction never changes, the camera
-# sees nothing at all, and there is no hidden robot. In PRP and RRP robots every leg meets the platform in a slide, so each direction
-# tells the platform's turn, three times over, and nothing of its position:
+# **Not every robot can be controlled like this.** In 3-PPR robots the last segment only slides: its direction never
+# changes, the camera sees nothing at all, and there is no hidden robot. In PRP and RRP robots every leg meets the
+# platform in a slide, so each direction tells the platform's turn, three times over, and nothing of its position:
 
 # %%
 print(derived["3prp"].verdict)
@@ -59,10 +59,11 @@ print()
 print(derived["3rrp"].verdict)
 
 # %% [markdown]
-# **The assembly modes.** With the directions held, the tip of each leg runs on a curve. It is a line if the leg slides
-# there, and a circle if a crank carries the rod. The platform is a triangle whose corners must lie on three such curves. For
-# three lines there are 2 solutions. For three circles there are 6, when complex ones are counted. That is the classical problem of a triangle on
-# two cranks: its third corner draws a *coupler curve*, and the third circle cuts it in up to six points (MMT Fig. 7).
+# **The assembly modes.** With the directions held, the tip of each leg runs on a curve. It is a line if the leg
+# slides there, and a circle if a crank carries the rod. The platform is a triangle whose corners must lie on three
+# such curves. For three lines there are 2 solutions. For three circles there are 6, when complex ones are counted.
+# That is the classical problem of a triangle on two cranks: its third corner draws a *coupler curve*, and the third
+# circle cuts it in up to six points (MMT Fig. 7).
 #
 # Can all six be real? With the shipped dimensions two are. Another geometry does it:
 
@@ -75,8 +76,8 @@ print(len(six.modes), "real of", six.found.complex)
 hrsynth.draw(six)
 
 # %% [markdown]
-# The blue curve is the coupler curve of the triangle on two legs, the black one is the third leg's circle. All six are proved: an
-# exact polynomial of degree six, its roots isolated, each pose enclosed by interval arithmetic.
+# The blue curve is the coupler curve of the triangle on two legs, the black one is the third leg's circle. All six
+# are proved: an exact polynomial of degree six, its roots isolated, each pose enclosed by interval arithmetic.
 
 # %%
 print(six.found.proof)
@@ -85,10 +86,10 @@ print("widest enclosure:", max(mode.radius for mode in six.modes))
 # %% [markdown]
 # ## Singularities
 #
-# The platform can move with all directions held where each of its corners can move along its own tangent. Motions of a plane are turns about
-# a point. A turn moves each corner at right angles to the line to that point. So the condition is: the three normals, drawn at the
-# three tips, meet in one point, or are parallel (then it is a translation). That is what `singular` says, and its
-# expression is the determinant of three lines:
+# The platform can move with all directions held where each of its corners can move along its own tangent. Motions of
+# a plane are turns about a point. A turn moves each corner at right angles to the line to that point. So the
+# condition is: the three normals, drawn at the three tips, meet in one point, or are parallel (then it is a
+# translation). That is what `singular` says, and its expression is the determinant of three lines:
 
 # %%
 condition = hrsynth.singular(derived["3rrr_m1"].robot, points=300)
@@ -134,8 +135,8 @@ print("smallest singular value of Mᵀ there:", example.sigma)
 # %% [markdown]
 # ## Exercises
 #
-# 1. Watch the *first* segment of each leg of `3rrr_m1`, the cranks, instead of the last (`observe=["prox_1", "prox_2", "prox_3"]`). What is the
-#    hidden robot now, and how many modes are there? Which well-known robot is it?
+# 1. Watch the *first* segment of each leg of `3rrr_m1`, the cranks, instead of the last (`observe=["prox_1",
+#    "prox_2", "prox_3"]`). What is the hidden robot now, and how many modes are there? Which well-known robot is it?
 # 2. `3rpr_m1` has hidden legs R̲PR, the same letters as its real legs. Has the real robot the same singularities?
 # 3. Which smallest sets of legs see as much as can be seen (`hrsynth.legs`)? Explain the answer for `3rrp` without a
 #    computer.

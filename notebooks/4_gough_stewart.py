@@ -1,9 +1,9 @@
 # %% [markdown]
 # # 4. Gough-Stewart and 3-U̲PS: eight modes and four planes
 #
-# The Gough-Stewart platform stands on six legs UP̲S: a universal joint on the base, a driven slide, a ball at the platform.
-# Six motors drive six freedoms. How many legs must a camera watch? MMT 4.2.1 says three. Let the program say it: `legs`
-# tries all sets.
+# The Gough-Stewart platform stands on six legs UP̲S: a universal joint on the base, a driven slide, a ball at the
+# platform. Six motors drive six freedoms. How many legs must a camera watch? MMT 4.2.1 says three. Let the program
+# say it: `legs` tries all sets.
 
 # %%
 from collections import Counter
@@ -22,8 +22,8 @@ for size in range(1, 7):
     print(size, "legs watched:", dict(words))
 
 # %% [markdown]
-# A direction in space is two numbers. Three directions are six numbers, and the platform has six freedoms. So three legs are the
-# fewest that could do, and here all choices of three do. Watch legs 1, 3 and 5:
+# A direction in space is two numbers. Three directions are six numbers, and the platform has six freedoms. So three
+# legs are the fewest that could do, and here all choices of three do. Watch legs 1, 3 and 5:
 
 # %%
 hidden = hrsynth.derive(robot, observe=["1", "3", "5"])
@@ -31,12 +31,14 @@ hidden
 
 # %% [markdown]
 # Look at the last lines. Legs 2, 4 and 6 have six freedoms each, so they constrain nothing. Without motors they are
-# only carried along, and the hidden robot can do without them: 3-U̲PS, three legs whose universal joints on the base are driven.
+# only carried along, and the hidden robot can do without them: 3-U̲PS, three legs whose universal joints on the base
+# are driven.
 #
 # ## Eight modes
 #
 # Hold the directions. Then the tip of leg i runs on a line: Bᵢ = Aᵢ + rᵢ uᵢ, with unknown lengths r₁, r₃, r₅. The
-# triangle of the tips is rigid, so three distances are known, and each is an equation of degree two. Three quadrics meet in 2 · 2 · 2 = 8 points.
+# triangle of the tips is rigid, so three distances are known, and each is an equation of degree two. Three quadrics
+# meet in 2 · 2 · 2 = 8 points.
 #
 # At this pose all eight are real:
 
@@ -51,8 +53,8 @@ print(found.found.proof)
 hrsynth.draw(found)
 
 # %% [markdown]
-# An independent check needs only NumPy: Newton's method on the three quadrics, from many random starts. It proves nothing, but
-# it must find the same eight.
+# An independent check needs only NumPy: Newton's method on the three quadrics, from many random starts. It proves
+# nothing, but it must find the same eight.
 
 # %%
 A = np.array([robot.joints[f"shoulder_{i}"].point for i in (1, 3, 5)])
@@ -108,8 +110,8 @@ except MissingExtra as error:
     print(error)
 
 # %% [markdown]
-# What does a controller do with eight poses that look the same? It ends in one of them, and the start decides in which. Some runs
-# to the pose above from random starts:
+# What does a controller do with eight poses that look the same? It ends in one of them, and the start decides in
+# which. Some runs to the pose above from random starts:
 
 # %%
 rng = np.random.default_rng(3)
@@ -117,7 +119,8 @@ ends = Counter()
 for _ in range(6):
     x, y, z, turn = rng.uniform((-0.1, -0.1, 0.25, -0.5), (0.1, 0.1, 0.4, 0.5))
     try:
-        run = hrsynth.servo(robot, ["1", "3", "5"], start=f"x={x:.3f},y={y:.3f},z={z:.3f},rpy=0/0/{turn:.2f}", goal=POSE)
+        start = f"x={x:.3f},y={y:.3f},z={z:.3f},rpy=0/0/{turn:.2f}"
+        run = hrsynth.servo(robot, ["1", "3", "5"], start=start, goal=POSE)
         ends[run.ended if run.ending.matched is None else f"mode {run.ending.matched}"] += 1
     except HrsynthError as error:
         ends[type(error).__name__] += 1
@@ -129,10 +132,11 @@ dict(ends)
 #
 # ## Four planes
 #
-# Where does the camera lose a motion? The platform must move so that each tip moves along its line, v(Bᵢ) ∥ uᵢ. Statics says the
-# same more simply: with the virtual motors held, leg i can push the tip only at right angles to uᵢ, so its forces lie in the plane through Bᵢ
-# normal to uᵢ. The three pencils of forces fail to hold the platform when the three planes, and the plane of the three tips,
-# meet in one point (MMT 4.2.1, Fig. 10). `singular` finds this condition by itself and checks it against the rank:
+# Where does the camera lose a motion? The platform must move so that each tip moves along its line, v(Bᵢ) ∥ uᵢ.
+# Statics says the same more simply: with the virtual motors held, leg i can push the tip only at right angles to uᵢ,
+# so its forces lie in the plane through Bᵢ normal to uᵢ. The three pencils of forces fail to hold the platform when
+# the three planes, and the plane of the three tips, meet in one point (MMT 4.2.1, Fig. 10). `singular` finds this
+# condition by itself and checks it against the rank:
 
 # %%
 condition = hrsynth.singular(robot, ["1", "3", "5"], points=300)
@@ -141,7 +145,8 @@ print(condition.condition.expression)
 print(condition.checked.points, "poses compared,", condition.checked.disagreements, "disagreements")
 
 # %% [markdown]
-# At a singular pose that it constructed, intersect three of the planes and see whether the fourth goes through that point:
+# At a singular pose that it constructed, intersect three of the planes and see whether the fourth goes through that
+# point:
 
 # %%
 example = condition.examples[0]
@@ -176,8 +181,8 @@ plt.show()
 # %% [markdown]
 # ## More legs than needed
 #
-# Watching all six legs removes most of the doubt: a pose is a mode only if all six directions agree. Here only the pose
-# itself is left of the eight.
+# Watching all six legs removes most of the doubt: a pose is a mode only if all six directions agree. Here only the
+# pose itself is left of the eight.
 
 # %%
 everything = hrsynth.modes(robot, at=POSE)
@@ -187,8 +192,8 @@ print(len(everything.modes), "mode,", len(everything.near), "near modes")
 # ## Exercises
 #
 # 1. Put the camera on the platform (`camera="platform"`). Which planes must meet now? Guess before you ask.
-# 2. Tsai's 3-UP̲U (`3upu`) only translates. How many legs must be watched? MMT gives the hidden robot 2-U̲PU for two watched
-#    legs. What does the certificate say?
+# 2. Tsai's 3-UP̲U (`3upu`) only translates. How many legs must be watched? MMT gives the hidden robot 2-U̲PU for two
+#    watched legs. What does the certificate say?
 # 3. How many of the eight modes are real at random poses? Draw twenty and count. Can the number be odd?
 
 # %% [markdown]
