@@ -13,7 +13,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme pictures lock setup setup-dev setup-all clean
+.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog pictures lock setup setup-dev setup-all clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -48,6 +48,10 @@ robots: setup  ## regenerate robots/*.urdf from the families
 
 readme: setup  ## regenerate the README's tables
 	@$(BIN)/python -m hrsynth.present.readme README.md
+	@$(BIN)/python -m hrsynth.catalog.readme README.md
+
+catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS= processes; hours)
+	@$(BIN)/hrsynth catalog build --workers $(JOBS)
 
 bench: setup-all  ## run the benchmarks and write their table in the README (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py README.md
