@@ -13,7 +13,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog pictures lock setup setup-dev setup-all clean
+.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -52,6 +52,12 @@ readme: setup  ## regenerate the README's tables
 
 catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS= processes; hours)
 	@$(BIN)/hrsynth catalog build --workers $(JOBS)
+
+notebooks: setup-all  ## write notebooks/*.ipynb from their scripts, without outputs
+	@$(BIN)/python docs/lessons.py
+
+docs: setup-all  ## run the notebooks that changed and build the site in build/site
+	@NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mkdocs build --quiet --strict
 
 bench: setup-all  ## run the benchmarks and write their table in the README (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py README.md

@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 import base64
 import html
+import os
 import re
 import sys
 from collections.abc import Iterator
@@ -19,6 +20,8 @@ PACKAGE = ROOT / "src" / "hrsynth"
 LINKS = {"docs/pictures/": "pictures/", "docs/pages/": "", "CONTRIBUTING.md": "contributing.md",
          "CHANGELOG.md": "changelog.md"}
 """Where what the README links to lies in the site."""
+QUICK = "HRSYNTH_DOCS_QUICK"
+"""Environment variable: notebooks of which no executed copy is kept are shown without outputs."""
 FOLDERS = ("mechanism", "description", "families", "kinematics", "rewrite", "analysis", "servo", "selection", "present",
            "catalog")
 
@@ -51,18 +54,30 @@ def relinked(text: str) -> str:
     """A page of the project's own folder with its links turned to the site's."""
     for old, new in LINKS.items():
         text = text.replace(f"]({old}", f"]({new}")
-    return text
+    return underlined(text)
+
+
+def underlined(text: str) -> str:
+    """Motors underlined by markup, outside of blocks of code: not every font has the combining line."""
+    parts = re.split(r"(^```.*?^```$)", text, flags=re.MULTILINE | re.DOTALL)
+    return "".join(part if place % 2 else _underlined(part) for place, part in enumerate(parts))
+
+
+def _underlined(text: str) -> str:
+    text = re.sub(r"`([^`\n]*\u0332[^`\n]*)`", lambda found: f"<code>{html.escape(found[1])}</code>", text)
+    return re.sub("(.)\u0332", r"<u>\1</u>", text)
 
 
 def lesson(script: Path) -> Iterator[tuple[str, str | bytes]]:
     """The page of a notebook with its outputs, and its pictures."""
     page, pictures = [], 0
-    for cell in lessons.executed(script).cells:
+    run = lessons.kept(script).exists() or os.environ.get(QUICK) is None
+    for cell in (lessons.executed(script) if run else lessons.notebook(script)).cells:
         if cell.cell_type == "markdown":
-            page.append(cell.source)
+            page.append(underlined(cell.source))
             continue
         shown = [f"```python\n{cell.source}\n```"]
-        for output in cell.outputs:
+        for output in cell.get("outputs", []):
             data = output.get("data", {})
             if "image/png" in data:
                 pictures += 1
@@ -72,7 +87,7 @@ def lesson(script: Path) -> Iterator[tuple[str, str | bytes]]:
             elif "text/html" in data:
                 shown.append(f'<div class="output">{data["text/html"]}</div>')
             elif text := output.get("text") or data.get("text/plain"):
-                shown.append(f'<div class="output"><pre>{html.escape(text)}</pre></div>')
+                shown.append(f'<div class="output"><pre>{_underlined(html.escape(text))}</pre></div>')
         page.append(folded(shown) if "solution" in cell.metadata.get("tags", []) else "\n\n".join(shown))
     yield f"notebooks/{script.stem}.md", "\n\n".join(page) + "\n"
 

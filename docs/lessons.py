@@ -56,15 +56,20 @@ def pair() -> list[Path]:
     return changed
 
 
+def kept(script: Path, folder: Path = EXECUTED) -> Path:
+    """Where the executed copy is kept while neither the script nor the package changes."""
+    return folder / f"{script.stem}.{_state(script)}.ipynb"
+
+
 def executed(script: Path, folder: Path = EXECUTED) -> Any:
-    """The notebook with its outputs: run now, or read where neither the script nor the package has changed since.
+    """The notebook with its outputs: the kept copy, or run now.
 
     Raises ``nbclient.exceptions.CellExecutionError`` where a cell fails.
     """
     import nbformat
     from nbclient import NotebookClient
 
-    file = folder / f"{script.stem}.{_state(script)}.ipynb"
+    file = kept(script, folder)
     if file.exists():
         return nbformat.read(file, as_version=4)
     made = notebook(script)

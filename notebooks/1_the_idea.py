@@ -160,7 +160,7 @@ print(hrsynth.path(robot, start="x=0,y=0.345", goal=goal))
 # below.
 
 # %%
-hrsynth.draw(hrsynth.check(robot, grid="x=-0.06:0.06:25,y=0.28:0.35:29"))
+hrsynth.draw(hrsynth.check(robot, grid="x=-0.06:0.06:17,y=0.29:0.35:25"))
 
 # %%
 condition = hrsynth.singular(robot, points=200)
