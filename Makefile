@@ -13,11 +13,11 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all clean
+.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
-	@awk -F ':.*## +' '/^[a-z-]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+	@awk -F ':.*## +' '/^[a-z-]+:.*## / { printf "  make %-13s %s\n", $$1, $$2 }' Makefile
 
 demo: setup  ## derive the hidden robot of a Quattro of which legs 1 and 4 are observed
 	@$(BIN)/hrsynth derive robots/quattro.urdf --observe 1,4
@@ -25,7 +25,7 @@ demo: setup  ## derive the hidden robot of a Quattro of which legs 1 and 4 are o
 test: setup-dev  ## the tests, without the slow ones
 	@$(PYTEST) -m "not slow and not long and not browser" tests
 
-test-all: setup-all  ## all tests but the longest
+test-all: setup-all setup-browser  ## all tests but the longest
 	@$(PYTEST) -m "not long" tests
 
 test-long: setup-all  ## the longest tests: many instances, all robots; more than an hour
@@ -79,7 +79,7 @@ pictures: setup-all  ## draw the pictures in docs/pictures again
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt
 	@$(LOCK) --group dev --constraint requirements/main.txt --output-file requirements/dev.txt
-	@$(LOCK) --group dev --extra all --constraint requirements/dev.txt --output-file requirements/all.txt
+	@$(LOCK) --group dev --group browser --extra all --constraint requirements/dev.txt --output-file requirements/all.txt
 
 setup: $(VENV)/main.stamp  ## .venv with what hrsynth needs to run
 	@:
@@ -89,6 +89,12 @@ setup-dev: $(VENV)/dev.stamp  ## the same, with the tools of development
 
 setup-all: $(VENV)/all.stamp  ## the same, with every extra
 	@:
+
+setup-browser:  ## Chromium for the tests of pages, from Debian's packages where that is possible
+	@command -v chromium > /dev/null || command -v chromium-browser > /dev/null || command -v google-chrome > /dev/null || \
+		{ test "$$(id -u)" = 0 && command -v apt-get > /dev/null && apt-get -qq update && \
+		DEBIAN_FRONTEND=noninteractive apt-get -qq install --no-install-recommends chromium fonts-dejavu-core > /dev/null; } || \
+		echo "the tests of pages are left out: they need Chromium (on Debian: apt-get install chromium)" >&2
 
 $(BIN)/python:
 	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' 2>/dev/null || \

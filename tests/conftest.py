@@ -2,5 +2,7 @@
 
 import os
 
+pytest_plugins = ["browser"]
+
 for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS"):
     os.environ.setdefault(library, "1")

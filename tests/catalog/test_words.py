@@ -25,6 +25,13 @@ def test_what_is_listed_is_canonical_and_belongs_there(name):
         assert group(parse(text)) == name
 
 
+@pytest.mark.parametrize("name", GROUPS)
+def test_a_motor_changes_no_leg_s_label(name):
+    for word in map(parse, LISTED[name]):
+        assert tuple(leg.unmoved for leg in word.legs) == word.unmoved.legs == \
+            tuple(leg.unmoved for leg in word.driven.legs)
+
+
 def test_at_least_five_thousand_in_four_groups():
     counts = {name: len(found) for name, found in LISTED.items()}
     assert sum(counts.values()) >= 5000

@@ -25,8 +25,9 @@ n q      in a U: normal to its other axis, and (n) to the line of centres next t
          the joint before it and to its rods
 =======  ==============================================================================================================
 
-The canonical word has its legs sorted, names letters of the same kind in the order of the leg, and drops the ``!`` of
-a default segment. It is the key of the catalog and is stable: a change of what a word means is a change of ``VERSION``.
+The canonical word has its legs sorted, first as if they had no motors (a motor changes no leg's label), names letters
+of the same kind in the order of the leg, and drops the ``!`` of a default segment. It is the key of the catalog and is
+stable: a change of what a word means is a change of ``VERSION``.
 """
 
 from __future__ import annotations
@@ -135,6 +136,11 @@ class Leg:
         return len(self.joints) - (1 if self.joints[-1].letter in COMPOSITE else 2)
 
 
+def _order(leg: Leg) -> tuple[Leg, Leg]:
+    """The place of a leg among others: as it is without motors, then by its motors."""
+    return leg.unmoved, leg
+
+
 @dataclass(frozen=True)
 class Word:
     """An architecture: a platform and, for each of its bodies, the legs that end on it, sorted."""
@@ -145,8 +151,8 @@ class Word:
     @classmethod
     def of(cls, legs: list[Leg], *more: list[Leg], platform: str = "") -> Word:
         """The canonical word of these legs; ``more``: those of a second body."""
-        bodies = sorted(tuple(sorted(leg.canonical() for leg in body)) for body in (legs, *more))
-        return cls(platform, tuple(bodies))
+        bodies = (tuple(sorted((leg.canonical() for leg in body), key=_order)) for body in (legs, *more))
+        return cls(platform, tuple(sorted(bodies, key=lambda body: ([leg.unmoved for leg in body], body))))
 
     @property
     def legs(self) -> tuple[Leg, ...]:
