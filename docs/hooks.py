@@ -84,6 +84,11 @@ def lesson(script: Path) -> Iterator[tuple[str, str | bytes]]:
                 name = f"{script.stem}_{pictures}.png"
                 yield f"notebooks/{name}", base64.b64decode(data["image/png"])
                 shown.append(f"![Picture {pictures} of this notebook: {caption(data)}]({name})")
+            elif "image/svg+xml" in data:
+                pictures += 1
+                name = f"{script.stem}_{pictures}.svg"
+                yield f"notebooks/{name}", data["image/svg+xml"]
+                shown.append(f"![Picture {pictures} of this notebook: {caption(data)}]({name})")
             elif "text/html" in data:
                 shown.append(f'<div class="output">{data["text/html"]}</div>')
             elif text := output.get("text") or data.get("text/plain"):

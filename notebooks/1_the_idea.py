@@ -100,6 +100,9 @@ plt.show()
 hidden = hrsynth.derive(robot)
 hidden
 
+# %%
+hrsynth.draw(hidden)
+
 # %% [markdown]
 # The crank has become part of a passive parallelogram, and the motors sit where the rods begin: `ΠR̲RR̲Π`. The lines
 # below the certificate are the steps of the derivation; notebook 2 takes them one by one.

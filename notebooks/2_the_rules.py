@@ -147,6 +147,9 @@ state = step(state, pi_form)
 hidden = hrsynth.derive(leg)
 hidden
 
+# %%
+hrsynth.draw(hidden)
+
 # %% [markdown]
 # ## When a rule must not be used
 #

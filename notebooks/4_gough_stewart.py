@@ -29,10 +29,13 @@ for size in range(1, 7):
 hidden = hrsynth.derive(robot, observe=["1", "3", "5"])
 hidden
 
+# %%
+hrsynth.draw(hidden)
+
 # %% [markdown]
-# Look at the last lines. Legs 2, 4 and 6 have six freedoms each, so they constrain nothing. Without motors they are
-# only carried along, and the hidden robot can do without them: 3-U̲PS, three legs whose universal joints on the base
-# are driven.
+# Look at the last lines of the table. Legs 2, 4 and 6 have six freedoms each, so they constrain nothing. Without
+# motors they are only carried along, and the hidden robot can do without them: 3-U̲PS, three legs whose universal
+# joints on the base are driven.
 #
 # ## Eight modes
 #

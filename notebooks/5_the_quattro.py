@@ -28,6 +28,9 @@ print(hrsynth.legs(robot))
 hidden = hrsynth.derive(robot, observe=["1", "4"])
 hidden
 
+# %%
+hrsynth.draw(hidden)
+
 # %% [markdown]
 # The rows `leg removal … no` and `end change … yes` at the end are the story of MMT 4.2.2. If the legs that are not
 # watched are simply dropped, the platform gains freedoms that it must not have. With universal joints in place of

@@ -22,6 +22,9 @@ robot = hrsynth.load("prrrp_parallel")
 hidden = hrsynth.derive(robot)
 hidden
 
+# %%
+hrsynth.draw(hidden)
+
 # %% [markdown]
 # The virtual motors sit where the rods begin. The carriages have become passive, and both slide along the same
 # direction. Hold both directions: the whole figure can still be pushed along the rails. Nothing that the camera sees

@@ -6,6 +6,7 @@ import html
 import re
 from functools import cache
 from pathlib import Path
+from xml.etree import ElementTree
 
 import pytest
 
@@ -99,7 +100,8 @@ def test_pictures_of_results_are_shown_in_notebooks_and_saved(command: str, tmp_
     picture = hrsynth.draw(answer(command), **options)
     assert picture._repr_png_().startswith(b"\x89PNG")
     picture.save(tmp_path / "p.png")
-    assert (tmp_path / "p.png").read_bytes() == picture.png
+    assert (tmp_path / "p.png").read_bytes() == picture.content
+    assert picture._repr_svg_() is None
     with pytest.raises(BadRequest, match=r"p\.jpg"):
         picture.save(tmp_path / "p.jpg")
 
@@ -108,7 +110,21 @@ def test_pictures_of_grids():
     robot = load("rrrrr_m1")
     grid = "x=-0.02:0.02:3,y=0.3:0.34:3"
     for found in (hrsynth.check(robot, grid=grid), hrsynth.accuracy(robot, cones="0.1deg", grid=grid)):
-        assert hrsynth.draw(found).png.startswith(b"\x89PNG")
+        assert hrsynth.draw(found)._repr_png_().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(("name", "observe"), [("rrrrr_m1", None), ("quattro", ["1", "4"]), ("3ppr_m1", None)])
+def test_a_derivation_is_drawn_as_two_schemes(name: str, observe: list[str] | None):
+    found = hrsynth.derive(load(name), observe)
+    picture = hrsynth.draw(found)
+    root = ElementTree.fromstring(picture._repr_svg_())
+    schemes = root.findall("{http://www.w3.org/2000/svg}svg")
+    assert picture._repr_png_() is None
+    assert len(schemes) == 1 + (found.hidden is not None)
+    width, height = (float(root.get(name)) for name in ("width", "height"))
+    for scheme in schemes:
+        assert float(scheme.get("x")) + float(scheme.get("width")) <= width
+        assert float(scheme.get("y")) + float(scheme.get("height")) <= height
 
 
 def test_what_has_no_picture_is_refused():

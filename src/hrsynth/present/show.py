@@ -29,25 +29,29 @@ _DRAWN = {"AssemblyModes": "modes.picture", "Servo": "runs.picture"}
 
 @dataclass(frozen=True, repr=False)
 class Picture:
-    """A picture (PNG); a notebook shows it."""
+    """A picture, ``png`` or ``svg``; a notebook shows it."""
 
-    png: bytes
+    content: bytes
     words: str
+    kind: str = "png"
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.words}>"
 
-    def _repr_png_(self) -> bytes:
-        return self.png
+    def _repr_png_(self) -> bytes | None:
+        return self.content if self.kind == "png" else None
+
+    def _repr_svg_(self) -> str | None:
+        return self.content.decode() if self.kind == "svg" else None
 
     def save(self, file: str | Path) -> None:
-        """Write it, whole or not at all; raises ``BadRequest`` for another ending than ``.png``."""
+        """Write it, whole or not at all; raises ``BadRequest`` for another ending than its kind's."""
         from ..description.files import require_folder, write_whole
 
-        if Path(file).suffix.lower() != ".png":
-            raise BadRequest("cannot write the picture: unknown ending", str(file), ".png")
+        if Path(file).suffix.lower() != f".{self.kind}":
+            raise BadRequest("cannot write the picture: its ending is not its kind", str(file), f".{self.kind}")
         require_folder(file)
-        write_whole(file, self.png)
+        write_whole(file, self.content)
 
 
 def text(result: Result) -> str:
@@ -65,20 +69,29 @@ def html(result: Result) -> str:
 
 
 def draw(result: Result, *, plane: Pose | str | None = None, steps: int = 51) -> Picture:
-    """A picture of assembly modes, of a servo run, of checked or accuracy poses over a grid, and of where a freedom is
-    lost over a ``plane`` of poses (``steps`` a side), as ``-o`` draws them.
+    """A picture of a result: the kinematic schemes of a derivation's robots, and as ``-o`` draws them assembly modes, a
+    servo run, checked or accuracy poses over a grid, and where a freedom is lost over a ``plane`` of poses (``steps`` a
+    side).
 
     Raises ``BadRequest`` for a result that has no picture.
     """
     kind = type(result).__name__
     if kind != "Singularity" and plane is not None:
         raise BadRequest("a plane is drawn", kind, "only of the result of singular")
+    if kind == "Derivation":
+        return Picture(_schemes(result).encode(), result.headline(), "svg")
     if kind == "Singularity":
         return Picture(_locus(result, plane, steps), result.headline())
     if kind in _DRAWN:
         module, name = _DRAWN[kind].split(".")
         return Picture(getattr(import_module(f".{module}", __package__), name)(result), result.headline())
     return Picture(_grid(result), result.headline())
+
+
+def _schemes(result: Any) -> str:
+    from .drawings.derived import derivation_svg
+
+    return derivation_svg(result)
 
 
 def _locus(result: Any, plane: Pose | str | None, steps: int) -> bytes:
@@ -97,4 +110,4 @@ def _grid(result: Any) -> bytes:
     if getattr(result, "grid", None) is not None:
         return distance_map(result)
     raise BadRequest("there is no picture of", repr(result),
-                     "modes, servo, singular; check with a grid; accuracy with a plane or grid")
+                     "derive, modes, servo, singular; check with a grid; accuracy with a plane or grid")
