@@ -18,7 +18,7 @@ import lessons
 ROOT = lessons.ROOT
 PACKAGE = ROOT / "src" / "hrsynth"
 LINKS = {"docs/pictures/": "pictures/", "docs/pages/": "", "CONTRIBUTING.md": "contributing.md",
-         "CHANGELOG.md": "changelog.md"}
+         "CHANGELOG.md": "changelog.md", "notebooks/README.md": "notebooks/index.md"}
 """Where what the README links to lies in the site."""
 QUICK = "HRSYNTH_DOCS_QUICK"
 """Environment variable: notebooks of which no executed copy is kept are shown without outputs."""
@@ -40,6 +40,8 @@ def made() -> Iterator[tuple[str, str | bytes]]:
     for name, source in (("index.md", "README.md"), ("contributing.md", "CONTRIBUTING.md"),
                          ("changelog.md", "CHANGELOG.md")):
         yield name, relinked((ROOT / source).read_text(encoding="utf-8"))
+    overview = (lessons.FOLDER / "README.md").read_text(encoding="utf-8")
+    yield "notebooks/index.md", underlined(overview.replace(".ipynb)", ".md)"))
     for picture in sorted((ROOT / "docs" / "pictures").iterdir()):
         yield f"pictures/{picture.name}", picture.read_bytes()
     for script in lessons.scripts():
