@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "notebooks"
 EXECUTED = ROOT / "build" / "notebooks"
 TIMEOUT = 300
-"""Seconds that a cell may take."""
+"""Seconds that a cell, or the start of the kernel, may take."""
 KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
 
 
@@ -74,7 +74,7 @@ def executed(script: Path, folder: Path = EXECUTED) -> Any:
         return nbformat.read(file, as_version=4)
     made = notebook(script)
     folder.mkdir(parents=True, exist_ok=True)
-    NotebookClient(made, timeout=TIMEOUT, kernel_name="python3",
+    NotebookClient(made, timeout=TIMEOUT, startup_timeout=TIMEOUT, kernel_name="python3",
                    resources={"metadata": {"path": str(folder)}}).execute()
     for old in folder.glob(f"{script.stem}.*.ipynb"):
         old.unlink(missing_ok=True)
