@@ -1,4 +1,10 @@
-"""The commands of the catalog: build, list, show."""
+"""The commands of the catalog: build, list, show.
+
+Their records, besides ``command`` ("catalog build" …) and ``version``: ``build`` gives ``groups``, each with
+``group``, ``words``, ``now`` (made), ``before`` and ``file`` (null while it is not complete), with ``--check`` instead
+``stale``, one text for each thing; ``list`` gives ``total`` and ``entries``; ``show`` gives ``entry``, ``drawing``
+(lines), ``note`` and ``file``.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +16,18 @@ from typing import Annotated, Any
 
 import typer
 
-catalog = typer.Typer(name="catalog", no_args_is_help=True, rich_markup_mode=None,
+catalog = typer.Typer(name="catalog", invoke_without_command=True, rich_markup_mode=None,
                       help="The catalog of architectures: what can be controlled by watching legs.")
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
 Kept = Annotated[str | None, typer.Option("--catalog", metavar="PATH", help="A folder or SQLite file (default: what is "
                                           "shipped).")]
+
+
+@catalog.callback()
+def _alone(context: typer.Context) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
 
 
 @catalog.command()
@@ -36,6 +48,7 @@ def build(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of --sample.")] = 0,
 ) -> None:
     """Build the catalog, or go on where a build was broken off; the bytes do not depend on who builds."""
+    _require_together(check, {"--sample": sample is not None}, {"--limit": limit is not None, "--anew": anew})
     if check:
         _check(groups or [], output, workers, cluster, sample, seed, json)
         return
@@ -48,6 +61,15 @@ def build(
         done = [each.to_dict() for each in run(target, groups or [], workers=workers, cluster=cluster, limit=limit,
                                                anew=anew, tell=meter.tell)]
     typer.echo(records.record("catalog build", None, {"groups": done}) if json else built(done))
+
+
+def _require_together(check: bool, with_it: dict[str, bool], without: dict[str, bool]) -> None:
+    """Raise ``BadRequest`` for options that mean nothing with, or without, ``--check``."""
+    from .errors import BadRequest
+
+    for option, given in (without if check else with_it).items():
+        if given:
+            raise BadRequest(f"{option} {'with' if check else 'without'} --check", None)
 
 
 def _check(groups: list[str], target: str | None, workers: int, cluster: str | None, sample: int | None, seed: int,

@@ -51,6 +51,8 @@ def _facts(record: Record) -> Iterable[tuple[str, str]]:
     yield "hidden robot", str(record.get("hidden", "none"))
     yield "verdict", f"{record['verdict']} (rank {record['rank']} of {record['dof']})"
     yield "exact", "proved" if record["instances"] == 1 else f"{record['instances']} instances"
+    if record.get("steps"):
+        yield "rules", "; ".join(record["steps"])
     if record.get("lost"):
         yield "lost", "; ".join(record["lost"])
     if record.get("minimal"):
