@@ -13,7 +13,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog pictures lock setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -46,18 +46,25 @@ types: setup-dev  ## type check
 robots: setup  ## regenerate robots/*.urdf from the families
 	@$(BIN)/python -m hrsynth.families
 
-readme: setup  ## regenerate the README's tables
-	@$(BIN)/python -m hrsynth.present.readme README.md
+readme: setup  ## regenerate the tables of the README and of docs/pages
+	@$(BIN)/python -m hrsynth.present.readme README.md docs/pages/papers.md
 	@$(BIN)/python -m hrsynth.catalog.readme README.md
 
 catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS= processes; hours)
 	@$(BIN)/hrsynth catalog build --workers $(JOBS)
 
-bench: setup-all  ## run the benchmarks and write their table in the README (some minutes)
-	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py README.md
+notebooks: setup-all  ## write notebooks/*.ipynb from their scripts, without outputs
+	@$(BIN)/python docs/lessons.py
+
+docs: setup-all  ## run the notebooks that changed and build the site in build/site
+	@NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mkdocs build --quiet --strict
+
+bench: setup-all  ## run the benchmarks and write their table in docs/pages (some minutes)
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py docs/pages/batches.md
 
 pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again
 	@mkdir -p build docs/pictures
+	@$(BIN)/python -c 'import hrsynth; hrsynth.draw(hrsynth.derive(hrsynth.load("quattro"), ["1", "4"])).save("docs/pictures/derivation_quattro.svg")'
 	@$(BIN)/hrsynth modes rrrrr_m1 -o docs/pictures/modes_rrrrr.png > /dev/null
 	@$(BIN)/hrsynth modes 3rrr_m1 -o docs/pictures/modes_3rrr.png > /dev/null
 	@$(BIN)/hrsynth modes gough_stewart --observe 1,3,5 --at x=-0.03,y=-0.06,z=0.37,rpy=-0.1/0.5/0.1 -o docs/pictures/modes_gough_stewart.png > /dev/null
