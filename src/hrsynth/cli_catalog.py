@@ -177,8 +177,10 @@ def site(
 def _known(word: str, kept: str | None) -> tuple[Any, str]:
     """The record of a word, and where it comes from if not from the catalog."""
     from .catalog import load
+    from .catalog.groups import group
     from .catalog.source import architectures, made
     from .catalog.store import shipped
+    from .catalog.words import parse
 
     if kept is not None or shipped().groups():
         found = load(kept)
@@ -187,7 +189,7 @@ def _known(word: str, kept: str | None) -> tuple[Any, str]:
     import json
 
     source = architectures()
-    ((_, line),) = made(source.entry, "none", [word])
+    ((_, line),) = made(source.entry, group(parse(word)), [word])
     return json.loads(line), "not in the catalog, studied now"
 
 

@@ -21,6 +21,7 @@ from hrsynth.catalog import load
 from hrsynth.catalog.build import build
 from hrsynth.catalog.journal import Journal
 from hrsynth.catalog.lines import decoded, encoded, line
+from hrsynth.catalog.source import architectures
 from hrsynth.errors import BadRequest, BuildStopped, HrsynthError
 
 TESTS = Path(__file__).resolve().parent.parent
@@ -281,3 +282,19 @@ def test_files_round_trip_and_cut_off_ones_are_refused(whole: dict[str, bytes]):
             decoded(data[:cut], "c")
     with pytest.raises(BadRequest, match=r"another version, found 'format 1, words 9', allowed: .*build it again"):
         decoded(data.replace(b'"catalog":1', b'"catalog":9', 1), "c")
+
+
+@pytest.mark.slow
+def test_the_catalog_itself_has_the_same_bytes_from_two_workers(tmp_path: Path):
+    """A few words of every group: that they are made here or elsewhere, alone or after others, changes nothing."""
+    pytest.importorskip("joblib")
+    every = architectures()
+    few = {group: random.Random(5).sample(every.words(group), 4) for group in every.groups}
+    some = replace(every, groups={group: few[group].copy for group in few})
+    build(tmp_path / "one", source=some)
+    build(tmp_path / "two", source=some, workers=2)
+    assert content(tmp_path / "one") == content(tmp_path / "two")
+    assert all(record["group"] in few for record in load(tmp_path / "one"))
+    for group, words in few.items():
+        (first, *_) = load(tmp_path / "one", group=group)
+        assert line(first) == line({**every.entry(min(words)), "group": group})

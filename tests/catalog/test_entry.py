@@ -5,15 +5,19 @@ import random
 import subprocess
 import sys
 
+import numpy as np
 import pytest
 
 from hrsynth.analysis.derive import derive
+from hrsynth.analysis.setting import prepare
 from hrsynth.catalog.entry import entry
+from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS, words
 from hrsynth.catalog.groups.planar import chains
 from hrsynth.catalog.words import Leg, Word, parse
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
+from oracle import Oracle
 
 SHIPPED = {
     "3rrr_m1": "3(Rz*-Rz-Rz)", "3rrr_m2": "3(Rz-Rz*-Rz)", "3rpr_m1": "3(Rz*-Pl-Rz)", "3rpr_m2": "3(Rz-Pl*-Rz)",
@@ -115,3 +119,26 @@ def test_what_does_not_move_has_no_verdict():
     assert entry("3(Pz*-S)+3(Rt*-S)")["refused"].startswith("neither the platform nor a segment of a leg can move")
     with pytest.raises(BadRequest):
         entry("3(Rz*-Q-Rz)")
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_screws_without_pinocchio_see_the_same(name):
+    """At the zero configuration, in maximal coordinates: dof, mobility and rank of all legs and of a smallest set."""
+    for text in random.Random(7).sample(words(name), 3):
+        found = entry(text)
+        if "refused" in found:
+            continue
+        setting = prepare(mechanism(parse(text)), samples=1)
+        oracle = Oracle(setting.mechanism)
+        assert oracle.mobility(oracle.zero()) == found["mobility"]
+        sets = [setting.segments, *([o for o in setting.segments if o.leg in each] for each in found["minimal"])]
+        for seen in sets:
+            point = setting.anatomy.point is not None
+            basis = oracle.relation(oracle.zero(), seen, point_only=point)
+            size = 3 if point else 6
+            assert _rank(basis[:size]) == found["dof"]
+            assert _rank(basis[:size]) - (basis.shape[1] - _rank(basis[size:])) == found["rank"], text
+
+
+def _rank(rows):
+    return int(np.linalg.matrix_rank(rows, tol=1e-8))

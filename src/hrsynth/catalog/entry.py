@@ -50,8 +50,8 @@ def entry(text: str) -> dict[str, Any]:
     anatomy = dissect(normal_form(drawn).mechanism)
     driven = [joint for joint in drawn.joints.values() if joint.actuated]
     rank = found.driven([joint.name for joint in driven])
-    return {**record, "notation": anatomy.architecture().ascii, **found.facts, "motors": len(driven),
-            "motor_rank": rank, "driven": rank == found.facts["dof"],
+    return {**record, "notation": anatomy.architecture().ascii, **found.facts, "attempt": found.attempt or None,
+            "motors": len(driven), "motor_rank": rank, "driven": rank == found.facts["dof"],
             "base_motors": all(drawn.base in joint.links for joint in driven)}
 
 

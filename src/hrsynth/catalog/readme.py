@@ -5,13 +5,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from ..analysis.verdict import CONTROLLABLE, PARTIAL, UNCONTROLLABLE
+from ..analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from ..present.readme import replaced
 from .query import Catalog, load
 from .store import shipped
 
 START = "<!-- generated: catalog -->"
-VERDICTS = (CONTROLLABLE, PARTIAL, UNCONTROLLABLE, None)
+VERDICTS = (CONTROLLABLE, PARTIAL, BLIND, None)
 HEADS = ("group", "architectures", "controllable", "partially controllable", "uncontrollable", "refused")
 
 

@@ -10,8 +10,7 @@ from typing import Any
 from ..errors import BadRequest, HrsynthError
 from .lines import line
 
-Group = Callable[[], Iterable[object]]
-"""Gives words, as text or as what is written so."""
+Group = Callable[[], Iterable[str]]
 Made = list[tuple[str, str]]
 """Words with the lines of their records."""
 
@@ -40,7 +39,7 @@ class Source:
 
     def words(self, group: str) -> list[str]:
         """The words of a group, sorted."""
-        return sorted({str(word) for word in self.groups[group]()})
+        return sorted(set(self.groups[group]()))
 
     def chunks(self, words: Iterable[str], size: int) -> Iterator[list[str]]:
         """The words in parts of at least ``size`` (but for the last); kin stay together."""

@@ -8,7 +8,7 @@ from ...analysis.derive import Derivation, derived
 from ...analysis.setting import prepare
 from ...errors import HrsynthError
 from ...mechanism.model import Mechanism
-from ..entry import ATTEMPTS, SAMPLES
+from ..entry import SAMPLES
 from ..geometry import mechanism
 from ..lines import Record
 from ..words import parse
@@ -16,8 +16,8 @@ from ..words import parse
 
 @dataclass(frozen=True, eq=False)
 class Study:
-    """The number of the dimensions, the derivation in these (None: there is none), and how it differs from the
-    record, if it does."""
+    """The number of the dimensions, the derivation in these (None: there is none), and what it ends in or why there is
+    none, where the record says otherwise."""
 
     attempt: int
     derivation: Derivation | None = None
@@ -34,26 +34,20 @@ class Study:
 
 
 def study(word: str, record: Record) -> Study:
-    """Derive the hidden robot of a word without motors in the first dimensions in which it is that of the record; if
-    there are none, in the first in which there is one."""
+    """Derive the hidden robot of a word without motors in the dimensions of its record; none where it is refused."""
+    attempt = record.get("attempt", 0)
     if "refused" in record:
-        return Study(0)
-    first: Study | None = None
-    for attempt in range(ATTEMPTS):
-        try:
-            setting = prepare(mechanism(parse(word).driven, attempt), samples=SAMPLES)
-            found = derived(setting, beside=False)
-        except HrsynthError:
-            continue
-        differs = _difference(found, record)
-        if not differs:
-            return Study(attempt, found)
-        first = first or Study(attempt, found, differs)
-    return first or Study(0, differs="no hidden robot is derived")
+        return Study(attempt)
+    try:
+        setting = prepare(mechanism(parse(word).driven, attempt), samples=SAMPLES)
+        found = derived(setting, beside=False)
+    except HrsynthError as error:
+        return Study(attempt, differs=str(error).splitlines()[0])
+    return Study(attempt, found, _difference(found, record))
 
 
 def _difference(found: Derivation, record: Record) -> str:
-    """What a derivation ends in, where it is not what the record says."""
+    """What a derivation ends in, where that is not what the record says."""
     hidden = found.hidden_architecture and found.hidden_architecture.ascii
     same = (hidden, found.verdict.verdict, found.verdict.rank) == (record.get("hidden"), record["verdict"],
                                                                    record["rank"])

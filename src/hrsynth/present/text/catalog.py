@@ -21,9 +21,9 @@ def entries(records: Sequence[Record], total: int) -> str:
 
 def entry(record: Record, drawn: str, note: str = "", file: str | None = None) -> str:
     """One entry: its legs drawn, then what is known of it."""
-    head = f"{record['word']}   {record.get('notation', '')}".rstrip() + (f"   {note}" if note else "")
-    written = "" if file is None else f"\n\nwritten to {file}"
-    return f"{head}\n\n{drawn}\n{LEGEND}\n\n{listing(_all(record))}{written}"
+    head = f"{record['word']}   {record.get('notation', '')}".rstrip()
+    more = [note, "" if file is None else f"written to {file}"]
+    return "\n\n".join([head, f"{drawn}\n{LEGEND}", listing(_all(record)), *filter(None, more)])
 
 
 def built(groups: Iterable[Mapping[str, Any]]) -> str:
@@ -70,7 +70,7 @@ def facts(record: Record) -> Iterable[tuple[str, str]]:
         yield "Type 2", str(record["condition"])
     if record.get("modes_bound") is not None:
         legs = f" with legs {', '.join(record['modes_legs'])} watched" if record.get("modes_legs") else ""
-        yield "modes", f"{record['modes_seen']} real ones seen of {record['modes_bound']} complex{legs}"
+        yield "modes", f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}"
     if record.get("cure"):
         yield "cure", str(record["cure"])
 
