@@ -6,6 +6,7 @@ import errno
 import json
 import re
 from collections.abc import Iterator
+from html import unescape
 from html.parser import HTMLParser
 from itertools import chain
 from pathlib import Path
@@ -29,8 +30,9 @@ from hrsynth.cli import _run
 from hrsynth.errors import BadRequest, BuildStopped
 from hrsynth.rewrite.strategy import Step
 
-WORDS = ("3(Rz*-Rz-Rz)", "3(Rz-Rz*-Rz)", "(Rz!-Rz-Rz*)+2(Rz*!-Rz-Rz)", "3(Px*-Rz-Rz)", "point:2(Rz*-Rz-Rz)", "2(Rt*-2SSt)",
-         "(Cr*-Pz-S)+2(Rt-Pl*-S)", "3(Ro-Ro*-Ro)", "3(Ra*!-Rb-Ra-Ph)", "bar:2(Rt*-2SSt)|2(Rt*-2SSt)")
+REFUSED = "3(Ra*!-Rb-Ra-Ph)"
+WORDS = ("3(Rz*-Rz-Rz)", "3(Rz-Rz*-Rz)", "(Rz!-Rz-Rz*)+2(Rz*!-Rz-Rz)", "point:2(Rz*-Rz-Rz)", "2(Rt*-2SSt)",
+         "3(Ro-Ro*-Ro)", REFUSED)
 VOID = {"meta", "link", "br", "input"}
 
 
@@ -40,9 +42,10 @@ def catalog() -> Catalog:
 
 
 @pytest.fixture(scope="module")
-def few(catalog: Catalog) -> Catalog:
-    """Three structures that are quick to derive, four architectures."""
-    return Catalog(catalog.records[:3] + catalog.records[4:5])
+def few() -> Catalog:
+    """Three structures, four architectures, without derivations: what a folder does with them is quick to see."""
+    return Catalog(tuple({"word": word, "group": "none", "legs": len(parse(word).legs), "refused": "to be quick"}
+                         for word in WORDS[:4]))
 
 
 @pytest.fixture(scope="module")
@@ -115,10 +118,9 @@ def test_drawings_are_well_formed_and_show_the_motors_and_the_virtual_actuators(
     for each in structures(catalog):
         text = (target / "p" / f"{each.name}.html").read_text(encoding="utf-8")
         drawn = [etree.fromstring(svg) for svg in re.findall(r"<svg.*?</svg>", text, flags=re.DOTALL)]
-        assert len(drawn) == ("notation" in each.fact) + bool(each.fact.get("hidden")) + ("notation" not in each.fact)
+        assert len(drawn) == 1 + bool(each.fact.get("hidden"))
         motors = [g for g in drawn[0].iter("{*}g") if g.get("class") == "motor"]
-        assert len(motors) == each.fact["word"].replace("*", "**").count("*") / 2 * 1 or len(motors) == sum(
-            joint.motor for leg in parse(each.fact["word"]).legs for joint in leg.joints)
+        assert len(motors) == sum(joint.motor for leg in parse(each.fact["word"]).legs for joint in leg.joints)
         for hidden in drawn[1:]:
             assert [g for g in hidden.iter("{*}g") if g.get("class") == "virtual"]
 
@@ -126,9 +128,9 @@ def test_drawings_are_well_formed_and_show_the_motors_and_the_virtual_actuators(
 def test_a_page_says_what_the_record_says(made, catalog):
     target, _ = made
     for each in structures(catalog):
-        text = (target / "p" / f"{each.name}.html").read_text(encoding="utf-8")
+        text = unescape((target / "p" / f"{each.name}.html").read_text(encoding="utf-8"))
         if "refused" in each.fact:
-            assert f"refused: {each.fact['refused'].split(':')[0]}" in text.replace("&#39;", "'")
+            assert f"refused: {each.fact['refused']}" in text
             continue
         assert f"{each.fact['verdict']}: watching all legs shows {each.fact['rank']} of {each.fact['dof']}" in text
         assert ("Proved in exact arithmetic" in text) == (each.fact["instances"] == 1)
@@ -141,7 +143,7 @@ def test_a_page_says_what_the_record_says(made, catalog):
             assert "{" + ", ".join(legs) + "}" in text
 
 
-@pytest.mark.parametrize("word", [word for word in WORDS if word not in ("3(Ra*!-Rb-Ra-Ph)",)])
+@pytest.mark.parametrize("word", [word for word in WORDS if word != REFUSED])
 def test_the_robot_file_is_what_save_writes_and_derives_as_the_record(made, catalog, word, tmp_path):
     target, _ = made
     file = target / "r" / f"{named(word)}.urdf"
@@ -210,12 +212,12 @@ def test_what_stands_in_a_page_is_made_safe():
     assert notation("2-Pi-{2-U*U}") == "2-Π-{2-<u>U</u>U}"
 
 
-def test_a_derivation_that_does_not_end_in_the_record_is_told(few):
-    fact = {**few.records[0], "hidden": "3-R*R", "rank": 2}
+def test_a_derivation_that_does_not_end_in_the_record_is_told(catalog):
+    fact = {**catalog.records[0], "hidden": "3-R*R", "rank": 2}
     found = study.study("3(Rz-Rz-Rz)", fact)
     assert found.derivation is not None
     assert found.differs == "3-PiR*R, controllable, rank 3"
-    assert not study.study("3(Rz-Rz-Rz)", few.records[0]).differs
+    assert not study.study("3(Rz-Rz-Rz)", catalog.records[0]).differs
 
 
 def refused(target: Path, catalog: Catalog) -> str:
