@@ -69,6 +69,9 @@ pictures: setup-all  ## draw the pictures in docs/pictures again
 	@$(BIN)/hrsynth servo 3rpr_m1 --from x=-0.08,y=-0.06,phi=-10deg --to x=0.034,y=0.23,phi=23deg -o docs/pictures/servo_3rpr.png > /dev/null
 	@$(BIN)/hrsynth servo quattro --observe 1,4 --from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0 -o docs/pictures/servo_quattro.gif > /dev/null
 	@$(BIN)/hrsynth accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7 -o docs/pictures/accuracy_quattro.png > /dev/null
+	@mkdir -p build
+	@$(BIN)/hrsynth catalog site --group planar --legs '3-R*RR' -o build/pages > /dev/null
+	@$(BIN)/python tests/browser.py build/pages/p/96081be379a6.html docs/pictures/catalog.png 1000 1100
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt

@@ -24,7 +24,8 @@ Dof = Annotated[int | None, typer.Option(help="Freedoms of the platform.")]
 Motion = Annotated[str | None, typer.Option(help="Its translations and turns, as 3T or 2T1R.")]
 Verdict = Annotated[str | None, typer.Option(help="controllable, partially controllable, uncontrollable.")]
 Group = Annotated[str | None, typer.Option(help="planar, pods, deltas, spatial.")]
-BaseMotors = Annotated[bool | None, typer.Option("--base-motors/--moving-motors", help="All motors on the base, or not.")]
+BaseMotors = Annotated[bool | None, typer.Option("--base-motors/--moving-motors", help="All motors on the base, or "
+                                                 "not.")]
 Fewest = Annotated[int | None, typer.Option(help="Legs to watch to see all that can be seen.")]
 Text = Annotated[str | None, typer.Option(help="What occurs in any field.")]
 
@@ -142,8 +143,8 @@ def show(
 
 @catalog.command()
 def site(
-    output: Annotated[str, typer.Option("-o", "--output", metavar="DIR", help="A new or empty folder, or an older site, "
-                                        "which is replaced.")],
+    output: Annotated[str, typer.Option("-o", "--output", metavar="DIR", help="A new or empty folder, or an older "
+                                        "site, which is replaced.")],
     legs: Legs = None,
     dof: Dof = None,
     motion: Motion = None,
@@ -157,7 +158,7 @@ def site(
     kept: Kept = None,
     json: Json = False,
 ) -> None:
-    """Pages of the architectures that fit: a list that filters, drawings, derivations, robot files; no server needed."""
+    """Pages of the architectures that fit: a list that filters, drawings, derivations, robot files; needs no server."""
     from .catalog import load
     from .catalog.site import site as run
     from .present import records

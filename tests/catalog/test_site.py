@@ -204,10 +204,10 @@ def test_steps_that_differ_by_their_leg_alone_are_one_row():
 
 def test_what_stands_in_a_page_is_made_safe():
     fact = {"word": "3(S-S)", "group": "none", "refused": "<b>1 < 2 & 'so'"}
-    shown = rendered("page.html", structure=Structure("3(S-S)", (fact,)), fact=fact, facts=[("refused", fact["refused"])],
-                     differs="<i>", real=None, hidden=None, blind=False, steps=[],
+    shown = rendered("page.html", structure=Structure("3(S-S)", (fact,)), fact=fact,
+                     facts=[("refused", fact["refused"])], differs="<i>", real=None, hidden=None, blind=False, steps=[],
                      variants=[{"name": "x", "word": "<u>", "notation": "", "motors": "", "joints": [], "file": False}])
-    assert "<b>" not in shown and "<i>" not in shown and "<u>" not in shown
+    assert not [tag for tag in ("<b>", "<i>", "<u>") if tag in shown]
     assert Page(shown).links[:2] == ["data:,", "../site.css"]
     assert notation("2-Pi-{2-U*U}") == "2-Π-{2-<u>U</u>U}"
 
@@ -295,9 +295,8 @@ def test_a_full_disk_stops_the_build_and_keeps_the_older_site(few, tmp_path, mon
 
 
 def test_one_build_at_a_time(few, tmp_path):
-    with folder.draft(tmp_path / "site", {"site": "other"}):
-        with pytest.raises(BadRequest, match="another build"):
-            site(few, tmp_path / "site")
+    with folder.draft(tmp_path / "site", {"site": "other"}), pytest.raises(BadRequest, match="another build"):
+        site(few, tmp_path / "site")
     assert (tmp_path / "site" / "site.json").is_file()
 
 

@@ -86,7 +86,8 @@ def _stamp(every: Iterable[Structure]) -> dict[str, str]:
     """What a site is made from: the version, its templates, its records."""
     digest = sha256()
     for kind in ("assets", "templates"):
-        for file in sorted(resources.files("hrsynth.catalog.site").joinpath(kind).iterdir(), key=lambda file: file.name):
+        files = resources.files("hrsynth.catalog.site").joinpath(kind).iterdir()
+        for file in sorted(files, key=lambda file: file.name):
             digest.update(file.read_bytes())
     for each in every:
         digest.update("\n".join(line(record) for record in each.records).encode())

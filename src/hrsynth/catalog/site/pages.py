@@ -14,6 +14,7 @@ from ...mechanism.model import Mechanism
 from ...present.drawings.schematic import robot_svg
 from ...present.text.catalog import facts, motors
 from ...rewrite.strategy import Step
+from ..lines import Record
 from ..source import Made, Stopped
 from .folder import FOLDERS
 from .render import rendered
@@ -88,7 +89,7 @@ def trace(steps: Iterable[Step]) -> list[dict[str, Any]]:
     return found
 
 
-def _variant(record: dict[str, Any], robot: Mechanism | None) -> dict[str, Any]:
+def _variant(record: Record, robot: Mechanism | None) -> dict[str, Any]:
     """What a page says of one architecture: its name, its motors, its file."""
     return {"name": named(record["word"]), "word": record["word"], "notation": record.get("notation", ""),
             "motors": motors(record) if "motors" in record else "",
