@@ -32,7 +32,7 @@ from hrsynth.rewrite.strategy import Step
 
 REFUSED = "3(Ra*!-Rb-Ra-Ph)"
 WORDS = ("3(Rz*-Rz-Rz)", "3(Rz-Rz*-Rz)", "(Rz!-Rz-Rz*)+2(Rz*!-Rz-Rz)", "point:2(Rz*-Rz-Rz)", "2(Rt*-2SSt)",
-         "3(Ro-Ro*-Ro)", REFUSED)
+         "3(Ro-Ro*-Ro)", "3(Ra*-Ro-Ro-Ro)", "3(Ra-Ro*-Ro-Ro)", REFUSED)
 VOID = {"meta", "link", "br", "input"}
 
 
@@ -91,11 +91,12 @@ def test_every_record_has_its_page_and_its_robot_file(made, catalog):
     target, done = made
     assert (done.architectures, done.differ) == (len(WORDS), ())
     assert done.pages == len(list((target / "p").iterdir())) == len(structures(catalog))
-    for word in WORDS:
-        page = (target / "p" / f"{named(str(parse(word).unmoved))}.html").read_text(encoding="utf-8")
-        assert f'data-name="{named(word)}"' in page
-        assert word in page
-        assert (target / "r" / f"{named(word)}.urdf").is_file()
+    for each in structures(catalog):
+        page = (target / "p" / f"{each.name}.html").read_text(encoding="utf-8")
+        for word in (known["word"] for known in each.records):
+            assert f'data-name="{named(word)}"' in page
+            assert word in page
+            assert (target / "r" / f"{named(word)}.urdf").is_file()
     assert len(list((target / "r").iterdir())) == len(WORDS)
 
 
@@ -163,7 +164,7 @@ def test_columns_hold_what_the_records_hold(catalog):
     assert sorted(held["word"]) == sorted(WORDS)
     for i, each in enumerate(records):
         assert held["word"][i] == each["word"]
-        assert held["pages"][held["page"][i]] == named(str(parse(each["word"]).unmoved))
+        assert each in every[held["page"][i]].records
         assert held["name"][i] == named(each["word"])
         for field in NUMBERS:
             assert held[field][i] == each.get(field)
@@ -171,7 +172,13 @@ def test_columns_hold_what_the_records_hold(catalog):
             place = held[field]["at"][i]
             own = each.get(field) if field in TEXTS else "; ".join(each.get(field) or ()) or None
             assert (None if place < 0 else held[field]["values"][place]) == own
+    assert held["pages"] == [structure.name for structure in every]
     assert json.loads(json.dumps(held)) == held
+
+
+def unmarked(word: str) -> set[str]:
+    """The chains of a word without motors and observed links."""
+    return {str(leg.canonical()).translate({ord("*"): None, ord("!"): None}) for leg in parse(word).legs}
 
 
 def test_structures_part_the_records_and_kin_differ_by_what_is_watched(catalog):
@@ -181,12 +188,20 @@ def test_structures_part_the_records_and_kin_differ_by_what_is_watched(catalog):
     assert len(words) == len(every)
     for each in every:
         assert Structure.unpacked(each.packed()) == each
-        assert {str(parse(record["word"]).unmoved) for record in each.records} == {each.word}
+        assert {str(parse(record["word"]).unmoved) for record in each.records} == {str(parse(each.word).unmoved)}
         for other, verdict in each.kin:
-            assert other.replace("!", "") != other or each.word.replace("!", "") != each.word
+            assert unmarked(other) == unmarked(each.word)
             assert verdict == words[other].fact.get("verdict", "refused")
             assert each.word in [word for word, _ in words[other].kin]
     assert [word for word, _ in words["3(Rz-Rz-Rz)"].kin] == ["3(Rz!-Rz-Rz)"]
+
+
+def test_motors_that_change_what_is_known_part_a_structure():
+    facts = [{"word": word, "group": "none", "rank": rank} for word, rank in (
+        ("3(Ra*-Ro-Ro-Ro)", 0), ("3(Ra-Ro*-Ro-Ro)", 3))]
+    assert [(each.word, each.fact["rank"]) for each in structures(facts)] == [
+        ("3(Ra-Ro*-Ro-Ro)", 3), ("3(Ra-Ro-Ro-Ro)", 0)]
+    assert len(structures([{**fact, "rank": 0} for fact in facts])) == 1
 
 
 def test_names_are_stable_and_distinct():
@@ -214,10 +229,10 @@ def test_what_stands_in_a_page_is_made_safe():
 
 def test_a_derivation_that_does_not_end_in_the_record_is_told(catalog):
     fact = {**catalog.records[0], "hidden": "3-R*R", "rank": 2}
-    found = study.study("3(Rz-Rz-Rz)", fact)
+    found = study.study(fact)
     assert found.derivation is not None
     assert found.differs == "3-PiR*R, controllable, rank 3"
-    assert not study.study("3(Rz-Rz-Rz)", catalog.records[0]).differs
+    assert not study.study(catalog.records[0]).differs
 
 
 def refused(target: Path, catalog: Catalog) -> str:

@@ -31,7 +31,7 @@ def written(folder: str, parts: Iterable[str]) -> Made:
     found: Made = []
     for part in parts:
         structure = Structure.unpacked(part)
-        studied = study(structure.word, structure.fact)
+        studied = study(structure.fact)
         try:
             _write(Path(folder), structure, studied)
         except OSError as error:

@@ -1,4 +1,4 @@
-"""Structures: the architectures that differ by their motors alone have one hidden robot, one verdict, and one page."""
+"""Structures: architectures that differ by their motors alone have one hidden robot, one verdict, and one page."""
 
 from __future__ import annotations
 
@@ -20,10 +20,14 @@ def named(word: str) -> str:
     return sha256(word.encode()).hexdigest()[:LENGTH]
 
 
+OF_MOTORS = frozenset({"word", "notation", "motors", "motor_rank", "driven", "base_motors"})
+"""Fields of a record that depend on its motors."""
+
+
 @dataclass(frozen=True)
 class Structure:
-    """A word without motors, the records of its architectures, and its kin: words and verdicts of the structures that
-    differ from it by the observed segments alone."""
+    """A word without motors (with motors, where these change what is known), the records of its architectures, and its
+    kin: words and verdicts of the structures that differ from it by the observed segments alone."""
 
     word: str
     records: tuple[Record, ...]
@@ -53,13 +57,17 @@ class Structure:
 
 def structures(records: Iterable[Record]) -> tuple[Structure, ...]:
     """The structures of records, sorted by word; their records by word too, those with all motors on the base first."""
+    alike: dict[str, dict[str, list[Record]]] = {}
+    for each in sorted(records, key=lambda record: (not record.get("base_motors"), record["word"])):
+        common = line({**each, **dict.fromkeys(OF_MOTORS), "word": ""})
+        alike.setdefault(str(parse(each["word"]).unmoved), {}).setdefault(common, []).append(each)
     own: dict[str, list[Record]] = {}
     unseen: dict[str, list[str]] = {}
-    for each in sorted(records, key=lambda record: (not record.get("base_motors"), record["word"])):
-        word = parse(each["word"]).unmoved
-        own.setdefault(str(word), []).append(each)
-        if len(own[str(word)]) == 1:
-            unseen.setdefault(str(_unseen(word)), []).append(str(word))
+    for unmoved, parts in alike.items():
+        for part in parts.values():
+            word = part[0]["word"] if unmoved in own else unmoved
+            own[word] = part
+            unseen.setdefault(str(_unseen(parse(unmoved))), []).append(word)
     kin = {word: words for words in unseen.values() for word in words}
     return tuple(Structure(word, tuple(own[word]), tuple((other, own[other][0].get("verdict", "refused"))
                                                          for other in sorted(kin[word]) if other != word))

@@ -8,7 +8,7 @@ from ...analysis.derive import Derivation, derived
 from ...analysis.setting import prepare
 from ...errors import HrsynthError
 from ...mechanism.model import Mechanism
-from ..entry import SAMPLES
+from ..entry import SAMPLES, model
 from ..geometry import mechanism
 from ..lines import Record
 from ..words import parse
@@ -33,13 +33,13 @@ class Study:
         return mechanism(parse(word), self.attempt)
 
 
-def study(word: str, record: Record) -> Study:
-    """Derive the hidden robot of a word without motors in the dimensions of its record; none where it is refused."""
+def study(record: Record) -> Study:
+    """Derive the hidden robot of a record in its dimensions; none where it is refused."""
     attempt = record.get("attempt", 0)
     if "refused" in record:
         return Study(attempt)
     try:
-        setting = prepare(mechanism(parse(word).driven, attempt), samples=SAMPLES)
+        setting = prepare(mechanism(model(parse(record["word"])), attempt), samples=SAMPLES)
         found = derived(setting, beside=False)
     except HrsynthError as error:
         return Study(attempt, differs=str(error).splitlines()[0])
