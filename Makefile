@@ -86,6 +86,8 @@ pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again
 	@$(BIN)/python tests/browser.py build/quattro.html docs/pictures/report_quattro.png 1200 1500
 	@$(BIN)/hrsynth derive uranesx --report build/uranesx.html > /dev/null
 	@$(BIN)/python tests/browser.py build/uranesx.html docs/pictures/report_uranesx.png 1200 1500
+	@$(BIN)/hrsynth catalog site --group planar --legs '3-R*RR' -o build/pages > /dev/null
+	@$(BIN)/python tests/browser.py build/pages/p/96081be379a6.html docs/pictures/catalog.png 1000 1100
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt
