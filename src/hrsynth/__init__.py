@@ -12,12 +12,13 @@ if TYPE_CHECKING:
     from .analysis.modes.modes import modes
     from .analysis.singularity.singular import singular
     from .description import load, save, shipped
+    from .present.view.view import view
     from .selection.select import select
     from .servo.servo import servo
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "accuracy", "advise", "check", "derive", "legs", "load", "modes", "path", "save", "select",
-           "servo", "shipped", "singular"]
+           "servo", "shipped", "singular", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
@@ -33,6 +34,7 @@ _HOME = {
     "servo": ".servo.servo",
     "shipped": ".description",
     "singular": ".analysis.singularity.singular",
+    "view": ".present.view.view",
 }
 
 
