@@ -439,7 +439,7 @@ def view(
     elif static is None:
         from .present.view.server import serve
 
-        serve(found, port, lambda address: _shown(written(found, address), address if open_ else None))
+        serve(found, port, lambda _, address: _shown(written(found, address), address if open_ else None))
     else:
         typer.echo(written(found, static))
 

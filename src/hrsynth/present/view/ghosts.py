@@ -29,10 +29,10 @@ class Ghost:
     @property
     def words(self) -> str:
         """The pose, short."""
-        x, y, z = ((value or 0.0) + 0.0 for value in (self.pose.x, self.pose.y, self.pose.z))
-        turn = np.degrees(self.pose.rpy or (0.0,))
-        turned = ", rpy " + "/".join(f"{angle:.1f}" for angle in turn) + "°" if np.max(np.abs(turn)) > 0.05 else ""
-        return f"x {x:.3f}, y {y:.3f}, z {z:.3f} m{turned}"
+        x, y, z = (round(value or 0.0, 3) + 0.0 for value in (self.pose.x, self.pose.y, self.pose.z))
+        turn = np.round(np.degrees(self.pose.rpy or np.zeros(3)), 1) + 0.0
+        turned = ", rpy " + "/".join(f"{angle:g}" for angle in turn) + "°" if turn.any() else ""
+        return f"x {x:g}, y {y:g}, z {z:g} m{turned}"
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""

@@ -147,7 +147,7 @@ class Page {
   aim() {
     const n = scene.normal, half = Math.PI * 13 / 180;
     const from = n ? vector(n).add(Math.abs(n[2]) > 0.9 ? new THREE.Vector3(0, -0.4, 0) : new THREE.Vector3(0.1, 0, 0.4))
-      : new THREE.Vector3(0.85, -1.5, 0.6);
+      : new THREE.Vector3(0.6, -1.6, 0.62);
     from.set(from.x, from.z, -from.y).normalize();
     const [across, up] = [new THREE.Vector3(0, 1, 0).cross(from).normalize(), new THREE.Vector3()];
     up.crossVectors(from, across);
@@ -158,7 +158,7 @@ class Page {
     const size = ends.map(([low, high]) => high - low), target = new THREE.Vector3();
     [across, up, from].forEach((axis, i) => target.addScaledVector(axis, (ends[i][0] + ends[i][1]) / 2));
     const wide = $("pane").offsetWidth / window.innerHeight;
-    const away = 0.56 * Math.max(size[1], size[0] / wide) / Math.tan(half) + 0.5 * size[2];
+    const away = 0.535 * Math.max(size[1], size[0] / wide) / Math.tan(half) + 0.5 * size[2];
     const camera = new THREE.PerspectiveCamera(2 * 13, wide, 0.01 * away, 100 * away);
     camera.position.copy(target).addScaledVector(from, away);
     this.viewer.controls.dispose();
@@ -248,7 +248,7 @@ class Panel {
       const row = element("label", $("modes"));
       const input = element("input", row, undefined, { type: "checkbox", checked: this.chosen[i] });
       element("b", row, record.label).style.background = "#" + new THREE.Color(GHOSTS[i % GHOSTS.length]).getHexString();
-      row.append(` ${record.words}${record.reachable ? "" : " (cannot be assembled)"}`);
+      element("span", row, `${record.words}${record.reachable ? "" : " (cannot be assembled)"}`);
       input.onchange = () => { this.chosen[i] = input.checked; this.reveal(); };
     });
     this.page.haunt(ghosts);
@@ -289,7 +289,7 @@ class Panel {
     for (const [key, text, there] of offers) if (there) {
       const box = element("label", $("toggles"));
       const input = element("input", box, undefined, { type: "checkbox", checked: true, id: `show-${key}` });
-      box.append(` ${text}`);
+      element("span", box, text);
       input.onchange = () => { this.shown[key] = input.checked; this.reveal(); };
     }
   }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -56,49 +57,62 @@ class Session:
         return reply
 
 
-def serve(found: View, port: int, ready: Callable[[str], None]) -> None:
-    """Answer until an interrupt; ``ready`` is told the address once it can be opened. Port 0 is any that is free.
+class Server(ThreadingHTTPServer):
+    """The page at the root, and answers to its questions."""
+
+    daemon_threads = True
+
+    def __init__(self, found: View, port: int) -> None:
+        self.session, self.shown = Session(found), page(found, live=True).encode()
+        super().__init__((HOST, port), Handler)
+
+
+class Handler(BaseHTTPRequestHandler):
+    """One question to a :class:`Server`."""
+
+    server: Server
+
+    def do_GET(self) -> None:
+        """The page, and nothing else."""
+        if self.path == "/":
+            self._reply(HTTPStatus.OK, self.server.shown, "text/html; charset=utf-8")
+        else:
+            self._reply(HTTPStatus.NOT_FOUND)
+
+    def do_POST(self) -> None:
+        """A question of the page's sliders."""
+        try:
+            size = int(self.headers.get("Content-Length", ""))
+            if self.path != "/pose" or not 0 <= size <= LONGEST:
+                raise ValueError(self.path)
+            answer = self.server.session.answer(json.loads(self.rfile.read(size)))
+        except (ValueError, KeyError, TypeError, AttributeError):
+            self._reply(HTTPStatus.BAD_REQUEST)
+        else:
+            self._reply(HTTPStatus.OK, json.dumps(answer).encode(), "application/json")
+
+    def _reply(self, status: HTTPStatus, body: bytes = b"", kind: str = "text/plain") -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Nothing: the library never prints."""
+
+
+def serve(found: View, port: int, ready: Callable[[Server, str], None]) -> None:
+    """Answer until an interrupt or the server's ``shutdown``; ``ready`` is told the server and its address once the
+    page can be opened. Port 0 is any that is free.
 
     Raises ``BadRequest`` for a port that cannot be had.
     """
-    session, shown = Session(found), page(found, live=True).encode()
-
-    class Handler(BaseHTTPRequestHandler):
-        def do_GET(self) -> None:
-            if self.path == "/":
-                self.reply(HTTPStatus.OK, shown, "text/html; charset=utf-8")
-            else:
-                self.reply(HTTPStatus.NOT_FOUND, b"", "text/plain")
-
-        def do_POST(self) -> None:
-            try:
-                size = int(self.headers.get("Content-Length", ""))
-                if self.path != "/pose" or not 0 <= size <= LONGEST:
-                    raise ValueError(self.path)
-                answer = session.answer(json.loads(self.rfile.read(size)))
-            except (ValueError, KeyError, TypeError, AttributeError):
-                self.reply(HTTPStatus.BAD_REQUEST, b"", "text/plain")
-            else:
-                self.reply(HTTPStatus.OK, json.dumps(answer).encode(), "application/json")
-
-        def reply(self, status: HTTPStatus, body: bytes, kind: str) -> None:
-            self.send_response(status)
-            self.send_header("Content-Type", kind)
-            self.send_header("Content-Length", str(len(body)))
-            self.end_headers()
-            self.wfile.write(body)
-
-        def log_message(self, format: str, *args: object) -> None:
-            pass
-
     try:
-        server = ThreadingHTTPServer((HOST, port), Handler)
+        server = Server(found, port)
     except (OSError, OverflowError) as error:
         reason = getattr(error, "strerror", None) or "no such port"
         raise BadRequest(f"cannot serve the view: {reason}", port, "a free port, or 0 for any") from None
-    with server:
-        try:
-            ready(f"http://{HOST}:{server.server_port}/")
-            server.serve_forever()
-        except KeyboardInterrupt:
-            return
+    with server, contextlib.suppress(KeyboardInterrupt):
+        ready(server, f"http://{HOST}:{server.server_port}/")
+        server.serve_forever()

@@ -3,7 +3,7 @@ const { THREE } = MeshCat;
 
 const COLOURS = { base: 0x8794a5, leg: 0x6d7f96, platform: 0x98a2ae, virtual: 0xa98be0, joint: 0x2f3b4a,
                   motor: 0xf08a24, actuator: 0xd81b7a, arrow: 0x1463e0, pale: 0x9aa5b1 };
-const GHOSTS = [0x1a9c8c, 0x9a5fd0, 0xc0762a, 0x3d7fd6, 0x7a9a1f, 0xc2487e, 0x5a6b7d];
+const GHOSTS = [0x1a9c8c, 0xb8742a, 0x7a9a1f, 0xa8503a, 0x2f7fa8, 0x4f8a4c, 0x7d6b5a];
 const STRONG = { motor: 1.3, actuator: 1.45 };
 const STOPS = [[0, 0xc81e2c], [0.2, 0xee7d2f], [0.4, 0xf3c44a], [0.7, 0x63b86f], [1, 0x14795a]];
 
