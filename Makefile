@@ -12,6 +12,11 @@ PYTEST = OMP_NUM_THREADS=1 $(BIN)/pytest -q -n $(JOBS)
 LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
+COMMA := ,
+# the view of a robot in the browser, as docs/pictures/view_NAME.png
+VIEWED = $(BIN)/hrsynth view $(1) --static $(VENV)/view.html > /dev/null && \
+	$(BIN)/python tests/browser.py $(VENV)/view.html docs/pictures/view_$(2).png 1100 760
+
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme pictures lock setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
@@ -52,7 +57,7 @@ readme: setup  ## regenerate the README's tables
 bench: setup-all  ## run the benchmarks and write their table in the README (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py README.md
 
-pictures: setup-all  ## draw the pictures in docs/pictures again
+pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again
 	@mkdir -p docs/pictures
 	@$(BIN)/hrsynth modes rrrrr_m1 -o docs/pictures/modes_rrrrr.png > /dev/null
 	@$(BIN)/hrsynth modes 3rrr_m1 -o docs/pictures/modes_3rrr.png > /dev/null
@@ -65,6 +70,11 @@ pictures: setup-all  ## draw the pictures in docs/pictures again
 	@$(BIN)/hrsynth servo 3rpr_m1 --from x=-0.08,y=-0.06,phi=-10deg --to x=0.034,y=0.23,phi=23deg -o docs/pictures/servo_3rpr.png > /dev/null
 	@$(BIN)/hrsynth servo quattro --observe 1,4 --from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0 -o docs/pictures/servo_quattro.gif > /dev/null
 	@$(BIN)/hrsynth accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7 -o docs/pictures/accuracy_quattro.png > /dev/null
+	@$(call VIEWED,rrrrr_m1 --hidden,rrrrr)
+	@$(call VIEWED,3rrr_m1 --hidden,3rrr)
+	@$(call VIEWED,gough_stewart --hidden --observe 1$(COMMA)3$(COMMA)5,gough_stewart)
+	@$(call VIEWED,quattro --hidden --observe 1$(COMMA)4,quattro)
+	@$(call VIEWED,uranesx --hidden,uranesx)
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt

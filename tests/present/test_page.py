@@ -131,7 +131,7 @@ def test_with_a_server_sliders_move_the_robot_together(tab: Tab, address: str):
 def test_the_page_is_whole_and_asks_for_nothing():
     text = page.page(seen("rrrrr_m1"))
     outside = re.sub(r"<script>.*?</script>", "", text, flags=re.DOTALL)
-    assert not re.search(r"(src|href)\s*=\s*[\"']?(?!data:)", outside)
+    assert not re.search(r"(src|href)\s*=\s*[\"'](?!data:)", outside)
     assert text.count("<script") == 3
     assert "Three.js Authors" in text
 
@@ -147,7 +147,7 @@ def test_a_name_cannot_break_the_page():
 
 
 def test_an_interrupt_ends_the_server_quietly():
-    command = [sys.executable, "-m", "hrsynth", "view", "rrrrr_m1", "--no-open"]
+    command = [sys.executable, "-m", "hrsynth.cli", "view", "rrrrr_m1", "--no-open"]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                env={**os.environ, "PYTHONUNBUFFERED": "1"})
     assert process.stdout is not None

@@ -20,7 +20,7 @@ from present.views import miss, moved, seen, serving
 FIVE_BAR = "rrrrr_m1"
 
 
-@pytest.fixture(params=[FIVE_BAR, "quattro"])
+@pytest.fixture(params=[FIVE_BAR, pytest.param("quattro", marks=pytest.mark.slow)])
 def found(request: pytest.FixtureRequest) -> View:
     return seen(request.param)
 
@@ -74,7 +74,8 @@ def test_beyond_the_workspace_it_stops_at_its_edge(found: View, address: str):
 def test_what_is_no_question_is_refused(found: View, address: str, body: object):
     with pytest.raises(urllib.error.HTTPError) as error:
         ask(address, body)
-    assert error.value.code == 400
+    with error.value:
+        assert error.value.code == 400
 
 
 @pytest.mark.parametrize("found", [FIVE_BAR], indirect=True)
@@ -83,7 +84,8 @@ def test_only_the_page_can_be_read(found: View, address: str):
         assert reply.read().startswith(b"<!DOCTYPE html>")
     with pytest.raises(urllib.error.HTTPError) as error:
         urllib.request.urlopen(address + "etc/passwd", timeout=20)
-    assert error.value.code == 404
+    with error.value:
+        assert error.value.code == 404
 
 
 @pytest.mark.parametrize("found", [FIVE_BAR], indirect=True)

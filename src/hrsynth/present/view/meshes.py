@@ -67,6 +67,8 @@ def _solid(geometry: Any, folder: Path) -> Any:
         raise ValueError("no geometry")
     path = _local(geometry.mesh.filename, folder)
     solid = trimesh.load(path, force="mesh")
+    if not len(solid.faces):
+        raise ValueError(f"no triangles in {path.name}")
     solid.apply_scale(1.0 if geometry.mesh.scale is None else geometry.mesh.scale)
     return solid
 

@@ -27,7 +27,7 @@ class Machine {
     if (shape.role === "platform") return this.platform;
     const clear = shape.role === "base" && shape.kind === "plate";
     const key = shape.role + (clear ? " plate" : "");
-    this.plain[key] ||= material(COLOURS[shape.role], clear ? { transparent: true, opacity: 0.22, depthWrite: false } : {});
+    this.plain[key] ||= material(COLOURS[shape.role], clear ? { ...BEHIND, opacity: 0.22, polygonOffsetUnits: 8 } : {});
     return this.plain[key];
   }
 
@@ -55,7 +55,7 @@ function moved(point, place) {
 /* The real robot at another assembly mode, its rods and plates: all of them, or those of its platform alone. */
 function ghost(record, number) {
   const group = new THREE.Group(), colour = GHOSTS[number % GHOSTS.length];
-  const look = material(colour, { transparent: true, opacity: record.reachable ? 0.26 : 0.16, depthWrite: false });
+  const look = material(colour, { ...BEHIND, opacity: record.reachable ? 0.26 : 0.16 });
   const corners = [];
   for (const shape of scene.machines[0].shapes) {
     const place = record.places[shape.link], other = record.places[shape.other ?? shape.link];
@@ -97,7 +97,7 @@ class Page {
 
   arrow(record) {
     const group = new THREE.Group(), ends = record.ends.map(vector);
-    group.add(...arrow(ends[0], ends[1], 1.75 * radius, material(COLOURS.arrow, { emissive: 0x062050 })));
+    group.add(...arrow(ends[0], ends[1], 1.9 * radius, material(COLOURS.arrow, { emissive: 0x062050 })));
     const name = label(record.leg, COLOURS.arrow, 0.14 * length);
     name.position.copy(ends[1]).lerp(ends[0], 0.85);
     group.add(name);
@@ -130,7 +130,7 @@ class Page {
     if (hidden) hidden.group.visible = shown.hidden;
     const both = Boolean(hidden && shown.hidden), links = real.record.links;
     const shared = links.map((link) => both && hidden.record.links.includes(link));
-    this.pale ||= material(COLOURS.pale, { transparent: true, opacity: 0.3, depthWrite: false });
+    this.pale ||= material(COLOURS.pale, { ...BEHIND, opacity: 0.3 });
     real.links.forEach((group, i) => { group.visible = !shared[i]; });
     real.spans.forEach(({ holder, shape }) => { holder.visible = !(shared[shape.link] && shared[shape.other]); });
     real.group.traverse((mesh) => {

@@ -7,6 +7,8 @@ const GHOSTS = [0x1a9c8c, 0xb8742a, 0x7a9a1f, 0xa8503a, 0x2f7fa8, 0x4f8a4c, 0x7d
 const STRONG = { motor: 1.3, actuator: 1.45 };
 const STOPS = [[0, 0xc81e2c], [0.2, 0xee7d2f], [0.4, 0xf3c44a], [0.7, 0x63b86f], [1, 0x14795a]];
 
+const BEHIND = { transparent: true, depthWrite: false, polygonOffset: true, polygonOffsetFactor: 1, polygonOffsetUnits: 2 };
+
 const vector = (p) => new THREE.Vector3(p[0], p[1], p[2]);
 
 function material(colour, more = {}) {
@@ -45,7 +47,8 @@ function fan(points, faces) {
 /* The geometries of a shape, each with the points between which it is stretched, if any. */
 function pieces(shape) {
   const p = shape.points.map(vector), s = shape.size * (STRONG[shape.role] || 1);
-  const middle = () => p[0].clone().lerp(p[p.length - 1], 0.5);
+  const middle = p[0].clone().lerp(p[Math.min(1, p.length - 1)], 0.5);
+  if (STRONG[shape.role]) p.forEach((end) => end.lerp(middle, 1 - STRONG[shape.role]));
   switch (shape.kind) {
     case "rod": case "rail": case "span": case "hinge": case "disc":
       return [[cylinder(s), p[0], p[1]]];
@@ -55,7 +58,7 @@ function pieces(shape) {
       return [[new THREE.SphereGeometry(s, 28, 20), p[0]]];
     case "cross":
       return [[cylinder(s), p[0], p[1]], [cylinder(s), p[2], p[3]],
-              [new THREE.SphereGeometry(1.5 * s, 24, 16), p[0].clone().lerp(p[1], 0.5)]];
+              [new THREE.SphereGeometry(1.5 * s, 24, 16), middle]];
     case "plate": {
       const hub = shape.points[0].map((_, i) => shape.points.reduce((sum, each) => sum + each[i], 0) / p.length);
       return [[fan([hub, ...shape.points], p.map((_, i) => [0, i + 1, (i + 1) % p.length + 1]))]];
@@ -63,7 +66,7 @@ function pieces(shape) {
     case "mesh":
       return [[fan(shape.points, shape.faces)]];
   }
-  return [[new THREE.SphereGeometry(s), middle()]];
+  throw new Error(`no such shape: ${shape.kind}`);
 }
 
 /* Meshes of a shape in the frame of its link. */
