@@ -18,7 +18,7 @@ VIEWED = $(BIN)/hrsynth view $(1) --static $(VENV)/view.html > /dev/null && \
 	$(BIN)/python tests/browser.py $(VENV)/view.html docs/pictures/view_$(2).png 1100 760
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme pictures lock setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog pictures lock setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -53,6 +53,10 @@ robots: setup  ## regenerate robots/*.urdf from the families
 
 readme: setup  ## regenerate the README's tables
 	@$(BIN)/python -m hrsynth.present.readme README.md
+	@$(BIN)/python -m hrsynth.catalog.readme README.md
+
+catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS= processes; hours)
+	@$(BIN)/hrsynth catalog build --workers $(JOBS)
 
 bench: setup-all  ## run the benchmarks and write their table in the README (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py README.md

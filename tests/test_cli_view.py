@@ -18,7 +18,7 @@ def ask(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, s
     return status, out, err
 
 
-def refused(answer: tuple[int, str, str], status: int, words: str) -> None:
+def assert_refused(answer: tuple[int, str, str], status: int, words: str) -> None:
     assert (answer[0], answer[1]) == (status, ""), answer
     assert answer[2].startswith("hrsynth: ")
     assert answer[2].count("\n") == 1
@@ -47,15 +47,15 @@ def test_the_record_says_what_is_shown(capfd: pytest.CaptureFixture[str], tmp_pa
 
 @pytest.mark.parametrize("file", ["view.png", "view", "view.html.txt"])
 def test_other_endings_are_refused(capfd: pytest.CaptureFixture[str], tmp_path: Path, file: str):
-    refused(ask(capfd, "rrrrr_m1", "--static", str(tmp_path / file)), 2, "unknown ending")
+    assert_refused(ask(capfd, "rrrrr_m1", "--static", str(tmp_path / file)), 2, "unknown ending")
     assert not list(tmp_path.iterdir())
 
 
 def test_what_cannot_be_done_is_refused_in_one_line(capfd: pytest.CaptureFixture[str], tmp_path: Path):
-    refused(ask(capfd, "rrrrr_m1", "--static", str(tmp_path / "none" / "view.html")), 2, "no such folder")
-    refused(ask(capfd, "rrrrr_m1", "--observe", "7", "--static", str(tmp_path / "view.html")), 2, "has no leg or link")
-    refused(ask(capfd, "nobody", "--static", str(tmp_path / "view.html")), 2, "nobody")
-    refused(ask(capfd, "rrrrr_m1", "--port", "70000"), 2, "65535")
+    assert_refused(ask(capfd, "rrrrr_m1", "--static", str(tmp_path / "none" / "view.html")), 2, "no such folder")
+    assert_refused(ask(capfd, "rrrrr_m1", "--observe", "7", "--static", str(tmp_path / "view.html")), 2, "has no leg or link")
+    assert_refused(ask(capfd, "nobody", "--static", str(tmp_path / "view.html")), 2, "nobody")
+    assert_refused(ask(capfd, "rrrrr_m1", "--port", "70000"), 2, "65535")
     assert not list(tmp_path.iterdir())
 
 
@@ -63,7 +63,7 @@ def test_a_port_that_is_taken_is_refused(capfd: pytest.CaptureFixture[str]):
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
-        refused(ask(capfd, "rrrrr_m1", "--no-open", "--port", str(taken.getsockname()[1])), 2, "cannot serve the view")
+        assert_refused(ask(capfd, "rrrrr_m1", "--no-open", "--port", str(taken.getsockname()[1])), 2, "cannot serve the view")
 
 
 def test_without_meshcat_the_extra_is_named(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
@@ -72,4 +72,4 @@ def test_without_meshcat_the_extra_is_named(capfd: pytest.CaptureFixture[str], m
 
     there = importlib.util.find_spec
     monkeypatch.setattr(importlib.util, "find_spec", find)
-    refused(ask(capfd, "rrrrr_m1", "--no-open"), 3, 'pip install "hrsynth[view]"')
+    assert_refused(ask(capfd, "rrrrr_m1", "--no-open"), 3, 'pip install "hrsynth[view]"')

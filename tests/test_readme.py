@@ -5,10 +5,12 @@ from __future__ import annotations
 import contextlib
 import io
 import re
+import shlex
 from pathlib import Path
 
 import pytest
 
+from hrsynth.catalog import readme as catalog
 from hrsynth.cli import _run
 from hrsynth.description import shipped
 from hrsynth.families.replays import REPLAYS, SIMULATED
@@ -52,6 +54,10 @@ def test_the_replays_are_fresh():
     assert readme.block(TEXT, replays.START) == replays.table(), "the README is stale: make readme"
 
 
+def test_the_table_of_the_catalog_is_fresh():
+    assert readme.block(TEXT, catalog.START) == catalog.table(), "the README is stale: make readme"
+
+
 def test_the_text_outside_the_marks_is_kept():
     assert readme.replaced(TEXT, readme.block(TEXT)) == TEXT
     other = readme.replaced(TEXT, "none at all\n")
@@ -70,9 +76,11 @@ def test_the_python_example_runs_and_prints_what_it_says():
 
 
 @pytest.mark.parametrize("command", re.findall(r"\$ hrsynth (\w.*)", TEXT))
-def test_the_commands_print_what_the_readme_shows(command: str, capsys: pytest.CaptureFixture[str]):
+def test_the_commands_print_what_the_readme_shows(command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,
+                                                  monkeypatch: pytest.MonkeyPatch):
     """Line by line, decimal numbers and widths left out of it; the README may leave lines out."""
-    assert _run(command.split()) == 0
+    monkeypatch.chdir(tmp_path)
+    assert _run(shlex.split(command)) == 0
     printed = {_plain(line) for line in capsys.readouterr().out.splitlines()}
     shown = re.search(re.escape(f"$ hrsynth {command}\n") + r"(.*?)\n(?:```|\n?\$ )", TEXT, re.DOTALL)[1]
     missing = [line for line in shown.splitlines() if line.strip() not in ("", "…") and _plain(line) not in printed]

@@ -3,6 +3,7 @@
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from . import catalog
     from .analysis.accuracy.accuracy import accuracy
     from .analysis.advice import advise
     from .analysis.aspects.path import path
@@ -17,8 +18,8 @@ if TYPE_CHECKING:
     from .servo.servo import servo
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "accuracy", "advise", "check", "derive", "legs", "load", "modes", "path", "save", "select",
-           "servo", "shipped", "singular", "view"]
+__all__ = ["__version__", "accuracy", "advise", "catalog", "check", "derive", "legs", "load", "modes", "path", "save",
+           "select", "servo", "shipped", "singular", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
@@ -40,10 +41,12 @@ _HOME = {
 
 def __getattr__(name: str) -> object:
     """The public functions, imported when they are first asked for (``import hrsynth`` alone stays light)."""
-    if name not in _HOME:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from importlib import import_module
 
+    if name == "catalog":
+        return import_module(".catalog", __name__)
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     value: object = globals().setdefault(name, getattr(import_module(_HOME[name], __name__), name))
     return value
 

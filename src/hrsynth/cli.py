@@ -14,6 +14,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from .cli_catalog import catalog
+
 if TYPE_CHECKING:
     from .mechanism import Mechanism
 
@@ -21,6 +23,7 @@ app = typer.Typer(
     name="hrsynth", invoke_without_command=True, add_completion=False, rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Hidden robots of parallel robots that are controlled by watching the directions of their legs.")
+app.add_typer(catalog)
 
 ROBOT = typer.Argument(metavar="ROBOT", help="A robot file in any dialect, or the name of a shipped robot.")
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]

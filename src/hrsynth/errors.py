@@ -153,6 +153,16 @@ class NotConfined(HrsynthError):
         super().__init__(f"{robot}: its assembly modes cannot be listed, which is not supported here: {reason}")
 
 
+class NotConfirmed(HrsynthError):
+    """An architecture without a verdict that is exact and that closed configurations confirm: why."""
+
+    exit_status = 3
+
+    def __init__(self, robot: str, what: str) -> None:
+        self.robot, self.what = robot, what
+        super().__init__(f"{robot}: no confirmed verdict: {what}")
+
+
 class NotCertified(HrsynthError):
     """No hidden robot passed the certificate: the best angle seen."""
 
@@ -193,3 +203,27 @@ class NotRendered(HrsynthError):
     def __init__(self, reason: str) -> None:
         self.reason = reason
         super().__init__(f"pictures cannot be rendered here: {reason} (MUJOCO_GL chooses between egl, osmesa and glfw)")
+
+
+class BuildStopped(HrsynthError):
+    """A build of the catalog that cannot go on: why, and the journal that keeps what was built, if any."""
+
+    exit_status = 3
+
+    def __init__(self, reason: str, kept: str | None = None) -> None:
+        self.reason, self.kept = reason, kept
+        rest = "" if kept is None else f"; what was built is kept in {kept}, the same command goes on"
+        super().__init__(f"the build stopped: {reason}{rest}")
+
+
+class CatalogStale(HrsynthError):
+    """A stored catalog that is not what is built today: what differs, a line each."""
+
+    exit_status = 3
+
+    def __init__(self, complaints: Iterable[str]) -> None:
+        self.complaints = tuple(complaints)
+        super().__init__("; ".join(self.complaints))
+
+    def lines(self) -> list[str]:
+        return list(self.complaints)

@@ -97,7 +97,11 @@ def advise(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     """
     tell = progress or silent
     tell("sampling")
-    setting = prepare(robot, observe, camera, seed=seed)
+    return advised(prepare(robot, observe, camera, seed=seed), tell)
+
+
+def advised(setting: Setting, tell: Callable[[str], None] = silent, *, most: int | None = None) -> Advice:
+    """What is missing in a setting, as :func:`advise`; of the smallest sets at most so many are verified and given."""
     now = verdict_of(setting, setting.labels, setting.samples)
     if now.verdict == CONTROLLABLE:
         return Advice(setting, now, (), 0, True)
@@ -106,8 +110,8 @@ def advise(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     search = Search(samples, len(setting.observed), everything)
     chosen, complete = search.smallest(tell)
     tell("verification")
-    sets = _verified(setting, samples, [tuple(search.useful[i] for i in places) for places in chosen])
-    undecided = len(chosen) - len(sets)
+    sets = _verified(setting, samples, [tuple(search.useful[i] for i in places) for places in chosen[:most]])
+    undecided = len(chosen[:most]) - len(sets)
     best = max((each.verdict.rank for each in sets), default=now.rank)
     kept = tuple(each for each in sets if each.verdict.rank == best)
     return Advice(setting, now, kept, search.tried, complete and not undecided, undecided)

@@ -118,10 +118,15 @@ def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     """
     if form not in FORMS:
         raise BadRequest("unknown form", form, FORMS)
-
     tell = progress or silent
     tell("sampling")
-    setting = prepare(robot, observe, camera, seed=seed)
+    return derived(prepare(robot, observe, camera, seed=seed), form=form, progress=tell)
+
+
+def derived(setting: Setting, *, form: str = "simplified", beside: bool = True,
+            progress: Callable[[str], None] = silent) -> Derivation:
+    """The certified hidden robot of a setting, as :func:`derive`; ``beside``: with the paper's own form."""
+    tell, robot = progress, setting.robot
     anatomy, samples = setting.anatomy, setting.samples
     verdict = verdict_of(setting, setting.labels, samples)
     exact = exact_architecture(setting).verdict(setting.observed)
@@ -138,7 +143,7 @@ def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
         if not (certificate.passed and _virtual_only(result)):
             result, hidden, certificate = _fallback(setting, evidence, samples, certificate, run)
         architecture: Architecture | None = result.state.architecture()
-        if form == "simplified" and architecture is not None:
+        if beside and form == "simplified" and architecture is not None:
             tell("the paper's form")
             paper = _paper_form(setting, evidence, samples, architecture, certificate)
     else:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import shutil
+from collections.abc import Iterator
 from pathlib import Path
 
 from ..errors import BadRequest
@@ -37,19 +39,31 @@ def require_same(path: Path, content: bytes) -> None:
 def write_whole(path: str | Path, content: bytes) -> None:
     """Write a file under a temporary name, then rename it; raises ``BadRequest`` where it cannot be written."""
     try:
-        target = Path(os.path.realpath(path))
-        if target.is_dir():
-            raise BadRequest("cannot write the file: a directory", str(path))
-        if target.exists() and not target.is_file():
-            raise BadRequest("cannot write the file: not a regular file", str(path))
-        draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
-        try:
+        with drafted(path) as draft:
             draft.write_bytes(content)
-            if target.exists():
-                shutil.copymode(target, draft)
-            os.replace(draft, target)
-        finally:
-            draft.unlink(missing_ok=True)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise BadRequest(f"cannot write the file: {reason}", str(path)) from None
+
+
+@contextlib.contextmanager
+def drafted(path: str | Path, *, sync: bool = False) -> Iterator[Path]:
+    """A temporary name beside a file; what is written there takes the file's place when the block ends without an
+    error, with ``sync`` not before it is on the disk. Raises ``BadRequest`` for a directory or a device, ``OSError``
+    where the disk refuses."""
+    target = Path(os.path.realpath(path))
+    if target.is_dir():
+        raise BadRequest("cannot write the file: a directory", str(path))
+    if target.exists() and not target.is_file():
+        raise BadRequest("cannot write the file: not a regular file", str(path))
+    draft = target.with_name(f".{target.name}.{os.getpid()}.tmp")
+    try:
+        yield draft
+        if target.exists():
+            shutil.copymode(target, draft)
+        if sync:
+            with draft.open("rb") as written:
+                os.fsync(written.fileno())
+        os.replace(draft, target)
+    finally:
+        draft.unlink(missing_ok=True)

@@ -145,6 +145,13 @@ def modes_at(setting: Setting, goal: ClosedConfiguration, *, real: bool = False,
                          tuple(reader.read(mode, False) for mode in found.near), confined, made)
 
 
+def counted(measured: Measured, at: ClosedConfiguration) -> Modes:
+    """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
+    as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
+    confined = confinement(measured.setting.anatomy, measured.question, measured.structure, at)
+    return solve(model(confined).system, near=False)
+
+
 class _Reader:
     """Poses of a system read as poses of the robot."""
 

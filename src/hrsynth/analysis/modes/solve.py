@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import islice
 from typing import Any
@@ -77,11 +77,12 @@ class Modes:
                 "degenerate": self.degenerate, "continuum": self.continuum}
 
 
-def solve(system: System) -> Modes:
+def solve(system: System, *, near: bool = True) -> Modes:
     """All modes of a system: the solutions of its first square part that is not degenerate at which all tips fit.
 
     Where more is observed than needed, a pose is a mode if its residual is at most ``VANISHES``; ``near`` are the poses
-    with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, found from several square parts.
+    with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, found from several square parts (unless
+    ``near`` is false).
     Tips on surfaces are left to :func:`solve_by_msolve` where no square part decides the pose; it raises
     ``MissingExtra`` where that is not installed.
     """
@@ -91,14 +92,16 @@ def solve(system: System) -> Modes:
     for square in system.squares():
         roots = solve_square(square)
         if not roots.continuum:
+            if not near:
+                return _judged(system, square, roots, None)
             others = (each for each in system.squares() if each.legs != square.legs)
             return _judged(system, square, roots, ((each, solve_square(each)) for each in islice(others, CHOICES)))
     if system.surfaces and not isinstance(system, Translating):
-        return solve_by_msolve(system)
+        return solve_by_msolve(system, near=near)
     return _undecided(system, square is not None)
 
 
-def solve_by_msolve(system: System) -> Modes:
+def solve_by_msolve(system: System, *, near: bool = True) -> Modes:
     """All modes of a system in the pose's own coordinates, counted by msolve and enclosed here.
 
     As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
@@ -110,7 +113,7 @@ def solve_by_msolve(system: System) -> Modes:
     for part in islice(wholes(system), CHOICES):
         roots = solve_whole(part)
         if not roots.continuum:
-            return _judged(system, part, roots, ())
+            return _judged(system, part, roots, () if near else None)
     return _undecided(system, part is not None)
 
 
@@ -134,20 +137,27 @@ def continuum(text: str, size: int | None) -> Modes:
     return Modes(0, (), False, "a continuum is not counted", degenerate=text, continuum=size)
 
 
-def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[Part, Roots]]) -> Modes:
-    """The modes among the solutions of a square part; near ones are looked for from those of others too."""
+def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[Part, Roots]] | None) -> Modes:
+    """The modes among the solutions of a square part; near ones are looked for from those of others too (not at all
+    where these are None)."""
     found = [_mode(system, square, root) for root in roots.real]
     complete = roots.complete and not (nearly_double(roots) and any(not root.thick for root in roots.real))
     if square.whole:
         return Modes(roots.complex, tuple(found), complete, _proof(roots), degenerate=_special(roots))
     modes = tuple(mode for mode in found if mode.residual <= VANISHES)
-    starts = [mode.q for mode in found]
-    for other, found_there in others:
-        starts += [_mode(system, other, root).q for root in found_there.real]
-    near = tuple(_nearly(system, q) for q in stationary(system, starts, [mode.q for mode in modes]))
+    near = () if others is None else _near(system, found, modes, others)
     proof = (f"from {len(square.legs)} of {len(system.curves)} legs: {_proof(roots)}; "
              f"the other legs fit at {len(modes)} of these, to {VANISHES:g} of the robot's size")
     return Modes(len(modes), modes, complete, proof, near, _special(roots))
+
+
+def _near(system: System, found: Sequence[Mode], modes: Sequence[Mode], others: Iterable[tuple[Part, Roots]]
+          ) -> tuple[Mode, ...]:
+    """Near modes, from all solutions of one square part and of others."""
+    starts = [mode.q for mode in found]
+    for other, found_there in others:
+        starts += [_mode(system, other, root).q for root in found_there.real]
+    return tuple(_nearly(system, q) for q in stationary(system, starts, [mode.q for mode in modes]))
 
 
 def _mode(system: System, square: Part, root: Root) -> Mode:

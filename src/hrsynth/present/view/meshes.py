@@ -66,7 +66,7 @@ def _solid(geometry: Any, folder: Path) -> Any:
     if geometry.mesh is None:
         raise ValueError("no geometry")
     path = _local(geometry.mesh.filename, folder)
-    solid = trimesh.load(path, force="mesh")
+    solid: Any = trimesh.load(path, force="mesh")
     if not len(solid.faces):
         raise ValueError(f"no triangles in {path.name}")
     solid.apply_scale(1.0 if geometry.mesh.scale is None else geometry.mesh.scale)

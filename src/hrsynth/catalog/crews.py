@@ -1,0 +1,150 @@
+"""Who makes the records: this process, several on this machine, or a cluster. Parts come back in any order."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Iterator
+from itertools import islice
+from typing import Any
+
+from .. import __version__
+from ..errors import BadRequest, MissingExtra
+from .source import Made, Stopped
+
+Task = Callable[[list[str]], Made]
+Crew = Callable[[Task, Iterable[list[str]]], Iterator[Made]]
+"""Takes a task and the parts to do it on, gives what each part gave as soon as it is done."""
+
+PATIENCE = 10.0
+"""Seconds within which a cluster has to answer."""
+AHEAD = 3
+"""Parts that wait for each thread of a cluster."""
+
+
+def crew(workers: int = 1, cluster: str | None = None) -> Crew:
+    """The crew for a number of processes, or of the cluster at an address; raises ``MissingExtra``, ``BadRequest``."""
+    if workers < 1:
+        raise BadRequest("number of workers", workers, "1 or more")
+    if cluster is not None:
+        if workers > 1:
+            raise BadRequest("workers and a cluster", workers, "one of the two")
+        _require("distributed", "a cluster")
+        return lambda task, parts: _clustered(task, parts, cluster)
+    if workers == 1:
+        return _alone
+    _require("joblib", "more than one worker")
+    return lambda task, parts: _together(task, parts, workers)
+
+
+def _require(package: str, what: str) -> None:
+    from importlib.util import find_spec
+
+    if find_spec(package) is None:
+        raise MissingExtra(what, "cluster")
+
+
+def _alone(task: Task, parts: Iterable[list[str]]) -> Iterator[Made]:
+    for part in parts:
+        for word in part:
+            yield task([word])
+
+
+def _together(task: Task, parts: Iterable[list[str]], workers: int) -> Iterator[Made]:
+    from joblib import Parallel, delayed
+    from joblib.externals.loky.process_executor import BrokenProcessPool, TerminatedWorkerError
+
+    pool = Parallel(n_jobs=workers, batch_size=1, pre_dispatch=2 * workers, return_as="generator_unordered")
+    try:
+        yield from pool(delayed(task)(part) for part in parts)
+    except TerminatedWorkerError:
+        raise Stopped("a worker process died") from None
+    except BrokenProcessPool as error:
+        raise Stopped(f"the worker processes cannot be used: {str(error).splitlines()[0]}") from None
+
+
+def _clustered(task: Task, parts: Iterable[list[str]], address: str) -> Iterator[Made]:
+    from distributed import Client
+
+    logging.getLogger("distributed").setLevel(logging.CRITICAL)
+    try:
+        client = Client(address, timeout=PATIENCE, set_as_default=False)
+    except (ValueError, TypeError) as error:
+        raise BadRequest("address of a cluster", address, f"such as tcp://host:8786 ({error})") from None
+    except (OSError, ImportError):
+        raise Stopped(f"no cluster answers at {address} within {PATIENCE:g} s") from None
+    try:
+        yield from _served(client, task, iter(parts))
+    finally:
+        client.close(timeout=1)
+
+
+def _served(client: Any, task: Task, parts: Iterator[list[str]]) -> Iterator[Made]:
+    """Keeps some parts waiting on the cluster; a worker that is lost leaves its parts to the others."""
+    from asyncio import CancelledError
+    from concurrent.futures import CancelledError as FutureCancelled
+
+    waiting: set[Any] = set()
+    ahead = AHEAD * max(2, sum(client.nthreads().values()))
+    try:
+        while waiting := waiting | _submitted(client, task, islice(parts, ahead - len(waiting))):
+            done, waiting = _finished(client, waiting)
+            for future in done:
+                yield _result(future)
+    except (OSError, CancelledError, FutureCancelled):
+        raise Stopped("the cluster is gone") from None
+
+
+def _submitted(client: Any, task: Task, parts: Iterable[list[str]]) -> set[Any]:
+    if client.status != "running":
+        raise Stopped("the cluster is gone")
+    return {client.submit(_versioned, task, part, pure=False) for part in parts}
+
+
+def _finished(client: Any, waiting: set[Any]) -> tuple[set[Any], set[Any]]:
+    """Parts that are done, at least one of them unless time has passed, and those that are not."""
+    from distributed import wait
+
+    try:
+        with client.as_current():
+            done, rest = wait(waiting, timeout=PATIENCE, return_when="FIRST_COMPLETED")
+    except TimeoutError:
+        _require_alive(client)
+        return set(), waiting
+    return done, rest
+
+
+def _result(future: Any) -> Made:
+    """What a part gave; what is neither our own ``Stopped`` nor a lost line is wrong with the cluster's workers."""
+    from concurrent.futures import CancelledError
+
+    from distributed.scheduler import KilledWorker
+
+    if future.cancelled():
+        raise Stopped("the cluster is gone")
+    try:
+        version, found = future.result()
+    except (Stopped, OSError, CancelledError):
+        raise
+    except KilledWorker:
+        raise Stopped("the cluster's workers died one after the other on the same words") from None
+    except Exception as error:
+        raise Stopped(f"the cluster cannot do the work, needed there: hrsynth {__version__} "
+                      f"({str(error).splitlines()[0]})") from None
+    if version != __version__:
+        raise Stopped(f"a worker of the cluster has hrsynth {version}, needed: {__version__}")
+    return list(found)
+
+
+def _require_alive(client: Any) -> None:
+    """Raise ``Stopped`` where the cluster no longer answers, or has no workers left."""
+    try:
+        workers = client.nthreads()
+    except (RuntimeError, ValueError):
+        raise Stopped("the cluster is gone") from None
+    if not workers:
+        raise Stopped("the cluster has no workers left")
+
+
+def _versioned(task: Task, part: list[str]) -> tuple[str, Made]:
+    """What a part gives, and the version that made it."""
+    return __version__, task(part)

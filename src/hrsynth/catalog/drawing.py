@@ -1,0 +1,66 @@
+"""A robot drawn as text: the chain of each leg from the base to the platform, with its motors and its watched link."""
+
+from __future__ import annotations
+
+import re
+
+from ..errors import HrsynthError
+from ..mechanism.legs import default_observation, dissect
+from ..mechanism.normal import normal_form
+from .geometry import mechanism
+from .words import COMPOSITE, Leg, Word
+
+ENDS = {"": ("platform",), "point": ("platform, a point",), "bar": ("plate 1", "plate 2"),
+        "slide": ("plate", "platform")}
+"""On what the legs of each body end."""
+BETWEEN = {"bar": "plate 1 and plate 2 are joined by a bar, the platform, and its parallel twin",
+           "slide": "the plate slides on the platform"}
+
+
+def drawing(word: Word) -> str:
+    """A line for all legs that are equal: ``*`` marks a motor, a double line the watched link."""
+    watched = _watched(word)
+    groups: dict[tuple[int, Leg], list[int]] = {}
+    number = 0
+    for body, legs in enumerate(word.bodies):
+        for leg in legs:
+            number += 1
+            groups.setdefault((body, leg), []).append(number)
+    heads = [_head(numbers) for numbers in groups.values()]
+    width = max(map(len, heads))
+    lines = [f"{head:<{width}}  {_chain(leg, watched.get(numbers[0]), ENDS[word.platform][body])}"
+             for head, ((body, leg), numbers) in zip(heads, groups.items(), strict=True)]
+    return "\n".join([*lines, *([BETWEEN[word.platform]] if word.platform in BETWEEN else [])])
+
+
+def _head(numbers: list[int]) -> str:
+    return f"leg{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
+
+
+def _chain(leg: Leg, watched: int | None, end: str) -> str:
+    """The chain; ``watched`` is the joint inside or after which the observed link lies."""
+    text, last = "base", len(leg.joints) - 1
+    for i, joint in enumerate(leg.joints):
+        text += f" {_line(leg, i, watched)} {joint.letter}{joint.axes}{'*' * joint.motor}"
+    return f"{text} {_line(leg, last + 1, watched)} {end}"
+
+
+def _line(leg: Leg, place: int, watched: int | None) -> str:
+    """The link before a joint: double if it is the watched one, and on both sides of a composite whose rod is."""
+    if watched is None:
+        return "──"
+    inside = leg.joints[watched].letter in COMPOSITE
+    return "══" if place == watched + 1 or (inside and place == watched) else "──"
+
+
+def _watched(word: Word) -> dict[int, int]:
+    """The place of the observed link in each leg: the joint inside or after which it lies; nothing where the mechanism
+    cannot be made."""
+    try:
+        anatomy = dissect(normal_form(mechanism(word)).mechanism)
+        given = {seen.leg: seen.link for seen in anatomy.mechanism.observations}
+        links = [given.get(leg.label) or default_observation(anatomy, leg).link for leg in anatomy.legs]
+    except HrsynthError:
+        return {}
+    found = (re.fullmatch(r"(?:link|rod)_(\d+)_(\d+)a?", link) for link in links)
+    return {int(match[1]): int(match[2]) - 1 for match in found if match}

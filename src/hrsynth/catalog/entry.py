@@ -1,0 +1,210 @@
+"""The record of an architecture: what its hidden robot is, what it sees, exactly and at closed configurations."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from itertools import combinations, groupby
+from typing import Any
+
+from ..analysis.advice import Advice, advised
+from ..analysis.controllability import CONTROLLABLE, Verdict, verdict_of
+from ..analysis.derive import derived
+from ..analysis.exact import ExactArchitecture, architecture
+from ..analysis.modes.modes import counted
+from ..analysis.setting import Setting, prepare, restricted, selected
+from ..analysis.singularity.measured import Measured
+from ..errors import BadRequest, HrsynthError, NotConfined, NotConfirmed, Unsolved
+from ..kinematics.ranks import range_basis
+from ..kinematics.relation import Relation
+from ..kinematics.sampling import Samples
+from ..mechanism.legs import dissect
+from ..mechanism.normal import normal_form
+from ..mechanism.sensors import encoders
+from ..rewrite.strategy import Step
+from .geometry import mechanism
+from .groups import group
+from .words import Word, parse
+
+SAMPLES = 10
+"""Closed configurations at which an exact verdict is confirmed."""
+ATTEMPTS = 3
+"""Choices of dimensions, of which the first that can be studied is taken."""
+INSTANCES = 5
+"""Configurations at which assembly modes are listed."""
+
+
+def entry(text: str) -> dict[str, Any]:
+    """The record of a word: its verdict, exact and confirmed at closed configurations, or why there is none.
+
+    The same for the same word, whatever was asked before. Raises ``BadRequest`` for a text that is no word.
+    """
+    word = parse(text)
+    record: dict[str, Any] = {"word": str(word), "group": group(word)}
+    found = _studied(str(word.unmoved))
+    if isinstance(found, str):
+        return {**record, "refused": found}
+    drawn = mechanism(word, found.attempt)
+    anatomy = dissect(normal_form(drawn).mechanism)
+    driven = [joint for joint in drawn.joints.values() if joint.actuated]
+    rank = found.driven([joint.name for joint in driven])
+    return {**record, "notation": anatomy.architecture().ascii, **found.facts, "attempt": found.attempt or None,
+            "motors": len(driven), "motor_rank": rank, "driven": rank == found.facts["dof"],
+            "base_motors": all(drawn.base in joint.links for joint in driven)}
+
+
+@dataclass(frozen=True, eq=False)
+class _Study:
+    """What the architectures of one word have in common, whatever is driven."""
+
+    facts: dict[str, Any]
+    attempt: int
+    encoders: Relation
+    joints: tuple[str, ...]
+    """The joint of each observation of ``encoders``."""
+
+    def driven(self, names: Sequence[str]) -> int:
+        """What motors on these joints see of the platform."""
+        return selected(self.encoders, [i for i, name in enumerate(self.joints) if name in names]).rank
+
+
+@lru_cache(maxsize=128)
+def _studied(text: str) -> _Study | str:
+    """The study of a word without motors, or why there is none, with the first dimensions that can be studied."""
+    word, reason = parse(text), ""
+    for attempt in range(ATTEMPTS):
+        try:
+            return _study(word, attempt)
+        except HrsynthError as error:
+            reason = reason or str(error).splitlines()[0].removeprefix(f"{word.driven}: ")
+    return reason
+
+
+def _study(word: Word, attempt: int) -> _Study:
+    setting = prepare(mechanism(word.driven, attempt), samples=SAMPLES)
+    if not setting.dof:
+        raise NotConfirmed(setting.robot.name, "its platform does not move")
+    derivation = derived(setting, beside=False)
+    exact = architecture(setting)
+    _agree(exact, setting.samples, derivation.verdict)
+    fewest = _smallest(setting, exact, _kinds(word), derivation.verdict)
+    facts = {
+        "hidden": derivation.hidden_architecture and derivation.hidden_architecture.ascii,
+        "steps": _steps(derivation.steps), "legs": len(word.legs), "dof": setting.dof, "motion": _motion(setting),
+        "mobility": setting.mobility.total, "idle": setting.mobility.idle,
+        "verdict": derivation.verdict.verdict, "rank": derivation.verdict.rank, "exact": derivation.exact.exact,
+        "instances": derivation.exact.instances, "confirmed": len(setting.configurations),
+        "lost": [_general(freedom.name) for freedom in derivation.verdict.lost],
+        "minimal": [list(each) for each in fewest], "fewest": len(fewest[0]) if fewest else 0,
+        "condition": None, "modes_legs": None, "modes_bound": None, "modes_seen": None, "cure": None}
+    if derivation.verdict.verdict == CONTROLLABLE:
+        facts.update(_singular(setting), **_modes(setting, fewest[0]))
+    else:
+        facts["cure"] = _cure(advised(setting, most=1))
+    return _Study(facts, attempt, *_encoders(setting))
+
+
+def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
+    """Raise ``NotConfirmed`` unless the exact verdict is that of the closed configurations."""
+    generic = exact.verdict(samples.question.observations)
+    if not generic.exact:
+        raise NotConfirmed(exact.mechanism.name, generic.reason)
+    if generic.rank != found.rank:
+        raise NotConfirmed(exact.mechanism.name, f"legs {', '.join(found.legs)} see {generic.rank} of {found.dof} "
+                                                 f"freedoms in exact arithmetic, {found.rank} at samples")
+
+
+def _kinds(word: Word) -> list[str]:
+    """What each leg is, in the order of the labels: equal legs of one body can be exchanged."""
+    return [f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs]
+
+
+def _smallest(setting: Setting, exact: ExactArchitecture, kinds: Sequence[str], best: Verdict
+              ) -> list[tuple[str, ...]]:
+    """The smallest sets of legs that see as much as all together, one of those that differ by equal legs; each rank
+    exact and confirmed."""
+    if not best.rank:
+        return []
+    for size in range(1, len(kinds) + 1):
+        found = []
+        for places in _choices(kinds, size):
+            seen = [setting.segments[i] for i in places]
+            samples = restricted(setting.everything, seen)
+            verdict = verdict_of(setting, [o.leg for o in seen], samples)
+            _agree(exact, samples, verdict)
+            if verdict.rank == best.rank:
+                found.append(verdict.legs)
+        if found:
+            return found
+    raise AssertionError("all legs together see what all legs see")
+
+
+def _choices(kinds: Sequence[str], size: int) -> Iterator[tuple[int, ...]]:
+    """Sets of places, the first of each that holds the same kinds."""
+    known: set[tuple[str, ...]] = set()
+    for places in combinations(range(len(kinds)), size):
+        key = tuple(kinds[i] for i in places)
+        if key not in known:
+            known.add(key)
+            yield places
+
+
+def _steps(steps: Sequence[Step]) -> list[str]:
+    """The rules that were applied, in order, each with the legs to which it was in a row: "takeover 1,2,3"."""
+    taken = [(step.rule, step.leg) for step in steps if step.accepted]
+    return [" ".join([rule, ",".join(str(leg) for _, leg in part if leg)]).strip()
+            for rule, part in ((rule, list(part)) for rule, part in groupby(taken, key=lambda step: step[0]))]
+
+
+def _motion(setting: Setting) -> str:
+    """Translations and other motions of the platform at a generic configuration: 3T, 2T1R, 1T2R, 3T3R …"""
+    twists = setting.everything.members[0].relation.twists
+    turns = range_basis(twists[3:], 1.0)[1].value if twists.shape[0] > 3 else 0
+    return "".join(f"{count}{letter}" for count, letter in ((setting.dof - turns, "T"), (turns, "R")) if count)
+
+
+def _general(name: str) -> str:
+    """A freedom's name without the dimensions of this one mechanism."""
+    name = re.sub(r" \(with the platform at .*\)", "", name)
+    return re.split(r" of pitch| (?:along|about the line through|about) \(", name)[0]
+
+
+def _singular(setting: Setting) -> dict[str, Any]:
+    """When the hidden robot loses a freedom, in words; None where that is not known in words."""
+    return {"condition": Measured.watched(setting).condition.words}
+
+
+def _modes(setting: Setting, legs: Sequence[str]) -> dict[str, Any]:
+    """Complex assembly modes of a smallest set of legs, and the most real ones of some configurations."""
+    measured = Measured.watched(replace(setting, observed=tuple(o for o in setting.segments if o.leg in legs)))
+    bounds, seen = [], []
+    try:
+        for at in setting.configurations[:INSTANCES]:
+            found = counted(measured, at)
+            if found.complete and not found.continuum:
+                bounds.append(found.complex)
+                seen.append(sum(mode.multiplicity for mode in found.modes))
+    except (NotConfined, Unsolved, BadRequest):
+        bounds = []
+    if not bounds:
+        return {}
+    return {"modes_legs": list(legs), "modes_bound": max(bounds), "modes_seen": max(seen)}
+
+
+def _cure(found: Advice) -> str:
+    """The first of the smallest sets of further measurements that see what is lost."""
+    if not found.sets:
+        return "none of up to four measurements"
+    first = " and ".join(f"{each.kind} {each.of}" + (f" ({each.axis})" if each.axis else "")
+                         for each in found.sets[0].measurements)
+    return first if found.cured else f"not all by {first}"
+
+
+def _encoders(setting: Setting) -> tuple[Relation, tuple[str, ...]]:
+    """What encoders on all joints see at a configuration, and the joint of each."""
+    every = [(joint.name, each) for joint in setting.mechanism.joints.values()
+             for each in encoders(setting.mechanism, joint, "")]
+    found = setting.measuring(tuple(each for _, each in every)).members[0].relation
+    return found, tuple(name for name, _ in every)

@@ -1,0 +1,32 @@
+"""The groups of the catalog: what is enumerated, each group in a module of its own.
+
+A group is a law over words, so that a word alone says where it belongs; what :data:`GROUPS` lists of it is finite.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from functools import partial
+
+from ..words import Word
+from . import deltas, planar, pods, spatial
+
+_LISTED: Mapping[str, Callable[[], Iterable[Word]]] = {
+    "planar": planar.words, "pods": pods.words, "deltas": deltas.words, "spatial": spatial.words}
+"""What each module lists, in no order, some of it twice or of another group."""
+
+
+def group(word: Word) -> str:
+    """The group to which a word belongs: the first whose law it obeys."""
+    if planar.belongs(word):
+        return "planar"
+    return next((name for name, law in (("pods", pods.belongs), ("deltas", deltas.belongs)) if law(word)), "spatial")
+
+
+def words(name: str) -> list[str]:
+    """All canonical words that are listed in a group, sorted, each once."""
+    return sorted({str(word) for word in _LISTED[name]() if group(word) == name})
+
+
+GROUPS: Mapping[str, Callable[[], list[str]]] = {name: partial(words, name) for name in _LISTED}
+"""The words of each group."""

@@ -1,0 +1,49 @@
+"""Multisets of legs, and legs with every choice of a motor or of an observed segment."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations_with_replacement
+
+from ..words import COMPOSITE, MOVED, Leg, Word, parse
+
+
+def leg(text: str) -> Leg:
+    """The leg that ``text`` writes, as between the brackets of a word."""
+    return parse(f"2({text})").legs[0]
+
+
+def driven(chain: Leg, places: Iterable[int]) -> Iterator[Leg]:
+    """The leg with one motor, on each of these joints in turn that can have one."""
+    for place in places:
+        if chain.joints[place].letter in MOVED:
+            yield Leg(tuple(replace(joint, motor=i == place) for i, joint in enumerate(chain.joints)))
+
+
+def base_driven(chain: Leg) -> Leg:
+    """The leg with a motor on the first joint that can have one."""
+    return next(driven(chain, range(len(chain.joints))))
+
+
+def watched(chain: Leg) -> Iterator[Leg]:
+    """The leg with each segment observed in turn, one of those that always turn alike."""
+    last = len(chain.joints) - (1 if chain.joints[-1].letter in COMPOSITE else 2)
+    seen = (Leg(tuple(replace(joint, watched=i == place) for i, joint in enumerate(chain.joints))).canonical()
+            for place in range(last, -1, -1))
+    yield from dict.fromkeys(seen)
+
+
+def robots(legs: Sequence[Leg], count: int, platform: str = "") -> Iterator[Word]:
+    """All robots with ``count`` of these legs, alike or not."""
+    for chosen in combinations_with_replacement(legs, count):
+        yield Word.of(list(chosen), platform=platform)
+
+
+def pairs(legs: Sequence[Leg], count: int) -> Iterator[Word]:
+    """All robots with ``count`` legs of at most two kinds."""
+    for i, one in enumerate(legs):
+        yield Word.of([one] * count)
+        for other in legs[i + 1 :]:
+            for ones in range(1, count):
+                yield Word.of([one] * ones + [other] * (count - ones))

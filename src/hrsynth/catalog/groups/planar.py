@@ -1,0 +1,59 @@
+"""Planar robots, complete: the seven chains of three joints R and P, with every motor and every observed segment.
+
+Three legs on a rigid platform move it with three freedoms, two legs that end on one R move a point with two. Special
+geometry: the rails of all legs that begin with a P are parallel; and equal legs in which parallelograms take the place
+of P or R joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import product
+
+from ..geometry import planar as belongs
+from ..words import Leg, Word
+from .legs import driven, leg, robots, watched
+
+__all__ = ["belongs", "chains", "words"]
+
+_OWN = "hj"
+"""Names of the P axes of a leg that are not along its line."""
+
+
+def chains(rail: str = "h") -> Iterator[Leg]:
+    """The seven chains of R and P; a P between two R lies along the line of their centres, a first P along ``rail``."""
+    for letters in product("RP", repeat=3):
+        if letters == ("P", "P", "P"):
+            continue
+        own = iter([rail, *(name for name in _OWN if name != rail)] if letters[0] == "P" else _OWN)
+        names = ["z" if letter == "R" else "l" if letters == ("R", "P", "R") else next(own) for letter in letters]
+        yield leg("-".join(map("".join, zip(letters, names, strict=True))))
+
+
+def with_parallelograms() -> Iterator[Leg]:
+    """Chains of three R, P and Π, with an R, a Π, and a joint of another kind or R or P besides."""
+    for letters in product(("R", "P", "Pi"), repeat=3):
+        if "R" in letters and "Pi" in letters:
+            own = iter(_OWN)
+            yield leg("-".join(f"P{next(own)}" if letter == "P" else f"{letter}z" for letter in letters))
+
+
+def _kinds(rail: str, motors: int, tip: str = "RP") -> list[Leg]:
+    """Chains with each motor on the first ``motors`` joints and each segment observed; with the rail x only those that
+    begin with a P."""
+    return [moved for chain in chains(rail) if chain.joints[-1].letter in tip
+            and (rail == "h" or chain.joints[0].letter == "P")
+            for seen in watched(chain) for moved in driven(seen, range(motors))]
+
+
+def words() -> Iterator[Word]:
+    """Robots with three and with two freedoms, of general geometry and with parallel rails."""
+    for rail in ("h", "x"):
+        yield from robots(_kinds(rail, 3), 3)
+        yield from robots(_kinds(rail, 2, tip="R"), 2, "point")
+    for chain in with_parallelograms():
+        for seen in watched(chain):
+            for moved in driven(seen, range(3)):
+                yield Word.of([moved] * 3)
+                if chain.joints[-1].letter == "R":
+                    yield Word.of([moved] * 2, platform="point")

@@ -1,0 +1,30 @@
+"""The n-pods: three to six legs, each with a P between a joint (or a slide) on the base and one on the platform."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ..words import Word
+from .legs import leg, robots
+
+KINDS = tuple(map(leg, ("Utn-Pl*-S", "Utn-Pl*-Unt", "Rt-Pl*-S", "S-Pl*-S", "S-Pl*-Rt", "Pr*-Pz-S", "Cr*-Pz-S")))
+"""UPS, UPU (parallel outer axes), RPS, SPS, SPR, and PPS, CPS that slide along the radius."""
+LEAST = 6
+"""Freedoms of a leg that constrains nothing."""
+
+
+def belongs(word: Word) -> bool:
+    """Whether all legs have three joints, the middle one a P, and end on U, S or R, on one rigid platform."""
+    return not word.platform and all(
+        len(leg.joints) == 3 and leg.joints[1].letter == "P" and leg.joints[2].letter in ("U", "S", "R")
+        and leg.joints[0].letter in ("U", "R", "S", "P", "C") and "o" not in leg.joints[0].axes
+        and {leg.joints[0].letter, leg.joints[2].letter} != {"R"} for leg in word.legs)
+
+
+def words() -> Iterator[Word]:
+    """Robots of three to six legs, alike or mixed, whose legs leave a freedom by their count; and all legs alike."""
+    for count in range(3, 7):
+        for word in robots(KINDS, count):
+            constraints = sum(max(0, LEAST - each.freedoms) for each in word.legs)
+            if constraints < LEAST or len(set(word.legs)) == 1:
+                yield word

@@ -1,0 +1,117 @@
+"""The journal of a build: every record on the disk as soon as it is there, and a build goes on where it was killed."""
+
+from __future__ import annotations
+
+import contextlib
+import fcntl
+import json
+import os
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from ..errors import BadRequest, BuildStopped
+from .lines import head, require_version, word_of
+
+ENDING = ".part"
+
+
+class Journal:
+    """An append-only file of records in the order in which they were made; open in one process at a time.
+
+    A last line that was torn is cut off, a line that cannot be read is passed over: those records are made again.
+    Raises ``BadRequest`` for a journal of another version, one that another build has open, or one that cannot be
+    opened, ``BuildStopped`` where the disk takes no more.
+    """
+
+    def __init__(self, path: Path, group: str, *, anew: bool = False) -> None:
+        self.path = path
+        try:
+            self._file = os.open(path, os.O_RDWR | os.O_CREAT | os.O_APPEND | os.O_CLOEXEC, 0o666)
+        except OSError as error:
+            raise BadRequest(f"cannot write the journal: {error.strerror}", str(path)) from None
+        try:
+            self._lock()
+            if anew:
+                os.ftruncate(self._file, 0)
+            self._places = self._read(group)
+        except BaseException:
+            os.close(self._file)
+            raise
+
+    def __enter__(self) -> Journal:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        os.close(self._file)
+
+    def __contains__(self, word: str) -> bool:
+        return word in self._places
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    def lines(self, words: Iterable[str]) -> Iterator[str]:
+        """The records of these words."""
+        for word in words:
+            start, size = self._places[word]
+            yield os.pread(self._file, size, start).decode("ascii")
+
+    def add(self, made: Iterable[tuple[str, str]]) -> None:
+        """Append words with their lines; returns when they are on the disk."""
+        made = list(made)
+        self._append("".join(f"{text}\n" for _, text in made))
+        place = self._end - sum(len(text) + 1 for _, text in made)
+        for word, text in made:
+            self._places[word] = place, len(text)
+            place += len(text) + 1
+
+    def remove(self) -> None:
+        """The records are in the store: the journal is no longer needed."""
+        self.path.unlink(missing_ok=True)
+
+    def _lock(self) -> None:
+        try:
+            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            raise BadRequest("another build writes this journal", str(self.path), "one build at a time") from None
+
+    def _read(self, group: str) -> dict[str, tuple[int, int]]:
+        """Where the line of each word starts, and its length."""
+        places: dict[str, tuple[int, int]] = {}
+        self._end = 0
+        with os.fdopen(os.dup(self._file), "rb") as content:
+            content.seek(0)
+            for raw in content:
+                if not raw.endswith(b"\n"):
+                    break
+                if self._end == 0:
+                    self._require_head(raw)
+                else:
+                    with contextlib.suppress(ValueError, BadRequest):
+                        places[word_of(raw.decode("ascii"))] = self._end, len(raw) - 1
+                self._end += len(raw)
+        os.ftruncate(self._file, self._end)
+        if self._end == 0:
+            self._append(head(group) + "\n")
+        return places
+
+    def _require_head(self, raw: bytes) -> None:
+        try:
+            known = json.loads(raw)
+            versions = known["format"], known["catalog"]
+        except (ValueError, TypeError, KeyError):
+            raise BadRequest("no journal of a build: its first line is not a head", str(self.path)) from None
+        require_version(versions, str(self.path))
+
+    def _append(self, text: str) -> None:
+        content = text.encode("ascii")
+        try:
+            done = 0
+            while done < len(content):
+                done += os.write(self._file, content[done:])
+            os.fsync(self._file)
+        except OSError as error:
+            with contextlib.suppress(OSError):
+                os.ftruncate(self._file, self._end)
+            raise BuildStopped(f"{self.path}: {error.strerror}", str(self.path)) from None
+        self._end += len(content)

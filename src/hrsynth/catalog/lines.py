@@ -1,0 +1,73 @@
+"""Records as lines: a head that says what they are, then a line of JSON each, as short as it can be and ASCII."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping
+from typing import Any
+
+from ..errors import BadRequest
+from .words import VERSION
+
+Record = Mapping[str, Any]
+"""What the catalog says of one architecture; a field that is missing is not known or does not apply."""
+
+FORMAT = 1
+"""Version of the lines, the journal and the tables."""
+
+
+def line(entry: Record) -> str:
+    """A record as one line without its end: ``word`` and ``group`` first, then fields by name, none that is None."""
+    first = {name: entry[name] for name in ("word", "group")}
+    rest = {name: entry[name] for name in sorted(entry) if name not in first and entry[name] is not None}
+    return json.dumps(first | rest, separators=(",", ":"), allow_nan=False)
+
+
+def head(group: str, count: int | None = None) -> str:
+    """The first line of a file; a journal's says no count."""
+    counted = {} if count is None else {"count": count}
+    return json.dumps({"format": FORMAT, "catalog": VERSION, "group": group, **counted}, separators=(",", ":"))
+
+
+def record(text: str) -> Record:
+    """The record of a line; raises ``BadRequest`` where it holds none."""
+    try:
+        found = json.loads(text)
+        if isinstance(found["word"], str):
+            return dict(found)
+    except (ValueError, TypeError, KeyError):
+        pass
+    raise BadRequest("no record of the catalog", text[:60], "an object of JSON with a word")
+
+
+def word_of(text: str) -> str:
+    """The word of a record's line."""
+    return str(record(text)["word"])
+
+
+def encoded(group: str, lines: Iterable[str]) -> bytes:
+    """The bytes of a group's file, sorted by word, whatever the order of the lines."""
+    ordered = sorted(lines, key=word_of)
+    return "".join(f"{each}\n" for each in [head(group, len(ordered)), *ordered]).encode("ascii")
+
+
+def decoded(content: bytes, file: str) -> list[str]:
+    """The lines of a group's file; raises ``BadRequest`` for another version, a file cut off or of something else."""
+    try:
+        first, *lines = content.decode("ascii").splitlines() or [""]
+        known = json.loads(first)
+        versions = known["format"], known["catalog"]
+        count = known["count"]
+    except (ValueError, TypeError, KeyError):
+        raise BadRequest(f"{file}: no file of the catalog: its first line is not a head") from None
+    require_version(versions, file)
+    if len(lines) != count or not content.endswith(b"\n"):
+        raise BadRequest(f"{file}: cut off, records", len(lines), str(count))
+    return lines
+
+
+def require_version(found: tuple[object, object], file: str) -> None:
+    """Raise ``BadRequest`` where a file is of another version of the format or of the catalog."""
+    if found != (FORMAT, VERSION):
+        raise BadRequest(f"{file}: a catalog of another version", "format {}, words {}".format(*found),
+                         f"format {FORMAT}, words {VERSION}; build it again")

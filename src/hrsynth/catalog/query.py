@@ -1,0 +1,88 @@
+"""Asking the catalog: all records of a store, by word, or those that fit."""
+
+from __future__ import annotations
+
+import difflib
+from collections import Counter
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..errors import BadRequest
+from .fits import EXACT, fits, require
+from .lines import Record, record
+from .store import DATABASES, Store, shipped, store
+from .words import parse
+
+
+@dataclass(frozen=True, eq=False)
+class Catalog:
+    """Records, by group and then by word."""
+
+    records: tuple[Record, ...]
+
+    def __iter__(self) -> Iterator[Record]:
+        return iter(self.records)
+
+    def __len__(self) -> int:
+        return len(self.records)
+
+    def __contains__(self, word: object) -> bool:
+        return word in self._places
+
+    def __getitem__(self, word: str) -> Record:
+        """The record of an architecture, its word spelt in any way; raises ``BadRequest`` with words close to it."""
+        name = word if word in self._places else str(parse(word))
+        if name not in self._places:
+            close = difflib.get_close_matches(name, self._places, n=3, cutoff=0.4)
+            raise BadRequest("not in the catalog", name, f"{', '.join(close)} …" if close else None)
+        return self.records[self._places[name]]
+
+    def where(self, **asked: Any) -> Catalog:
+        """The records that fit all that is asked for and not None; raises ``BadRequest`` for what cannot be asked.
+
+        ``group``, ``dof``, ``motion`` ("3T", "2T1R"), ``verdict``, ``base_motors`` and ``fewest`` (legs of the smallest
+        set that sees all that can be seen) have to be equal. ``legs`` is their number, or a pattern of ``*`` and ``?``
+        for the notation or for the chain of one leg, with or without the marks of motors. ``text`` has to occur in
+        some field. Several values in a tuple: one of them.
+        """
+        require(asked)
+        return Catalog(tuple(each for each in self.records if fits(each, asked)))
+
+    def count(self, *fields: str) -> dict[tuple[Any, ...], int]:
+        """How many records have which values of the fields, sorted by these; None where a record has no such field."""
+        counts = Counter(tuple(each.get(name) for name in fields) for each in self.records)
+        return dict(sorted(counts.items(), key=lambda item: [(value is None, str(value)) for value in item[0]]))
+
+    @cached_property
+    def _places(self) -> dict[str, int]:
+        return {str(each["word"]): i for i, each in reversed(list(enumerate(self.records)))}
+
+
+def load(path: str | Path | None = None, **asked: Any) -> Catalog:
+    """The shipped catalog, or that of a folder or SQLite file; ``asked`` as for ``Catalog.where``.
+
+    Of a SQLite file only the records that fit are read. Raises ``BadRequest`` where there is none or one of
+    another version.
+    """
+    require(asked)
+    kept = shipped() if path is None else store(path)
+    _require_there(kept, path)
+    exactly = {name: value for name, value in asked.items()
+               if name in EXACT and value is not None and not isinstance(value, tuple)}
+    wanted = asked.get("group")
+    groups = [name for name in kept.groups() if wanted is None or name in _tuple(wanted)]
+    return Catalog(tuple(record(line) for name in groups for line in kept.lines(name, exactly))).where(**asked)
+
+
+def _tuple(value: object) -> tuple[object, ...]:
+    return value if isinstance(value, tuple) else (value,)
+
+
+def _require_there(kept: Store, path: str | Path | None) -> None:
+    if path is not None and not Path(path).exists():
+        raise BadRequest("no such catalog", str(path), f"a folder, or a file that ends in {', '.join(DATABASES)}")
+    if not kept.groups():
+        raise BadRequest("nothing in the catalog", str(kept.path), "one that was built by hrsynth catalog build")

@@ -1,0 +1,148 @@
+"""Where the catalog is kept: a folder with a file of lines for each group, or one SQLite file for all."""
+
+from __future__ import annotations
+
+import contextlib
+import errno
+import sqlite3
+from collections.abc import Iterable, Iterator, Mapping
+from importlib import resources
+from pathlib import Path
+from typing import Any, Protocol
+
+from ..description.files import drafted
+from ..errors import BadRequest, BuildStopped
+from . import tables
+from .journal import ENDING, Journal
+from .lines import decoded, encoded
+
+DATABASES = (".sqlite", ".sqlite3", ".db")
+"""Endings of a store that is one SQLite file."""
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+
+
+class Store(Protocol):
+    """Lines of records by group; written whole or not at all."""
+
+    path: Path
+
+    def groups(self) -> list[str]:
+        """The groups that are stored, by name."""
+
+    def lines(self, group: str, exactly: Mapping[str, Any]) -> list[str]:
+        """The lines of a group, sorted by word; with ``exactly``, at most those without a field of another value."""
+
+    def write(self, group: str, lines: Iterable[str]) -> None:
+        """Replace a group."""
+
+    def journal(self, group: str, *, anew: bool = False) -> Journal:
+        """The journal of a group's build, beside the store."""
+
+    def file(self, group: str) -> Path:
+        """The file that holds a group."""
+
+
+class Folder:
+    """A folder with ``GROUP.jsonl`` for each group."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def groups(self) -> list[str]:
+        return sorted(file.stem for file in self.path.glob("*.jsonl"))
+
+    def lines(self, group: str, exactly: Mapping[str, Any]) -> list[str]:
+        file = self.file(group)
+        with _readable(file):
+            return decoded(file.read_bytes(), str(file))
+
+    def write(self, group: str, lines: Iterable[str]) -> None:
+        file = self.file(group)
+        with _writable(file), drafted(file, sync=True) as draft:
+            draft.write_bytes(encoded(group, lines))
+
+    def journal(self, group: str, *, anew: bool = False) -> Journal:
+        with _writable(self.path):
+            self.path.mkdir(exist_ok=True)
+        return _opened(self.file(group), f"{group}.jsonl", group, anew)
+
+    def file(self, group: str) -> Path:
+        return self.path / f"{group}.jsonl"
+
+
+class Database:
+    """One SQLite file with the same lines, and indexes on what is asked for most."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    def groups(self) -> list[str]:
+        with self._read() as file:
+            return tables.groups(file)
+
+    def lines(self, group: str, exactly: Mapping[str, Any]) -> list[str]:
+        with self._read() as file:
+            return tables.lines(file, group, exactly)
+
+    def write(self, group: str, lines: Iterable[str]) -> None:
+        kept = {} if not self.path.exists() else {name: self.lines(name, {}) for name in self.groups() if name != group}
+        with _writable(self.path), drafted(self.path, sync=True) as draft:
+            draft.unlink(missing_ok=True)
+            try:
+                tables.write(draft, {**kept, group: lines})
+            except sqlite3.Error as error:
+                raise BuildStopped(f"{self.path}: {error}") from None
+
+    def journal(self, group: str, *, anew: bool = False) -> Journal:
+        if self.path.exists():
+            self.groups()
+        return _opened(self.path, f"{self.path.name}.{group}", group, anew)
+
+    def file(self, group: str) -> Path:
+        return self.path
+
+    @contextlib.contextmanager
+    def _read(self) -> Iterator[sqlite3.Connection]:
+        with _readable(self.path):
+            self.path.open("rb").close()
+        with tables.opened(self.path) as file:
+            yield file
+
+
+def store(path: str | Path) -> Store:
+    """The store of this name: a SQLite file by its ending, else a folder."""
+    path = Path(path)
+    return Database(path) if path.suffix in DATABASES else Folder(path)
+
+
+def shipped() -> Folder:
+    """The catalog that comes with the package."""
+    packaged = Path(str(resources.files("hrsynth").joinpath("catalog", "shipped")))
+    return Folder(packaged if packaged.is_dir() else Path(__file__).parents[3] / "catalog")
+
+
+def _opened(file: Path, name: str, group: str, anew: bool) -> Journal:
+    """The journal beside a file; drafts that a killed build left there go."""
+    journal = Journal(file.with_name(name + ENDING), group, anew=anew)
+    for draft in file.parent.glob(f".{file.name}.*.tmp"):
+        draft.unlink(missing_ok=True)
+    return journal
+
+
+@contextlib.contextmanager
+def _readable(file: Path) -> Iterator[None]:
+    try:
+        yield
+    except OSError as error:
+        raise BadRequest(f"cannot read the catalog: {error.strerror}", str(file)) from None
+
+
+@contextlib.contextmanager
+def _writable(file: Path) -> Iterator[None]:
+    """A disk that is full stops a build, anything else is a bad request."""
+    try:
+        yield
+    except OSError as error:
+        if error.errno in FULL:
+            raise BuildStopped(f"{file}: {error.strerror}") from None
+        raise BadRequest(f"cannot write the catalog: {error.strerror}", str(file)) from None

@@ -1,0 +1,233 @@
+"""Words of architectures: legs as chains of joints whose axes are named, robots as multisets of legs on a platform.
+
+A word says what stays so in motion and nothing else, no lengths::
+
+    robot    = [platform ":"] legs ["|" legs]
+    platform = "point" (all legs end on one R axis) or "bar" / "slide" (two plates, joined by a bar on two R and its
+               parallel twin, or by a P; "|" parts the legs of the one from those of the other)
+    legs     = [count] "(" joint ("-" joint)* ")", several joined by "+"
+    joint    = letter axes ["*"] ["!"]
+    letter   = R P C (one axis), U (two, at right angles), S (none), Pi (the normal of a parallelogram), 2SS (two equal
+               parallel rods between S joints, the axis along their distance), 2US (the same with U at the upper ends)
+
+``*`` marks a motor, ``!`` the joint after which the observed link follows (of two rods, the first of them), where it is
+not the default segment. Axes are directions at the zero configuration, named by
+
+=======  ==============================================================================================================
+x y z    the base's axes: the same direction for all legs; z is the normal of a planar robot
+t r      the tangent and the radius of the leg's foot on the base
+k        some direction of the leg's own normal to t
+h j m    directions of the leg's own normal to z
+a b c    directions of the leg's own, in general position
+l        along the line from the centre before to the centre after
+o        through a point that all legs share
+n q      in a U: normal to its other axis, and (n) to the line of centres next to it; n of a Pi: normal to the axis of
+         the joint before it and to its rods
+=======  ==============================================================================================================
+
+The canonical word has its legs sorted, first as if they had no motors (a motor changes no leg's label), names letters
+of the same kind in the order of the leg, and drops the ``!`` of a default segment. It is the key of the catalog and is
+stable: a change of what a word means is a change of ``VERSION``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from dataclasses import dataclass, replace
+
+from ..errors import BadRequest
+
+VERSION = 1
+"""Version of the words and of the mechanisms they stand for."""
+
+AXES = {"R": 1, "P": 1, "C": 1, "U": 2, "S": 0, "Pi": 1, "2SS": 1, "2US": 1}
+"""How many axes each letter has."""
+FREEDOMS = {"R": 1, "P": 1, "C": 2, "U": 2, "S": 3, "Pi": 1, "2SS": 4, "2US": 4}
+"""Freedoms of each letter (idle ones left out)."""
+COMPOSITE = ("Pi", "2SS", "2US")
+MOVED = ("R", "P", "C", "U")
+"""Letters that can have a motor."""
+NAMES = "xyztrkhjmabclonq"
+"""Names of directions."""
+ALIKE = ("hjm", "abc")
+"""Names that stand for the same kind of direction, in the order in which a leg uses them."""
+PLATFORMS = {"": 1, "point": 1, "bar": 2, "slide": 2}
+"""Platforms, and the bodies on which legs end."""
+LARGEST = 12
+"""Legs of a word."""
+
+_JOINT = re.compile(r"(?P<letter>2SS|2US|Pi|[RPCUS])(?P<axes>[a-z]*)(?P<motor>\*?)(?P<watched>!?)")
+_LEGS = re.compile(r"(?P<count>[0-9]*)\((?P<leg>[^()]*)\)")
+
+
+@dataclass(frozen=True, order=True)
+class Joint:
+    """A joint of a leg: its letter, the names of its axes, whether it has a motor, whether the link after it is
+    observed."""
+
+    letter: str
+    axes: str = ""
+    motor: bool = False
+    watched: bool = False
+
+    def __str__(self) -> str:
+        return f"{self.letter}{self.axes}{'*' * self.motor}{'!' * self.watched}"
+
+
+@dataclass(frozen=True, order=True)
+class Leg:
+    """A leg from the base to the platform."""
+
+    joints: tuple[Joint, ...]
+
+    def __str__(self) -> str:
+        return f"({'-'.join(map(str, self.joints))})"
+
+    @property
+    def freedoms(self) -> int:
+        """Freedoms of the leg's end."""
+        return sum(FREEDOMS[joint.letter] for joint in self.joints)
+
+    @property
+    def unmoved(self) -> Leg:
+        """The leg without its motors."""
+        return Leg(tuple(replace(joint, motor=False) for joint in self.joints))
+
+    @property
+    def driven(self) -> Leg:
+        """The leg with one motor, on its first R or P."""
+        first = next((i for i, joint in enumerate(self.joints) if joint.letter in ("R", "P")), None)
+        return Leg(tuple(replace(joint, motor=i == first) for i, joint in enumerate(self.joints)))
+
+    @property
+    def observed(self) -> int | None:
+        """The joint after which the observed link follows; None for the default segment."""
+        return next((i for i, joint in enumerate(self.joints) if joint.watched), None)
+
+    def canonical(self) -> Leg:
+        """The leg with names in order and without the mark of a default segment."""
+        names: dict[str, str] = {}
+        for name in "".join(joint.axes for joint in self.joints):
+            for kind in ALIKE:
+                if name in kind and name not in names:
+                    names[name] = kind[sum(known in kind for known in names)]
+        axes = ["".join(names.get(name, name) for name in joint.axes) for joint in self.joints]
+        mark = self.observed
+        if mark is not None:
+            inside = self.joints[mark].letter in COMPOSITE and mark + 1 < len(self.joints)
+            mark = mark if inside else self._along(mark)
+            mark = None if mark == self._default() and not inside else mark
+        return Leg(tuple(replace(joint, axes=own, watched=i == mark)
+                         for i, (joint, own) in enumerate(zip(self.joints, axes, strict=True))))
+
+    def _along(self, mark: int) -> int:
+        """The last link that turns as this one: P joints do not change a direction."""
+        while mark + 2 < len(self.joints) and self.joints[mark + 1].letter == "P":
+            mark += 1
+        return mark
+
+    def _default(self) -> int:
+        """The joint before the default segment: the axis of a P between two moving links, else the last segment."""
+        inner = range(1, len(self.joints) - 1)
+        slide = next((i for i in inner if self.joints[i].letter == "P"), None)
+        if slide is not None:
+            return self._along(slide - 1)
+        return len(self.joints) - (1 if self.joints[-1].letter in COMPOSITE else 2)
+
+
+def _order(leg: Leg) -> tuple[Leg, Leg]:
+    """The place of a leg among others: as it is without motors, then by its motors."""
+    return leg.unmoved, leg
+
+
+@dataclass(frozen=True)
+class Word:
+    """An architecture: a platform and, for each of its bodies, the legs that end on it, sorted."""
+
+    platform: str
+    bodies: tuple[tuple[Leg, ...], ...]
+
+    @classmethod
+    def of(cls, legs: list[Leg], *more: list[Leg], platform: str = "") -> Word:
+        """The canonical word of these legs; ``more``: those of a second body."""
+        bodies = (tuple(sorted((leg.canonical() for leg in body), key=_order)) for body in (legs, *more))
+        return cls(platform, tuple(sorted(bodies, key=lambda body: ([leg.unmoved for leg in body], body))))
+
+    @property
+    def legs(self) -> tuple[Leg, ...]:
+        """All legs, in the order of their labels 1, 2, …"""
+        return tuple(leg for body in self.bodies for leg in body)
+
+    @property
+    def unmoved(self) -> Word:
+        """The architecture without its motors: what the hidden robot is found from."""
+        return Word.of(*[[leg.unmoved for leg in body] for body in self.bodies], platform=self.platform)
+
+    @property
+    def driven(self) -> Word:
+        """The architecture with a motor on the first R or P of each leg: three R that meet in a point are no S then."""
+        return Word.of(*[[leg.driven for leg in body] for body in self.bodies], platform=self.platform)
+
+    def __str__(self) -> str:
+        bodies = ["+".join(f"{count if count > 1 else ''}{leg}" for leg, count in Counter(body).items())
+                  for body in self.bodies]
+        return f"{self.platform}:{'|'.join(bodies)}" if self.platform else bodies[0]
+
+
+def parse(text: str) -> Word:
+    """The word that ``text`` writes, canonical; raises ``BadRequest`` with what is wrong in it."""
+    platform, colon, rest = text.strip().rpartition(":")
+    if platform not in PLATFORMS or bool(colon) != bool(platform):
+        raise BadRequest(f"word {text!r}: unknown platform", platform, [name for name in PLATFORMS if name])
+    bodies = [_legs(text, part) for part in rest.split("|")]
+    if len(bodies) != PLATFORMS[platform]:
+        raise BadRequest(f"word {text!r}: bodies on which legs end", len(bodies),
+                         str(PLATFORMS[platform]))
+    word = Word.of(*bodies, platform=platform)
+    if not 2 <= len(word.legs) <= LARGEST:
+        raise BadRequest(f"word {text!r}: number of legs", len(word.legs), f"2 to {LARGEST}")
+    return word
+
+
+def _legs(text: str, part: str) -> list[Leg]:
+    found: list[Leg] = []
+    for term in part.split("+"):
+        match = _LEGS.fullmatch(term.strip())
+        if match is None:
+            raise BadRequest(f"word {text!r}: cannot be read", term, "legs such as 3(Rz*-Rz-Rz), joined by +")
+        count = int(match["count"] or 1)
+        if not 1 <= count <= LARGEST:
+            raise BadRequest(f"word {text!r}: number of equal legs", count, f"1 to {LARGEST}")
+        found += [_leg(text, match["leg"])] * count
+    return found
+
+
+def _leg(text: str, chain: str) -> Leg:
+    joints = tuple(_joint(text, part) for part in chain.split("-"))
+    if joints[0].letter == "Pi" and joints[0].axes == "n":
+        raise BadRequest(f"word {text!r}: the Pi's normal is normal to the axis before it", chain, "a joint before it")
+    if sum(joint.watched for joint in joints) > 1:
+        raise BadRequest(f"word {text!r}: observed links of one leg", sum(joint.watched for joint in joints), "one")
+    if joints[-1].watched and joints[-1].letter not in COMPOSITE:
+        raise BadRequest(f"word {text!r}: observed", "the platform", "a link of the leg")
+    if len(joints) == 1 and joints[0].letter not in COMPOSITE:
+        raise BadRequest(f"word {text!r}: a leg of one joint has no segment to observe", chain, "two joints or more")
+    return Leg(joints)
+
+
+def _joint(text: str, part: str) -> Joint:
+    match = _JOINT.fullmatch(part)
+    if match is None:
+        raise BadRequest(f"word {text!r}: unknown joint", part, f"a letter of {', '.join(AXES)}, axes, * and !")
+    letter, axes = match["letter"], match["axes"]
+    if len(axes) != AXES[letter]:
+        raise BadRequest(f"word {text!r}: axes of {part!r}", len(axes), f"{AXES[letter]} for {letter}")
+    unknown = sorted(set(axes) - set(NAMES))
+    if unknown:
+        raise BadRequest(f"word {text!r}: unknown axis in {part!r}", unknown[0], " ".join(NAMES))
+    if letter != "U" and set(axes) & {"n", "q"} and (letter, axes) != ("Pi", "n"):
+        raise BadRequest(f"word {text!r}: axis n or q of {part!r}", letter, "a U, whose other axis it is normal to")
+    if match["motor"] and letter not in MOVED:
+        raise BadRequest(f"word {text!r}: a motor on {part!r}", letter, MOVED)
+    return Joint(letter, axes, bool(match["motor"]), bool(match["watched"]))

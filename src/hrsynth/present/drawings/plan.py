@@ -1,0 +1,247 @@
+"""Where everything stands in a drawing: legs as parallel rows from the base on the left to the platform on the right.
+
+Links have columns, ears have lanes: a box stands in its ear's lane between the columns of its two links, a link is
+the line between its boxes, with a bar across the lanes where it has more than two. What is in no leg and not in the
+platform makes the whole mechanism one group.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+from ...errors import HrsynthError
+from ...mechanism import Mechanism
+from ...mechanism.legs import Anatomy, dissect
+from ...mechanism.observation import Direction
+from .boxes import Box, Ear, boxes_of, ears
+
+Point = tuple[float, int]
+"""Column and lane."""
+
+
+@dataclass(frozen=True)
+class Spot:
+    """A box, where it stands, and the group that it belongs to."""
+
+    box: Box
+    x: float
+    lane: int
+    row: int
+
+
+@dataclass(frozen=True)
+class Net:
+    """A link: lines through (column, lane) points within a lane, and a bar (column, first lane, last lane) or None."""
+
+    link: str
+    ways: tuple[tuple[Point, ...], ...]
+    bar: tuple[float, int, int] | None
+    row: int
+    """The group of its first line."""
+
+
+@dataclass(frozen=True)
+class Row:
+    """A group: a leg's label (None: the platform's own joints, or all), its lanes and columns."""
+
+    label: str | None
+    first: int
+    last: int
+    start: float
+    end: float
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A drawing in columns and lanes; ``observed`` are links, ``platform`` all links of an articulated platform."""
+
+    mechanism: Mechanism
+    spots: tuple[Spot, ...]
+    nets: tuple[Net, ...]
+    rows: tuple[Row, ...]
+    observed: frozenset[str]
+    platform: tuple[str, ...]
+
+    @property
+    def columns(self) -> float:
+        """The last column."""
+        return max((row.end for row in self.rows), default=1.0)
+
+    @property
+    def lanes(self) -> int:
+        """The number of lanes."""
+        return self.rows[-1].last + 1 if self.rows else 1
+
+
+@dataclass(frozen=True)
+class _Group:
+    label: str | None
+    ears: tuple[Ear, ...]
+
+
+def plan(mechanism: Mechanism | Anatomy, *, observed: Collection[str] | None = None, virtual: Collection[str] = (),
+         leg: str | None = None) -> Plan:
+    """The plan of a mechanism, or of one that is already taken apart; of one ``leg`` by its label.
+
+    ``observed`` are names of links (default: those of the mechanism's observations), ``virtual`` names of joints.
+    Raises ``BadRequest`` for a leg that is not there.
+    """
+    anatomy = mechanism if isinstance(mechanism, Anatomy) else _anatomy(mechanism)
+    whole = mechanism.mechanism if isinstance(mechanism, Anatomy) else mechanism
+    seen = (o.link for o in whole.observations if isinstance(o, Direction)) if observed is None else observed
+    links = frozenset(seen)
+    boxes = sorted(boxes_of(whole, links, virtual), key=lambda box: links.isdisjoint((box.tail, box.head)))
+    groups, platform = _groups(whole, anatomy, boxes)
+    if leg is not None:
+        chosen = (anatomy or dissect(whole)).leg(leg)
+        own = [box for box in boxes if set(box.joints) <= set(chosen.joints)]
+        groups, platform = [_Group(leg, tuple(ears(own, (whole.base, chosen.attach))))], (chosen.attach,)
+    columns = _columns(groups, whole.base)
+    ends = {group.ears[0].links[-1] for group in groups if group.ears}
+    spots, ways, rows = _placed(groups, columns)
+    return Plan(whole, tuple(spots), tuple(_nets(whole, ends, ways, columns)), tuple(rows), links, platform)
+
+
+def _anatomy(mechanism: Mechanism) -> Anatomy | None:
+    try:
+        return dissect(mechanism)
+    except HrsynthError:
+        return None
+
+
+def _groups(mechanism: Mechanism, anatomy: Anatomy | None, boxes: list[Box]) -> tuple[list[_Group], tuple[str, ...]]:
+    """The legs in the order of what they end on, the platform's own joints after those of the first end."""
+    ends = (mechanism.base, mechanism.platform)
+    everything = [_Group(None, tuple(ears(boxes, ends)))]
+    if anatomy is None:
+        return everything, (mechanism.platform,)
+    of_leg = {name: leg.label for leg in anatomy.legs for name in leg.joints}
+    members: dict[str | None, list[Box]] = {}
+    for box in boxes:
+        members.setdefault(of_leg.get(box.joints[0]), []).append(box)
+    platform = set(anatomy.platform)
+    inner = members.pop(None, [])
+    if any(not {box.tail, box.head, *box.inside} <= platform for box in inner):
+        return everything, (mechanism.platform,)
+    attached = tuple(dict.fromkeys(leg.attach for leg in anatomy.legs))
+    groups: list[_Group] = []
+    for attach in attached:
+        groups += [_Group(leg.label, tuple(ears(members.get(leg.label, ()), (mechanism.base, attach))))
+                   for leg in anatomy.legs if leg.attach == attach]
+        if attach == attached[0] and inner:
+            groups.append(_Group(None, tuple(ears(inner, attached))))
+    return groups, anatomy.platform
+
+
+def _columns(groups: Sequence[_Group], base: str) -> dict[str, int]:
+    """A column for each link, such that every box has its two links in different ones: longest ways from the left."""
+    after: dict[str, set[str]] = {base: set()}
+    column: dict[str, int] = {base: 0}
+    for group in sorted(groups, key=lambda group: group.label is None):
+        for ear in group.ears:
+            first, last = ear.links[0], ear.links[-1]
+            turned = last in column and column[last] < column.get(first, 0)
+            links = ear.links[::-1] if turned else ear.links
+            for a, b in pairwise(links):
+                after.setdefault(a, set()).add(b)
+                after.setdefault(b, set())
+            column = _longest(after)
+    return column
+
+
+def _longest(after: dict[str, set[str]]) -> dict[str, int]:
+    """The length of the longest way to each node of a graph without cycles."""
+    incoming = dict.fromkeys(after, 0)
+    for others in after.values():
+        for other in others:
+            incoming[other] += 1
+    found = dict.fromkeys(after, 0)
+    pending = [node for node, count in incoming.items() if not count]
+    for node in pending:
+        for other in after[node]:
+            found[other] = max(found[other], found[node] + 1)
+            incoming[other] -= 1
+            if not incoming[other]:
+                pending.append(other)
+    return found
+
+
+_Way = tuple[str, tuple[Point, ...], int]
+"""A link, the points of its line within a lane, the group."""
+
+
+def _placed(groups: Sequence[_Group], columns: dict[str, int]) -> tuple[list[Spot], list[_Way], list[Row]]:
+    spots: list[Spot] = []
+    ways: list[_Way] = []
+    rows: list[Row] = []
+    shared = _shared(ear for group in groups for ear in group.ears)
+    top = 0
+    for number, group in enumerate(groups):
+        lanes: list[list[tuple[int, int]]] = []
+        for ear in group.ears:
+            ends = sorted((columns[ear.links[0]], columns[ear.links[-1]]))
+            lane = _free(lanes, ends[0], ends[1])
+            xs = _between(ear, columns, shared)
+            spots += [Spot(box, x, top + lane, number) for box, x in zip(ear.boxes, xs, strict=True)]
+            ways += _ways(ear, xs, columns, shared, top + lane, number)
+        touched = [columns[link] for ear in group.ears for link in ear.links] or [0]
+        rows.append(Row(group.label, top, top + max(len(lanes), 1) - 1, min(touched), max(touched)))
+        top += max(len(lanes), 1)
+    return spots, ways, rows
+
+
+def _shared(found: Iterable[Ear]) -> set[str]:
+    """The links that have a place of their own: ends of ears."""
+    return {link for ear in found for link in ((ear.links[0],) if ear.open else (ear.links[0], ear.links[-1]))}
+
+
+def _free(lanes: list[list[tuple[int, int]]], start: int, end: int) -> int:
+    """The first lane in which nothing stands between two columns; it is taken."""
+    for lane, taken in enumerate(lanes):
+        if all(end < a or b < start for a, b in taken):
+            taken.append((start, end))
+            return lane
+    lanes.append([(start, end)])
+    return len(lanes) - 1
+
+
+def _between(ear: Ear, columns: dict[str, int], shared: set[str]) -> list[float]:
+    """The columns of the boxes, as evenly as half columns allow between links that have a place of their own."""
+    fixed = [i for i, link in enumerate(ear.links) if link in shared or i in (0, len(ear.links) - 1)]
+    xs: list[float] = []
+    for i, j in pairwise(fixed):
+        start, end = sorted((columns[ear.links[i]], columns[ear.links[j]]))
+        found = [start + int((k + 0.5) * (end - start) / (j - i)) + 0.5 for k in range(j - i)]
+        xs += found if start == columns[ear.links[i]] else found[::-1]
+    return xs
+
+
+def _ways(ear: Ear, xs: list[float], columns: dict[str, int], shared: set[str], lane: int,
+          row: int) -> list[_Way]:
+    """The line of each link of an ear: from the box before it, through its own place, to the box after it."""
+    found: list[_Way] = []
+    for i, link in enumerate(ear.links):
+        points = [(xs[i - 1], lane)] if i else []
+        if link in shared or not 0 < i < len(ear.links) - 1:
+            points.append((float(columns[link]), lane))
+        points += [(xs[i], lane)] if i < len(xs) else []
+        found.append((link, tuple(points), row))
+    return found
+
+
+def _nets(mechanism: Mechanism, platform: Collection[str], ways: list[_Way],
+          columns: dict[str, int]) -> Iterable[Net]:
+    table: dict[str, list[_Way]] = {}
+    for way in ways:
+        table.setdefault(way[0], []).append(way)
+    for link in mechanism.links:
+        own = table.get(link)
+        if own is None:
+            continue
+        lanes = sorted({way[1][0][1] for way in own})
+        bar = None
+        if len(own) > 1 or link == mechanism.base or link in platform:
+            bar = float(columns[link]), lanes[0], lanes[-1]
+        yield Net(link, tuple(way[1] for way in own), bar, own[0][2])

@@ -1,0 +1,61 @@
+"""SVG as text: elements with few decimals, names kept safe, a title and a description for those who do not see it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from xml.sax.saxutils import escape, quoteattr
+
+MOTOR = "#bdbdbd"
+"""Fill of what a real motor drives (MMT Table 1)."""
+VIRTUAL = "#b3400a"
+"""Virtual actuators and observed segments; white letters on it have a contrast of 6."""
+TINT = "#fbd5b5"
+"""Inside the symbol of a virtual actuator."""
+INK = "#1a1a1a"
+PALE = "#f1f3f5"
+"""Behind a leg."""
+FONT = "system-ui, 'DejaVu Sans', 'Liberation Sans', Arial, sans-serif"
+
+Place = tuple[float, float]
+"""x to the right, y down, in pixels."""
+
+
+def number(value: float) -> str:
+    """A coordinate with at most one decimal."""
+    return f"{value:.1f}".removesuffix(".0")
+
+
+def attributes(**values: object) -> str:
+    """``stroke_width=2`` as `` stroke-width="2"``; None is left out."""
+    return "".join(f" {name.rstrip('_').replace('_', '-')}="
+                   f"{quoteattr(number(value) if isinstance(value, float) else str(value))}"
+                   for name, value in values.items() if value is not None)
+
+
+def element(name: str, *content: str, **values: object) -> str:
+    """An element; its content is SVG already."""
+    inner = "".join(content)
+    return f"<{name}{attributes(**values)}>{inner}</{name}>" if inner else f"<{name}{attributes(**values)}/>"
+
+
+def title(text: str) -> str:
+    """What is read out, and shown under the pointer."""
+    return element("title", escape(text))
+
+
+def words(text: str, x: float, y: float, **values: object) -> str:
+    """Text at a place."""
+    return element("text", escape(text), x=x, y=y, **values)
+
+
+def lines(points: Iterable[Iterable[Place]]) -> str:
+    """The path data of polylines."""
+    return "".join("M" + "L".join(f"{number(x)} {number(y)}" for x, y in way) for way in points)
+
+
+def picture(width: float, height: float, name: str, description: str, *content: str) -> str:
+    """A whole drawing, on its own or inside a page."""
+    return (f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {number(width)} {number(height)}" '
+            f'width="{number(width)}" height="{number(height)}" role="img" aria-label={quoteattr(name)} '
+            f'font-family="{FONT}" font-size="12">{title(name)}{element("desc", escape(description))}'
+            f'{"".join(content)}</svg>\n')

@@ -1,0 +1,71 @@
+"""Entries of the catalog as text: a table of many, one in full, what a build did."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
+
+from .tables import listing, table
+
+HEADS = ("word", "robot", "dof", "motion", "hidden robot", "verdict", "rank", "legs needed")
+LEGEND = "* a motor   ══ the watched link"
+
+Record = Mapping[str, Any]
+
+
+def entries(records: Sequence[Record], total: int) -> str:
+    """A line an entry, and how many of all they are."""
+    count = f"{len(records)} of {total} architectures"
+    return f"{table([_row(record) for record in records], HEADS)}\n\n{count}" if records else count
+
+
+def entry(record: Record, drawn: str, note: str = "", file: str | None = None) -> str:
+    """One entry: its legs drawn, then what is known of it."""
+    head = f"{record['word']}   {record.get('notation', '')}".rstrip()
+    more = [note, "" if file is None else f"written to {file}"]
+    return "\n\n".join([head, f"{drawn}\n{LEGEND}", listing(list(_facts(record))), *filter(None, more)])
+
+
+def built(groups: Iterable[Mapping[str, Any]]) -> str:
+    """A line a group that was built."""
+    rows = [(*(str(each[name]) for name in ("group", "words", "now", "before")), each["file"] or "not complete")
+            for each in groups]
+    return table(rows, ("group", "words", "made now", "before", "file"))
+
+
+def _row(record: Record) -> tuple[str, ...]:
+    if "refused" in record:
+        return (record["word"], record.get("notation", ""), "", "", "", f"refused: {record['refused']}", "", "")
+    return (record["word"], record["notation"], str(record["dof"]), record["motion"], record.get("hidden", "none"),
+            record["verdict"], f"{record['rank']} of {record['dof']}", str(record["fewest"]))
+
+
+def _facts(record: Record) -> Iterable[tuple[str, str]]:
+    """What is known, by name; what is not known is left out."""
+    if "refused" in record:
+        yield "group", str(record["group"])
+        yield "refused", str(record["refused"])
+        return
+    yield "group", str(record["group"])
+    yield "dof", f"{record['dof']}, {record['motion']} (mobility {record['mobility']}, of which {record['idle']} idle)"
+    yield "hidden robot", str(record.get("hidden", "none"))
+    yield "verdict", f"{record['verdict']} (rank {record['rank']} of {record['dof']})"
+    yield "exact", "proved" if record["instances"] == 1 else f"{record['instances']} instances"
+    if record.get("lost"):
+        yield "lost", "; ".join(record["lost"])
+    if record.get("minimal"):
+        yield "legs needed", "  ".join("{" + ", ".join(legs) + "}" for legs in record["minimal"])
+    if record.get("condition"):
+        yield "Type 2", str(record["condition"])
+    if record.get("modes_bound") is not None:
+        legs = f" with legs {', '.join(record['modes_legs'])} watched" if record.get("modes_legs") else ""
+        yield "modes", f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}"
+    if record.get("cure"):
+        yield "cure", str(record["cure"])
+    if "motors" in record:
+        base = "all on the base" if record["base_motors"] else "not all on the base"
+        yield "motors", f"{record['motors']}, {base}" + _drive(record)
+
+
+def _drive(record: Record) -> str:
+    return f"; they determine {record['motor_rank']} of {record['dof']} freedoms" if "motor_rank" in record else ""

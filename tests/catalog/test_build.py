@@ -1,0 +1,300 @@
+"""Builds: the same bytes whoever builds, in whatever order, however often killed; nothing lost that was built."""
+
+from __future__ import annotations
+
+import errno
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from catalog.stub import REFUSED, broken, died, entry, source
+from hrsynth.catalog import load
+from hrsynth.catalog.build import build
+from hrsynth.catalog.journal import Journal
+from hrsynth.catalog.lines import decoded, encoded, line
+from hrsynth.catalog.source import architectures
+from hrsynth.errors import BadRequest, BuildStopped, HrsynthError
+
+TESTS = Path(__file__).resolve().parent.parent
+
+
+def content(folder: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in sorted(folder.iterdir())}
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> dict[str, bytes]:
+    """The bytes of a build that nothing disturbed."""
+    folder = tmp_path_factory.mktemp("whole")
+    build(folder, source=source())
+    return content(folder)
+
+
+def started(target: Path, delay: float, workers: int = 1) -> subprocess.Popen[bytes]:
+    environment = os.environ | {"PYTHONPATH": str(TESTS), "STUB_DELAY": str(delay)}
+    command = [sys.executable, "-m", "catalog.stub", str(target), str(workers)]
+    return subprocess.Popen(command, env=environment, stderr=subprocess.DEVNULL, start_new_session=True)
+
+
+def lines_in(journals: list[Path]) -> int:
+    return sum(file.read_bytes().count(b"\n") for file in journals if file.exists())
+
+
+def killed_after(process: subprocess.Popen[bytes], folder: Path, records: int) -> None:
+    """Kill a build, and what it started, when its journals have grown by so many lines."""
+    end = time.monotonic() + 20
+    before = lines_in(list(folder.glob("*.part")))
+    while process.poll() is None and time.monotonic() < end:
+        if lines_in(list(folder.glob("*.part"))) >= before + records:
+            break
+        time.sleep(0.002)
+    os.killpg(process.pid, signal.SIGKILL)
+    process.wait()
+
+
+def test_a_group_is_one_file_sorted_compact_and_ascii(whole: dict[str, bytes]):
+    assert list(whole) == ["c.jsonl", "d.jsonl"]
+    for group, data in zip("cd", whole.values(), strict=True):
+        head, *lines = data.decode("ascii").splitlines()
+        assert head == f'{{"format":1,"catalog":1,"group":"{group}","count":{len(lines)}}}'
+        assert lines == [line({**entry_or_refused(word), "word": word, "group": group})
+                         for word in sorted(source().groups[group]())]
+        assert b"null" not in data
+
+
+def entry_or_refused(word: str) -> dict:
+    try:
+        return entry(word)
+    except HrsynthError:
+        return {"refused": f"{REFUSED}: refused on two lines"}
+
+
+def test_what_a_build_says_is_what_it_did(tmp_path: Path):
+    told: list[tuple[str, int, int]] = []
+    done = build(tmp_path / "new", ["d"], source=source(), tell=lambda *step: told.append(step))
+    assert [each.to_dict() for each in done] == [{"group": "d", "words": 18, "now": 18, "before": 0,
+                                                  "file": str(tmp_path / "new" / "d.jsonl")}]
+    assert told == [("d", i, 18) for i in range(19)]
+
+
+@pytest.mark.parametrize("seed", [0, pytest.param(1, marks=pytest.mark.slow)])
+def test_a_build_killed_again_and_again_gives_the_same_bytes(seed: int, tmp_path: Path, whole: dict[str, bytes]):
+    draw, kills = random.Random(seed), 0
+    for _ in range(4):
+        process = started(tmp_path, delay=0.02)
+        killed_after(process, tmp_path, draw.randint(1, 9))
+        kills += process.returncode == -signal.SIGKILL
+    assert kills == 4
+    left = lines_in(list(tmp_path.glob("*.part"))) + sum(data.count(b"\n") for data in content(tmp_path).values())
+    assert left > 8
+    build(tmp_path, source=source())
+    assert content(tmp_path) == whole
+
+
+@pytest.mark.parametrize("moment", ["writing", "all written", "one journal gone"])
+def test_a_kill_while_groups_are_finished_loses_nothing(moment: str, tmp_path: Path, whole: dict[str, bytes],
+                                                        monkeypatch: pytest.MonkeyPatch):
+    """The states that a kill can leave there, set up one by one."""
+    removed = Journal.remove
+    monkeypatch.setattr(Journal, "remove", lambda journal: None)
+    build(tmp_path, source=source())
+    monkeypatch.setattr(Journal, "remove", removed)
+    assert sorted(content(tmp_path)) == ["c.jsonl", "c.jsonl.part", "d.jsonl", "d.jsonl.part"]
+    if moment == "writing":
+        (tmp_path / "d.jsonl").rename(tmp_path / ".d.jsonl.4711.tmp")
+    if moment == "one journal gone":
+        (tmp_path / "c.jsonl.part").unlink()
+    done = build(tmp_path, source=source())
+    assert [each.now for each in done] == [24 if moment == "one journal gone" else 0, 0]
+    assert content(tmp_path) == whole
+
+
+def test_records_in_the_journal_are_not_made_again(tmp_path: Path):
+    made: list[str] = []
+
+    def counted(word: str) -> dict:
+        made.append(word)
+        return entry(word)
+
+    noted = replace(source(), entry=counted)
+    limits = [5, 0, 20, 30]
+    done = [build(tmp_path, source=noted, limit=limit) for limit in limits]
+    assert [sum(each.now for each in groups) for groups in done] == [5, 0, 20, 17]
+    assert len(made) == len(set(made)) == 42
+    assert done[2][0].file is not None
+    assert done[2][1].file is None
+
+
+@settings(max_examples=60, deadline=None)
+@given(cut=st.integers(min_value=0, max_value=4000), tail=st.binary(max_size=12), broken=st.integers(0, 12))
+def test_a_torn_journal_is_read_up_to_where_it_is_whole(cut: int, tail: bytes, broken: int,
+                                                        tmp_path_factory: pytest.TempPathFactory):
+    """Cut anywhere, with rubbish at the end or zeros in a line: what is whole is kept, and appended to."""
+    path = tmp_path_factory.mktemp("torn") / "x.part"
+    lines = [line({**entry(f"(w{i})"), "word": f"(w{i})", "group": "x"}) for i in range(8)]
+    with Journal(path, "x") as journal:
+        head = path.stat().st_size
+        journal.add((f"(w{i})", text) for i, text in enumerate(lines))
+    data = path.read_bytes()[:head + cut]
+    if 0 < broken < len(data.splitlines()) - 1:
+        parts = data.splitlines(keepends=True)
+        data = b"".join([*parts[:broken], b"\0" * (len(parts[broken]) - 1) + b"\n", *parts[broken + 1:]])
+    path.write_bytes(data + tail.replace(b"\n", b" "))
+    whole = [text for text in lines if f"{text}\n".encode() in data]
+    with Journal(path, "x") as journal:
+        found = [f"(w{i})" for i, text in enumerate(lines) if text in whole]
+        assert [f"(w{i})" in journal for i in range(8)] == [text in whole for text in lines]
+        assert list(journal.lines(found)) == whole
+        journal.add([("(new)", '{"word":"(new)"}')])
+    with Journal(path, "x") as journal:
+        assert len(journal) == len(whole) + 1
+        assert list(journal.lines(["(new)"])) == ['{"word":"(new)"}']
+
+
+def test_a_journal_of_something_else_is_refused(tmp_path: Path):
+    path = tmp_path / "c.jsonl.part"
+    for text, said in [("a list\nof words\n", "not a head"), ('{"format":1,"catalog":99}\n', "another version")]:
+        path.write_text(text)
+        with pytest.raises(BadRequest, match=said):
+            build(tmp_path, ["c"], source=source())
+        assert path.read_text() == text
+    build(tmp_path, ["c"], source=source(), anew=True)
+    assert len(load(tmp_path)) == 24
+
+
+def test_one_build_at_a_time(tmp_path: Path):
+    with Journal(tmp_path / "c.jsonl.part", "c"), pytest.raises(BadRequest, match="another build"):
+        build(tmp_path, ["c"], source=source())
+
+
+@pytest.mark.parametrize("workers", [2, pytest.param(3, marks=pytest.mark.slow)])
+def test_any_number_of_workers_gives_the_same_bytes(workers: int, tmp_path: Path, whole: dict[str, bytes]):
+    pytest.importorskip("joblib")
+    build(tmp_path, source=source(), workers=workers)
+    assert content(tmp_path) == whole
+
+
+@pytest.mark.slow
+def test_a_build_with_workers_is_killed_and_goes_on(tmp_path: Path, whole: dict[str, bytes]):
+    pytest.importorskip("joblib")
+    process = started(tmp_path, delay=0.05, workers=2)
+    killed_after(process, tmp_path, 10)
+    assert process.returncode == -signal.SIGKILL
+    build(tmp_path, source=source(), workers=2)
+    assert content(tmp_path) == whole
+
+
+def test_kin_are_made_in_one_process():
+    chunks = list(source().chunks(source().groups["c"](), 5))
+    assert sorted(word for chunk in chunks for word in chunk) == sorted(source().groups["c"]())
+    assert all(len(chunk) == 6 for chunk in chunks)
+    homes = {word.replace("*", ""): i for i, chunk in enumerate(chunks) for word in chunk}
+    assert all(homes[word.replace("*", "")] == i for i, chunk in enumerate(chunks) for word in chunk)
+
+
+def test_a_worker_that_dies_stops_the_build_in_one_line(tmp_path: Path, whole: dict[str, bytes]):
+    pytest.importorskip("joblib")
+    with pytest.raises(BuildStopped, match=r"a worker process died; what was built is kept in .*d\.jsonl\.part"):
+        build(tmp_path, source=replace(source(), entry=died), workers=2)
+    assert (tmp_path / "c.jsonl").read_bytes() == whole["c.jsonl"]
+    (first, _) = build(tmp_path, source=source())
+    assert (first.now, first.before) == (0, 24)
+    assert content(tmp_path) == whole
+
+
+@pytest.mark.parametrize("workers", [1, 2])
+def test_a_defect_names_its_word_and_loses_nothing(workers: int, tmp_path: Path):
+    if workers > 1:
+        pytest.importorskip("joblib")
+    with pytest.raises(BuildStopped, match=r"\(c05\): a defect .*IndexError: list index.*; what was built is kept in"):
+        build(tmp_path, source=replace(source(), entry=broken), workers=workers)
+    assert (tmp_path / "c.jsonl.part").exists()
+
+
+@pytest.mark.parametrize("room", [10, 700, 3000])
+def test_a_full_disk_stops_the_build_and_keeps_the_journal(room: int, tmp_path: Path, whole: dict[str, bytes],
+                                                           monkeypatch: pytest.MonkeyPatch):
+    """Only so many bytes can be written, the last write being cut short."""
+    left, write = [room], os.write
+
+    def full(file: int, data: bytes) -> int:
+        if left[0] == 0:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+        done = write(file, data[:left[0]])
+        left[0] -= done
+        return done
+
+    monkeypatch.setattr(os, "write", full)
+    with pytest.raises(BuildStopped, match="No space left on device") as stopped:
+        build(tmp_path, source=source())
+    assert stopped.value.exit_status == 3
+    assert len(stopped.value.lines()) == 1
+    monkeypatch.undo()
+    journal = tmp_path / "c.jsonl.part"
+    kept = journal.read_bytes()
+    assert len(kept) <= room
+    assert kept == b"" or kept.endswith(b"\n")
+    (done, _) = build(tmp_path, source=source())
+    assert done.before == max(0, kept.count(b"\n") - 1)
+    assert content(tmp_path) == whole
+
+
+@pytest.mark.parametrize("name", ["folder", "big.sqlite"])
+def test_a_disk_full_at_the_end_keeps_the_journal(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    def full(*_: object) -> None:
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.raises(BuildStopped, match=r"No space left on device; what was built is kept in .*\.part"):
+        build(tmp_path / name, ["d"], source=source())
+    monkeypatch.undo()
+    assert not list(tmp_path.rglob("*.tmp"))
+    (done,) = build(tmp_path / name, ["d"], source=source())
+    assert (done.now, done.before) == (0, 18)
+
+
+@pytest.mark.parametrize(("target", "groups", "said"), [("there", ["nothing"], "unknown group"),
+                                                        ("no/such/folder", [], "cannot write"),
+                                                        ("file", [], "cannot write")])
+def test_bad_requests_are_one_line_before_any_work(target: str, groups: list[str], said: str, tmp_path: Path):
+    (tmp_path / "file").write_text("a file")
+    with pytest.raises(BadRequest, match=said) as refused:
+        build(tmp_path / target, groups, source=source())
+    assert len(refused.value.lines()) == 1
+    assert [file.name for file in tmp_path.iterdir()] == ["file"]
+
+
+def test_files_round_trip_and_cut_off_ones_are_refused(whole: dict[str, bytes]):
+    data = whole["c.jsonl"]
+    lines = decoded(data, "c")
+    assert encoded("c", random.Random(3).sample(lines, len(lines))) == data
+    for cut in range(0, len(data), 37):
+        with pytest.raises(BadRequest):
+            decoded(data[:cut], "c")
+    with pytest.raises(BadRequest, match=r"another version, found 'format 1, words 9', allowed: .*build it again"):
+        decoded(data.replace(b'"catalog":1', b'"catalog":9', 1), "c")
+
+
+@pytest.mark.slow
+def test_the_catalog_itself_has_the_same_bytes_from_two_workers(tmp_path: Path):
+    """A few words of every group: that they are made here or elsewhere, alone or after others, changes nothing."""
+    pytest.importorskip("joblib")
+    every = architectures()
+    few = {group: random.Random(5).sample(every.words(group), 4) for group in every.groups}
+    some = replace(every, groups={group: few[group].copy for group in few})
+    build(tmp_path / "one", source=some)
+    build(tmp_path / "two", source=some, workers=2)
+    assert content(tmp_path / "one") == content(tmp_path / "two")
+    assert all(record["group"] in few for record in load(tmp_path / "one"))
+    for group, words in few.items():
+        (first, *_) = load(tmp_path / "one", group=group)
+        assert line(first) == line({**every.entry(min(words)), "group": group})

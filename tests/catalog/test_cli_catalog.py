@@ -1,0 +1,174 @@
+"""`catalog` on the command line: JSON, text, robots written, refusals in one line."""
+
+from __future__ import annotations
+
+import json
+import os
+import re
+import time
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import hrsynth
+from catalog.stub import WORKERS, source
+from hrsynth.catalog import load
+from hrsynth.catalog.build import build
+from hrsynth.catalog.drawing import drawing
+from hrsynth.catalog.words import parse
+from hrsynth.cli import _run
+from hrsynth.cli_catalog import Meter
+
+
+@pytest.fixture
+def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    """The command line on the small catalog: status, output, errors."""
+    monkeypatch.delenv("HRSYNTH_DEBUG", raising=False)
+    for module in ("build", "check", "source"):
+        monkeypatch.setattr(f"hrsynth.catalog.{module}.architectures", source)
+
+    def call(*arguments: str | Path) -> tuple[int, str, str]:
+        capsys.readouterr()
+        return _run(["catalog", *map(str, arguments)]), *capsys.readouterr()
+
+    return call
+
+
+def check_refused(answer: tuple[int, str, str], said: str, status: int = 2) -> None:
+    found, out, err = answer
+    assert (found, out) == (status, ""), err
+    assert re.fullmatch(r"hrsynth: [^\n]*\n", err)
+    assert said in err
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    build(tmp_path / "small", source=source())
+    return tmp_path / "small"
+
+
+def test_build_writes_and_tells_what_it_did(run, tmp_path: Path):
+    status, out, err = run("build", "-o", tmp_path / "new", "--limit", 30, "--json")
+    data = json.loads(out)
+    assert (status, err, data["command"], data["version"]) == (0, "", "catalog build", hrsynth.__version__)
+    assert [(each["now"], each["file"] is None) for each in data["groups"]] == [(24, False), (6, True)]
+    status, out, err = run("build", "-o", tmp_path / "new", "--workers", WORKERS)
+    assert (status, err) == (0, "")
+    assert [line.split()[:4] for line in out.splitlines()[2:]] == [["c", "24", "0", "24"], ["d", "18", "12", "6"]]
+    assert len(load(tmp_path / "new")) == 42
+    status, out, _ = run("build", "--check", "-o", tmp_path / "new")
+    assert (status, out) == (0, "not stale\n")
+
+
+def test_check_tells_what_is_stale_with_status_3(run, folder: Path):
+    file = folder / "c.jsonl"
+    file.write_text(file.read_text().replace('"mobility"', '"Mobility"'))
+    (folder / "d.jsonl").unlink()
+    status, out, err = run("build", "--check", "--sample", 9, "-o", folder)
+    assert (status, out, len(err.splitlines())) == (3, "", 2)
+    assert all(re.match(r"hrsynth: [cd]: ", line) for line in err.splitlines())
+    status, out, err = run("build", "c", "--check", "-o", folder, "--json")
+    assert status == 3
+    assert [f"hrsynth: {each}" for each in json.loads(out)["stale"]] == err.splitlines()
+
+
+def test_list_finds_what_python_finds(run, folder: Path):
+    for options, asked in [([], {}), (["--dof", 3], {"dof": 3}), (["--legs", "?-R*", "--base-motors"],
+                           {"legs": "?-R*", "base_motors": True}), (["--verdict", "controllable", "--moving-motors"],
+                           {"verdict": "controllable", "base_motors": False}),
+                           (["--text", "two lines"], {"text": "two lines"}), (["--legs", "9"], {"legs": 9}),
+                           (["--group", "d", "--fewest", 2, "--motion", "3T"],
+                           {"group": "d", "fewest": 2, "motion": "3T"})]:
+        wanted = load(folder, **asked)
+        status, out, err = run("list", "--catalog", folder, *options, "--json")
+        data = json.loads(out)
+        assert (status, err, data["command"], data["total"]) == (0, "", "catalog list", 42)
+        assert data["entries"] == list(wanted)
+        status, out, _ = run("list", "--catalog", folder, *options)
+        assert status == 0
+        assert out.splitlines()[-1] == f"{len(wanted)} of 42 architectures"
+        assert len(out.splitlines()) == (len(wanted) + 4 if len(wanted) else 1)
+
+
+def test_show_draws_and_writes_a_robot(run, tmp_path: Path):
+    store = tmp_path / "real"
+    word = "3(Rz*-Rz-Rz)"
+    facts = {"word": word, "group": "g", "notation": "3-R*RR", "hidden": "3-PiR*R", "legs": 3, "dof": 3,
+             "motion": "2T1R", "mobility": 3, "idle": 0, "verdict": "controllable", "rank": 3,
+             "exact": True, "instances": 1, "motors": 3, "base_motors": True, "fewest": 3,
+             "minimal": [["1", "2", "3"]], "lost": [], "modes_bound": 6, "modes_seen": 2,
+             "condition": "the lines meet in a point"}
+    build(store, source=hrsynth.catalog.source.Source({"g": lambda: [word]}, lambda _: facts))
+    file = tmp_path / "robot.urdf"
+    status, out, err = run("show", "(Rz*-Rz-Rz)+2(Rz*-Rz-Rz)", "--catalog", store, "-o", file)
+    assert (status, err) == (0, "")
+    for line in (r"3\(Rz\*-Rz-Rz\)   3-R\*RR", r"legs 1, 2, 3  base ── Rz\* ── Rz ══ Rz ── platform",
+                 r"dof +3, 2T1R \(mobility 3, of which 0 idle\)", r"verdict +controllable \(rank 3 of 3\)",
+                 r"exact +proved", r"legs needed +\{1, 2, 3\}", r"modes +2 real seen of 6 complex",
+                 f"written to {re.escape(str(file))}"):
+        assert re.search(f"^{line}$", out, re.MULTILINE), out
+    robot = hrsynth.load(file)
+    assert len(robot.joints) == 9
+    data = json.loads(run("show", word, "--catalog", store, "--json")[1])
+    assert (data["command"], data["note"], data["file"]) == ("catalog show", None, None)
+    assert data["entry"] == facts
+
+
+def test_show_studies_what_is_not_in_the_catalog(run, folder: Path):
+    status, out, _ = run("show", "3(Rz*-Rz-Rz)", "--catalog", folder, "--json")
+    assert status == 0
+    assert json.loads(out)["note"] == "not in the catalog, studied now"
+
+
+@pytest.mark.parametrize(("word", "legs"), [
+    ("2(Rt*-2SSt)+(Pz*-2SSt)", ["base ── Rt* ══ 2SSt ══ platform", "base ── Pz* ══ 2SSt ══ platform"]),
+    ("3(Rz*!-Rz-Rz)", ["base ── Rz* ══ Rz ── Rz ── platform"]),
+    ("3(Rz-Rz*-Rz)+(Rz-Rz-Rz)", ["base ── Rz ── Rz ══ Rz ── platform", "base ── Rz ── Rz* ══ Rz ── platform"]),
+    ("6(Utn-Pl*-S)", ["base ── Utn ══ Pl* ── S ── platform"])])
+def test_drawings_show_motors_and_watched_links(word: str, legs: list[str]):
+    """P joints do not turn what is watched: either side of one is the same direction."""
+    drawn = [re.sub(r" ══ Pl\* ── | ── Pl\* ══ ", " ══ Pl* ── ", line) for line in drawing(parse(word)).splitlines()]
+    assert sorted(line.split("  ", 1)[1].strip() for line in drawn) == sorted(legs)
+    labels = Counter(label for line in drawn for label in re.findall(r"\d+", line.split("base")[0]))
+    assert labels == Counter(str(i + 1) for i in range(len(parse(word).legs)))
+
+
+def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.chdir(tmp_path)
+    check_refused(run("build"), "nowhere to build")
+    package = Path(hrsynth.__file__).parent
+    check_refused(run("build", "-o", package / "catalog" / "new"), "cannot build into the package")
+    check_refused(run("build", "nothing", "-o", tmp_path / "new"), "unknown group, found 'nothing', allowed: c, d")
+    check_refused(run("build", "-o", tmp_path / "new", "--workers", 0), "--workers")
+    check_refused(run("build", "-o", tmp_path / "no" / "where"), "No such file or directory")
+    check_refused(run("list", "--catalog", tmp_path / "nowhere"), "no such catalog")
+    check_refused(run("list", "--dof", "many"), "--dof")
+    check_refused(run("show", "3(Qz*-Rz-Rz)"), "unknown joint")
+    check_refused(run("show", "3(Rz*-Rz-Rz)", "-o", tmp_path / "robot.doc"), "robot.doc")
+    check_refused(run("show", "3()"), "unknown joint")
+    (folder / "c.jsonl").write_text((folder / "c.jsonl").read_text().replace('"catalog":1', '"catalog":0'))
+    check_refused(run("list", "--catalog", folder), "another version")
+    assert sorted(file.name for file in tmp_path.iterdir()) == ["small"]
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root may write anywhere")
+def test_a_folder_that_cannot_be_written_is_one_line(run, tmp_path: Path):
+    (tmp_path / "locked").mkdir(mode=0o500)
+    check_refused(run("build", "-o", tmp_path / "locked"), "Permission denied")
+
+
+def test_the_meter_tells_the_time_left_on_a_terminal(monkeypatch: pytest.MonkeyPatch,
+                                                     capsys: pytest.CaptureFixture[str]):
+    monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
+    with Meter(wait=-1.0) as meter:
+        meter.tell("c", 2, 10)
+        meter.tell("d", 0, 5)
+        for done in range(3, 11):
+            meter.tell("c", done, 10)
+            time.sleep(0.03)
+    shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", capsys.readouterr().err)
+    assert re.search(r"c .*\b10/15\b.*\b0:00:0[01]\b.* left", shown), shown
+    with Meter() as meter:
+        meter.tell("c", 2, 10)
+    assert capsys.readouterr().err == ""

@@ -1,0 +1,178 @@
+"""Queries: what is found is what a plain reading of the records finds, from lines and from SQLite alike."""
+
+from __future__ import annotations
+
+import re
+import sqlite3
+from pathlib import Path
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hrsynth
+from catalog.stub import CHAINS, REFUSED, VERDICTS, WORKERS, source
+from hrsynth.catalog import Catalog, load
+from hrsynth.catalog.build import build
+from hrsynth.catalog.check import check
+from hrsynth.errors import BadRequest
+
+ASKED = st.fixed_dictionaries({}, optional={
+    "group": st.sampled_from(["c", "d", "e", ("c", "d")]),
+    "dof": st.one_of(st.none(), st.integers(1, 7)),
+    "motion": st.sampled_from(["2T", "3T", "3T1R", "3T2R", "6T"]),
+    "verdict": st.sampled_from([*VERDICTS, VERDICTS[:2], "none"]),
+    "base_motors": st.sampled_from([None, True, False]),
+    "fewest": st.integers(0, 6),
+    "legs": st.one_of(st.integers(1, 7), st.sampled_from(["3", "?-R*", "*S", "6-UPS", "UPS", "R?R", "(c0?*)", "R-{*"]),
+                      st.sampled_from([f"4-{chain}" for chain in CHAINS])),
+    "text": st.sampled_from(["ROTATION", "σ", "two lines", "(d", "nowhere"])})
+
+
+@pytest.fixture(scope="module")
+def stores(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    folder = tmp_path_factory.mktemp("stores")
+    build(folder / "lines", source=source((30, 20)))
+    build(folder / "big.sqlite", source=source((30, 20)))
+    return folder / "lines", folder / "big.sqlite"
+
+
+def plainly(record: dict[str, Any], asked: dict[str, Any]) -> bool:
+    """The meaning of a query, written down once more."""
+    for name, value in asked.items():
+        if value is None:
+            continue
+        values = value if isinstance(value, tuple) else (value,)
+        if name == "text":
+            held = " ".join(str(each) for each in record.values()).lower()
+            met = any(each.lower() in held for each in values)
+        elif name == "legs":
+            met = any(plain_legs(record, str(each)) for each in values)
+        else:
+            met = name in record and record[name] in values
+        if not met:
+            return False
+    return True
+
+
+def plain_legs(record: dict[str, Any], wanted: str) -> bool:
+    if wanted.isdigit():
+        return record.get("legs") == int(wanted)
+    pattern = "".join({"*": ".*", "?": "."}.get(letter, re.escape(letter)) for letter in wanted)
+    notation = record.get("notation", "")
+    chain = notation.split("-", 1)[-1]
+    every = [form for name in (record["word"], notation, chain) for form in (name, name.replace("*", "")) if form]
+    return any(re.fullmatch(pattern, form) for form in every)
+
+
+@settings(max_examples=150, deadline=None)
+@given(asked=ASKED)
+def test_a_query_finds_what_a_plain_reading_finds(asked: dict[str, Any], stores: tuple[Path, Path]):
+    lines, big = stores
+    every = load(lines)
+    wanted = [record["word"] for record in every if plainly(dict(record), asked)]
+    assert [record["word"] for record in every.where(**asked)] == wanted
+    assert [record["word"] for record in load(lines, **asked)] == wanted
+    assert [record["word"] for record in load(big, **asked)] == wanted
+
+
+def test_sqlite_holds_the_same_records(stores: tuple[Path, Path]):
+    lines, big = stores
+    assert list(load(lines)) == list(load(big))
+    assert len(load(big)) == 100
+    assert sorted(file.name for file in big.parent.iterdir()) == ["big.sqlite", "lines"]
+
+
+def test_sqlite_has_the_same_bytes_however_it_was_built(stores: tuple[Path, Path], tmp_path: Path):
+    other = tmp_path / "big.sqlite"
+    build(other, source=source((30, 20)), limit=13)
+    build(other, ["d"], source=source((30, 20)))
+    build(other, source=source((30, 20)), workers=WORKERS)
+    assert other.read_bytes() == stores[1].read_bytes()
+    assert [file.name for file in tmp_path.iterdir()] == ["big.sqlite"]
+
+
+def test_a_catalog_is_a_collection(stores: tuple[Path, Path]):
+    every = load(stores[0])
+    assert len(list(every)) == len(every) == 100
+    words = [(record["group"], record["word"]) for record in every]
+    assert words == sorted(words)
+    assert every["(c05*)"]["word"] == "(c05*)"
+    assert "(c05*)" in every
+    assert every[REFUSED]["refused"] == f"{REFUSED}: refused on two lines"
+    counts = every.count("group", "verdict")
+    assert sum(counts.values()) == 100
+    for (group, verdict), count in counts.items():
+        fit = every.where(group=group, verdict=verdict) if verdict else every.where(text="refused on")
+        assert len(fit) == count
+    assert list(every.where(dof=3).where(verdict="controllable")) == list(every.where(verdict="controllable", dof=3))
+
+
+def test_words_are_found_however_they_are_spelt():
+    catalog = Catalog(({"word": "2(Rz*-Rz-Rz)", "group": "planar"},))
+    assert catalog["(Rz*-Rz-Rz)+(Rz*-Rz-Rz)"] is catalog.records[0]
+    with pytest.raises(BadRequest, match=r"not in the catalog, found '3\(Rz\*-Rz-Rz\)', allowed: 2\(Rz\*-Rz-Rz\)"):
+        _ = catalog["3(Rz*-Rz-Rz)"]
+    with pytest.raises(BadRequest, match="unknown joint"):
+        _ = catalog["3(Qz*-Rz-Rz)"]
+
+
+def test_the_package_has_its_catalog():
+    assert hrsynth.catalog.load is load
+
+
+def test_what_cannot_be_asked_or_read_is_refused(stores: tuple[Path, Path], tmp_path: Path):
+    lines, big = stores
+    with pytest.raises(BadRequest, match="cannot be asked for, found 'colour'"):
+        load(lines, colour="red")
+    with pytest.raises(BadRequest, match="no such catalog"):
+        load(tmp_path / "nowhere")
+    with pytest.raises(BadRequest, match="nothing in the catalog"):
+        load(tmp_path)
+    text = tmp_path / "text.sqlite"
+    text.write_text("no database, but long enough to be looked at as one" * 20)
+    with pytest.raises(BadRequest, match="no file of the catalog"):
+        load(text)
+    with pytest.raises(BadRequest, match="no file of the catalog"):
+        build(text, source=source())
+    newer = tmp_path / "newer.sqlite"
+    newer.write_bytes(big.read_bytes())
+    with sqlite3.connect(newer) as file:
+        file.execute("UPDATE versions SET format = 7")
+    for refuse in (load, lambda path: build(path, source=source())):
+        with pytest.raises(BadRequest, match="another version, found 'format 7, words 1', allowed: format 1, words 1"):
+            refuse(newer)
+
+
+def test_a_fresh_catalog_is_not_stale(stores: tuple[Path, Path]):
+    for path in stores:
+        assert check(path, source=source((30, 20))) == ()
+        assert check(path, source=source((30, 20)), sample=3, workers=WORKERS) == ()
+
+
+@pytest.mark.parametrize(("old", "new", "said"), [
+    ('"dof":', '"DOF":', "c: 59 of 60 compared with other records today, the first (c00)"),
+    ('"catalog":1', '"catalog":8', "another version"),
+    ('"count":60', '"count":61', "cut off, records, found 60, allowed: 61"),
+    ('{"word":"(c01)"', '{"word":"(b01)"', "c: 1 missing, the first (c01)"),
+    ('{"word":"(c01)"', '{"word":"(b01)"', "c: 1 no longer of the group, the first (b01)"),
+    ('{"word":"(c01)"', '{"word":"(c90)"', "is not sorted"),
+    ('{"word":"(c01)"', '{"words":"(c01)"', "no record of the catalog"),
+    ('{"word":"(c01)"', '"word":"(c01)"', "no record of the catalog")])
+def test_what_is_stale_is_told(old: str, new: str, said: str, stores: tuple[Path, Path], tmp_path: Path):
+    for file in stores[0].iterdir():
+        (tmp_path / file.name).write_text(file.read_text().replace(old, new, -1 if "dof" in old else 1))
+    stale = check(tmp_path, ["c"], source=source((30, 20)))
+    assert any(said in each for each in stale), stale
+    assert all("\n" not in each for each in stale)
+
+
+def test_a_missing_group_is_stale(stores: tuple[Path, Path], tmp_path: Path):
+    assert [each[:2] for each in check(tmp_path, source=source((30, 20)))] == ["c:", "d:"]
+    (tmp_path / "c.jsonl").write_bytes((stores[0] / "c.jsonl").read_bytes())
+    assert len(check(tmp_path, source=source((30, 20)))) == 1
+    assert check(tmp_path, source=source((31, 20)), sample=0) == (
+        "c: 2 missing, the first (c30)", check(tmp_path, ["d"], source=source((30, 20)))[0])
+    build(tmp_path / "one.sqlite", ["c"], source=source((30, 20)))
+    assert check(tmp_path / "one.sqlite", source=source((30, 20))) == (f"d: not in {tmp_path / 'one.sqlite'}",)

@@ -1,0 +1,100 @@
+"""Words: canonical, stable, and refused in one line where they say nothing."""
+
+import random
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.groups import GROUPS, group, words
+from hrsynth.catalog.words import COMPOSITE, Leg, Word, parse
+from hrsynth.errors import BadRequest
+from hrsynth.mechanism.legs import dissect
+from hrsynth.mechanism.normal import normal_form
+
+LISTED = {name: words(name) for name in GROUPS}
+SOME = [word for name in GROUPS for word in random.Random(3).sample(LISTED[name], 40)]
+ANY = st.sampled_from([word for name in GROUPS for word in LISTED[name]])
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_what_is_listed_is_canonical_and_belongs_there(name):
+    for text in LISTED[name]:
+        assert str(parse(text)) == text
+        assert group(parse(text)) == name
+
+
+@pytest.mark.parametrize("name", GROUPS)
+def test_a_motor_changes_no_leg_s_label(name):
+    for word in map(parse, LISTED[name]):
+        assert tuple(leg.unmoved for leg in word.legs) == word.unmoved.legs == \
+            tuple(leg.unmoved for leg in word.driven.legs)
+
+
+def test_at_least_five_thousand_in_four_groups():
+    counts = {name: len(found) for name, found in LISTED.items()}
+    assert sum(counts.values()) >= 5000
+    assert min(counts.values()) >= 1000, counts
+
+
+@settings(max_examples=200)
+@given(ANY, st.randoms(use_true_random=False))
+def test_order_of_legs_and_choice_of_names_do_not_count(text, rng):
+    word = parse(text)
+    bodies = []
+    for body in word.bodies:
+        renamed = [_renamed(leg, rng) for leg in body]
+        rng.shuffle(renamed)
+        bodies.append(renamed)
+    rng.shuffle(bodies)
+    assert str(Word.of(*bodies, platform=word.platform)) == text
+    assert parse(str(word)) == word
+
+
+def _renamed(leg, rng):
+    for kind in ("hjm", "abc"):
+        to = "".join(rng.sample(kind, 3))
+        leg = Leg(tuple(joint.__class__(joint.letter, joint.axes.translate(str.maketrans(kind, to)), joint.motor,
+                                        joint.watched) for joint in leg.joints))
+    return leg
+
+
+@pytest.mark.parametrize("text", SOME)
+def test_a_mechanism_has_the_joints_of_its_word(text):
+    word = parse(text)
+    drawn = mechanism(word)
+    anatomy = dissect(normal_form(drawn).mechanism)
+    assert anatomy.labels == tuple(str(k + 1) for k in range(len(word.legs)))
+    assert sum(joint.actuated for joint in drawn.joints.values()) == sum(j.motor for leg in word.legs
+                                                                         for j in leg.joints)
+    for number, leg in enumerate(word.legs, start=1):
+        chain = [drawn.joints[name].type.value for name in drawn.joints if name.startswith(f"joint_{number}_")]
+        assert chain == [joint.letter for joint in leg.joints if joint.letter not in COMPOSITE]
+
+
+def test_the_same_word_has_the_same_geometry_whatever_is_driven():
+    one, other = mechanism(parse("3(Rz*-Rz-Rz)")), mechanism(parse("3(Rz-Rz*-Rz)"))
+    assert [d for d in one.differences(other) if not d.startswith("actuated")] == []
+    assert mechanism(parse("3(Rz*-Rz-Rz)"), attempt=1).differences(one)
+
+
+@pytest.mark.parametrize(("text", "told"), [
+    ("3(Rz*-Qz-Rz)", "Qz"), ("3(Rz*-Rzz-Rz)", "Rzz"), ("3(Rz*-Rv-Rz)", "v"), ("3(Rz*-S*)", "S*"),
+    ("3(Rz)", "one joint"),
+    ("(Rz*-Rz-Rz)", "number of legs"), ("13(Rz*-Rz-Rz)", "13"), ("ball:3(Rz*-Rz-Rz)", "ball"), ("3Rz", "3Rz"),
+    ("bar:4(Rt*-2SSt)", "bodies"), ("3(Rz!-Rz!-Rz)", "observed"), ("3(Rz-Rz-Rz!)", "platform"), ("", "''"),
+    ("3(Rn*-S)", "Rn"), ("3()", "3()"), ("3(Rz*-2SSt*)", "2SSt*"), ("0(Rz-Rz)+2(Rz-Rz)", "0"), ("3(Pin-Rz-Rz)", "Pin"),
+])
+def test_what_is_no_word_is_refused(text, told):
+    with pytest.raises(BadRequest) as caught:
+        parse(text)
+    assert "\n" not in str(caught.value)
+    assert told in str(caught.value) or told == "''"
+
+
+def test_axes_of_a_u_must_be_at_right_angles():
+    with pytest.raises(BadRequest, match="right angles"):
+        mechanism(parse("3(Uxk-Pl*-S)"))
+    with pytest.raises(BadRequest, match="by itself"):
+        mechanism(parse("3(Unq-Pl*-S)"))
