@@ -21,7 +21,7 @@ import pytest
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 """WebGL without a graphics card."""
-READY = 30_000
+READY = 90_000
 """Longest time that a page may take to be ready (ms)."""
 AT_REST = 500
 """Pause before the shell's picture (ms)."""

@@ -92,7 +92,7 @@ def test_what_is_switched_off_is_gone(tab: Tab, tmp_path: Path):
 
 
 @pytest.mark.browser
-def test_the_text_of_the_page_is_that_of_the_view(tab: Tab, tmp_path: Path):
+def test_the_panel_says_what_is_shown_and_fits_a_narrow_window(tab: Tab, tmp_path: Path):
     file = tmp_path / "view.html"
     page.write(seen("uranesx"), str(file))
     tab.page.set_viewport_size(SIZE)
@@ -101,6 +101,11 @@ def test_the_text_of_the_page_is_that_of_the_view(tab: Tab, tmp_path: Path):
     assert all(machine.words in text for machine in seen("uranesx").machines)
     assert all(note in text for note in seen("uranesx").notes)
     assert "virtual actuator" in text
+    tab.page.set_viewport_size({"width": 420, "height": 800})
+    drawn(tab)
+    canvas, panel = (tab.page.locator(part).bounding_box() for part in ("main canvas", "aside"))
+    assert canvas["y"] + canvas["height"] <= panel["y"] + 1
+    assert canvas["width"] == panel["width"] == 420
     assert "motor" in text
 
 

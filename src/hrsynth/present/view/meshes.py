@@ -80,7 +80,7 @@ def _local(name: str, folder: Path) -> Path:
         return folder / name
     if scheme == "file":
         return Path(rest)
-    if scheme in ("package", "model"):
+    if scheme in ("package", "model") and (rest := rest.lstrip("/")):
         for parent in (folder, *folder.resolve().parents):
             for path in (parent / rest, parent / Path(*Path(rest).parts[1:])):
                 if path.is_file():

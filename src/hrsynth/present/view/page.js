@@ -74,6 +74,8 @@ function ghost(record, number) {
 class Page {
   constructor(pane) {
     this.viewer = new MeshCat.Viewer(pane);
+    const resize = this.viewer.set_3d_pane_size;
+    this.viewer.set_3d_pane_size = () => resize.call(this.viewer, pane.offsetWidth, pane.offsetHeight);
     ["Lights", "Grid", "Axes"].forEach((path) => this.viewer.set_property([path], "visible", false));
     this.viewer.hide_background();
     this.machines = scene.machines.map((record) => new Machine(record));
@@ -157,7 +159,7 @@ class Page {
     });
     const size = ends.map(([low, high]) => high - low), target = new THREE.Vector3();
     [across, up, from].forEach((axis, i) => target.addScaledVector(axis, (ends[i][0] + ends[i][1]) / 2));
-    const wide = $("pane").offsetWidth / window.innerHeight;
+    const wide = $("pane").offsetWidth / $("pane").offsetHeight;
     const away = 0.535 * Math.max(size[1], size[0] / wide) / Math.tan(half) + 0.5 * size[2];
     const camera = new THREE.PerspectiveCamera(2 * 13, wide, 0.01 * away, 100 * away);
     camera.position.copy(target).addScaledVector(from, away);
