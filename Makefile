@@ -12,6 +12,11 @@ PYTEST = OMP_NUM_THREADS=1 $(BIN)/pytest -q -n $(JOBS)
 LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
+COMMA := ,
+# the view of a robot in the browser, as docs/pictures/view_NAME.png
+VIEWED = $(BIN)/hrsynth view $(1) --static $(VENV)/view.html > /dev/null && \
+	$(BIN)/python tests/browser.py $(VENV)/view.html docs/pictures/view_$(2).png 1100 760
+
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
@@ -88,6 +93,11 @@ pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again
 	@$(BIN)/python tests/browser.py build/uranesx.html docs/pictures/report_uranesx.png 1200 1500
 	@$(BIN)/hrsynth catalog site --group planar --legs '3-R*RR' -o build/pages > /dev/null
 	@$(BIN)/python tests/browser.py build/pages/p/96081be379a6.html docs/pictures/catalog.png 1000 1100
+	@$(call VIEWED,rrrrr_m1 --hidden,rrrrr)
+	@$(call VIEWED,3rrr_m1 --hidden,3rrr)
+	@$(call VIEWED,gough_stewart --hidden --observe 1$(COMMA)3$(COMMA)5,gough_stewart)
+	@$(call VIEWED,quattro --hidden --observe 1$(COMMA)4,quattro)
+	@$(call VIEWED,uranesx --hidden,uranesx)
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt

@@ -21,8 +21,10 @@ import pytest
 NAMES = ("chromium", "chromium-browser", "google-chrome")
 FLAGS = ("--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--ignore-gpu-blocklist")
 """WebGL without a graphics card."""
-READY = 30_000
+READY = 90_000
 """Longest time that a page may take to be ready (ms)."""
+AT_REST = 500
+"""Pause before the shell's picture (ms)."""
 LOCAL = ("file:", "data:", "blob:", "about:", "http://127.0.0.1:", "http://localhost:")
 """What a page may ask for."""
 
@@ -97,11 +99,11 @@ def tab(browser: Any) -> Iterator[Tab]:
 
 
 def main(page: str, picture: str, width: str = "1200", height: str = "800") -> None:
-    """Take a picture of a page."""
+    """Take a picture of a page; one whose body says ``data-ready="no"`` is waited for until it says something else."""
     with running() as browser:
         tab = Tab.of(browser.new_page(viewport={"width": int(width), "height": int(height)}))
-        tab.open(page if "://" in page else Path(page))
-        tab.page.wait_for_load_state("networkidle")
+        tab.open(page if "://" in page else Path(page), "document.body.dataset.ready != 'no'")
+        tab.page.wait_for_timeout(AT_REST)
         tab.picture(picture)
         sys.exit("\n".join(tab.complaints) or None)
 

@@ -31,6 +31,7 @@ FIELDS = {
               "type2", "notes", "spread", "error", "times", "poses", "file"},
     "accuracy": {"observed", "cones", "axes", "fixed", "reached", "position_mm", "orientation_deg", "checked"},
     "select": {"from", "to", "cones", "best", "sets"},
+    "view": {"observed", "dof", "shown", "sliders", "modes", "distance", "largest_distance", "notes", "file"},
     "robots": {"robots"},
     "convert": {"file", "files"},
 }

@@ -77,8 +77,10 @@ def test_the_python_example_runs_and_prints_what_it_says():
 
 
 @pytest.mark.parametrize("command", re.findall(r"\$ hrsynth (\w.*)", TEXT))
-def test_the_commands_print_what_the_readme_shows(command: str, capsys: pytest.CaptureFixture[str]):
+def test_the_commands_print_what_the_readme_shows(command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,
+                                                  monkeypatch: pytest.MonkeyPatch):
     """Line by line, decimal numbers and widths left out of it; the README may leave lines out."""
+    monkeypatch.chdir(tmp_path)
     assert _run(shlex.split(command)) == 0
     printed = {_plain(line) for line in capsys.readouterr().out.splitlines()}
     shown = re.search(re.escape(f"$ hrsynth {command}\n") + r"(.*?)\n(?:```|\n?\$ )", TEXT, re.DOTALL)[1]

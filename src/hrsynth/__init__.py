@@ -14,12 +14,13 @@ if TYPE_CHECKING:
     from .analysis.singularity.singular import singular
     from .description import load, save, shipped
     from .present.show import draw, html, text
+    from .present.view.view import view
     from .selection.select import select
     from .servo.servo import servo
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "accuracy", "advise", "catalog", "check", "derive", "draw", "html", "legs", "load", "modes",
-           "path", "save", "select", "servo", "shipped", "singular", "text"]
+           "path", "save", "select", "servo", "shipped", "singular", "text", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
@@ -38,6 +39,7 @@ _HOME = {
     "shipped": ".description",
     "singular": ".analysis.singularity.singular",
     "text": ".present.show",
+    "view": ".present.view.view",
 }
 
 

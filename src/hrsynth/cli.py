@@ -422,6 +422,53 @@ def select(
 
 
 @app.command()
+@_of_robot
+def view(
+    robot: Source,
+    observe: Observe = "all",
+    camera: Camera = None,
+    hidden: Annotated[bool, typer.Option("--hidden", help="The hidden robot too, its virtual actuators highlighted.")]
+    = False,
+    static: Annotated[str | None, typer.Option(metavar="FILE", help="Write a page that needs no server (.html).")]
+    = None,
+    port: Annotated[int, typer.Option(min=0, max=65535, help="Port of the server (default: any that is free).")] = 0,
+    open_: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
+    json: Json = False,
+    seed: Seed = 0,
+) -> None:
+    """A 3D view in the browser: sliders that keep the loops closed, what is observed, assembly modes."""
+    from .present import records
+    from .present.text.view import view as written
+    from .present.view import page
+    from .present.view.view import view as run
+
+    page.writable(static)
+    with Progress() as progress:
+        found = run(robot.load(), _list(observe), camera, hidden=hidden, seed=seed, progress=progress.tell)
+    if static is not None:
+        page.write(found, static)
+    if json:
+        typer.echo(records.record("view", found.setting.robot.name, {**found.to_dict(), "file": static}))
+    elif static is None:
+        from .present.view.server import serve
+
+        serve(found, port, lambda _, address: _shown(written(found, address), address if open_ else None))
+    else:
+        typer.echo(written(found, static))
+
+
+def _shown(text: str, address: str | None) -> None:
+    """Tell what is served, and open the page if there is an ``address``."""
+    typer.echo(f"{text}   (Ctrl-C ends it)")
+    sys.stdout.flush()
+    if address is not None:
+        import threading
+        import webbrowser
+
+        threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+
+
+@app.command()
 def robots(json: Json = False) -> None:
     """The shipped robots."""
     from .description import shipped

@@ -63,6 +63,13 @@ class Wanted(Protocol):
         """Error (reached − wanted) and its Jacobian."""
 
 
+class Aim(Wanted, Protocol):
+    """What a platform is led to along a way."""
+
+    def towards(self, X: Array, fraction: float) -> Aim:
+        """What lies ``fraction`` of the way from the pose X (4, 4) to it."""
+
+
 @dataclass(frozen=True, eq=False)
 class Target:
     """What a configuration is to reach besides closed loops: the pose X_BP of ``link`` (only the position of ``point``,

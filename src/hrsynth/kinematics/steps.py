@@ -8,7 +8,7 @@ import numpy as np
 
 from ..mechanism.vectors import Array
 from ..tolerances import CLOSED, FOLLOWED, NEAREST, PASSED_BY, RANK_CUTOFF, SOLVED
-from .configuration import ClosedConfiguration, closed, limited, system
+from .configuration import Aim, ClosedConfiguration, closed, limited, system
 from .parts import Goal, PlatformMotion
 from .ranks import kernel_basis, range_basis
 from .twin import Twin
@@ -29,7 +29,7 @@ LONGEST = 0.3
 """Largest change of a coordinate in one step."""
 
 
-def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal,
+def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Aim,
         halvings: int = HALVINGS) -> tuple[ClosedConfiguration, float]:
     """Lead a configuration to a goal by small steps: where it comes to, and the part of the way that it came (1: all of
     it)."""
@@ -56,7 +56,7 @@ def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal,
     return here, 1.0
 
 
-def _eased(here: ClosedConfiguration, goal: Goal, X: Array, stride: float) -> ClosedConfiguration:
+def _eased(here: ClosedConfiguration, goal: Aim, X: Array, stride: float) -> ClosedConfiguration:
     """As near as steps with closed loops come to a goal of more parts than the platform has freedoms: the straight way
     from the pose X need not be one that it can go."""
     twin = here.twin
@@ -74,7 +74,7 @@ def _eased(here: ClosedConfiguration, goal: Goal, X: Array, stride: float) -> Cl
     return here
 
 
-def _stepped(here: ClosedConfiguration, goal: Goal, home: Goal) -> ClosedConfiguration | None:
+def _stepped(here: ClosedConfiguration, goal: Aim, home: Goal) -> ClosedConfiguration | None:
     """The configuration at a goal nearby, moved towards ``home`` where parts are free; None where it jumps or lies
     beyond a fold, in another working mode."""
     twin = here.twin
@@ -97,7 +97,7 @@ def _beyond(before: Array, after: Array) -> bool:
     return bool(np.linalg.svd(span.T @ after, compute_uv=False)[-1] > NEAR_FOLD)
 
 
-def _corrected(here: ClosedConfiguration, step: Array, goal: Goal | None) -> ClosedConfiguration | None:
+def _corrected(here: ClosedConfiguration, step: Array, goal: Aim | None) -> ClosedConfiguration | None:
     """The closed configuration at the goal after a step; None where there is none or the correction is a jump."""
     twin = here.twin
     predicted = twin.moved(here.q, step)
@@ -108,13 +108,13 @@ def _corrected(here: ClosedConfiguration, step: Array, goal: Goal | None) -> Clo
     return ClosedConfiguration.of(twin, q)
 
 
-def nearest(here: ClosedConfiguration, goal: Goal, home: Goal) -> ClosedConfiguration:
+def nearest(here: ClosedConfiguration, goal: Aim, home: Goal) -> ClosedConfiguration:
     """The configuration at ``goal`` whose platform pose is nearest to ``home``: the projected gradient vanishes, the
     loops are closed as well as floating point can."""
     return polished(_drawn_home(here, goal, home, 100), goal)
 
 
-def _drawn_home(here: ClosedConfiguration, goal: Goal, home: Goal, iterations: int) -> ClosedConfiguration:
+def _drawn_home(here: ClosedConfiguration, goal: Aim, home: Goal, iterations: int) -> ClosedConfiguration:
     """Gauss-Newton in the tangent space: minimise |home's error| with the goal held."""
     twin = here.twin
     for _ in range(iterations):
@@ -133,14 +133,14 @@ def _drawn_home(here: ClosedConfiguration, goal: Goal, home: Goal, iterations: i
     return here
 
 
-def _shrinking(here: ClosedConfiguration, step: Array, goal: Goal) -> Iterator[ClosedConfiguration]:
+def _shrinking(here: ClosedConfiguration, step: Array, goal: Aim) -> Iterator[ClosedConfiguration]:
     for shrink in (1.0, 0.5, 0.25, 0.1, 0.02):
         there = _corrected(here, shrink * step, goal)
         if there is not None:
             yield there
 
 
-def polished(here: ClosedConfiguration, goal: Goal) -> ClosedConfiguration:
+def polished(here: ClosedConfiguration, goal: Aim) -> ClosedConfiguration:
     """Newton steps of minimum norm until the residual no longer falls: on the edge of the workspace a configuration
     is only as exact as the square root of its residual."""
     twin, q = here.twin, here.q
@@ -155,7 +155,7 @@ def polished(here: ClosedConfiguration, goal: Goal) -> ClosedConfiguration:
     return ClosedConfiguration.of(twin, _on_fold(twin, q, goal))
 
 
-def _on_fold(twin: Twin, q: Array, goal: Goal) -> Array:
+def _on_fold(twin: Twin, q: Array, goal: Aim) -> Array:
     """The configuration on a fold of the way (the edge of the workspace) where ``q`` cannot be told from it: where the
     weak singular value of loops and goal vanishes, if the residual stays within ``SOLVED`` there."""
     rows = system(twin, q, goal)[1]

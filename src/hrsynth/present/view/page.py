@@ -1,0 +1,54 @@
+"""The view as one self-contained page: MeshCat's viewer, the scene and the script that moves it, no network."""
+
+from __future__ import annotations
+
+import importlib.util
+from pathlib import Path
+from typing import Any
+
+from ...description.files import require_folder, write_whole
+from ...errors import BadRequest, MissingExtra
+from .view import View
+
+FOLDER = Path(__file__).parent
+
+
+def writable(output: str | None) -> None:
+    """Raise ``BadRequest`` where a page cannot have this name or its folder is not there, ``MissingExtra`` where
+    MeshCat is missing."""
+    viewer()
+    if output is None:
+        return
+    if Path(output).suffix.lower() not in (".html", ".htm"):
+        raise BadRequest("cannot write the view: unknown ending", output, ".html")
+    require_folder(output)
+
+
+def write(found: View, file: str) -> None:
+    """Write the view as a page that needs no server, whole or not at all."""
+    write_whole(file, page(found).encode())
+
+
+def page(found: View, *, live: bool = False) -> str:
+    """The page; ``live`` where a server answers its sliders."""
+    from jinja2 import Environment, StrictUndefined
+
+    def own(name: str) -> str:
+        return (FOLDER / name).read_text(encoding="utf-8")
+
+    scene: dict[str, Any] = {**found.scene(), "live": live}
+    template = Environment(autoescape=True, undefined=StrictUndefined).from_string(own("page.html"))
+    return template.render(robot=found.setting.robot.name, scene=scene, viewer=viewer(), style=own("page.css"),
+                           solids=own("solids.js"), script=own("page.js"))
+
+
+def viewer() -> str:
+    """MeshCat's script with the notices of what it holds; raises ``MissingExtra``."""
+    spec = importlib.util.find_spec("meshcat")
+    for place in spec.submodule_search_locations or () if spec is not None else ():
+        script = Path(place, "viewer", "dist", "main.min.js")
+        if script.is_file():
+            notice = script.with_name(script.name + ".LICENSE.txt")
+            words = notice.read_text(encoding="utf-8") if notice.is_file() else ""
+            return words + "\n" + script.read_text(encoding="utf-8")
+    raise MissingExtra("the 3D view", "view")

@@ -1,0 +1,118 @@
+"""The view with a server behind it, on this machine alone: any sliders together, the loops solved at every move."""
+
+from __future__ import annotations
+
+import contextlib
+import json
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from threading import Lock
+from typing import Any
+
+import numpy as np
+
+from ...errors import BadRequest
+from .ghosts import ghosts
+from .page import page
+from .states import Posed
+from .view import View
+
+HOST = "127.0.0.1"
+LONGEST = 10_000
+"""Bytes of a question at most."""
+ARRIVED = 1e-6
+"""Difference (metres, radians) within which the platform has come to where it was sent."""
+
+
+@dataclass(eq=False)
+class Session:
+    """A view and where its robot is now; it answers one question at a time."""
+
+    found: View
+    here: Posed = field(init=False)
+    lock: Lock = field(default_factory=Lock)
+
+    def __post_init__(self) -> None:
+        self.here = self.found.mover.home
+
+    def answer(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """The state at the coordinates ``values``, or as near as the robot comes (``stopped``), or at ``home``; with
+        ``modes`` the other assembly modes there. Raises ``ValueError`` for what is no such question."""
+        mover = self.found.mover
+        wanted = np.array(asked["values"], dtype=float)
+        if wanted.shape != mover.coordinates.values.shape or not np.isfinite(wanted).all():
+            raise ValueError("values")
+        with self.lock:
+            if asked.get("home"):
+                self.here, reached = mover.home, wanted
+            else:
+                self.here, reached = mover.sent(self.here, wanted)
+            reply: dict[str, Any] = {"state": mover.state(self.here).scene(),
+                                     "stopped": bool(np.max(np.abs(reached - wanted), initial=0.0) > ARRIVED)}
+            if asked.get("modes") and self.found.ghosts:
+                others, _ = ghosts(self.found.setting, self.here.real)
+                reply["ghosts"] = [ghost.scene() for ghost in others]
+        return reply
+
+
+class Server(ThreadingHTTPServer):
+    """The page at the root, and answers to its questions."""
+
+    daemon_threads = True
+
+    def __init__(self, found: View, port: int) -> None:
+        self.session, self.shown = Session(found), page(found, live=True).encode()
+        super().__init__((HOST, port), Handler)
+
+
+class Handler(BaseHTTPRequestHandler):
+    """One question to a :class:`Server`."""
+
+    server: Server
+
+    def do_GET(self) -> None:
+        """The page, and nothing else."""
+        if self.path == "/":
+            self._reply(HTTPStatus.OK, self.server.shown, "text/html; charset=utf-8")
+        else:
+            self._reply(HTTPStatus.NOT_FOUND)
+
+    def do_POST(self) -> None:
+        """A question of the page's sliders."""
+        try:
+            size = int(self.headers.get("Content-Length", ""))
+            if self.path != "/pose" or not 0 <= size <= LONGEST:
+                raise ValueError(self.path)
+            answer = self.server.session.answer(json.loads(self.rfile.read(size)))
+        except (ValueError, KeyError, TypeError, AttributeError):
+            self._reply(HTTPStatus.BAD_REQUEST)
+        else:
+            self._reply(HTTPStatus.OK, json.dumps(answer).encode(), "application/json")
+
+    def _reply(self, status: HTTPStatus, body: bytes = b"", kind: str = "text/plain") -> None:
+        self.send_response(status)
+        self.send_header("Content-Type", kind)
+        self.send_header("Content-Length", str(len(body)))
+        self.end_headers()
+        self.wfile.write(body)
+
+    def log_message(self, format: str, *args: object) -> None:
+        """Nothing: the library never prints."""
+
+
+def serve(found: View, port: int, ready: Callable[[Server, str], None]) -> None:
+    """Answer until an interrupt or the server's ``shutdown``; ``ready`` is told the server and its address once the
+    page can be opened. Port 0 is any that is free.
+
+    Raises ``BadRequest`` for a port that cannot be had.
+    """
+    try:
+        server = Server(found, port)
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or "no such port"
+        raise BadRequest(f"cannot serve the view: {reason}", port, "a free port, or 0 for any") from None
+    with server, contextlib.suppress(KeyboardInterrupt):
+        ready(server, f"http://{HOST}:{server.server_port}/")
+        server.serve_forever()

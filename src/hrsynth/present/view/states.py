@@ -1,0 +1,166 @@
+"""Where all links are, at the zero configuration, along each slider, and wherever the platform is sent.
+
+A link's place is its displacement from the zero configuration: position and unit quaternion (x, y, z, w).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...analysis.posture import Examiner
+from ...analysis.setting import Setting
+from ...kinematics.configuration import ClosedConfiguration, Target, closed
+from ...kinematics.coordinates import Coordinates
+from ...kinematics.steps import led
+from ...kinematics.twin import Twin
+from ...mechanism import Mechanism
+from ...mechanism.vectors import Array, inverse
+from ...tolerances import FOLLOWED, SOLVED
+from .shapes import FINE
+
+REAL, HIDDEN = "real", "hidden"
+TURN, WAY = 1.0, 1.0
+"""How far a slider turns (rad) and moves (characteristic lengths) the platform each way at most."""
+STEPS = 10
+"""Configurations on each side of a slider's home."""
+EASY = 60
+"""Iterations in which the hidden robot is to follow."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """The places (links, 7) of each machine's links, and the smallest singular value of Mᵀ (characteristic lengths;
+    None where Mᵀ does not exist)."""
+
+    places: Mapping[str, Array]
+    distance: float | None
+
+    def scene(self) -> dict[str, Any]:
+        """What the page is given."""
+        return {**{key: listed(places) for key, places in self.places.items()},
+                "distance": None if self.distance is None else float(f"{self.distance:.5g}")}
+
+
+@dataclass(frozen=True, eq=False)
+class Slider:
+    """One freedom of the platform: its coordinate's values (n,) in metres or radians, the state at each of them, and
+    which of them is home."""
+
+    name: str
+    unit: str
+    values: tuple[float, ...]
+    states: tuple[State, ...]
+    home: int
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"name": self.name, "unit": self.unit, "values": list(self.values), "home": self.home,
+                "distances": [state.distance for state in self.states]}
+
+    def scene(self) -> dict[str, Any]:
+        """What the page is given."""
+        return {"name": self.name, "unit": self.unit, "values": [round(value, FINE) for value in self.values],
+                "home": self.home, "states": [state.scene() for state in self.states]}
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """A configuration of the real robot and the coordinates (nq,) of the hidden one that goes with it."""
+
+    real: ClosedConfiguration
+    hidden: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Mover:
+    """The real robot with its platform's coordinates, and the twin of the hidden robot that follows it."""
+
+    setting: Setting
+    coordinates: Coordinates
+    examiner: Examiner
+    hidden: Twin | None = None
+
+    @classmethod
+    def of(cls, setting: Setting, hidden: Mechanism | None) -> Mover:
+        """At the zero configuration."""
+        start = setting.everything.start
+        twin = None if hidden is None else Twin(hidden, start.twin.length)
+        return cls(setting, Coordinates.of(start, setting.everything.question, setting.motion), Examiner(setting), twin)
+
+    @property
+    def home(self) -> Posed:
+        """The zero configuration."""
+        return Posed(self.setting.everything.start, None if self.hidden is None else self.hidden.q0)
+
+    def state(self, at: Posed) -> State:
+        """What the page shows of a configuration."""
+        places = {REAL: displacements(self.setting.mechanism, at.real.pose)}
+        if self.hidden is not None and at.hidden is not None:
+            q = at.hidden
+            places[HIDDEN] = displacements(self.hidden.mechanism, lambda link: self.hidden.pose(q, link))
+        return State(places, self.examiner.glance(at.real).distances.type2)
+
+    def sent(self, here: Posed, values: Array) -> tuple[Posed, Array]:
+        """Where the robot comes to from ``here`` when the platform is sent to coordinates (n,), and those there."""
+        aim = Coordinates(self.setting.motion, self.coordinates.places, values)
+        there, _ = led(here.real, self.setting.motion, aim)
+        followed = self._followed(here, [there])
+        found = followed[-1] if followed else here
+        return found, aim.read(found.real.pose(self.setting.motion.link))
+
+    def sliders(self) -> tuple[Slider, ...]:
+        """Each coordinate alone changed from home, as far as the robot, and the hidden one with it, goes."""
+        return tuple(self._slider(index) for index in range(len(self.coordinates.places)))
+
+    def _slider(self, index: int) -> Slider:
+        home, turns = self.home, self.coordinates.places[index] >= 3
+        span = TURN if turns else WAY * home.real.twin.length
+        ways = self.coordinates.along(home.real, index, (span, span), STEPS)
+        start = next(i for i, (_, at) in enumerate(ways) if at is home.real)
+        down = self._followed(home, [at for _, at in reversed(ways[:start])])
+        up = self._followed(home, [at for _, at in ways[start + 1 :]])
+        posed = [*reversed(down), home, *up]
+        values = [value for value, _ in ways[start - len(down) : start + len(up) + 1]]
+        return Slider(self.coordinates.names[index], "rad" if turns else "m", tuple(values),
+                      tuple(map(self.state, posed)), len(down))
+
+    def _followed(self, start: Posed, way: Iterable[ClosedConfiguration]) -> list[Posed]:
+        """The way with the hidden robot beside the real one, as far as it can follow."""
+        found: list[Posed] = []
+        q = start.hidden
+        for at in way:
+            if self.hidden is not None and q is not None:
+                q, residual = closed(self.hidden, q, self._target(at), tolerance=SOLVED, iterations=EASY)
+                if not residual <= FOLLOWED:
+                    break
+            found.append(Posed(at, q))
+        return found
+
+    def _target(self, at: ClosedConfiguration) -> Target:
+        """The pose and the directions that the hidden robot takes over; blind links are not in it."""
+        target = self.setting.samples.question.target(at)
+        assert self.hidden is not None
+        links = self.hidden.mechanism.links
+        return Target(target.link, target.pose, target.point, target.reference,
+                      tuple(pair for pair in target.measured if pair[0].link in links))
+
+
+def displacements(mechanism: Mechanism, pose: Any) -> Array:
+    """The displacement of each link from the zero configuration, (links, 7); ``pose`` gives X_BL (4, 4) of a link."""
+    return np.array([place(pose(name) @ inverse(link.pose)) for name, link in mechanism.links.items()])
+
+
+def place(X: Array) -> Array:
+    """Position and unit quaternion (x, y, z, w) of a pose X (4, 4), (7,)."""
+    from scipy.spatial.transform import Rotation
+
+    return np.concatenate([X[:3, 3], Rotation.from_matrix(X[:3, :3]).as_quat(canonical=True)])
+
+
+def listed(places: Array) -> list[list[float]]:
+    """Places (links, 7) with the digits that the page is given."""
+    return (np.round(places, FINE) + 0.0).tolist()

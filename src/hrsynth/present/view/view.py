@@ -1,0 +1,186 @@
+"""What the 3D view of a robot shows: its links and joints, its hidden robot, sliders, directions, assembly modes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...analysis.derive import Derivation, derive
+from ...analysis.setting import Setting, prepare, silent
+from ...mechanism import Mechanism
+from ...mechanism.observation import Direction
+from ...mechanism.vectors import Array
+from .ghosts import Ghost, ghosts
+from .meshes import meshes
+from .shapes import FINE, RADIUS, Drawer, Shape
+from .states import HIDDEN, REAL, Mover, Slider, State, listed, place
+
+ARROW = (0.35, 0.7)
+"""Length of an arrow at least and at most (characteristic lengths); between these, a part ``SHARE`` of its link's."""
+SHARE = 0.55
+MARGIN = 4.0
+"""What a rail is longer than the way of its slider, at each end (radii of rods)."""
+
+
+@dataclass(frozen=True, eq=False)
+class Machine:
+    """A robot that is drawn: ``key`` real or hidden, what it is called, its links in order, its shapes, the base's
+    and the platform's frame (7,) at the zero configuration."""
+
+    key: str
+    words: str
+    links: tuple[str, ...]
+    platform: tuple[str, ...]
+    shapes: tuple[Shape, ...]
+    frames: tuple[tuple[str, Array], ...] = ()
+
+    def scene(self) -> dict[str, Any]:
+        """What the page is given."""
+        places = {name: i for i, name in enumerate(self.links)}
+        return {"key": self.key, "words": self.words, "links": list(self.links),
+                "platform": [places[link] for link in self.platform],
+                "shapes": [shape.scene(places) for shape in self.shapes],
+                "frames": [{"link": places[link], "place": listed(X[None])[0]} for link, X in self.frames]}
+
+
+@dataclass(frozen=True, eq=False)
+class Arrow:
+    """An observed direction: its leg, its link, and where the arrow runs (2, 3) at the zero configuration."""
+
+    leg: str
+    link: str
+    ends: Array
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """All that the page needs. ``normal`` (3,) is that of the plane in which everything moves, None in space."""
+
+    setting: Setting
+    derivation: Derivation | None
+    mover: Mover
+    machines: tuple[Machine, ...]
+    home: State
+    sliders: tuple[Slider, ...]
+    arrows: tuple[Arrow, ...]
+    ghosts: tuple[Ghost, ...]
+    normal: Array | None
+    notes: tuple[str, ...]
+
+    @property
+    def largest(self) -> float | None:
+        """The largest of the smallest singular values that are shown: the far end of the scale of colours."""
+        found = [state.distance for slider in self.sliders for state in slider.states]
+        return max((value for value in found if value is not None), default=self.home.distance)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {
+            **self.setting.to_dict(), "dof": self.setting.dof,
+            "shown": {machine.key: machine.words for machine in self.machines},
+            "distance": self.home.distance, "largest_distance": self.largest,
+            "sliders": [slider.to_dict() for slider in self.sliders],
+            "modes": [{"label": ghost.label, "pose": ghost.pose.to_dict(), "reachable": ghost.reachable}
+                      for ghost in self.ghosts],
+            "notes": list(self.notes),
+        }
+
+    def scene(self) -> dict[str, Any]:
+        """What the page is given."""
+        mechanism = self.setting.mechanism
+        places = {name: i for i, name in enumerate(mechanism.links)}
+        return {
+            "length": mechanism.length, "radius": _radius(mechanism), "largest": self.largest,
+            "normal": None if self.normal is None else np.round(self.normal, FINE).tolist(),
+            "machines": [machine.scene() for machine in self.machines],
+            "home": self.home.scene(), "sliders": [slider.scene() for slider in self.sliders],
+            "arrows": [{"leg": a.leg, "link": places[a.link], "ends": np.round(a.ends, FINE).tolist()}
+                       for a in self.arrows],
+            "ghosts": [ghost.scene() for ghost in self.ghosts], "notes": list(self.notes),
+        }
+
+
+def view(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+         hidden: bool = False, seed: int = 0, progress: Callable[[str], None] = silent) -> View:
+    """What there is to see of a robot, and with ``hidden`` of its hidden robot too: every position of a slider is a
+    closed configuration, in which one of the platform's coordinates alone differs from the zero configuration's.
+
+    ``observe`` and ``camera`` as for ``derive``, which also says what is raised. Assembly modes that cannot be listed
+    and meshes that are missing are told in ``notes``.
+    """
+    progress("sampling")
+    derivation = derive(robot, observe, camera, seed=seed, progress=progress) if hidden else None
+    setting = prepare(robot, observe, camera, seed=seed) if derivation is None else derivation.setting
+    other = None if derivation is None else derivation.hidden
+    mover = Mover.of(setting, other)
+    progress("sliders")
+    sliders = mover.sliders()
+    progress("modes")
+    found, notes = ghosts(setting)
+    shapes, missing = meshes(setting)
+    home = mover.state(mover.home)
+    states = (home, *(state for slider in sliders for state in slider.states))
+    machines = [_machine(REAL, setting, setting.mechanism, str(setting.anatomy.architecture()), states, shapes)]
+    if derivation is not None and other is not None:
+        machines.append(_machine(HIDDEN, setting, other, str(derivation.hidden_architecture), states, shapes))
+    elif hidden:
+        notes = (*notes, "every leg is blind: there is no hidden robot")
+    return View(setting, derivation, mover, tuple(machines), home, sliders, tuple(_arrows(setting)), found,
+                _normal(setting), (*notes, *missing))
+
+
+def _machine(key: str, setting: Setting, mechanism: Mechanism, words: str, states: Sequence[State],
+             meshes: Sequence[Shape]) -> Machine:
+    real = setting.mechanism
+    kept = tuple(shape for shape in meshes if shape.link in mechanism.links)
+    drawer = Drawer(mechanism, real, setting.anatomy.platform, _radius(real), kept)
+    shapes = drawer.shapes(_travels(drawer, key, states))
+    frames = tuple((link, place(mechanism.links[link].pose)) for link in (mechanism.base, mechanism.platform))
+    return Machine(key, words, tuple(mechanism.links), setting.anatomy.platform, shapes, frames)
+
+
+def _radius(mechanism: Mechanism) -> float:
+    return RADIUS * mechanism.length
+
+
+def _travels(drawer: Drawer, key: str, states: Sequence[State]) -> dict[str, tuple[float, float]]:
+    """How far each joint on the base slides, with a margin for its carriage (m)."""
+    from scipy.spatial.transform import Rotation
+
+    links = {name: i for i, name in enumerate(drawer.mechanism.links)}
+    found = {}
+    for joint in drawer.sliders():
+        places = np.array([state.places[key][links[joint.successor]] for state in states])
+        moved = Rotation.from_quat(places[:, 3:]).apply(np.array(joint.point)) + places[:, :3] - joint.point
+        ways = moved @ joint.axis
+        margin = MARGIN * drawer.radius
+        found[joint.name] = (float(ways.min()) - margin, float(ways.max()) + margin)
+    return found
+
+
+def _arrows(setting: Setting) -> Iterator[Arrow]:
+    """An arrow on the middle of each observed link, along what is observed."""
+    mechanism = setting.mechanism
+    for seen in setting.observed:
+        if not isinstance(seen, Direction):
+            continue
+        direction = mechanism.links[seen.link].pose[:3, :3] @ seen.direction
+        ways = np.array([joint.point for joint in mechanism.joints_of(seen.link)])
+        along = ways @ direction
+        middle = ways.mean(axis=0) + (0.5 * (along.min() + along.max()) - along.mean()) * direction
+        half = 0.5 * float(np.clip(SHARE * np.ptp(along), *(np.array(ARROW) * mechanism.length)))
+        yield Arrow(seen.leg, seen.link, np.array([middle - half * direction, middle + half * direction]))
+
+
+def _normal(setting: Setting) -> Array | None:
+    """The normal of the plane in which the platform moves, None where it leaves every plane."""
+    motion = setting.motion
+    if motion.shifts.shape[1] != 2:
+        return None
+    normal = np.cross(*motion.shifts.T)
+    if motion.spins.shape[1] > 1 or (motion.spins.shape[1] and abs(normal @ motion.spins[:, 0]) < 1 - 1e-6):
+        return None
+    return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))]))

@@ -1,0 +1,84 @@
+"""Visual shapes of a robot's file: drawn where they can be read, rods and a note where they cannot."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from hrsynth import load, view
+from hrsynth.description import shipped
+from hrsynth.present.view.view import View
+
+ROBOT = "3rrr_m1"
+SIZE = np.array([0.03, 0.02, 0.01])
+BOX = ('<visual><origin xyz="0.1 0 0.05" rpy="0 0 1.5707963267948966"/>'
+       '<geometry><box size="0.03 0.02 0.01"/></geometry></visual>')
+
+
+def with_visuals(folder: Path, hidden: bool = False, **visuals: str) -> View:
+    """A shipped robot with visuals on some of its links."""
+    text = shipped()[ROBOT].read_text()
+    for link, visual in visuals.items():
+        assert f'<link name="{link}"/>' in text
+        text = text.replace(f'<link name="{link}"/>', f'<link name="{link}">{visual}</link>')
+    file = folder / "robot.urdf"
+    file.write_text(text)
+    return view(load(file), hidden=hidden)
+
+
+def mesh(name: str, scale: str = "1 1 1") -> str:
+    return f'<visual><geometry><mesh filename="{name}" scale="{scale}"/></geometry></visual>'
+
+
+def meshed(found: View, link: str) -> list[np.ndarray]:
+    return [shape.points for shape in found.machines[0].shapes if (shape.kind, shape.link) == ("mesh", link)]
+
+
+def rods(found: View, link: str) -> int:
+    return sum((shape.kind, shape.link) == ("rod", link) for shape in found.machines[0].shapes)
+
+
+def test_solids_stand_for_the_rods_of_their_links(tmp_path: Path):
+    found = with_visuals(tmp_path, hidden=True, platform=BOX)
+    (points,) = meshed(found, "platform")
+    X = found.setting.mechanism.links["platform"].pose
+    middle = X[:3, :3] @ [0.1, 0, 0.05] + X[:3, 3]
+    assert points.mean(axis=0) == pytest.approx(middle)
+    assert np.ptp((points - X[:3, 3]) @ X[:3, :3], axis=0) == pytest.approx(SIZE[[1, 0, 2]])
+    assert rods(found, "platform") == 0
+    assert rods(found, "prox_1") == 1
+    assert [shape.role for shape in found.machines[1].shapes if shape.kind == "mesh"] == ["platform"]
+    joints = {shape.joint for shape in found.machines[0].shapes if shape.joint}
+    assert joints == set(found.setting.mechanism.joints)
+
+
+@pytest.mark.parametrize("address", [
+    "part.stl", pytest.param("package://some_robot/part.stl", marks=pytest.mark.slow),
+    pytest.param("file://{folder}/part.stl", marks=pytest.mark.slow)])
+def test_mesh_files_beside_the_robot_are_read(tmp_path: Path, address: str):
+    import trimesh
+
+    trimesh.creation.box(extents=SIZE).export(tmp_path / "part.stl")
+    found = with_visuals(tmp_path, prox_1=mesh(address.format(folder=tmp_path), "2 2 2"))
+    (points,) = meshed(found, "prox_1")
+    X = found.setting.mechanism.links["prox_1"].pose
+    assert np.ptp((points - X[:3, 3]) @ X[:3, :3], axis=0) == pytest.approx(2 * SIZE, rel=1e-5)
+    assert not any("visual" in note for note in found.notes)
+
+
+@pytest.mark.parametrize("address", [
+    "missing.stl", pytest.param("package://none/missing.dae", marks=pytest.mark.slow),
+    pytest.param("http://robots.invalid/part.stl", marks=pytest.mark.slow)])
+def test_missing_meshes_are_told_once_and_rods_drawn(tmp_path: Path, address: str):
+    found = with_visuals(tmp_path, platform=BOX, prox_1=mesh(address), dist_2=mesh(address))
+    assert [note for note in found.notes if note.startswith("2 visual shapes cannot be read (prox_1")]
+    assert (rods(found, "prox_1"), rods(found, "dist_2"), rods(found, "platform")) == (1, 1, 0)
+
+
+def test_a_mesh_that_is_none_is_a_note(tmp_path: Path):
+    (tmp_path / "part.stl").write_bytes(b"no mesh")
+    found = with_visuals(tmp_path, prox_1=mesh("part.stl"))
+    assert sum("cannot be read" in note for note in found.notes) == 1
+    assert rods(found, "prox_1") == 1

@@ -1,0 +1,76 @@
+"""`hrsynth view`: a page whole or not at all, a record, refusals in one line."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import socket
+from pathlib import Path
+
+import pytest
+
+from hrsynth.cli import _run
+
+
+def ask(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
+    status = _run(["view", *arguments])
+    out, err = capfd.readouterr()
+    return status, out, err
+
+
+def assert_refused(answer: tuple[int, str, str], status: int, words: str) -> None:
+    assert (answer[0], answer[1]) == (status, ""), answer
+    assert answer[2].startswith("hrsynth: ")
+    assert answer[2].count("\n") == 1
+    assert words in answer[2]
+
+
+def test_a_page_is_written_and_told(capfd: pytest.CaptureFixture[str], tmp_path: Path):
+    file = tmp_path / "out.html"
+    status, out, err = ask(capfd, "rrrrr_m1", "--hidden", "--static", str(file))
+    assert (status, err) == (0, "")
+    assert "ΠR̲RR̲Π" in out
+    assert f"page          {file}" in out
+    assert file.read_text().startswith("<!DOCTYPE html>")
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_the_record_says_what_is_shown(capfd: pytest.CaptureFixture[str], tmp_path: Path):
+    status, out, _ = ask(capfd, "rrrrr_m1", "--observe", "1,2", "--json")
+    data = json.loads(out)
+    assert (status, data["command"], data["robot"], data["file"]) == (0, "view", "rrrrr_m1", None)
+    assert list(data["shown"]) == ["real"]
+    assert [slider["name"] for slider in data["sliders"]] == ["x", "y"]
+    assert all(len(slider["values"]) == len(slider["distances"]) for slider in data["sliders"])
+    assert [mode["label"] for mode in data["modes"]] == ["2"]
+
+
+@pytest.mark.parametrize("file", ["view.png", "view", "view.html.txt"])
+def test_other_endings_are_refused(capfd: pytest.CaptureFixture[str], tmp_path: Path, file: str):
+    assert_refused(ask(capfd, "rrrrr_m1", "--static", str(tmp_path / file)), 2, "unknown ending")
+    assert not list(tmp_path.iterdir())
+
+
+def test_what_cannot_be_done_is_refused_in_one_line(capfd: pytest.CaptureFixture[str], tmp_path: Path):
+    assert_refused(ask(capfd, "rrrrr_m1", "--static", str(tmp_path / "none" / "view.html")), 2, "no such folder")
+    assert_refused(ask(capfd, "rrrrr_m1", "--observe", "7", "--no-open"), 2, "has no leg or link")
+    assert_refused(ask(capfd, "nobody", "--static", str(tmp_path / "view.html")), 2, "nobody")
+    assert_refused(ask(capfd, "rrrrr_m1", "--port", "70000"), 2, "65535")
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_port_that_is_taken_is_refused(capfd: pytest.CaptureFixture[str]):
+    with socket.socket() as taken:
+        taken.bind(("127.0.0.1", 0))
+        taken.listen()
+        port = str(taken.getsockname()[1])
+        assert_refused(ask(capfd, "rrrrr_m1", "--no-open", "--port", port), 2, "cannot serve the view")
+
+
+def test_without_meshcat_the_extra_is_named(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
+    def find(name: str, *rest: str | None) -> object:
+        return None if name == "meshcat" else there(name, *rest)
+
+    there = importlib.util.find_spec
+    monkeypatch.setattr(importlib.util, "find_spec", find)
+    assert_refused(ask(capfd, "rrrrr_m1", "--no-open"), 3, 'pip install "hrsynth[view]"')
