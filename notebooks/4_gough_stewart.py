@@ -13,7 +13,7 @@ import numpy as np
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import hrsynth
-from hrsynth.errors import HrsynthError, MissingExtra
+from hrsynth.errors import HrsynthError
 
 robot = hrsynth.load("gough_stewart")
 sets = hrsynth.legs(robot)
@@ -109,7 +109,7 @@ print(len(ours), "solutions; largest difference in a leg's length:", np.abs(np.a
 try:
     real = hidden.modes(at=POSE, real=True)
     print(f"{len(real.modes)} real of {real.found.complex} complex")
-except MissingExtra as error:
+except HrsynthError as error:
     print(error)
 
 # %% [markdown]
