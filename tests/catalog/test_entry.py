@@ -10,7 +10,7 @@ import pytest
 
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.setting import prepare
-from hrsynth.catalog.entry import entry
+from hrsynth.catalog.entry import entry, model
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS, words
 from hrsynth.catalog.groups.planar import chains
@@ -142,3 +142,9 @@ def test_screws_without_pinocchio_see_the_same(name):
 
 def _rank(rows):
     return int(np.linalg.matrix_rank(rows, tol=1e-8))
+
+
+@pytest.mark.parametrize(("word", "own"), [("3(Rz-Rz*-Rz)", False), ("3(Ra*-Ro-Ro-Ro)", False),
+                                           ("3(Ra-Ro*-Ro-Ro)", True)])
+def test_motors_count_where_they_keep_joints_apart(word, own):
+    assert str(model(parse(word))) == (word if own else str(parse(word).driven))
