@@ -18,7 +18,7 @@ VIEWED = $(BIN)/hrsynth view $(1) --static $(VENV)/view.html > /dev/null && \
 	$(BIN)/python tests/browser.py $(VENV)/view.html docs/pictures/view_$(2).png 1100 760
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog pictures lock setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -51,18 +51,25 @@ types: setup-dev  ## type check
 robots: setup  ## regenerate robots/*.urdf from the families
 	@$(BIN)/python -m hrsynth.families
 
-readme: setup  ## regenerate the README's tables
-	@$(BIN)/python -m hrsynth.present.readme README.md
+readme: setup  ## regenerate the tables of the README and of docs/pages
+	@$(BIN)/python -m hrsynth.present.readme README.md docs/pages/papers.md
 	@$(BIN)/python -m hrsynth.catalog.readme README.md
 
 catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS= processes; hours)
 	@$(BIN)/hrsynth catalog build --workers $(JOBS)
 
-bench: setup-all  ## run the benchmarks and write their table in the README (some minutes)
-	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py README.md
+notebooks: setup-all  ## write notebooks/*.ipynb from their scripts, without outputs
+	@$(BIN)/python docs/lessons.py
+
+docs: setup-all  ## run the notebooks that changed and build the site in build/site
+	@NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mkdocs build --quiet --strict
+
+bench: setup-all  ## run the benchmarks and write their table in docs/pages (some minutes)
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py docs/pages/batches.md
 
 pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again
-	@mkdir -p docs/pictures
+	@mkdir -p build docs/pictures
+	@$(BIN)/python -c 'import hrsynth; hrsynth.draw(hrsynth.derive(hrsynth.load("quattro"), ["1", "4"])).save("docs/pictures/derivation_quattro.svg")'
 	@$(BIN)/hrsynth modes rrrrr_m1 -o docs/pictures/modes_rrrrr.png > /dev/null
 	@$(BIN)/hrsynth modes 3rrr_m1 -o docs/pictures/modes_3rrr.png > /dev/null
 	@$(BIN)/hrsynth modes gough_stewart --observe 1,3,5 --at x=-0.03,y=-0.06,z=0.37,rpy=-0.1/0.5/0.1 -o docs/pictures/modes_gough_stewart.png > /dev/null
@@ -79,6 +86,18 @@ pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again
 	@$(call VIEWED,gough_stewart --hidden --observe 1$(COMMA)3$(COMMA)5,gough_stewart)
 	@$(call VIEWED,quattro --hidden --observe 1$(COMMA)4,quattro)
 	@$(call VIEWED,uranesx --hidden,uranesx)
+	@$(BIN)/hrsynth derive rrrrr_m1 --report build/rrrrr_m1.html > /dev/null
+	@$(BIN)/python tests/browser.py build/rrrrr_m1.html docs/pictures/report_rrrrr_m1.png 1200 1500
+	@$(BIN)/hrsynth derive 3rrr_m1 --report build/3rrr_m1.html > /dev/null
+	@$(BIN)/python tests/browser.py build/3rrr_m1.html docs/pictures/report_3rrr_m1.png 1200 1500
+	@$(BIN)/hrsynth derive gough_stewart --report build/gough_stewart.html > /dev/null
+	@$(BIN)/python tests/browser.py build/gough_stewart.html docs/pictures/report_gough_stewart.png 1200 1500
+	@$(BIN)/hrsynth derive quattro --observe 1,4 --report build/quattro.html > /dev/null
+	@$(BIN)/python tests/browser.py build/quattro.html docs/pictures/report_quattro.png 1200 1500
+	@$(BIN)/hrsynth derive uranesx --report build/uranesx.html > /dev/null
+	@$(BIN)/python tests/browser.py build/uranesx.html docs/pictures/report_uranesx.png 1200 1500
+	@$(BIN)/hrsynth catalog site --group planar --legs '3-R*RR' -o build/pages > /dev/null
+	@$(BIN)/python tests/browser.py build/pages/p/96081be379a6.html docs/pictures/catalog.png 1000 1100
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt

@@ -19,7 +19,7 @@ from hrsynth.description import shipped
 
 FIELDS = {
     "derive": {"observed", "notation", "dof", "mobility", "verdict", "lost", "paper_form", "steps", "certificate",
-               "hidden_file", "architecture"},
+               "hidden_file", "report_file", "architecture"},
     "legs": {"sets", "minimal"},
     "advise": {"verdict", "rank", "dof", "lost", "nothing_missing", "sets", "size", "tried", "complete"},
     "check": {"characteristic_length", "observed", "camera", "configurations", "redundant", "grid"},

@@ -13,19 +13,22 @@ if TYPE_CHECKING:
     from .analysis.modes.modes import modes
     from .analysis.singularity.singular import singular
     from .description import load, save, shipped
+    from .present.show import draw, html, text
     from .present.view.view import view
     from .selection.select import select
     from .servo.servo import servo
 
 __version__ = "0.1.0"
-__all__ = ["__version__", "accuracy", "advise", "catalog", "check", "derive", "legs", "load", "modes", "path", "save",
-           "select", "servo", "shipped", "singular", "view"]
+__all__ = ["__version__", "accuracy", "advise", "catalog", "check", "derive", "draw", "html", "legs", "load", "modes",
+           "path", "save", "select", "servo", "shipped", "singular", "text", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
     "advise": ".analysis.advice",
     "check": ".analysis.check",
     "derive": ".analysis.derive",
+    "draw": ".present.show",
+    "html": ".present.show",
     "legs": ".analysis.controllability",
     "load": ".description",
     "modes": ".analysis.modes.modes",
@@ -35,6 +38,7 @@ _HOME = {
     "servo": ".servo.servo",
     "shipped": ".description",
     "singular": ".analysis.singularity.singular",
+    "text": ".present.show",
     "view": ".present.view.view",
 }
 

@@ -115,6 +115,8 @@ def derive(
     = "simplified",
     output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Write the hidden robot.")]
     = None,
+    report: Annotated[str | None, typer.Option("--report", metavar="FILE", help="Write a page (.html) with drawings, "
+                                               "proof, singularities, assembly modes and accuracy.")] = None,
     json: Json = False,
     seed: Seed = 0,
 ) -> None:
@@ -122,21 +124,29 @@ def derive(
     from .analysis.derive import derive as run
     from .description import save, targets
     from .present import records
+    from .present.report import pages
     from .present.text.verdicts import derivation
 
     if output is not None:
         targets(output)
+    pages.writable(report)
     with Progress() as progress:
         found = run(robot.load(), _list(observe), camera, form=form, seed=seed, progress=progress.tell)
+        if report is not None:
+            _other_than(robot, found.robot, report)
+            page = pages.report(found, _list(observe), camera, seed=seed, progress=progress.tell)
     written = None
     if output is not None and found.hidden is not None:
         _other_than(robot, found.robot, output)
         save(found.hidden, output)
         written = output
+    if report is not None:
+        pages.write(page, report)
     if json:
-        typer.echo(records.record("derive", found.robot.name, {**found.to_dict(), "hidden_file": written}))
+        fields = {**found.to_dict(), "hidden_file": written, "report_file": report}
+        typer.echo(records.record("derive", found.robot.name, fields))
     else:
-        typer.echo(derivation(found, written))
+        typer.echo(derivation(found, written, report))
     if output is not None and found.hidden is None:
         typer.echo("hrsynth: nothing was written: every leg is blind, there is no hidden robot", err=True)
 

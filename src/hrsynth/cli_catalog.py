@@ -1,4 +1,10 @@
-"""The commands of the catalog: build, list, show."""
+"""The commands of the catalog: build, list, show, site.
+
+Their records, besides ``command`` ("catalog build" …) and ``version``: ``build`` gives ``groups``, each with
+``group``, ``words``, ``now`` (made), ``before`` and ``file`` (null while it is not complete), with ``--check`` instead
+``stale``, one text for each thing; ``list`` gives ``total`` and ``entries``; ``show`` gives ``entry``, ``drawing``
+(lines), ``note`` and ``file``; ``site`` as told by ``catalog site --help``.
+"""
 
 from __future__ import annotations
 
@@ -10,12 +16,30 @@ from typing import Annotated, Any
 
 import typer
 
-catalog = typer.Typer(name="catalog", no_args_is_help=True, rich_markup_mode=None,
+catalog = typer.Typer(name="catalog", invoke_without_command=True, rich_markup_mode=None,
                       help="The catalog of architectures: what can be controlled by watching legs.")
 
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
 Kept = Annotated[str | None, typer.Option("--catalog", metavar="PATH", help="A folder or SQLite file (default: what is "
                                           "shipped).")]
+
+Workers = Annotated[int, typer.Option(min=1, help="Processes that share the work.")]
+Legs = Annotated[str | None, typer.Option(metavar="LEGS", help="Number of legs, or a pattern of the notation or of one "
+                                          "leg's chain: 3-R*, PUS.")]
+Dof = Annotated[int | None, typer.Option(help="Freedoms of the platform.")]
+Motion = Annotated[str | None, typer.Option(help="Its translations and turns, as 3T or 2T1R.")]
+Verdict = Annotated[str | None, typer.Option(help="controllable, partially controllable, uncontrollable.")]
+Group = Annotated[str | None, typer.Option(help="planar, pods, deltas, spatial.")]
+BaseMotors = Annotated[bool | None, typer.Option("--base-motors/--moving-motors", help="All motors on the base, or "
+                                                 "not.")]
+Fewest = Annotated[int | None, typer.Option(help="Legs to watch to see all that can be seen.")]
+Text = Annotated[str | None, typer.Option(help="What occurs in any field.")]
+
+
+@catalog.callback()
+def _alone(context: typer.Context) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
 
 
 @catalog.command()
@@ -23,7 +47,7 @@ def build(
     groups: Annotated[list[str] | None, typer.Argument(metavar="[GROUP]...", help="Groups (default: all).")] = None,
     output: Annotated[str | None, typer.Option("-o", "--output", metavar="PATH", help="A folder, or a file that ends "
                                                "in .sqlite (default: catalog/ of the checkout).")] = None,
-    workers: Annotated[int, typer.Option(min=1, help="Processes that share the work.")] = 1,
+    workers: Workers = 1,
     cluster: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A dask cluster that shares it.")] = None,
     check: Annotated[bool, typer.Option("--check", help="Build nothing: compare what is stored (default: what is "
                                         "shipped) with what would be built; exit 3 if it is stale.")] = False,
@@ -36,6 +60,7 @@ def build(
     seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of --sample.")] = 0,
 ) -> None:
     """Build the catalog, or go on where a build was broken off; the bytes do not depend on who builds."""
+    _require_together(check, {"--sample": sample is not None}, {"--limit": limit is not None, "--anew": anew})
     if check:
         _check(groups or [], output, workers, cluster, sample, seed, json)
         return
@@ -48,6 +73,15 @@ def build(
         done = [each.to_dict() for each in run(target, groups or [], workers=workers, cluster=cluster, limit=limit,
                                                anew=anew, tell=meter.tell)]
     typer.echo(records.record("catalog build", None, {"groups": done}) if json else built(done))
+
+
+def _require_together(check: bool, with_it: dict[str, bool], without: dict[str, bool]) -> None:
+    """Raise ``BadRequest`` for options that mean nothing with, or without, ``--check``."""
+    from .errors import BadRequest
+
+    for option, given in (without if check else with_it).items():
+        if given:
+            raise BadRequest(f"{option} {'with' if check else 'without'} --check", None)
 
 
 def _check(groups: list[str], target: str | None, workers: int, cluster: str | None, sample: int | None, seed: int,
@@ -70,16 +104,14 @@ def _check(groups: list[str], target: str | None, workers: int, cluster: str | N
 
 @catalog.command("list")
 def list_(
-    legs: Annotated[str | None, typer.Option(metavar="LEGS", help="Number of legs, or a pattern of the notation or of "
-                                             "one leg's chain: 3-R*, PUS.")] = None,
-    dof: Annotated[int | None, typer.Option(help="Freedoms of the platform.")] = None,
-    motion: Annotated[str | None, typer.Option(help="Its translations and turns, as 3T or 2T1R.")] = None,
-    verdict: Annotated[str | None, typer.Option(help="controllable, partially controllable, uncontrollable.")] = None,
-    group: Annotated[str | None, typer.Option(help="planar, pods, deltas, spatial.")] = None,
-    base_motors: Annotated[bool | None, typer.Option("--base-motors/--moving-motors", help="All motors on the base, or "
-                                                     "not.")] = None,
-    fewest: Annotated[int | None, typer.Option(help="Legs to watch to see all that can be seen.")] = None,
-    text: Annotated[str | None, typer.Option(help="What occurs in any field.")] = None,
+    legs: Legs = None,
+    dof: Dof = None,
+    motion: Motion = None,
+    verdict: Verdict = None,
+    group: Group = None,
+    base_motors: BaseMotors = None,
+    fewest: Fewest = None,
+    text: Text = None,
     kept: Kept = None,
     json: Json = False,
 ) -> None:
@@ -129,6 +161,40 @@ def show(
         typer.echo(records.record("catalog show", None, fields))
     else:
         typer.echo(entry(record, drawn, note, output))
+
+
+@catalog.command()
+def site(
+    output: Annotated[str, typer.Option("-o", "--output", metavar="DIR", help="A new or empty folder, or an older "
+                                        "site, which is replaced.")],
+    legs: Legs = None,
+    dof: Dof = None,
+    motion: Motion = None,
+    verdict: Verdict = None,
+    group: Group = None,
+    base_motors: BaseMotors = None,
+    fewest: Fewest = None,
+    text: Text = None,
+    workers: Workers = 1,
+    anew: Annotated[bool, typer.Option("--anew", help="Forget what a build that was broken off has made.")] = False,
+    kept: Kept = None,
+    json: Json = False,
+) -> None:
+    """Pages of the architectures that fit: a list that filters, drawings, derivations, robot files; needs no server."""
+    from .catalog import load
+    from .catalog.site import site as run
+    from .present import records
+    from .present.text.catalog import sited
+
+    found = load(kept, legs=legs, dof=dof, motion=motion, verdict=verdict, group=group, base_motors=base_motors,
+                 fewest=fewest, text=text)
+    with Meter() as meter:
+        done = run(found, output, workers=workers, anew=anew, tell=meter.tell)
+    if done.differ:
+        word, derived = done.differ[0]
+        typer.echo(f"hrsynth: {len(done.differ)} derivations do not end in what the catalog says, the first: {word}, "
+                   f"derived {derived}", err=True)
+    typer.echo(records.record("catalog site", None, done.to_dict()) if json else sited(done.to_dict()))
 
 
 def _known(word: str, kept: str | None) -> tuple[Any, str]:

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -49,15 +50,23 @@ def lines_in(journals: list[Path]) -> int:
     return sum(file.read_bytes().count(b"\n") for file in journals if file.exists())
 
 
-def killed_after(process: subprocess.Popen[bytes], folder: Path, records: int) -> None:
-    """Kill a build, and what it started, when its journals have grown by so many lines."""
-    end = time.monotonic() + 20
+def members(group: int) -> list[str]:
+    """The processes of a process group that still run."""
+    listing = subprocess.run(["ps", "-A", "-o", "pgid=,stat=,pid="], capture_output=True, text=True, check=True).stdout
+    rows = [line.split() for line in listing.splitlines()]
+    return [pid for found, state, pid in rows if int(found) == group and not state.startswith("Z")]
+
+
+def killed_after(process: subprocess.Popen[bytes], folder: Path, records: int,
+                 kill: Callable[[], None] | None = None) -> None:
+    """Kill a build (and what it started) when its journals have grown by so many lines."""
+    end = time.monotonic() + 60
     before = lines_in(list(folder.glob("*.part")))
     while process.poll() is None and time.monotonic() < end:
         if lines_in(list(folder.glob("*.part"))) >= before + records:
             break
         time.sleep(0.002)
-    os.killpg(process.pid, signal.SIGKILL)
+    (kill or (lambda: os.killpg(process.pid, signal.SIGKILL)))()
     process.wait()
 
 
@@ -160,6 +169,17 @@ def test_a_torn_journal_is_read_up_to_where_it_is_whole(cut: int, tail: bytes, b
         assert list(journal.lines(["(new)"])) == ['{"word":"(new)"}']
 
 
+def test_a_record_is_on_the_disk_before_the_next_is_made(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
+    safe: list[int] = []
+    monkeypatch.setattr(os, "fsync", lambda file: safe.append(os.fstat(file).st_size))
+    sizes: list[int] = []
+    with Journal(tmp_path / "x.part", "x") as journal:
+        for word in source().groups["c"]():
+            journal.add([(word, line({"word": word, "group": "x"}))])
+            sizes.append((tmp_path / "x.part").stat().st_size)
+    assert safe[1:] == sizes == sorted(set(sizes))
+
+
 def test_a_journal_of_something_else_is_refused(tmp_path: Path):
     path = tmp_path / "c.jsonl.part"
     for text, said in [("a list\nof words\n", "not a head"), ('{"format":1,"catalog":99}\n', "another version")]:
@@ -185,10 +205,15 @@ def test_any_number_of_workers_gives_the_same_bytes(workers: int, tmp_path: Path
 
 @pytest.mark.slow
 def test_a_build_with_workers_is_killed_and_goes_on(tmp_path: Path, whole: dict[str, bytes]):
+    """Its workers end with it."""
     pytest.importorskip("joblib")
-    process = started(tmp_path, delay=0.05, workers=2)
-    killed_after(process, tmp_path, 10)
+    process = started(tmp_path, delay=0.1, workers=2)
+    killed_after(process, tmp_path, 10, lambda: os.kill(process.pid, signal.SIGKILL))
     assert process.returncode == -signal.SIGKILL
+    end = time.monotonic() + 60
+    while (left := members(process.pid)) and time.monotonic() < end:
+        time.sleep(0.1)
+    assert left == []
     build(tmp_path, source=source(), workers=2)
     assert content(tmp_path) == whole
 

@@ -140,6 +140,8 @@ def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: p
     package = Path(hrsynth.__file__).parent
     check_refused(run("build", "-o", package / "catalog" / "new"), "cannot build into the package")
     check_refused(run("build", "nothing", "-o", tmp_path / "new"), "unknown group, found 'nothing', allowed: c, d")
+    check_refused(run("build", "-o", tmp_path / "new", "--sample", 3), "--sample without --check")
+    check_refused(run("build", "-o", folder, "--check", "--anew"), "--anew with --check")
     check_refused(run("build", "-o", tmp_path / "new", "--workers", 0), "--workers")
     check_refused(run("build", "-o", tmp_path / "no" / "where"), "No such file or directory")
     check_refused(run("list", "--catalog", tmp_path / "nowhere"), "no such catalog")
@@ -156,6 +158,12 @@ def test_bad_input_is_one_line(run, folder: Path, tmp_path: Path, monkeypatch: p
 def test_a_folder_that_cannot_be_written_is_one_line(run, tmp_path: Path):
     (tmp_path / "locked").mkdir(mode=0o500)
     check_refused(run("build", "-o", tmp_path / "locked"), "Permission denied")
+
+
+def test_without_a_command_it_tells_which_there_are(run):
+    status, out, err = run()
+    assert (status, err) == (0, "")
+    assert all(f"\n  {command}" in out for command in ("build", "list", "show"))
 
 
 def test_the_meter_tells_the_time_left_on_a_terminal(monkeypatch: pytest.MonkeyPatch,

@@ -41,7 +41,7 @@ def two_workers() -> Iterator[tuple[subprocess.Popen[str], str]]:
     yield process, address
     if process.poll() is None:
         os.killpg(process.pid, signal.SIGKILL)
-    process.wait()
+    process.communicate()
 
 
 def meanwhile(folder: Path, act) -> threading.Thread:

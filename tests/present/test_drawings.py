@@ -85,7 +85,7 @@ def runs(found: Plan) -> Iterator[tuple[int, float, float]]:
 
 
 def assert_free(found: Plan) -> None:
-    """Boxes stand apart, no line runs through one, no two links share a piece of a lane, bars meet no box."""
+    """Boxes stand apart, no line runs through one, no two links share a piece of a lane or bar, bars meet no box."""
     places = [(spot.x, spot.lane) for spot in found.spots]
     assert len(set(places)) == len(places)
     pieces = sorted(runs(found))
@@ -93,8 +93,11 @@ def assert_free(found: Plan) -> None:
         assert not any(at == lane and start < x < end for x, at in places)
     for (lane, _, end), (other, start, _) in pairwise(pieces):
         assert lane != other or end <= start
-    for net in found.nets:
-        assert net.bar is None or not any(x == net.bar[0] for x, _ in places)
+    bars = [net.bar for net in found.nets if net.bar is not None]
+    for x, first, last in bars:
+        assert not any(abs(x - at) < 0.25 and first <= lane <= last for at, lane in places)
+    for (x, _, last), (u, start, _) in pairwise(sorted(bars)):
+        assert x != u or last < start
 
 
 @DRAWINGS
@@ -168,3 +171,12 @@ def test_what_is_in_no_leg_makes_one_group_of_all() -> None:
     bridged = mechanism.changed(joints=[bridge])
     assert_whole(graph_svg(bridged, observed=()), bridged, set(), set())
     assert_free(plan(bridged, observed=()))
+
+
+def test_virtual_chains_from_a_camera_on_a_leg_are_told_apart() -> None:
+    hidden = derive(load("delta"), ["1", "2"], camera="arm_3").hidden
+    assert hidden is not None
+    found = plan(hidden, virtual=driven(hidden))
+    assert [row.label for row in found.rows] == [None]
+    assert_whole(graph_svg(hidden, virtual=driven(hidden)), hidden, {"rod_1a", "rod_2a"}, driven(hidden))
+    assert_free(found)

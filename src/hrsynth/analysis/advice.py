@@ -15,6 +15,7 @@ from ..kinematics.ranks import kernel_basis, largest_angle, range_basis
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.vectors import Array
+from ..results import Result
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
 from .candidates import Measurement, candidates
 from .controllability import CONTROLLABLE, Verdict, verdict_of
@@ -43,8 +44,8 @@ class Cure:
                 "rank": self.verdict.rank, "gap": self.verdict.gap}
 
 
-@dataclass(frozen=True, eq=False)
-class Advice:
+@dataclass(frozen=True, eq=False, repr=False)
+class Advice(Result):
     """What is missing. ``now`` is the verdict as it stands; ``sets`` are all the smallest sets of the best rank within
     reach, empty where nothing is missing or nothing helps."""
 
@@ -76,6 +77,11 @@ class Advice:
     def size(self) -> int:
         """Measurements of each set."""
         return len(self.sets[0].measurements) if self.sets else 0
+
+    def headline(self) -> str:
+        """The robot, its verdict and how many sets of how many measurements help."""
+        found = "nothing is missing" if self.nothing_missing else f"{len(self.sets)} sets of {self.size} more"
+        return f"{self.setting.headline()}: {self.now.verdict}, {found}"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""

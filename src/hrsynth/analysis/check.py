@@ -11,6 +11,7 @@ import numpy as np
 from ..kinematics.reach import reach, sweep
 from ..mechanism import Mechanism
 from ..mechanism.pose import SCALARS, Grid, Pose
+from ..results import Result
 from .posture import Examiner, Posture
 from .redundancy import Redundancy, listed
 from .setting import Setting, prepare, silent
@@ -46,8 +47,8 @@ class GridCheck:
                 **nested}
 
 
-@dataclass(frozen=True, eq=False)
-class Check:
+@dataclass(frozen=True, eq=False, repr=False)
+class Check(Result):
     """What is observed, the postures at the poses asked for, the loop constraints that are always redundant."""
 
     setting: Setting
@@ -59,6 +60,11 @@ class Check:
     def length(self) -> float:
         """The characteristic length (m) that makes lengths comparable with angles."""
         return self.setting.everything.twin.length
+
+    def headline(self) -> str:
+        """The robot, and the state of its hidden robot at each pose."""
+        states = "; ".join(f"{each.pose} {each.hidden.state}" for each in self.postures)
+        return f"{self.setting.headline()}: {states}"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""

@@ -12,6 +12,7 @@ from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.observation import labels_of
+from ..results import Result
 from ..tolerances import RANK_GAP
 from .exact import ExactVerdict, architecture
 from .freedoms import Freedom, name_freedoms, point_text
@@ -25,8 +26,8 @@ LARGEST_COMPLETE = 10
 """Number of legs up to which all sets are tried; beyond, sets of up to three legs and the whole."""
 
 
-@dataclass(frozen=True, eq=False)
-class Verdict:
+@dataclass(frozen=True, eq=False, repr=False)
+class Verdict(Result):
     """What one set of observed legs sees of the platform, at generic configurations."""
 
     legs: tuple[str, ...]
@@ -38,14 +39,18 @@ class Verdict:
     graph: bool = True
     """Whether Mᵀ exists: no observed direction moves while the platform rests."""
 
+    def headline(self) -> str:
+        """The legs, the verdict and the rank."""
+        return f"legs {', '.join(self.legs)}: {self.verdict}, rank {self.rank} of {self.dof}"
+
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"legs": list(self.legs), "verdict": self.verdict, "rank": self.rank,
                 "lost": [freedom.to_dict() for freedom in self.lost], "gap": self.gap, "interaction_matrix": self.graph}
 
 
-@dataclass(frozen=True, eq=False)
-class Legs:
+@dataclass(frozen=True, eq=False, repr=False)
+class Legs(Result):
     """The verdict of every set of observed legs, and the smallest sets of the best rank."""
 
     robot: str
@@ -57,6 +62,15 @@ class Legs:
     complete: bool
     """Whether all sets were tried."""
     minimal: tuple[tuple[str, ...], ...] = field(default=())
+
+    def headline(self) -> str:
+        """The robot and the smallest sets that see most."""
+        return f"{self.robot}, {len(self.sets)} sets, smallest of the best rank: {self.smallest}"
+
+    @property
+    def smallest(self) -> str:
+        """The smallest sets as text."""
+        return "  ".join("{" + ", ".join(each) + "}" for each in self.minimal)
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""

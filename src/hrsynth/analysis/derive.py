@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..mechanism import Mechanism
 from ..mechanism.legs import Anatomy
 from ..mechanism.notation import Architecture
 from ..mechanism.vectors import Array
+from ..results import Result
 from ..rewrite import strategy
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
@@ -27,6 +28,10 @@ from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
 from .setting import Mobility, Setting, prepare, silent
+
+if TYPE_CHECKING:
+    from ..mechanism.pose import Pose
+    from .modes.modes import AssemblyModes
 
 STEP_SAMPLES = 3
 """Configurations at which a single step is checked."""
@@ -51,8 +56,8 @@ class PaperForm:
                 "reason": self.reason}
 
 
-@dataclass(frozen=True, eq=False)
-class Derivation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Derivation(Result):
     """A robot, what is observed, its hidden robot (None where every leg is blind), how it came about, and the proof."""
 
     robot: Mechanism
@@ -78,10 +83,23 @@ class Derivation:
         """Mobility of the normal form."""
         return self.setting.mobility
 
+    def headline(self) -> str:
+        """The robot, the legs watched, the hidden robot and the verdict."""
+        legs = ", ".join(self.setting.labels)
+        return (f"{self.robot.name} {self.architecture}, watching {legs}: "
+                f"hidden robot {self.hidden_architecture or 'none'}, {self.verdict.verdict}")
+
+    def modes(self, at: Pose | str | None = None, *, real: bool = False,
+              progress: Callable[[str], None] = silent) -> AssemblyModes:
+        """All poses with the directions (``real``: the motors' coordinates) of the pose ``at``, as ``hrsynth.modes``
+        lists them."""
+        from .modes.modes import modes_with
+
+        return modes_with(self.setting, at, real=real, progress=progress)
+
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
         hidden = self.hidden_architecture
-        certificate = self.certificate
         written = self.setting.mobility_as_written
         return {
             **self.setting.to_dict(),
@@ -101,10 +119,7 @@ class Derivation:
             "paper_form": self.paper and self.paper.to_dict(),
             "steps": [{"rule": s.rule, "leg": s.leg, "accepted": s.accepted, "reason": s.reason,
                        "largest_angle": s.largest_angle} for s in self.steps],
-            "certificate": {"samples": certificate.samples, "discarded": certificate.discarded,
-                            "largest_angle": certificate.largest_angle, "smallest_gap": certificate.smallest_gap,
-                            "residual": certificate.residual, "passed": certificate.passed,
-                            "reason": certificate.reason},
+            "certificate": self.certificate.to_dict(),
         }
 
 

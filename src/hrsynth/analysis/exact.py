@@ -18,8 +18,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
+from ..kinematics.batch.stage import frames_at
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Question, Relation
 from ..mechanism import Mechanism, Observation
@@ -134,9 +133,7 @@ def architecture_of(mechanism: Mechanism, question: Question, at: Sequence[Close
     """The architecture of a mechanism from configurations ``at`` which relations must persist, and ρ at one of them."""
     places = [i for i, o in enumerate(question.observations) if type(o) is Direction]
     directions = [o for o in question.observations if type(o) is Direction]
-    found = np.array([[here.pose(name) for name in mechanism.links] for here in at])
-    poses = dict(zip(mechanism.links, found.swapaxes(0, 1), strict=True))
-    relations = recognise(mechanism, poses, directions, question.point)
+    relations = recognise(mechanism, frames_at(at), directions, question.point)
     return ExactArchitecture(mechanism, relations, directions, selected(relation, places))
 
 

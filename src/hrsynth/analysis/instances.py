@@ -9,18 +9,21 @@ points of an irreducible family, to which the robot's own configurations belong.
 from __future__ import annotations
 
 import random
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import gcd, lcm
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..mechanism import Joint, Mechanism
+from ..mechanism import Joint, Mechanism, graphs
 from ..mechanism.incidences import Incidence
 from ..mechanism.observation import Direction
 from ..mechanism.relations import Relations, Sight
-from ..mechanism.screws import Numbers, constraints, cross, normals
+from ..mechanism.screws import Numbers, allowed, cross, normals
+
+if TYPE_CHECKING:
+    from flint import fmpz_mat
 
 LARGEST = 10**6
 """Range of the random whole numbers: two that should differ are equal once in a million draws."""
@@ -64,39 +67,64 @@ class Instance:
 
 def draw(relations: Relations, rng: random.Random) -> Geometry:
     """A random geometry; raises ``NotRecognised`` where the relations leave no direction to choose."""
+    from flint import fmpq
+
     directions = _directions(relations, rng)
-    return Geometry(directions, _centres(relations, directions, rng))
+    centres = _centres(relations, directions, rng)
+    return Geometry(tuple(np.array([fmpq(x) for x in each], dtype=object) for each in directions), centres)
 
 
 def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[Direction], drawn: Geometry
              ) -> Instance:
-    """The kinematics of a mechanism with this geometry."""
-    from flint import fmpq
-
-    directions, centres = drawn.directions, drawn.centres
-    anywhere = np.array([fmpq(0)] * 3)
-
-    def geometry(joint: Joint) -> tuple[Numbers, list[Numbers]]:
-        number = relations.centres.get(joint.name)
-        return (anywhere if number is None else centres[number],
-                [directions[c] for c in relations.axes[joint.name]])
-
-    place = {name: i for i, name in enumerate(n for n in mechanism.links if n != mechanism.base)}
-    K = kernel(constraints(list(mechanism.joints.values()), place, geometry, dtype=object))
-
-    def twist(link: str) -> Numbers:
-        if link not in place:
-            return np.array([[fmpq(0)] * K.shape[1]] * 6).reshape(6, -1)
-        return K[6 * place[link] : 6 * place[link] + 6]
-
-    t = twist(mechanism.platform)
+    """The kinematics of a mechanism with this geometry, from the rates of its joints: whole numbers throughout."""
+    screws = {name: _screws(joint, relations, drawn) for name, joint in mechanism.joints.items()}
+    velocities, loops = _velocities(mechanism, screws)
+    t = velocities[mechanism.platform]
     if relations.point is not None:
-        t = t[:3] + cross(t[3:], centres[relations.point])
-    rates = []
+        point, scale = _scaled(drawn.centres[relations.point])
+        t = scale * t[:3] + cross(t[3:], point)
+    parts = [t]
     for observation, sight in zip(observations, relations.sights, strict=True):
-        turn = twist(observation.link)[3:] - twist(observation.seen_from or mechanism.reference)[3:]
-        rates.append(cross(seen(sight, drawn), turn))
+        turn = velocities[observation.link] - velocities[observation.seen_from or mechanism.reference]
+        parts.append(cross(_scaled(seen(sight, drawn))[0], turn[3:]))
+    rows, (free, _) = np.vstack(parts), _reduced(loops)
+    moved = np.array((_matrix(rows) * _matrix(free)).entries(), dtype=object).reshape(len(rows), free.shape[1])
+    t, *rates = np.split(moved, np.cumsum([len(part) for part in parts[:-1]]))
     return Instance(t, tuple(rates))
+
+
+def _screws(joint: Joint, relations: Relations, drawn: Geometry) -> Numbers:
+    """The twists that a joint allows, each of any length, columns of whole numbers (6, freedoms)."""
+    from flint import fmpz
+
+    number = relations.centres.get(joint.name)
+    anywhere = np.array([fmpz(0)] * 3, dtype=object)
+    point, scale = (anywhere, 1) if number is None else _scaled(drawn.centres[number])
+    axes = [_scaled(drawn.directions[c])[0] for c in relations.axes[joint.name]]
+    found = [np.concatenate([screw[:3], scale * screw[3:]]) if screw[3:].any() else screw
+             for screw in allowed(joint.type, point, axes)]
+    return np.array(found, dtype=object).reshape(-1, 6).T
+
+
+def _velocities(mechanism: Mechanism, screws: Mapping[str, Numbers]) -> tuple[dict[str, Numbers], Numbers]:
+    """The twists of all links (6, rates) along a tree of joints, and what the other joints ask of the rates (rows,
+    rates): that their loops stay closed."""
+    joints = list(mechanism.joints.values())
+    sizes = np.cumsum([0, *(screws[joint.name].shape[1] for joint in joints)])
+    own = {joint.name: slice(*sizes[i : i + 2]) for i, joint in enumerate(joints)}
+    velocities = {mechanism.base: np.zeros((6, sizes[-1]), dtype=object)}
+    tree = graphs.outward(mechanism.base, graphs.spanning_forest(mechanism.links, joints, [0.0] * len(joints)))
+    for joint, near, far in tree:
+        velocities[far] = velocities[near].copy()
+        velocities[far][:, own[joint.name]] = screws[joint.name] * (1 if far == joint.successor else -1)
+    used = {joint.name for joint, _, _ in tree}
+    loops = [np.zeros((0, sizes[-1]), dtype=object)]
+    for joint in joints:
+        if joint.name not in used:
+            loop = velocities[joint.successor] - velocities[joint.predecessor]
+            loop[:, own[joint.name]] -= screws[joint.name]
+            loops.append(loop)
+    return velocities, np.vstack(loops)
 
 
 def _directions(relations: Relations, rng: random.Random) -> tuple[Numbers, ...]:
@@ -159,31 +187,47 @@ def _numbers(count: int, rng: random.Random) -> Numbers:
 
 def _whole(vector: Numbers) -> Numbers:
     """The shortest vector of whole numbers along a rational one."""
-    from flint import fmpq
+    numbers, _ = _scaled(vector)
+    return numbers // gcd(*numbers)
 
+
+def _scaled(vector: Numbers) -> tuple[Numbers, int]:
+    """The first multiple of a rational vector that has whole entries, and how many times it is taken."""
     scale = lcm(*(int(x.q) for x in vector))
-    numbers = [int((x * scale).p) for x in vector]
-    common = gcd(*numbers)
-    return np.array([fmpq(x // common) for x in numbers], dtype=object)
+    return np.array([x.p * (scale // x.q) for x in vector], dtype=object), scale
 
 
 def kernel(rows: Numbers) -> Numbers:
-    """A basis of the exact kernel, rational, shape (columns, nullity)."""
-    from flint import fmpq, fmpq_mat
+    """A basis of the exact kernel of whole rows, rational, shape (columns, nullity)."""
+    from flint import fmpq
+
+    basis, divisor = _reduced(rows)
+    return np.array([fmpq(x, divisor) for x in basis.ravel()], dtype=object).reshape(basis.shape)
+
+
+def _reduced(rows: Numbers) -> tuple[Numbers, Any]:
+    """A whole basis of the kernel, shape (columns, nullity), and the value of each vector in its own free column."""
+    from flint import fmpz
 
     columns = rows.shape[1]
-    reduced, found = fmpq_mat(len(rows), columns, list(rows.ravel())).rref()
-    table = np.array(reduced.table(), dtype=object).reshape(rows.shape)[:found]
-    pivots = [next(j for j, x in enumerate(row) if x != 0) for row in table]
+    reduced, divisor, found = _matrix(rows).rref()
+    table = np.array(reduced.entries(), dtype=object).reshape(rows.shape)[:found]
+    pivots = [next(j for j, x in enumerate(row) if x) for row in table]
     free = sorted(set(range(columns)) - set(pivots))
-    basis = np.full((columns, len(free)), fmpq(0), dtype=object)
-    basis[free, range(len(free))] = fmpq(1)
+    basis = np.full((columns, len(free)), fmpz(0), dtype=object)
+    basis[free, range(len(free))] = divisor
     basis[pivots] = -table[:, free]
-    return basis
+    return basis, divisor
+
+
+def _matrix(rows: Numbers) -> fmpz_mat:
+    from flint import fmpz_mat
+
+    return fmpz_mat(rows.shape[0], rows.shape[1], rows.ravel().tolist())
 
 
 def rank(rows: Numbers) -> int:
     """The exact rank of a rational matrix."""
     from flint import fmpq_mat
 
-    return int(fmpq_mat(rows.shape[0], rows.shape[1], list(rows.ravel())).rank())
+    return int(fmpq_mat(rows.shape[0], rows.shape[1], rows.ravel().tolist()).rank())

@@ -38,7 +38,7 @@ class Mobility:
     idle: int
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Setting:
     """A robot as read, its normal form and legs, the observations asked for, and samples in which all legs count."""
 
@@ -50,6 +50,13 @@ class Setting:
     """Samples for the question of all default segments, and of the observed ones besides."""
     defaults: int
     """How many of the observations of ``everything`` are default segments; they come first."""
+
+    def headline(self) -> str:
+        """The robot and the observed legs."""
+        return f"{self.robot.name}, watching {', '.join(self.labels)}"
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.headline()}>"
 
     @property
     def mechanism(self) -> Mechanism:
@@ -162,7 +169,7 @@ def _prepared(robot: Mechanism, observe: Sequence[str] | str | None, camera: str
         robot = replace(robot, camera=camera)
     normal = normal_form(robot)
     anatomy = dissect(normal.mechanism)
-    defaults = _defaults(anatomy)
+    defaults = defaults_of(anatomy)
     observed = _observed(anatomy, normal, defaults, observe)
     known = {o.key for o in defaults.values()}
     extra = tuple(o for o in observed if o.key not in known)
@@ -172,7 +179,7 @@ def _prepared(robot: Mechanism, observe: Sequence[str] | str | None, camera: str
     return Setting(robot, normal, anatomy, observed, drawn, len(defaults))
 
 
-def _defaults(anatomy: Anatomy) -> dict[str, Observation]:
+def defaults_of(anatomy: Anatomy) -> dict[str, Observation]:
     """The segment of each leg that has one: the file's choice, else the theory's."""
     table: dict[str, Observation] = {}
     given = {o.leg: o for o in reversed(anatomy.mechanism.observations)}

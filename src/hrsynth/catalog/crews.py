@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import logging
+import os
+import time
 from collections.abc import Callable, Iterable, Iterator
+from functools import cache
 from itertools import islice
 from typing import Any
 
@@ -17,6 +20,8 @@ Crew = Callable[[Task, Iterable[list[str]]], Iterator[Made]]
 
 PATIENCE = 10.0
 """Seconds within which a cluster has to answer."""
+LEASH = 0.5
+"""Seconds within which a worker process notices that its parent was killed."""
 AHEAD = 3
 """Parts that wait for each thread of a cluster."""
 
@@ -55,11 +60,30 @@ def _together(task: Task, parts: Iterable[list[str]], workers: int) -> Iterator[
 
     pool = Parallel(n_jobs=workers, batch_size=1, pre_dispatch=2 * workers, return_as="generator_unordered")
     try:
-        yield from pool(delayed(task)(part) for part in parts)
+        yield from pool(delayed(_leashed)(os.getpid(), task, part) for part in parts)
     except TerminatedWorkerError:
         raise Stopped("a worker process died") from None
     except BrokenProcessPool as error:
         raise Stopped(f"the worker processes cannot be used: {str(error).splitlines()[0]}") from None
+
+
+def _leashed(parent: int, task: Task, part: list[str]) -> Made:
+    """What a part gives, in a process that does not outlive the one that started it."""
+    _leash(parent)
+    return task(part)
+
+
+@cache
+def _leash(parent: int) -> None:
+    from threading import Thread
+
+    Thread(target=_follow, args=(parent,), daemon=True).start()
+
+
+def _follow(parent: int) -> None:
+    while os.getppid() == parent:
+        time.sleep(LEASH)
+    os._exit(1)
 
 
 def _clustered(task: Task, parts: Iterable[list[str]], address: str) -> Iterator[Made]:

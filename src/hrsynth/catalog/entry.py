@@ -43,7 +43,7 @@ def entry(text: str) -> dict[str, Any]:
     """
     word = parse(text)
     record: dict[str, Any] = {"word": str(word), "group": group(word)}
-    found = _studied(str(word.unmoved))
+    found = _studied(str(model(word)))
     if isinstance(found, str):
         return {**record, "refused": found}
     drawn = mechanism(word, found.attempt)
@@ -55,9 +55,27 @@ def entry(text: str) -> dict[str, Any]:
             "base_motors": all(drawn.base in joint.links for joint in driven)}
 
 
+def model(word: Word) -> Word:
+    """The architecture that is studied for all that differ from it by their motors alone.
+
+    It has a motor on the first R or P of each leg; but it is the word itself where that makes other links, since
+    passive joints become one: three R that meet in a point an S.
+    """
+    return word.driven if _links(str(word)) == _links(str(word.driven)) else word
+
+
+@lru_cache(maxsize=128)
+def _links(text: str) -> frozenset[str]:
+    """The links of a word's normal form; none where its mechanism cannot be made."""
+    try:
+        return frozenset(normal_form(mechanism(parse(text))).mechanism.links)
+    except HrsynthError:
+        return frozenset()
+
+
 @dataclass(frozen=True, eq=False)
 class _Study:
-    """What the architectures of one word have in common, whatever is driven."""
+    """What the architectures of one model have in common, whatever is driven."""
 
     facts: dict[str, Any]
     attempt: int
@@ -72,18 +90,18 @@ class _Study:
 
 @lru_cache(maxsize=128)
 def _studied(text: str) -> _Study | str:
-    """The study of a word without motors, or why there is none, with the first dimensions that can be studied."""
+    """The study of a model, or why there is none, with the first dimensions that can be studied."""
     word, reason = parse(text), ""
     for attempt in range(ATTEMPTS):
         try:
             return _study(word, attempt)
         except HrsynthError as error:
-            reason = reason or str(error).splitlines()[0].removeprefix(f"{word.driven}: ")
+            reason = reason or str(error).splitlines()[0].removeprefix(f"{word}: ")
     return reason
 
 
 def _study(word: Word, attempt: int) -> _Study:
-    setting = prepare(mechanism(word.driven, attempt), samples=SAMPLES)
+    setting = prepare(mechanism(word, attempt), samples=SAMPLES)
     if not setting.dof:
         raise NotConfirmed(setting.robot.name, "its platform does not move")
     derivation = derived(setting, beside=False)

@@ -58,11 +58,11 @@ class Folder:
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         file = self.file(group)
-        with _writable(file), drafted(file, sync=True) as draft:
+        with writable(file), drafted(file, sync=True) as draft:
             draft.write_bytes(encoded(group, lines))
 
     def journal(self, group: str, *, anew: bool = False) -> Journal:
-        with _writable(self.path):
+        with writable(self.path):
             self.path.mkdir(exist_ok=True)
         return _opened(self.file(group), f"{group}.jsonl", group, anew)
 
@@ -86,7 +86,7 @@ class Database:
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         kept = {} if not self.path.exists() else {name: self.lines(name, {}) for name in self.groups() if name != group}
-        with _writable(self.path), drafted(self.path, sync=True) as draft:
+        with writable(self.path), drafted(self.path, sync=True) as draft:
             draft.unlink(missing_ok=True)
             try:
                 tables.write(draft, {**kept, group: lines})
@@ -138,11 +138,11 @@ def _readable(file: Path) -> Iterator[None]:
 
 
 @contextlib.contextmanager
-def _writable(file: Path) -> Iterator[None]:
+def writable(file: Path, what: str = "catalog") -> Iterator[None]:
     """A disk that is full stops a build, anything else is a bad request."""
     try:
         yield
     except OSError as error:
         if error.errno in FULL:
             raise BuildStopped(f"{file}: {error.strerror}") from None
-        raise BadRequest(f"cannot write the catalog: {error.strerror}", str(file)) from None
+        raise BadRequest(f"cannot write the {what}: {error.strerror}", str(file)) from None

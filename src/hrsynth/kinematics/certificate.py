@@ -4,12 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from ..errors import BadMechanism
 from ..mechanism import Mechanism
 from ..mechanism.vectors import Array
+from ..results import Result
 from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
 from .configuration import ClosedConfiguration, Target
 from .ranks import CLEAN, kernel_basis, largest_angle
@@ -27,8 +29,8 @@ class Mismatch:
     position: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Certificate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Certificate(Result):
     """What was compared: configurations, the largest angle between ρ and ρ_H, the smallest rank gap, the largest
     residual at which the hidden robot follows; ``reason`` says why it did not pass."""
 
@@ -40,6 +42,17 @@ class Certificate:
     passed: bool
     reason: str
     mismatch: Mismatch | None = None
+
+    def headline(self) -> str:
+        """Whether it passed, and the largest angle."""
+        passed = "passed" if self.passed else f"failed, {self.reason}"
+        return f"{passed}: largest angle {self.largest_angle:.1e} at {self.samples} configurations"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"samples": self.samples, "discarded": self.discarded, "largest_angle": self.largest_angle,
+                "smallest_gap": self.smallest_gap, "residual": self.residual, "passed": self.passed,
+                "reason": self.reason}
 
 
 def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bodies: tuple[str, ...] = (),

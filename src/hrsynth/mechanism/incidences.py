@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..tolerances import SAME_POINT
-from .vectors import Array
+from .vectors import Array, crossed
 
 Indices = NDArray[np.intp]
 
@@ -50,7 +50,7 @@ def rows(tuples: Iterable[Sequence[int]], k: int) -> Indices:
 
 def triple(a: Array, b: Array, c: Array) -> Array:
     """a · (b × c) along the last dimension."""
-    return np.asarray(np.sum(a * np.cross(b, c), axis=-1))
+    return np.asarray(np.sum(a * crossed(b, c), axis=-1))
 
 
 def incidences(classes: Array, points: Array, together: NDArray[np.bool_], owns: Sequence[set[int]],
@@ -64,7 +64,7 @@ def incidences(classes: Array, points: Array, together: NDArray[np.bool_], owns:
         return np.asarray(points[c[:, 1], s] - points[c[:, 0], s])
 
     def along(c: Indices, s: slice) -> Array:
-        return np.cross(between(c, s), classes[c[:, 2], s])
+        return crossed(between(c, s), classes[c[:, 2], s])
 
     def across(c: Indices, s: slice) -> Array:
         return np.asarray(np.sum(between(c, s) * classes[c[:, 2], s], axis=-1))
@@ -91,7 +91,7 @@ def _parallelograms(classes: Array, points: Array, together: NDArray[np.bool_], 
         return np.asarray(points[c[:, 0], s] - points[c[:, 1], s] - points[c[:, 2], s] + points[c[:, 3], s])
 
     def gap_across(c: Indices, s: slice) -> Array:
-        return np.cross(gap(c, s), classes[c[:, 4], s])
+        return crossed(gap(c, s), classes[c[:, 4], s])
 
     beside = [set(np.flatnonzero(each).tolist()) - {i} for i, each in enumerate(together)]
     quads = [(i, j, k, m) for i, near in enumerate(beside) for j, k in combinations(sorted(near), 2)

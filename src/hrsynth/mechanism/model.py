@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import BadMechanism
+from ..results import Result
 from ..tolerances import SAME_GEOMETRY
 from .graphs import Adjacency, adjacency
 from .observation import Observation
@@ -168,8 +169,8 @@ class Note:
         return f"{self.kind}: {self.text}"
 
 
-@dataclass(frozen=True, eq=False)
-class Mechanism:
+@dataclass(frozen=True, eq=False, repr=False)
+class Mechanism(Result):
     """Links, joints, a base, a platform, observations: a frozen value; every change returns a new one."""
 
     name: str
@@ -185,6 +186,11 @@ class Mechanism:
     file: str | None = None
     notes: tuple[Note, ...] = ()
     """What reading the file had to settle."""
+
+    def headline(self) -> str:
+        """The name, and how much there is of it."""
+        motors = sum(joint.actuated for joint in self.joints.values())
+        return f"{self.name}, {len(self.links)} links, {len(self.joints)} joints, {motors} motors"
 
     def __post_init__(self) -> None:
         for key, joint in self.joints.items():

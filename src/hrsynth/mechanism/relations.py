@@ -21,7 +21,7 @@ from . import graphs, lines
 from .incidences import Incidence, choices, held, incidences, triple
 from .model import Joint, JointType, Mechanism
 from .observation import Direction
-from .vectors import Array, inverse, unit
+from .vectors import Array, crossed, inverse, unit
 
 AXIAL = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 """Joints whose centre may slide along their axis without consequence."""
@@ -140,7 +140,7 @@ class _Drawing:
 
         def on_axis(point: Array, joint: Joint) -> bool:
             arm, axis = point - self.points[self.centres[joint.name]], self.directions[self.axes[joint.name][0]]
-            return bool(np.max(np.abs(np.cross(arm, axis))) < near)
+            return bool(np.max(np.abs(crossed(arm, axis))) < near)
 
         found: list[Array] = []
         for a, b in combinations(turning, 2):
@@ -171,7 +171,7 @@ class _Drawing:
 
 def _parallels(D: Array) -> tuple[Array, list[int]]:
     """One direction of each class of parallels (classes, configurations, 3), and the class of each direction."""
-    pairs = held(choices(len(D), 2), lambda c, s: np.cross(D[c[:, 0], s], D[c[:, 1], s]), SAME_DIRECTION)
+    pairs = held(choices(len(D), 2), lambda c, s: crossed(D[c[:, 0], s], D[c[:, 1], s]), SAME_DIRECTION)
     first = list(range(len(D)))
     for a, b in pairs.tolist():
         first[b] = min(first[b], first[a])
@@ -206,13 +206,13 @@ def _tower(classes: Array) -> tuple[tuple[tuple[tuple[int, ...], ...], ...], dic
 def _normal_of(classes: frozenset[int], directions: Array) -> Array:
     """The normal that one or two classes stand for."""
     first, *rest = (directions[c] for c in sorted(classes))
-    return unit(np.cross(first, rest[0])) if rest else first
+    return unit(crossed(first, rest[0])) if rest else first
 
 
 def _number(normal: Array, known: list[Array]) -> int:
     """The number of a normal among those known, to which it is added if it is new."""
     for number, other in enumerate(known):
-        if np.linalg.norm(np.cross(normal, other)) < SAME_PLANE:
+        if np.linalg.norm(crossed(normal, other)) < SAME_PLANE:
             return number
     known.append(normal)
     return len(known) - 1
@@ -223,7 +223,7 @@ def _sight(u: Array, classes: Array, points: Array, own: Sequence[int], near: Se
     def along(vectors: Array) -> bool:
         sizes = np.linalg.norm(vectors, axis=1)
         return bool(np.min(sizes) > SAME_POINT
-                    and np.max(np.linalg.norm(np.cross(vectors, u), axis=1) / sizes) < SAME_DIRECTION)
+                    and np.max(np.linalg.norm(crossed(vectors, u), axis=1) / sizes) < SAME_DIRECTION)
 
     for c, direction in enumerate(classes):
         if along(direction):
@@ -236,6 +236,6 @@ def _sight(u: Array, classes: Array, points: Array, own: Sequence[int], near: Se
             if along(between - classes[c] * np.sum(between * classes[c], axis=1, keepdims=True)):
                 return Sight("foot", (j, k), (c,))
     for a, b in combinations(near, 2):
-        if along(np.cross(classes[a], classes[b])):
+        if along(crossed(classes[a], classes[b])):
             return Sight("normal", classes=(a, b))
     return None

@@ -75,6 +75,26 @@ def transmitted(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> lis
             return []
 
 
+def allowed(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:
+    """The twists of the successor that a joint allows, one a freedom: reciprocal to all that it transmits."""
+    basis = [np.array([int(i == k) for i in range(3)], dtype=point.dtype) for k in range(3)]
+    match kind:
+        case JointType.REVOLUTE | JointType.UNIVERSAL:
+            return [rotation(axis, point) for axis in axes]
+        case JointType.PRISMATIC:
+            return [translation(axes[0])]
+        case JointType.CYLINDRICAL:
+            return [translation(axes[0]), rotation(axes[0], point)]
+        case JointType.SPHERICAL:
+            return [rotation(e, point) for e in basis]
+        case JointType.PLANAR:
+            return [*(translation(n) for n in normals(axes[0])), rotation(axes[0], point)]
+        case JointType.FIXED:
+            return []
+        case _:
+            return [*(translation(e) for e in basis), *(rotation(e, point) for e in basis)]
+
+
 def constraints(joints: Sequence[Joint], place: Mapping[str, int], geometry: Geometry, dtype: Any = float) -> Numbers:
     """The constraint matrix of joints on the stacked twists of links: A ξ = 0, shape (rows, 6 links).
 

@@ -26,6 +26,14 @@ def unit(vector: ArrayLike) -> Array:
     return array / length
 
 
+def crossed(a: Array, b: Array) -> Array:
+    """a × b along the last dimension (…, 3), without the bookkeeping of ``numpy.cross``, slow for few vectors."""
+    found = np.empty(np.broadcast(a, b).shape)
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        found[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+    return found
+
+
 def hat(vector: ArrayLike) -> Array:
     """The matrix [v]ₓ with [v]ₓ w = v × w; shape (3, 3)."""
     x, y, z = np.asarray(vector, dtype=float)

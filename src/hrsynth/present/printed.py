@@ -1,4 +1,4 @@
-"""The README's table of assembly modes that the papers print, beside those that are computed."""
+"""The table of assembly modes that the papers print, beside those that are computed."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The README's tables; ``python -m hrsynth.present.readme README.md`` writes each between its marks."""
+"""Generated tables; ``python -m hrsynth.present.readme FILE …`` writes each between its marks where a file has them."""
 
 from __future__ import annotations
 
@@ -81,6 +81,7 @@ def _smallest(sets: Sequence[Sequence[str]]) -> str:
 if __name__ == "__main__":
     for argument in sys.argv[1:]:
         file = Path(argument)
-        text = replaced(file.read_text(encoding="utf-8"), table())
-        text = replaced(text, printed.table(), printed.START)
-        file.write_text(replaced(text, replays.table(), replays.START), encoding="utf-8", newline="\n")
+        text = file.read_text(encoding="utf-8")
+        for start, make in ((START, table), (printed.START, printed.table), (replays.START, replays.table)):
+            text = replaced(text, make(), start) if start in text else text
+        file.write_text(text, encoding="utf-8", newline="\n")

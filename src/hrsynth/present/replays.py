@@ -1,4 +1,4 @@
-"""The README's table of servo runs that the papers print, beside what the same runs do here."""
+"""The table of servo runs that the papers print, beside what the same runs do here."""
 
 from __future__ import annotations
 

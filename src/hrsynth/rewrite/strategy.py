@@ -50,13 +50,15 @@ Check = Callable[[Mechanism, tuple[str, ...]], Comparison]
 
 @dataclass(frozen=True)
 class Step:
-    """One attempt: the rule, the leg (None: all), whether it was accepted, why, and the angle if it was measured."""
+    """One attempt: the rule, the leg (None: all), whether it was accepted, why, and the angle if it was measured;
+    ``state`` is what an accepted rewriting left behind."""
 
     rule: str
     leg: str | None
     accepted: bool
     reason: str
     largest_angle: float | None
+    state: State | None = field(default=None, compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,7 +95,7 @@ class _Run:
             self.progress(f"{rule.name} {leg or ''}")
         if self.check is None:
             self.state = proposal.state
-            self.steps.append(Step(rule.name, leg, True, proposal.reason, None))
+            self.steps.append(Step(rule.name, leg, True, proposal.reason, None, proposal.state))
             return True
         self.tried += 1
         if self.tried > BUDGET:
@@ -101,7 +103,8 @@ class _Run:
             return False
         found = self.check(proposal.state.mechanism, proposal.bodies)
         reason = proposal.reason if found.passed else f"{proposal.reason}: refused, {found.reason}"
-        self.steps.append(Step(rule.name, leg, found.passed, reason, found.largest_angle))
+        self.steps.append(Step(rule.name, leg, found.passed, reason, found.largest_angle,
+                               proposal.state if found.passed else None))
         if found.passed:
             self.state = proposal.state
         return found.passed
@@ -190,7 +193,7 @@ def _change_ends(run: _Run, left: list[str]) -> list[str]:
             best = remaining, trial.state, trial.steps
         if not remaining:
             break
-        run.steps.extend(replace(step, accepted=False, reason=step.reason + " (taken back: legs remain)")
+        run.steps.extend(replace(step, accepted=False, reason=step.reason + " (taken back: legs remain)", state=None)
                          for step in trial.steps)
     if best is not None and len(best[0]) < len(left):
         run.state = best[1]

@@ -25,6 +25,7 @@ from ..mechanism import Mechanism
 from ..mechanism.observation import Direction
 from ..mechanism.pose import Pose
 from ..mechanism.vectors import Array
+from ..results import Result
 from ..servo.camera import cylinders, placed
 from ..servo.ending import GOAL
 from ..servo.servo import servo
@@ -45,8 +46,8 @@ FOCAL = 800.0
 AUTO = "auto"
 
 
-@dataclass(frozen=True, eq=False)
-class Selection:
+@dataclass(frozen=True, eq=False, repr=False)
+class Selection(Result):
     """All sets of legs up to a size for one displacement: the kept ones first, the most accurate at the goal before
     the others, then the discarded ones."""
 
@@ -57,6 +58,11 @@ class Selection:
     cones: Array
     """Half-angles (rad) of all legs' cones."""
     sight: Sight | None
+
+    def headline(self) -> str:
+        """The robot, and the set that is best."""
+        best = f"best {', '.join(self.kept[0].legs)}" if self.kept else "none is kept"
+        return f"{self.setting.robot.name}: {len(self.candidates)} sets, {len(self.kept)} kept, {best}"
 
     @property
     def kept(self) -> tuple[Candidate, ...]:

@@ -13,6 +13,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.parts import rotation_vector
 from ..mechanism.pose import Pose
 from ..mechanism.vectors import Array
+from ..results import Result
 from .ending import Ending
 from .noise import Amount
 from .run import Run
@@ -48,8 +49,8 @@ class Spread:
                 "offset_mm": 1e3 * self.offset, "mean": list(self.mean)}
 
 
-@dataclass(frozen=True, eq=False)
-class Servo:
+@dataclass(frozen=True, eq=False, repr=False)
+class Servo(Result):
     """A servo run: what was asked, the run, its ending, what it passed.
 
     With noise the ending is that of the same loop without noise, run on from where the noisy one stopped; ``spread`` is
@@ -72,6 +73,10 @@ class Servo:
     spread: Spread | None = None
     notes: tuple[str, ...] = ()
     """What a bench measured, in words."""
+
+    def headline(self) -> str:
+        """The robot and where the run ended."""
+        return f"{self.setting.headline()}: ended at {self.pose}, {self.ended}"
 
     @property
     def ended(self) -> str:

@@ -21,7 +21,7 @@ from hrsynth.mechanism.vectors import Array
 from hrsynth.present import printed as table
 from hrsynth.present import readme
 
-README = (Path(__file__).resolve().parents[3] / "README.md").read_text(encoding="utf-8")
+PAGE = (Path(__file__).resolve().parents[3] / "docs" / "pages" / "papers.md").read_text(encoding="utf-8")
 L1, L2 = 0.380, 0.825
 ANGLES = np.array([-3, -1, 1, 3]) * np.pi / 4
 RADIAL = np.column_stack([np.cos(ANGLES), np.sin(ANGLES), 0 * ANGLES])
@@ -191,5 +191,5 @@ def test_the_printed_pose_of_legs_1_and_2_is_deeper_than_the_rods_are_long():
     assert min(m.pose.z for m in found.modes) == pytest.approx(-0.7023, abs=1e-4)
 
 
-def test_the_readme_shows_the_table():
-    assert readme.block(README, table.START) == table.table(), "the README is stale: make readme"
+def test_the_page_shows_the_table():
+    assert readme.block(PAGE, table.START) == table.table(), "the page is stale: make readme"

@@ -308,5 +308,5 @@ def test_kept_pictures_are_fresh_and_small(file: Path):
 
 
 def test_every_picture_that_is_drawn_is_kept_and_shown():
-    drawn_there = re.findall(r"-o docs/pictures/(\S+)", (ROOT / "Makefile").read_text())
+    drawn_there = re.findall(r" docs/pictures/(\S+\.\w+)", (ROOT / "Makefile").read_text())
     assert sorted(drawn_there) == [file.name for file in PICTURES]

@@ -15,6 +15,7 @@ from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
 from ...mechanism.pose import Grid, Pose
 from ...mechanism.vectors import Array
+from ...results import Result
 from ..controllability import verdict_of
 from ..setting import Setting, prepare, silent
 from .cones import Cones, half_angles
@@ -26,8 +27,8 @@ WORST = 3
 """Poses of a grid, those of the largest errors, at which the linear law is checked by samples."""
 
 
-@dataclass(frozen=True, eq=False)
-class Accuracy:
+@dataclass(frozen=True, eq=False, repr=False)
+class Accuracy(Result):
     """The error maxima for cones about the observed directions: at single poses, over a grid, and where asked for what
     samples of true errors give (None otherwise)."""
 
@@ -37,6 +38,12 @@ class Accuracy:
     poses: tuple[PoseErrors, ...]
     sampled: tuple[Sampled | None, ...]
     field: Field | None
+
+    def headline(self) -> str:
+        """The robot, and the largest errors at each pose or of the grid."""
+        worst = [f"{1e3 * each.position.largest:.3g} mm at {each.pose}" for each in self.poses]
+        grid = [] if self.field is None else [f"{self.field.reached.sum()} poses of a grid"]
+        return f"{self.setting.headline()}: {'; '.join(worst + grid)}"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""

@@ -12,6 +12,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.steps import led
 from ...mechanism.pose import Pose
 from ...mechanism.vectors import Array
+from ...results import Result
 from ..setting import Setting
 from .carriage import Carriage
 from .crossing import Crossing
@@ -33,8 +34,8 @@ class End:
         return {"pose": self.pose.to_dict(), "value": self.value}
 
 
-@dataclass(frozen=True, eq=False)
-class PathAnswer:
+@dataclass(frozen=True, eq=False, repr=False)
+class PathAnswer(Result):
     """``same aspect`` (with a certified path), ``separated`` or ``undecided``, and why.
 
     Between its poses the path moves the told ``point`` on straight lines and turns the platform about one axis;
@@ -59,6 +60,10 @@ class PathAnswer:
     """Joints whose limits hold all along a certified path."""
     unlimited: tuple[str, ...] = ()
     """Joints whose limits are not considered."""
+
+    def headline(self) -> str:
+        """The robot and the verdict."""
+        return f"{self.setting.headline()}: {self.verdict}"
 
     @property
     def not_proved(self) -> str:

@@ -16,6 +16,7 @@ from ...kinematics.relation import Question
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...mechanism.vectors import Array
+from ...results import Result
 from ...tolerances import SAME_RELATION
 from ..setting import Setting, prepare, silent
 from ..singularity.agreement import weakest
@@ -29,7 +30,7 @@ WITHIN = {"translations": "poses turned as this one", "bodies": "poses whose bod
 """Among which poses the modes are listed, for each way in which the platform moves."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AssemblyMode:
     """A pose of the platform with the measurements of the goal.
 
@@ -56,6 +57,10 @@ class AssemblyMode:
     bodies: dict[str, Array] | None = None
     """Poses (4, 4) of the bodies on which legs end."""
 
+    def __repr__(self) -> str:
+        said = "the pose itself" if self.goal else "reachable" if self.reachable else "out of the real robot's reach"
+        return f"<{type(self).__name__}: {self.pose}, {said}>"
+
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"pose": self.pose.to_dict(), "radius": self.radius if np.isfinite(self.radius) else None,
@@ -64,8 +69,8 @@ class AssemblyMode:
                 "multiplicity": self.multiplicity, "proved": self.proved}
 
 
-@dataclass(frozen=True, eq=False)
-class AssemblyModes:
+@dataclass(frozen=True, eq=False, repr=False)
+class AssemblyModes(Result):
     """All assembly modes with the measurements of one pose, the goal.
 
     ``complex``, ``complete``, ``proof``, ``degenerate`` and ``continuum`` as for :class:`Modes`; ``kind`` is ``hidden``
@@ -86,6 +91,11 @@ class AssemblyModes:
     def within(self) -> str | None:
         """Among which poses the modes are all."""
         return None if self.confined is None else WITHIN[self.confined.motion]
+
+    def headline(self) -> str:
+        """The robot and how many modes there are."""
+        count = "a continuum" if self.found.continuum is not None else f"{len(self.modes)} real of {self.found.complex}"
+        return f"{self.setting.headline()}: {count} ({self.kind} robot) at {self.pose}"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
@@ -113,7 +123,12 @@ def modes(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
     if real and observe not in (None, "all", ["all"]):
         raise BadRequest("the motors are held instead of directions", f"real with observe {observe}", "one of the two")
     progress("sampling")
-    setting = prepare(robot, observe, camera, seed=seed)
+    return modes_with(prepare(robot, observe, camera, seed=seed), at, real=real, progress=progress)
+
+
+def modes_with(setting: Setting, at: Pose | str | None = None, *, real: bool = False,
+               progress: Callable[[str], None] = silent) -> AssemblyModes:
+    """All assembly modes with the measurements at a pose of a setting, as :func:`modes`."""
     goal = setting.everything.start
     if at is not None:
         pose = Pose.parse(at) if isinstance(at, str) else at

@@ -11,6 +11,7 @@ from ...kinematics.configuration import ClosedConfiguration, closed
 from ...kinematics.relation import Question, platform_motions, relation
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
+from ...results import Result
 from ...tolerances import SOLVED
 from ..controllability import Verdict
 from ..freedoms import Freedom, name_freedoms
@@ -47,8 +48,8 @@ class Example:
                 "singular_value_nearby": self.nearby}
 
 
-@dataclass(frozen=True, eq=False)
-class Singularity:
+@dataclass(frozen=True, eq=False, repr=False)
+class Singularity(Result):
     """Where a robot loses a freedom of its platform to what is measured: the watched directions, or its own motors."""
 
     setting: Setting
@@ -66,6 +67,10 @@ class Singularity:
     def always(self) -> bool:
         """Whether a freedom is lost everywhere: partial controllability."""
         return self.condition is None
+
+    def headline(self) -> str:
+        """The robot and the condition in words."""
+        return f"{self.setting.headline()}: {self.words}"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
@@ -121,11 +126,16 @@ def drawn(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
     ``plane`` fixes parts of the pose so that two are left; a robot that is only partially controllable has no locus
     (``BadRequest``). Raises ``PlaneNotMet`` where no pose of the plane is reached.
     """
+    return locus_of(prepare(robot, observe, camera, seed=seed), plane=plane, steps=steps, progress=progress)
+
+
+def locus_of(setting: Setting, *, plane: Pose | str | None = None, steps: int = STEPS,
+             progress: Callable[[str], None] | None = None) -> Locus:
+    """Where the hidden and the real robot of a setting lose a freedom over a plane of poses, as :func:`drawn`."""
     tell = progress or silent
-    setting = prepare(robot, observe, camera, seed=seed)
     hidden = Measured.watched(setting)
     if hidden.verdict.rank < setting.dof:
-        raise BadRequest(f"{robot.name} has no locus: a freedom is lost at every pose", None,
+        raise BadRequest(f"{setting.robot.name} has no locus: a freedom is lost at every pose", None,
                          "legs that make it controllable")
     real = None
     if any(joint.actuated for joint in setting.mechanism.joints.values()):

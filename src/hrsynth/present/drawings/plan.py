@@ -19,6 +19,8 @@ from .boxes import Box, Ear, boxes_of, ears
 
 Point = tuple[float, int]
 """Column and lane."""
+BESIDE = 0.4
+"""How far bars of one column stand apart at most (columns)."""
 
 
 @dataclass(frozen=True)
@@ -198,7 +200,7 @@ def _shared(found: Iterable[Ear]) -> set[str]:
 
 
 def _free(lanes: list[list[tuple[int, int]]], start: int, end: int) -> int:
-    """The first lane in which nothing stands between two columns; it is taken."""
+    """The first lane in which nothing stands from one place to another; it is taken."""
     for lane, taken in enumerate(lanes):
         if all(end < a or b < start for a, b in taken):
             taken.append((start, end))
@@ -236,12 +238,30 @@ def _nets(mechanism: Mechanism, platform: Collection[str], ways: list[_Way],
     table: dict[str, list[_Way]] = {}
     for way in ways:
         table.setdefault(way[0], []).append(way)
+    bars = {link: _reach(own) for link, own in table.items()
+            if len(own) > 1 or link == mechanism.base or link in platform}
+    places = _apart(bars, columns)
     for link in mechanism.links:
-        own = table.get(link)
-        if own is None:
-            continue
-        lanes = sorted({way[1][0][1] for way in own})
-        bar = None
-        if len(own) > 1 or link == mechanism.base or link in platform:
-            bar = float(columns[link]), lanes[0], lanes[-1]
-        yield Net(link, tuple(way[1] for way in own), bar, own[0][2])
+        if link in table:
+            at = float(columns[link])
+            moved = tuple(tuple((places.get(link, at) if x == at else x, lane) for x, lane in points)
+                          for _, points, _ in table[link])
+            yield Net(link, moved, (places[link], *bars[link]) if link in bars else None, table[link][0][2])
+
+
+def _reach(ways: list[_Way]) -> tuple[int, int]:
+    """The first and the last lane of a link."""
+    lanes = [points[0][1] for _, points, _ in ways]
+    return min(lanes), max(lanes)
+
+
+def _apart(bars: dict[str, tuple[int, int]], columns: dict[str, int]) -> dict[str, float]:
+    """Where bars stand: in their columns, those that share lanes beside each other."""
+    places: dict[str, float] = {}
+    for column in sorted({columns[link] for link in bars}):
+        tracks: list[list[tuple[int, int]]] = []
+        track = {link: _free(tracks, *bars[link]) for link in bars if columns[link] == column}
+        step = BESIDE / max(len(tracks) - 1, 1)
+        places |= {link: column + step * number - (BESIDE / 2 if len(tracks) > 1 else 0.0)
+                   for link, number in track.items()}
+    return places

@@ -49,14 +49,14 @@ class _Bends:
     knees: tuple[tuple[tuple[float, float], ...], ...]
     """For each group (column, rise), from left to right."""
     level: frozenset[int]
-    """Lanes in which nothing turns."""
+    """Lanes with sliders beside a group's first chain: they are not bent."""
 
     @classmethod
     def of(cls, drawn: Plan) -> _Bends:
         scale = Scale(drawn.rows, PITCH, LANE, GAP, top=46.0)
-        bent = {spot.lane for spot in drawn.spots if spot.box.letter not in STRAIGHT}
-        return cls(scale, tuple(_knees(drawn, number) for number in range(len(drawn.rows))),
-                   frozenset(spot.lane for spot in drawn.spots) - bent)
+        first = {row.first for row in drawn.rows}
+        level = frozenset(s.lane for s in drawn.spots if s.box.letter in STRAIGHT and s.lane not in first)
+        return cls(scale, tuple(_knees(drawn, number) for number in range(len(drawn.rows))), level)
 
     def at(self, column: float, lane: int) -> svg.Place:
         """The pixel of a place in a lane."""

@@ -25,7 +25,7 @@ def accuracy(found: Accuracy, file: str | None = None) -> str:
     if setting.mechanism.reference != setting.mechanism.base:
         rows.insert(2, ("camera on", setting.mechanism.reference))
     if found.field is not None:
-        rows += [("", ""), *_field(found.field)]
+        rows += [("", ""), *field_rows(found.field)]
     for errors, true in zip(found.poses, found.sampled, strict=True):
         rows += [("", ""), ("pose", str(errors.pose)), *_pose(errors, true)]
     if file is not None:
@@ -33,7 +33,8 @@ def accuracy(found: Accuracy, file: str | None = None) -> str:
     return listing(rows)
 
 
-def _field(field: Field) -> list[tuple[str, str]]:
+def field_rows(field: Field) -> list[tuple[str, str]]:
+    """What a grid holds: its size, what is reached of it, the range of the errors, how they were checked."""
     grid = field.grid
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
     ranges = ", ".join(f"{name} {values[0]:.4g} to {values[-1]:.4g}" for name, values in grid.axes)

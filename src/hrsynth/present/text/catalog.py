@@ -23,7 +23,7 @@ def entry(record: Record, drawn: str, note: str = "", file: str | None = None) -
     """One entry: its legs drawn, then what is known of it."""
     head = f"{record['word']}   {record.get('notation', '')}".rstrip()
     more = [note, "" if file is None else f"written to {file}"]
-    return "\n\n".join([head, f"{drawn}\n{LEGEND}", listing(list(_facts(record))), *filter(None, more)])
+    return "\n\n".join([head, f"{drawn}\n{LEGEND}", listing(_all(record)), *filter(None, more)])
 
 
 def built(groups: Iterable[Mapping[str, Any]]) -> str:
@@ -33,6 +33,12 @@ def built(groups: Iterable[Mapping[str, Any]]) -> str:
     return table(rows, ("group", "words", "made now", "before", "file"))
 
 
+def sited(done: Mapping[str, Any]) -> str:
+    """What a site holds, and where it starts."""
+    pages = f"{done['pages']:,} pages, {done['now']:,} made now"
+    return f"{done['architectures']:,} architectures on {pages}: {done['index']}"
+
+
 def _row(record: Record) -> tuple[str, ...]:
     if "refused" in record:
         return (record["word"], record.get("notation", ""), "", "", "", f"refused: {record['refused']}", "", "")
@@ -40,17 +46,24 @@ def _row(record: Record) -> tuple[str, ...]:
             record["verdict"], f"{record['rank']} of {record['dof']}", str(record["fewest"]))
 
 
-def _facts(record: Record) -> Iterable[tuple[str, str]]:
-    """What is known, by name; what is not known is left out."""
+def _all(record: Record) -> list[tuple[str, str]]:
+    found = [("group", str(record["group"])), *facts(record)]
+    return [*found, ("motors", motors(record))] if "motors" in record else found
+
+
+def facts(record: Record) -> Iterable[tuple[str, str]]:
+    """What is known whatever is driven, by name; what is not known is left out."""
     if "refused" in record:
-        yield "group", str(record["group"])
         yield "refused", str(record["refused"])
         return
-    yield "group", str(record["group"])
     yield "dof", f"{record['dof']}, {record['motion']} (mobility {record['mobility']}, of which {record['idle']} idle)"
     yield "hidden robot", str(record.get("hidden", "none"))
     yield "verdict", f"{record['verdict']} (rank {record['rank']} of {record['dof']})"
     yield "exact", "proved" if record["instances"] == 1 else f"{record['instances']} instances"
+    if "confirmed" in record:
+        yield "confirmed", f"at {record['confirmed']} closed configurations"
+    if record.get("steps"):
+        yield "rules", "; ".join(record["steps"])
     if record.get("lost"):
         yield "lost", "; ".join(record["lost"])
     if record.get("minimal"):
@@ -62,10 +75,10 @@ def _facts(record: Record) -> Iterable[tuple[str, str]]:
         yield "modes", f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}"
     if record.get("cure"):
         yield "cure", str(record["cure"])
-    if "motors" in record:
-        base = "all on the base" if record["base_motors"] else "not all on the base"
-        yield "motors", f"{record['motors']}, {base}" + _drive(record)
 
 
-def _drive(record: Record) -> str:
-    return f"; they determine {record['motor_rank']} of {record['dof']} freedoms" if "motor_rank" in record else ""
+def motors(record: Record) -> str:
+    """How many motors an architecture has, where, and what they determine."""
+    base = "all on the base" if record["base_motors"] else "not all on the base"
+    rank = f"; they determine {record['motor_rank']} of {record['dof']} freedoms" if "motor_rank" in record else ""
+    return f"{record['motors']}, {base}{rank}"

@@ -24,23 +24,23 @@ def modes(found: AssemblyModes, file: str | None = None) -> str:
         rows.append(("special", count.degenerate))
     for number, mode in enumerate(found.modes, 1):
         rows += [("", ""), (f"mode {number}", f"{mode.pose}" + ("   (the pose itself)" if mode.goal else "")),
-                 ("", f"{_proved(mode)}, residual {mode.residual:.1e}"), *_robot(mode, found.kind)]
+                 ("", f"{proved(mode)}, residual {mode.residual:.1e}"), *at_mode(mode, found.kind)]
     for number, mode in enumerate(found.near, 1):
         rows += [("", ""), (f"near {number}", f"{mode.pose}   residual {mode.residual:.2e}: almost a mode, and none"),
-                 *_robot(mode, found.kind)]
+                 *at_mode(mode, found.kind)]
     if file is not None:
         rows += [("", ""), ("picture", file)]
     return listing(rows)
 
 
-def _proved(mode: AssemblyMode) -> str:
+def proved(mode: AssemblyMode) -> str:
     """What is proved of a mode's place."""
     if mode.proved:
         return f"enclosed to {mode.radius:.1e}"
     return f"not proved, {'a multiple one' if mode.multiplicity > 1 else 'known'} to {mode.radius:.1e}"
 
 
-def _robot(mode: AssemblyMode, kind: str) -> list[tuple[str, str]]:
+def at_mode(mode: AssemblyMode, kind: str) -> list[tuple[str, str]]:
     """What the real robot does at a mode."""
     if mode.open:
         legs = "legs" if len(mode.open) > 1 else "leg"

@@ -8,7 +8,7 @@ from ...analysis.singularity.singular import Singularity
 from .tables import listing
 
 
-def singularity(found: Singularity, file: str | None) -> str:
+def singularity(found: Singularity, file: str | None = None) -> str:
     """The condition in words and as an expression, what was checked, and singular poses."""
     anatomy, condition, checked = found.setting.anatomy, found.condition, found.checked
     measured = [o for o in found.question.observations]

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from ...analysis.controllability import Legs
+from ...analysis.controllability import Legs, Verdict
 from ...analysis.derive import Derivation
 from ...analysis.exact import ExactVerdict
+from ...kinematics.certificate import Certificate
 from ...tolerances import RANK_GAP, SAME_RELATION
 from .tables import listing, table
 
@@ -13,9 +14,9 @@ def _angle(angle: float | None) -> str:
     return "" if angle is None else f"{angle:.1e}"
 
 
-def derivation(found: Derivation, hidden_file: str | None) -> str:
+def derivation(found: Derivation, hidden_file: str | None = None, report: str | None = None) -> str:
     """The hidden robot first, the proof next, the trace last."""
-    mobility, certificate = found.mobility, found.certificate
+    mobility = found.mobility
     observed = ", ".join(f"{o.leg} ({o.link})" for o in found.setting.observed)
     hidden = found.hidden_architecture
     reference = found.setting.mechanism.reference
@@ -28,14 +29,11 @@ def derivation(found: Derivation, hidden_file: str | None) -> str:
         *([("camera on", reference)] if reference != found.setting.mechanism.base else []),
         ("hidden robot", str(hidden) if hidden else "none: every observed direction is constant"),
         ("verdict", found.verdict.verdict),
-        ("architecture", _exact(found.exact, found.verdict.rank)),
+        ("architecture", exact_words(found.exact, found.verdict.rank)),
         *[("lost at zero" if i == 0 else "", freedom.name) for i, freedom in enumerate(found.verdict.lost)],
         *([] if found.verdict.graph else
           [("", "there is no interaction matrix: observed links move while the platform rests")]),
-        ("certificate", f"{'passed' if certificate.passed else 'FAILED'} at {certificate.samples} configurations"
-         f" ({certificate.discarded} discarded): {certificate.reason + '; ' if certificate.reason else ''}"
-         f"largest angle {certificate.largest_angle:.1e} (allowed {SAME_RELATION:.0e}), smallest rank gap "
-         f"{certificate.smallest_gap:.1e} (needed {RANK_GAP:.0e}), follows to {certificate.residual:.1e}"),
+        ("certificate", certificate(found.certificate)),
     ]
     if found.paper is not None:
         paper = found.paper
@@ -45,12 +43,29 @@ def derivation(found: Derivation, hidden_file: str | None) -> str:
         rows += [("", f"loses {freedom.name}") for freedom in paper.loses]
     if hidden_file is not None:
         rows.append(("written to", hidden_file))
+    if report is not None:
+        rows.append(("report", report))
     steps = [(step.rule, step.leg or "all", "yes" if step.accepted else "no", _angle(step.largest_angle), step.reason)
              for step in found.steps]
     return "\n".join([listing(rows), "", table(steps, ("rule", "leg", "taken", "angle", "why"))])
 
 
-def _exact(exact: ExactVerdict, rank: int) -> str:
+def certificate(found: Certificate) -> str:
+    """How closely the hidden robot agrees with the real one, and how closely it must."""
+    return (f"{'passed' if found.passed else 'FAILED'} at {found.samples} configurations"
+            f" ({found.discarded} discarded): {found.reason + '; ' if found.reason else ''}"
+            f"largest angle {found.largest_angle:.1e} (allowed {SAME_RELATION:.0e}), smallest rank gap "
+            f"{found.smallest_gap:.1e} (needed {RANK_GAP:.0e}), follows to {found.residual:.1e}")
+
+
+def verdict(found: Verdict) -> str:
+    """What a set of legs sees, and what it does not."""
+    lost = [("lost" if i == 0 else "", freedom.name) for i, freedom in enumerate(found.lost)]
+    return listing([("legs", ", ".join(found.legs)), ("verdict", f"{found.verdict} (rank {found.rank} of {found.dof})"),
+                    *lost])
+
+
+def exact_words(exact: ExactVerdict, rank: int) -> str:
     """The architecture's verdict beside the ``rank`` that the robot itself shows."""
     if exact.rank is None:
         return f"not decided: {exact.reason}"
@@ -61,7 +76,7 @@ def _exact(exact: ExactVerdict, rank: int) -> str:
             "dimensions")
 
 
-def _exactly(exact: ExactVerdict, rank: int) -> str:
+def exact_cell(exact: ExactVerdict, rank: int) -> str:
     """The same in a cell of a table."""
     if exact.rank is None:
         return "not decided"
@@ -71,13 +86,12 @@ def _exactly(exact: ExactVerdict, rank: int) -> str:
 
 def legs(found: Legs) -> str:
     """One line a set of legs, the smallest sets of the best rank last."""
-    rows = [(", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", _exactly(exact, each.rank),
+    rows = [(", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", exact_cell(exact, each.rank),
              "; ".join(freedom.name for freedom in each.lost))
             for each, exact in zip(found.sets, found.exact, strict=True)]
-    smallest = "  ".join("{" + ", ".join(each) + "}" for each in found.minimal)
     lines = [f"{found.robot}   {found.architecture}   {found.dof} dof", "",
              table(rows, ("legs", "verdict", "rank", "exact", "lost (at the zero configuration)")), "",
-             f"smallest sets of the best rank: {smallest}"]
+             f"smallest sets of the best rank: {found.smallest}"]
     lines += [f"not decided in exact arithmetic: {reason}"
               for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)]
     if not found.complete:

@@ -1,0 +1,103 @@
+"""Notebooks and the scripts they are paired with: a script is the source, its notebook has no outputs.
+
+``python docs/lessons.py`` writes each ``notebooks/*.ipynb`` from the ``.py`` of its name. An executed copy is kept in
+``build/notebooks`` until the script or the package changes.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import os
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDER = ROOT / "notebooks"
+EXECUTED = ROOT / "build" / "notebooks"
+TIMEOUT = 300
+"""Seconds that a cell, or the start of the kernel, may take."""
+KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": "python3"}
+
+
+def scripts() -> list[Path]:
+    """The scripts, in their order."""
+    return sorted(FOLDER.glob("[0-9]*.py"))
+
+
+def notebook(script: Path) -> Any:
+    """The notebook of a script: its cells numbered, no outputs."""
+    import jupytext
+
+    made = jupytext.reads(script.read_text(encoding="utf-8"), fmt="py:percent")
+    made.metadata = {"jupytext": {"formats": "ipynb,py:percent"}, "kernelspec": dict(KERNEL),
+                     "language_info": {"name": "python"}}
+    made.nbformat, made.nbformat_minor = 4, 5
+    for number, cell in enumerate(made.cells, 1):
+        cell["id"] = f"cell-{number:02d}"
+    return made
+
+
+def text(script: Path) -> str:
+    """What the paired file ``.ipynb`` holds."""
+    import nbformat
+
+    return nbformat.writes(notebook(script)) + "\n"
+
+
+def pair() -> list[Path]:
+    """Write every notebook from its script; those that changed."""
+    changed = []
+    for script in scripts():
+        file, wanted = script.with_suffix(".ipynb"), text(script)
+        if not file.exists() or file.read_text(encoding="utf-8") != wanted:
+            file.write_text(wanted, encoding="utf-8")
+            changed.append(file)
+    return changed
+
+
+def kept(script: Path, folder: Path = EXECUTED) -> Path:
+    """Where the executed copy is kept while neither the script nor the package changes."""
+    return folder / f"{script.stem}.{_state(script)}.ipynb"
+
+
+def executed(script: Path, folder: Path = EXECUTED) -> Any:
+    """The notebook with its outputs: the kept copy, or run now.
+
+    Raises ``nbclient.exceptions.CellExecutionError`` where a cell fails.
+    """
+    import nbformat
+    from nbclient import NotebookClient
+
+    file = kept(script, folder)
+    if file.exists():
+        return nbformat.read(file, as_version=4)
+    made = notebook(script)
+    folder.mkdir(parents=True, exist_ok=True)
+    NotebookClient(made, timeout=TIMEOUT, startup_timeout=TIMEOUT, kernel_name="python3",
+                   resources={"metadata": {"path": str(folder)}}).execute()
+    for old in folder.glob(f"{script.stem}.*.ipynb"):
+        old.unlink(missing_ok=True)
+    fresh = file.with_suffix(f".{os.getpid()}")
+    nbformat.write(made, fresh)
+    fresh.replace(file)
+    return made
+
+
+def _state(script: Path) -> str:
+    return hashlib.sha256(script.read_bytes() + _package()).hexdigest()[:12]
+
+
+@cache
+def _package() -> bytes:
+    """What the outputs depend on besides the script: the package and its robots."""
+    found = hashlib.sha256()
+    for pattern in ("src/hrsynth/**/*.py", "robots/*.urdf"):
+        for path in sorted(ROOT.glob(pattern)):
+            found.update(path.read_bytes())
+    return found.digest()
+
+
+if __name__ == "__main__":
+    for path in pair():
+        print(path.relative_to(ROOT))

@@ -1,0 +1,222 @@
+# %% [markdown]
+# # 1. The idea, on a five-bar
+#
+# A parallel robot is usually controlled by its motors: encoders measure the motor angles, and a model turns them into
+# the pose of the platform. There is another way. A camera watches the robot's thin rods, and the controller turns the
+# motors until every rod points in the wanted *direction*. No motor angle is measured at all.
+#
+# Which poses can such a controller reach, and where does it fail? The answer of the papers is a change of view: a
+# controller that measures other things moves another robot. That other robot, the *hidden robot*, has motors where
+# the camera looks, and its own assembly modes and singularities. This notebook finds it for the smallest example that
+# shows everything: a planar five-bar. (MMT is Briot et al., *Mechanism and Machine Theory* 106, 2016; see the
+# README.)
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+import hrsynth
+
+robot = hrsynth.load("rrrrr_m1")
+robot
+
+# %% [markdown]
+# Two cranks turn about fixed points A₁, A₂ and are driven by motors. Two rods hang on the cranks' ends B₁, B₂ and
+# meet in the point C, the platform. All joints are revolute, with parallel axes. The letters `R̲RRRR̲` say this: five
+# revolute joints in a row, the underlined ones driven.
+#
+# The camera watches the directions u₁, u₂ of the two rods. At the zero configuration of the file:
+
+# %%
+points = {name: joint.point[:2] for name, joint in robot.joints.items()}
+A = [points["shoulder_1"], points["shoulder_2"]]
+B = [points["elbow_1"], points["elbow_2"]]
+C = points["end"]
+rod = [np.linalg.norm(C - B[i]) for i in (0, 1)]
+crank = [np.linalg.norm(B[i] - A[i]) for i in (0, 1)]
+u = [(C - B[i]) / rod[i] for i in (0, 1)]
+for i in (0, 1):
+    print(f"leg {i + 1}: crank {crank[i]:.3f} m, rod {rod[i]:.3f} m, direction {u[i].round(4)}")
+
+# %% [markdown]
+# ## Where can the platform be?
+#
+# Suppose the directions are known and nothing else. With u₁ held, leg 1 lets its crank turn and nothing more: the rod
+# is carried along without turning. So C = B₁ + l₁ u₁ moves as B₁ does, on a circle, only shifted by the constant
+# vector l₁ u₁. Leg 2 gives another circle. The platform must lie on both:
+
+# %%
+centre = [A[i] + rod[i] * u[i] for i in (0, 1)]
+
+
+def meet(centre, radius):
+    """The points where two circles meet."""
+    between = centre[1] - centre[0]
+    d = np.linalg.norm(between)
+    along = (d**2 + radius[0] ** 2 - radius[1] ** 2) / (2 * d)
+    across = np.sqrt(radius[0] ** 2 - along**2)
+    e = between / d
+    normal = np.array([-e[1], e[0]])
+    return [centre[0] + along * e + sign * across * normal for sign in (1, -1)]
+
+
+poses = meet(centre, crank)
+for pose in poses:
+    print(pose.round(6))
+
+
+# %%
+def draw_robot(place, C, colour, label):
+    """The five-bar with its platform at C and its rods in the given directions."""
+    for i in (0, 1):
+        elbow = C - rod[i] * u[i]
+        place.plot(*np.array([A[i], elbow]).T, color="0.45", lw=4, solid_capstyle="round")
+        place.plot(*np.array([elbow, C]).T, color=colour, lw=2.5, label=label if i == 0 else None)
+    place.plot(*C, "o", color=colour, ms=9)
+
+
+figure, place = plt.subplots(figsize=(5.5, 5.5))
+angle = np.linspace(0, 2 * np.pi, 200)
+for i in (0, 1):
+    place.plot(centre[i][0] + crank[i] * np.cos(angle), centre[i][1] + crank[i] * np.sin(angle), "k:", lw=1)
+draw_robot(place, poses[0], "tab:orange", "one pose")
+draw_robot(place, poses[1], "tab:green", "another, with the same directions")
+place.plot(*np.array(A).T, "ks", ms=8)
+place.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
+place.legend(frameon=False, loc="upper left")
+plt.show()
+
+# %% [markdown]
+# This is the picture of MMT Fig. 5: two configurations of one five-bar, and in both of them the rods point the same
+# way. The camera cannot tell them apart, however good it is. (The dotted circles are the two circles above.)
+#
+# ## The hidden robot
+#
+# Is there a mechanism whose *motors* set the directions u₁, u₂, and which for given motor angles allows just these
+# two poses? In each leg it must carry the rod on a circle without turning it. A parallelogram does that. Its letter
+# is Π. The rod hangs on the parallelogram by a motor that turns it. `derive` finds this by itself:
+
+# %%
+hidden = hrsynth.derive(robot)
+hidden
+
+# %%
+hrsynth.draw(hidden)
+
+# %% [markdown]
+# The crank has become part of a passive parallelogram, and the motors sit where the rods begin: `ΠR̲RR̲Π`. The lines
+# below the certificate are the steps of the derivation; notebook 2 takes them one by one.
+#
+# The *certificate* is not part of the derivation. It puts both robots at 20 random poses and compares how the
+# platform's velocity and the rates of the directions depend on each other. If the hidden robot were wrong, the angle
+# between these two linear relations would be of the order of one.
+
+# %%
+print(hidden.certificate)
+
+# %% [markdown]
+# The two poses are now the *assembly modes* of the hidden robot. `modes` lists all of them, with a proof that there
+# are no more:
+
+# %%
+found = hidden.modes()
+found
+
+# %%
+theirs = sorted((mode.pose.x, mode.pose.y) for mode in found.modes)
+ours = sorted(map(tuple, poses))
+print("largest difference to the circles above:", np.abs(np.array(theirs) - ours).max(), "m")
+
+# %%
+hrsynth.draw(found)
+
+# %% [markdown]
+# ## What a controller does
+#
+# The control law compares each direction with the wanted one, eᵢ = uᵢ × u_dᵢ, and commands the velocity with which
+# the errors would decay (MMT 2.3). Started well below the goal, it ends there:
+
+# %%
+goal = "x=0.02,y=0.3"
+print(repr(hrsynth.servo(robot, start="x=0.02,y=0.1", goal=goal)))
+
+# %% [markdown]
+# But from a start that is much nearer to the goal it ends far away from it, and yet both errors go to zero:
+
+# %%
+run = hrsynth.servo(robot, start="x=0,y=0.345", goal=goal)
+metres, _ = run.from_goal
+print(f"ended: {run.ended}, mode {run.ending.matched}, {1e3 * metres:.0f} mm from the goal")
+hrsynth.draw(run)
+
+# %% [markdown]
+# Why there? Start and goal lie on different sides of a *singularity* of the hidden robot, a place where its two
+# assembly modes meet and where the platform can move a little without changing the directions. `path` proves it:
+
+# %%
+print(hrsynth.path(robot, start="x=0,y=0.345", goal=goal))
+
+# %% [markdown]
+# The map shows the tip of the workspace, where both poses are. Its colour is the smallest singular value of Mᵀ, the
+# matrix that gives the rates of the directions from the velocity of the platform (MMT, eq. 7). Along the dark line it
+# is zero: there the platform has a motion that the camera does not see. The start lies above that line, the goal
+# below.
+
+# %%
+hrsynth.draw(hrsynth.check(robot, grid="x=-0.06:0.06:17,y=0.29:0.35:25"))
+
+# %%
+condition = hrsynth.singular(robot, points=200)
+condition
+
+# %% [markdown]
+# In words: the tips of the two legs, with their directions held, move along tangents τ₁, τ₂ of the two circles. Where
+# the circles touch, the tangents are parallel, the two modes become one, and the platform is free to move along them.
+# The real robot, driven by its motors, need not be singular there: who looks at the real robot alone may see nothing
+# special.
+
+# %%
+posture = hrsynth.check(robot, at=["x=0,y=0.3332050807568877"]).postures[0]
+print("hidden robot:", posture.hidden.state, "  real robot:", posture.real.state)
+
+# %% [markdown]
+# The plan of every later notebook is the same: find the hidden robot, and ask it what one asks of any robot. Where
+# are its assembly modes, where its singularities, how accurate is it?
+#
+# ## Exercises
+#
+# 1. The tangents are parallel where the cranks are. Check it: take the first singular pose that `condition.examples`
+#    lists and compute the angle between the two cranks there.
+# 2. Hold the *motors* instead of the directions (`hidden.modes(real=True)`). How many poses are there, and why does
+#    the picture of two circles look different?
+# 3. Watch only one rod. What does the controller still see, and what is lost?
+
+# %% [markdown]
+# ## Solutions
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 1. where the cranks are at the singular pose: their joints' points, moved with the link
+at = condition.examples[0].configuration
+moved = {}
+for i in (1, 2):
+    X = at.pose(f"prox_{i}")  # where the crank is now, in the base frame
+    home = robot.links[f"prox_{i}"].pose  # where it is at the zero configuration
+    shoulder, elbow = (robot.joints[f"{name}_{i}"].point for name in ("shoulder", "elbow"))
+    moved[i] = (X @ np.linalg.inv(home))[:3, :3] @ (elbow - shoulder)
+sine = np.linalg.norm(np.cross(moved[1], moved[2])) / (crank[0] * crank[1])
+print(f"sine of the angle between the cranks: {sine:.1e}")
+assert sine < 1e-6
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 2. with the cranks held, each rod may turn about its elbow: circles of the rods' lengths
+real = hidden.modes(real=True)
+print(len(real.modes), "modes:", [str(mode.pose) for mode in real.modes])
+ours = sorted(map(tuple, meet(B, rod)))
+theirs = sorted((mode.pose.x, mode.pose.y) for mode in real.modes)
+assert np.abs(np.array(theirs) - ours).max() < 1e-9
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 3. one direction is one number in the plane, and the platform has two freedoms: one is lost
+one = hrsynth.derive(robot, observe=["1"])
+print(one.verdict)
+assert one.verdict.rank == 1

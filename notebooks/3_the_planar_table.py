@@ -1,0 +1,162 @@
+# %% [markdown]
+# # 3. The planar table
+#
+# MMT's Table 1 lists the planar robots with three equal legs, each leg with three joints of type R (it turns) or P
+# (it slides), one of them driven. Its question for each: what becomes of the leg when the camera watches its
+# direction? This notebook computes that table and adds three columns.
+#
+# In a planar robot a direction is one angle. The virtual motor is an R̲, not a U̲.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+import hrsynth
+from hrsynth.families.planar import three_rrr
+
+NAMES = ["3rrr_m1", "3rrr_m2", "3rpr_m1", "3rpr_m2", "3prr_m1", "3prr_m2", "3ppr_m1", "3ppr_m2", "3prp", "3rrp"]
+
+
+def row(*cells):
+    """Cells in columns; the low line under a motor takes no room."""
+    widths = (10, 9, 10, 24, 8)
+    padded = [f"{cell!s:{w + str(cell).count(chr(0x332))}}" for cell, w in zip(cells, widths, strict=False)]
+    return "  ".join([*padded, *map(str, cells[len(widths):])])
+
+
+derived = {name: hrsynth.derive(hrsynth.load(name)) for name in NAMES}
+print(row("robot", "real", "hidden", "verdict", "seen", "modes (real of complex)"))
+for name, found in derived.items():
+    listed = found.modes()
+    count = "a continuum" if listed.found.continuum else f"{len(listed.modes)} of {listed.found.complex}"
+    print(row(name, found.architecture, found.hidden_architecture or "none", found.verdict.verdict,
+              f"{found.verdict.rank} of {found.verdict.dof}", count))
+
+# %% [markdown]
+# The second and third columns are those of the paper's table. All of it is checked here, robot by robot:
+
+# %%
+PRINTED = {"3rrr": "ΠR̲R", "3rpr": "R̲PR", "3prr": "PR̲R", "3ppr": None, "3prp": "PR̲P", "3rrp": "ΠR̲P"}
+for name, found in derived.items():
+    leg = PRINTED[name.split("_")[0]]
+    assert str(found.hidden_architecture) == f"3-{leg}" if leg else found.hidden_architecture is None
+    assert found.certificate.passed
+print("the same hidden legs as in MMT Table 1, each certified")
+
+# %% [markdown]
+# ## What the columns say
+#
+# **Which joint is driven does not matter.** The two robots of a kind differ in their motors and share their hidden
+# robot. The hidden robot forgets the real motors.
+#
+# **Not every robot can be controlled like this.** In 3-PPR robots the last segment only slides: its direction never
+# changes, the camera sees nothing at all, and there is no hidden robot. In PRP and RRP robots every leg meets the
+# platform in a slide, so each direction tells the platform's turn, three times over, and nothing of its position:
+
+# %%
+print(derived["3prp"].verdict)
+print()
+print(derived["3rrp"].verdict)
+
+# %% [markdown]
+# **The assembly modes.** With the directions held, the tip of each leg runs on a curve. It is a line if the leg
+# slides there, and a circle if a crank carries the rod. The platform is a triangle whose corners must lie on three
+# such curves. For three lines there are 2 solutions. For three circles there are 6, when complex ones are counted.
+# That is the classical problem of a triangle on two cranks: its third corner draws a *coupler curve*, and the third
+# circle cuts it in up to six points (MMT Fig. 7).
+#
+# Can all six be real? With the shipped dimensions two are. Another geometry does it:
+
+# %%
+angles = np.radians([93, 208, 329])
+wide = three_rrr(proximal=0.23, distal=0.3, platform=list(zip((0.16, 0.19, 0.13), angles, strict=True)),
+                 home=(0.01, -0.015, np.radians(-17)))
+six = hrsynth.modes(wide)
+print(len(six.modes), "real of", six.found.complex)
+hrsynth.draw(six)
+
+# %% [markdown]
+# The blue curve is the coupler curve of the triangle on two legs, the black one is the third leg's circle. All six
+# are proved: an exact polynomial of degree six, its roots isolated, each pose enclosed by interval arithmetic.
+
+# %%
+print(six.found.proof)
+print("widest enclosure:", max(mode.radius for mode in six.modes))
+
+# %% [markdown]
+# ## Singularities
+#
+# The platform can move with all directions held where each of its corners can move along its own tangent. Motions of
+# a plane are turns about a point. A turn moves each corner at right angles to the line to that point. So the
+# condition is: the three normals, drawn at the three tips, meet in one point, or are parallel (then it is a
+# translation). That is what `singular` says, and its expression is the determinant of three lines:
+
+# %%
+condition = hrsynth.singular(derived["3rrr_m1"].robot, points=300)
+print(condition.words)
+print(condition.condition.expression)
+print(condition.checked.points, "poses compared,", condition.checked.disagreements, "disagreements")
+
+# %% [markdown]
+# At a singular pose that it constructed, the normals do meet (MMT Fig. 8):
+
+# %%
+robot, example = derived["3rrr_m1"].robot, condition.examples[0]
+at = example.configuration
+
+
+def now(link, point):
+    """Where a point of a link is at the singular pose; it is given at the zero configuration."""
+    X = at.pose(link) @ np.linalg.inv(robot.links[link].pose)
+    return (X @ np.append(point, 1.0))[:2]
+
+
+figure, place = plt.subplots(figsize=(6, 6))
+normals, tips, ends = [], [], []
+for i in (1, 2, 3):
+    shoulder = robot.joints[f"shoulder_{i}"].point[:2]
+    elbow, tip = now(f"prox_{i}", robot.joints[f"elbow_{i}"].point), now(f"dist_{i}", robot.joints[f"wrist_{i}"].point)
+    normals.append((elbow - shoulder) / np.linalg.norm(elbow - shoulder))  # the tip's tangent is normal to the crank
+    tips.append(tip)
+    ends += [tip, shoulder]
+    place.plot(*np.array([shoulder, elbow]).T, color="0.45", lw=4)
+    place.plot(*np.array([elbow, tip]).T, color="tab:blue", lw=2.5)
+    place.axline(tip, slope=normals[-1][1] / normals[-1][0], color="crimson", lw=1, ls="--")
+place.fill(*np.array(tips).T, color="tab:orange", alpha=0.4)
+rows = np.array([[n[1], -n[0]] for n in normals])
+centre, residual, *_ = np.linalg.lstsq(rows, np.array([r @ t for r, t in zip(rows, tips, strict=True)]), rcond=None)
+place.plot(*centre, "o", color="crimson", ms=8)
+reach = np.abs(np.vstack([*ends, centre])).max() + 0.03
+place.set(xlim=(-reach, reach), ylim=(-reach, reach), aspect="equal", xlabel="x (m)", ylabel="y (m)")
+plt.show()
+print("the normals miss a common point by", np.sqrt(residual.max(initial=0.0)), "m")
+print("smallest singular value of Mᵀ there:", example.sigma)
+
+# %% [markdown]
+# ## Exercises
+#
+# 1. Watch the *first* segment of each leg of `3rrr_m1`, the cranks, instead of the last (`observe=["prox_1",
+#    "prox_2", "prox_3"]`). What is the hidden robot now, and how many modes are there? Which well-known robot is it?
+# 2. `3rpr_m1` has hidden legs R̲PR, the same letters as its real legs. Has the real robot the same singularities?
+# 3. Which smallest sets of legs see as much as can be seen (`hrsynth.legs`)? Explain the answer for `3rrp` without a
+#    computer.
+
+# %% [markdown]
+# ## Solutions
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 1. the cranks' directions are the motors' angles: the hidden robot is the real one, with its own six modes
+cranks = hrsynth.derive(derived["3rrr_m1"].robot, observe=["prox_1", "prox_2", "prox_3"])
+print(cranks.hidden_architecture, "  real:", cranks.architecture)
+print(cranks.modes().found.complex, "complex modes; with the motors held:", cranks.modes(real=True).found.complex)
+assert str(cranks.hidden_architecture) == str(cranks.architecture)
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 2. yes: the motor and the watched direction are the same angle, so both conditions are the same one
+for real in (False, True):
+    print(hrsynth.singular(derived["3rpr_m1"].robot, real=real, points=100).condition.expression)
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 3. each leg of 3rrp tells the platform's turn, so any one leg sees all that can be seen
+for name in ("3rrr_m1", "3rrp"):
+    print(name, hrsynth.legs(derived[name].robot).smallest)

@@ -1,0 +1,229 @@
+# %% [markdown]
+# # 4. Gough-Stewart and 3-U̲PS: eight modes and four planes
+#
+# The Gough-Stewart platform stands on six legs UP̲S: a universal joint on the base, a driven slide, a ball at the
+# platform. Six motors drive six freedoms. How many legs must a camera watch? MMT 4.2.1 says three. Let the program
+# say it: `legs` tries all sets.
+
+# %%
+from collections import Counter
+
+import matplotlib.pyplot as plt
+import numpy as np
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+import hrsynth
+from hrsynth.errors import HrsynthError, MissingExtra
+
+robot = hrsynth.load("gough_stewart")
+sets = hrsynth.legs(robot)
+for size in range(1, 7):
+    words = Counter(f"{each.verdict} (rank {each.rank} of {each.dof})" for each in sets.sets if len(each.legs) == size)
+    print(size, "legs watched:", dict(words))
+
+# %% [markdown]
+# A direction in space is two numbers. Three directions are six numbers, and the platform has six freedoms. So three
+# legs are the fewest that could do, and here all choices of three do. Watch legs 1, 3 and 5:
+
+# %%
+hidden = hrsynth.derive(robot, observe=["1", "3", "5"])
+hidden
+
+# %%
+hrsynth.draw(hidden)
+
+# %% [markdown]
+# Look at the last lines of the table. Legs 2, 4 and 6 have six freedoms each, so they constrain nothing. Without
+# motors they are only carried along, and the hidden robot can do without them: 3-U̲PS, three legs whose universal
+# joints on the base are driven.
+#
+# ## Eight modes
+#
+# Hold the directions. Then the tip of leg i runs on a line: Bᵢ = Aᵢ + rᵢ uᵢ, with unknown lengths r₁, r₃, r₅. The
+# triangle of the tips is rigid, so three distances are known, and each is an equation of degree two. Three quadrics
+# meet in 2 · 2 · 2 = 8 points.
+#
+# At this pose all eight are real:
+
+# %%
+POSE = "x=0.05,y=-0.05,z=0.36,rpy=-0.1/0/0.5"
+found = hidden.modes(at=POSE)
+for number, mode in enumerate(found.modes, 1):
+    print(number, mode.pose, "(the pose itself)" if mode.goal else "", "" if mode.reachable else "(out of reach)")
+print(found.found.proof)
+
+# %%
+hrsynth.draw(found)
+
+# %% [markdown]
+# An independent check needs only NumPy: Newton's method on the three quadrics, from many random starts. It proves
+# nothing, but it must find the same eight.
+
+# %%
+A = np.array([robot.joints[f"shoulder_{i}"].point for i in (1, 3, 5)])
+home = robot.links["platform"].pose
+B_home = np.array([robot.joints[f"wrist_{i}"].point for i in (1, 3, 5)])
+
+
+def tips(mode):
+    """The three tips at a mode, from the pose of the platform."""
+    X = mode.bodies["platform"] @ np.linalg.inv(home)
+    return B_home @ X[:3, :3].T + X[:3, 3]
+
+
+goal = tips(next(mode for mode in found.modes if mode.goal))
+u = (goal - A) / np.linalg.norm(goal - A, axis=1)[:, None]
+PAIRS = [(0, 1), (1, 2), (2, 0)]
+wanted = np.array([np.sum((B_home[i] - B_home[j]) ** 2) for i, j in PAIRS])
+
+
+def residual(r):
+    B = A + r[:, None] * u
+    return np.array([np.sum((B[i] - B[j]) ** 2) for i, j in PAIRS]) - wanted
+
+
+def jacobian(r):
+    B = A + r[:, None] * u
+    J = np.zeros((3, 3))
+    for row, (i, j) in enumerate(PAIRS):
+        J[row, i], J[row, j] = 2 * (B[i] - B[j]) @ u[i], -2 * (B[i] - B[j]) @ u[j]
+    return J
+
+
+solutions = []
+for start in np.random.default_rng(0).uniform(0, 1.5, (400, 3)):
+    r = start
+    for _ in range(30):
+        r = r - np.linalg.lstsq(jacobian(r), residual(r), rcond=None)[0]
+    if np.abs(residual(r)).max() < 1e-12 and all(np.abs(r - other).max() > 1e-6 for other in solutions):
+        solutions.append(r)
+ours = sorted(map(tuple, solutions))
+theirs = sorted(tuple(np.sum((tips(mode) - A) * u, axis=1)) for mode in found.modes)
+print(len(ours), "solutions; largest difference in a leg's length:", np.abs(np.array(ours) - theirs).max(), "m")
+
+# %% [markdown]
+# The real robot, its six motors held, has up to 40 poses (and here 40 complex ones). The hidden robot is the simpler
+# of the two. To list the 40 an external solver is needed, the extra `solve`:
+
+# %%
+try:
+    real = hidden.modes(at=POSE, real=True)
+    print(f"{len(real.modes)} real of {real.found.complex} complex")
+except MissingExtra as error:
+    print(error)
+
+# %% [markdown]
+# What does a controller do with eight poses that look the same? It ends in one of them, and the start decides in
+# which. Some runs to the pose above from random starts:
+
+# %%
+rng = np.random.default_rng(3)
+ends = Counter()
+for _ in range(6):
+    x, y, z, turn = rng.uniform((-0.1, -0.1, 0.25, -0.5), (0.1, 0.1, 0.4, 0.5))
+    try:
+        start = f"x={x:.3f},y={y:.3f},z={z:.3f},rpy=0/0/{turn:.2f}"
+        run = hrsynth.servo(robot, ["1", "3", "5"], start=start, goal=POSE)
+        ends[run.ended if run.ending.matched is None else f"mode {run.ending.matched}"] += 1
+    except HrsynthError as error:
+        ends[type(error).__name__] += 1
+dict(ends)
+
+# %% [markdown]
+# A mode far away is a real danger here, because this file gives the slides no limits. A leg that could not grow so
+# long would stop the run at a *boundary* instead.
+#
+# ## Four planes
+#
+# Where does the camera lose a motion? The platform must move so that each tip moves along its line, v(Bᵢ) ∥ uᵢ.
+# Statics says the same more simply: with the virtual motors held, leg i can push the tip only at right angles to uᵢ,
+# so its forces lie in the plane through Bᵢ normal to uᵢ. The three pencils of forces fail to hold the platform when
+# the three planes, and the plane of the three tips, meet in one point (MMT 4.2.1, Fig. 10). `singular` finds this
+# condition by itself and checks it against the rank:
+
+# %%
+condition = hrsynth.singular(robot, ["1", "3", "5"], points=300)
+print(condition.words)
+print(condition.condition.expression)
+print(condition.checked.points, "poses compared,", condition.checked.disagreements, "disagreements")
+
+# %% [markdown]
+# At a singular pose that it constructed, intersect three of the planes and see whether the fourth goes through that
+# point:
+
+# %%
+example = condition.examples[0]
+X = example.configuration.pose("platform") @ np.linalg.inv(home)
+B = B_home @ X[:3, :3].T + X[:3, 3]
+n = (B - A) / np.linalg.norm(B - A, axis=1)[:, None]
+point = np.linalg.solve(n, np.sum(n * B, axis=1))
+normal = np.cross(B[1] - B[0], B[2] - B[0])
+normal /= np.linalg.norm(normal)
+print("the three planes meet at", point.round(4))
+print("the platform's plane misses that point by", abs(normal @ (point - B[0])), "m")
+print("smallest singular value of Mᵀ there:", example.sigma)
+print("lost:", "; ".join(freedom.name for freedom in example.lost))
+
+# %%
+figure = plt.figure(figsize=(7.5, 6.5))
+place = figure.add_subplot(projection="3d")
+around = np.linspace(0, 2 * np.pi, 60)
+for i in range(3):
+    colour = f"C{2 * i}"
+    e1, e2 = np.linalg.svd(n[i][None])[2][1:]  # two directions of the plane
+    ring = B[i] + np.linalg.norm(point - B[i]) * (np.cos(around)[:, None] * e1 + np.sin(around)[:, None] * e2)
+    place.add_collection3d(Poly3DCollection([ring], alpha=0.15, color=colour))
+    place.plot(*np.array([A[i], B[i]]).T, color=colour, lw=3, label=f"leg {(1, 3, 5)[i]} and its plane")
+    place.plot(*np.array([B[i], point]).T, color=colour, ls="--", lw=1)
+place.plot(*np.vstack([B, B[:1]]).T, color="tab:orange", lw=3, label="the tips")
+place.plot(*point[:, None], "o", color="crimson", ms=9, label="common point")
+place.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", aspect="equal")
+place.legend(loc="upper left", frameon=False)
+plt.show()
+
+# %% [markdown]
+# ## More legs than needed
+#
+# Watching all six legs removes most of the doubt: a pose is a mode only if all six directions agree. Here only the
+# pose itself is left of the eight.
+
+# %%
+everything = hrsynth.modes(robot, at=POSE)
+print(len(everything.modes), "mode,", len(everything.near), "near modes")
+
+# %% [markdown]
+# ## Exercises
+#
+# 1. Put the camera on the platform (`camera="platform"`). Which planes must meet now? Guess before you ask.
+# 2. Tsai's 3-UP̲U (`3upu`) only translates. How many legs must be watched? MMT gives the hidden robot 2-U̲PU for two
+#    watched legs. What does the certificate say?
+# 3. How many of the eight modes are real at random poses? Draw twenty and count. Can the number be odd?
+
+# %% [markdown]
+# ## Solutions
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 1. seen from the platform, base and platform change places: the planes go through the points A_i of the base
+print(hrsynth.singular(robot, ["1", "3", "5"], camera="platform", points=100).words)
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 2. two legs; the third must stay as a passive leg, because without it the platform could turn
+tsai = hrsynth.load("3upu")
+print("smallest sets:", hrsynth.legs(tsai).smallest)
+two = hrsynth.derive(tsai, observe=["1", "2"])
+print("certified:", two.hidden_architecture, "  paper's form:", two.paper.hidden, two.paper.reason)
+assert not two.paper.equivalent
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 3. complex solutions come in pairs, so of eight an even number is real
+counts = Counter()
+rng = np.random.default_rng(0)
+while counts.total() < 20:
+    x, y, z, *turns = rng.uniform((-0.15, -0.15, 0.15, -0.8, -0.8, -0.8), (0.15, 0.15, 0.45, 0.8, 0.8, 0.8))
+    try:
+        at = f"x={x:.3f},y={y:.3f},z={z:.3f},rpy={turns[0]:.2f}/{turns[1]:.2f}/{turns[2]:.2f}"
+        counts[len(hidden.modes(at=at).modes)] += 1
+    except HrsynthError:
+        continue  # a pose that is not reached
+print(dict(sorted(counts.items())))
+assert all(count % 2 == 0 for count in counts)

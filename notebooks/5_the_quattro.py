@@ -1,0 +1,230 @@
+# %% [markdown]
+# # 5. The Quattro: which legs to watch
+#
+# The Quattro is a fast pick-and-place robot. Four arms turn about horizontal axes; on each hang two parallel rods,
+# {2-SS}; the platform has two halves that can move on each other, which turns the tool. Four freedoms: three
+# translations and the turn φ about the vertical. It is the example of MMT 5 and of the experiments there. This
+# notebook asks: which legs should a camera watch to go from one pose to another?
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+import hrsynth
+
+robot = hrsynth.load("quattro")
+START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
+print(hrsynth.legs(robot))
+
+# %% [markdown]
+# Two directions are four numbers, and the platform has four freedoms. Yet not every pair will do. Legs 1 and 2 hang
+# on the same half of the platform, 3 and 4 on the other. Watching both legs of one half shows nothing of the turn of
+# the other half about the hinge. One leg on each half is needed: four pairs are left.
+#
+# All four have the same hidden robot. In each watched leg the arm becomes a parallelogram, and the legs that are not
+# watched disappear, once the ends of the watched ones are changed:
+
+# %%
+hidden = hrsynth.derive(robot, observe=["1", "4"])
+hidden
+
+# %%
+hrsynth.draw(hidden)
+
+# %% [markdown]
+# The rows `leg removal … no` and `end change … yes` at the end are the story of MMT 4.2.2. If the legs that are not
+# watched are simply dropped, the platform gains freedoms that it must not have. With universal joints in place of
+# balls at the platform, it does not.
+#
+# ## Assembly modes
+#
+# With its direction held, the tip of a leg goes round a circle, that of its parallelogram. The platform joins two
+# such circles. One of them, carried along the other, sweeps a surface that MMT 4.2.2 calls a Bohemian dome. The goal
+# of the paper's first simulation (MMT 5.1.3), for two of the pairs:
+
+# %%
+pairs = {legs: hrsynth.derive(robot, observe=list(legs)) for legs in ("14", "23")}
+for legs, each in pairs.items():
+    found = each.modes(at=GOAL)
+    print(f"legs {legs[0]}, {legs[1]}: {len(found.modes)} real modes of {found.found.complex}")
+    for number, mode in enumerate(found.modes, 1):
+        print(f"   {number}  {mode.pose!s:52}", "the goal" if mode.goal else "reachable" if mode.reachable
+              else "the real robot cannot be assembled there: legs " + ", ".join(mode.open))
+hrsynth.draw(pairs["14"].modes(at=GOAL))
+
+# %% [markdown]
+# The other two legs decide whether the real robot fits. With legs 2 and 3 watched, two of the modes are nothing to
+# worry about: legs 1 and 4 do not reach that far.
+#
+# ## Servo runs
+#
+# Both pairs are as good as each other, one might think. Same start, same goal, same control law:
+
+# %%
+runs = {legs: hrsynth.servo(robot, list(legs), start=START, goal=GOAL) for legs in ("14", "23")}
+for run in runs.values():
+    metres, radians = run.from_goal
+    away = f"{1e3 * metres:.1f} mm and {np.degrees(radians):.1f}° from the goal"
+    print(f"legs {', '.join(run.setting.labels)}: {run.ended}, {away}")
+hrsynth.draw(runs["14"])
+
+# %% [markdown]
+# With legs 1 and 4 the directions arrive and the robot does not: it stops at another assembly mode. The same happens
+# in the paper (MMT Figs. 22 and 23). The reason is the one of notebook 1, a singularity of the hidden robot between
+# start and goal, and it is proved:
+
+# %%
+for legs in ("14", "23"):
+    answer = hrsynth.path(robot, list(legs), start=START, goal=GOAL)
+    print(f"legs {', '.join(legs)}: {answer.verdict}. {answer.reason}")
+print()
+print(hrsynth.singular(robot, ["1", "4"], points=200).words)
+
+# %% [markdown]
+# The paper prints digits of the modes too. They are not quite those that its own dimensions give: the second mode of
+# legs 1 and 4 is printed at z = −0.909 (MMT 5.1.3). Here it is, with a proof:
+
+# %%
+second = next(mode for mode in pairs["14"].modes(at=GOAL).modes if not mode.goal and abs(mode.pose.rpy[2]) < 1e-6)
+print(second.pose, " within", second.radius)
+print("printed minus computed:", round(1e3 * (-0.909 - second.pose.z), 1), "mm")
+
+# %% [markdown]
+# ## Accuracy
+#
+# A camera errs. If each direction may be off by 0.1°, how far may the platform be off? To first order the error is δt
+# = Mᵀ⁺ δu, and the largest one for all δu inside the cones is found exactly for two legs (MMT Appendix A.1). A map
+# over the plane z = −0.7 m with φ = 0, as in MMT Figs. 19 and 20:
+
+# %%
+maps = {legs: hrsynth.accuracy(robot, list(legs), cones="0.1deg", grid="x=-0.5:0.5:81,y=-0.5:0.5:81,z=-0.7,phi=0")
+        for legs in ("23", "24")}
+for legs, found in maps.items():
+    errors = 1e3 * found.field.position[np.isfinite(found.field.position)]
+    print(f"legs {legs[0]}, {legs[1]}: median {np.median(errors):.2f} mm over the plane, least {errors.min():.2f} mm")
+hrsynth.draw(maps["23"])
+
+# %%
+hrsynth.draw(maps["24"])
+
+# %% [markdown]
+# In the first map the white curve is a singularity of the hidden robot, and the error grows without bound towards it.
+# The second pair of legs has none in this plane. Which pair is better depends on where the robot works.
+#
+# ## Choose
+#
+# MMT Appendix A.2 puts all this in an order: throw away sets of legs that do not see everything, that are singular at
+# an end, or that have a singularity between start and goal; rank the rest by accuracy; simulate the best (left out
+# here with `runs=0`: the run is above). `select` does it:
+
+# %%
+best = hrsynth.select(robot, start=START, goal=GOAL, size=2, runs=0)
+best
+
+# %% [markdown]
+# ## More legs, and a local minimum
+#
+# Why not watch all four legs? Then eight numbers fix four freedoms, wrong modes are almost ruled out, and the error
+# becomes smaller. There is a price. With more equations than freedoms the error may have *local minima*: poses where
+# the wanted directions are not reached and yet every small motion makes the error larger. The command vanishes there,
+# and the robot stops.
+#
+# MMT 5.1.3 prints such a run (Figs. 26 and 27). With the printed dimensions it does not stop:
+
+# %%
+printed = hrsynth.servo(robot, start="x=0.028,y=0,z=-0.617,phi=0", goal="x=-0.6,y=0,z=-0.8,phi=0")
+print(printed.ended, "at", printed.pose)
+
+# %% [markdown]
+# But the phenomenon is real. A search over random starts and goals found this run:
+
+# %%
+stuck = hrsynth.servo(robot, start="x=-0.3,y=0,z=-0.6,phi=0", goal="x=0.05,y=0.07,z=-0.52,phi=0")
+stuck
+
+# %% [markdown]
+# Is it a minimum? Take the poses from where it stopped to the goal, and a little to every side of where it stopped,
+# and measure the error at each. (`batch` gives the directions of many poses at once.)
+
+# %%
+setting = stuck.setting
+X, Y = (at.pose(setting.motion.link) for at in (stuck.settled, stuck.target))
+
+
+def turned(X, angle):
+    """A pose, turned about the vertical."""
+    c, s = np.cos(angle), np.sin(angle)
+    moved = X.copy()
+    moved[:3, :3] = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ X[:3, :3]
+    return moved
+
+
+def shifted(X, by):
+    """A pose, moved by a vector."""
+    moved = X.copy()
+    moved[:3, 3] += by
+    return moved
+
+
+def size(poses):
+    """‖e‖ of the eight numbers at each pose."""
+    goal = setting.batch.evaluate(Y[None]).directions[0]
+    return np.linalg.norm(np.cross(setting.batch.evaluate(np.array(poses)).directions, goal), axis=(1, 2))
+
+
+angle = np.arctan2(X[1, 0], X[0, 0])
+part = np.linspace(-0.3, 1.3, 161)
+way = [shifted(turned(X, -angle * s), s * (Y - X)[:3, 3]) for s in part]
+figure, place = plt.subplots(figsize=(7, 4))
+place.plot(part, size(way))
+place.plot([0, 1], size([X, Y]), "o", color="crimson")
+place.annotate("stopped here", (0, size([X])[0]), xytext=(0, 20), textcoords="offset points", ha="center")
+place.annotate("goal", (1, 0), xytext=(14, 4), textcoords="offset points")
+place.set(xlabel="part of the way to the goal", ylabel="‖e‖", ylim=(0, None))
+plt.show()
+
+# %%
+steps = [shifted(X, s * axis) for s in (1e-3, -1e-3) for axis in np.eye(3)] + [turned(X, s) for s in (0.01, -0.01)]
+growth = size(steps) - size([X])
+print("‖e‖ where it stopped:", size([X])[0])
+print("change one millimetre, or 0.01 rad, to each side:", growth.round(7))
+assert (growth > 0).all()
+
+# %% [markdown]
+# Every step makes it worse. So more legs are better on the whole, and are no cure for everything. No rank tells that
+# there are no local minima: at this pose Mᵀ has full rank.
+
+# %%
+print(stuck.run.commands[-1].values)
+
+# %% [markdown]
+# ## Exercises
+#
+# 1. The rigid Quattro (`quattro_rigid`) has a platform in one piece and three freedoms. Which pairs of legs will do
+#    now? Count the modes for neighbouring and for opposite legs.
+# 2. With noise the run of legs 2 and 3 does not stand still at the goal. Run it with `noise="0.1deg"` and compare how
+#    far it strays with the largest error that `accuracy` gives at the goal.
+# 3. The paper says that one watched leg on each half is singular where the legs' planes are parallel. `singular`
+#    gives another condition. Show that the paper's is a special case of it.
+
+# %% [markdown]
+# ## Solutions
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 1. all pairs: two tangents are never parallel in general, and a translating platform is singular only then
+rigid = hrsynth.load("quattro_rigid")
+print(hrsynth.legs(rigid).smallest)
+for pair in (["1", "2"], ["1", "3"]):
+    print(pair, hrsynth.modes(rigid, pair, at="x=0,y=-0.25,z=-0.7").found.complex, "complex modes")
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 2. the loop averages the noise: it strays less than a single wrong picture could move it
+noisy = hrsynth.servo(robot, ["2", "3"], start=START, goal=GOAL, noise="0.1deg")
+bound = hrsynth.accuracy(robot, ["2", "3"], cones="0.1deg", at=[GOAL]).poses[0].position.largest
+print(f"strays by {1e3 * noisy.spread.rms_metres:.2f} mm (root mean square)")
+print(f"largest first-order error {1e3 * bound:.2f} mm")
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 3. the planes of MMT have the tangents as their normals: parallel planes are parallel tangents, and a determinant with
+#    two parallel vectors is zero; but it is zero too wherever e, τ1 and τ4 lie in one plane
+print(hrsynth.singular(robot, ["1", "4"], points=50).condition.expression)

@@ -1,0 +1,94 @@
+"""Building the site: pages by a crew into a draft, which goes on where it was broken off, then the index."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import partial
+from hashlib import sha256
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from ... import __version__
+from ...errors import BadRequest, BuildStopped
+from ..build import Tell
+from ..crews import Crew, crew
+from ..lines import line
+from ..query import Catalog
+from ..source import Made, Stopped
+from . import index
+from .folder import FOLDERS, draft
+from .pages import written
+from .structures import Structure, structures
+
+CHUNK = 4
+"""Pages that a worker is given at a time."""
+
+
+@dataclass(frozen=True)
+class Site:
+    """A site that was written: its first page, how many architectures on how many pages, those made now."""
+
+    index: Path
+    architectures: int
+    pages: int
+    now: int
+    differ: tuple[tuple[str, str], ...]
+    """Words whose derivation, made now, does not end in what the record says, and what it ends in."""
+
+    def to_dict(self) -> dict[str, Any]:
+        return {"index": str(self.index), "architectures": self.architectures, "pages": self.pages, "now": self.now,
+                "differ": [{"word": word, "derived": found} for word, found in self.differ]}
+
+
+def site(catalog: Catalog, target: str | Path, *, workers: int = 1, anew: bool = False, tell: Tell | None = None
+         ) -> Site:
+    """Write a catalog as a static site into a folder: new, empty, or of an older site, which it replaces as a whole.
+
+    ``workers`` processes share the pages. A build that was broken off goes on where it was, unless ``anew``.
+
+    Raises
+    ------
+    BadRequest
+        For a catalog without records, a folder of other files or that cannot be written, another build at work.
+    BuildStopped
+        For a full disk or a worker that died; the pages that were made are kept.
+    MissingExtra
+        Where joblib is not installed.
+    """
+    if not len(catalog):
+        raise BadRequest("no architectures for a site", 0, "one or more")
+    team, tell = crew(workers), tell or (lambda *_: None)
+    every = structures(catalog)
+    differ: list[tuple[str, str]] = []
+    with draft(target, _stamp(every), anew=anew) as folder:
+        wanted = [each for each in every if not (folder / FOLDERS[0] / f"{each.name}.html").exists()]
+        done = len(every) - len(wanted)
+        tell("pages", done, len(every))
+        for made in _made(team, folder, wanted):
+            done += len(made)
+            tell("pages", done, len(every))
+            differ += [(word, found) for word, found in made if found]
+        index.write(folder, every)
+    return Site(Path(target) / "index.html", len(catalog), len(every), len(wanted), tuple(sorted(differ)))
+
+
+def _made(team: Crew, folder: Path, wanted: Sequence[Structure]) -> Iterator[Made]:
+    packed = [each.packed() for each in wanted]
+    try:
+        yield from team(partial(written, str(folder)), (packed[i : i + CHUNK] for i in range(0, len(packed), CHUNK)))
+    except Stopped as stopped:
+        raise BuildStopped(str(stopped), str(folder)) from stopped
+
+
+def _stamp(every: Iterable[Structure]) -> dict[str, str]:
+    """What a site is made from: the version, its templates, its records."""
+    digest = sha256()
+    for kind in ("assets", "templates"):
+        files = resources.files("hrsynth.catalog.site").joinpath(kind).iterdir()
+        for file in sorted(files, key=lambda file: file.name):
+            digest.update(file.read_bytes())
+    for each in every:
+        digest.update("\n".join(line(record) for record in each.records).encode())
+    return {"site": "hrsynth catalog", "version": __version__, "made_from": digest.hexdigest()}

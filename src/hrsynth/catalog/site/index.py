@@ -1,0 +1,58 @@
+"""What the index knows of each architecture, by column: a script that a page loads without a server."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from importlib import resources
+from pathlib import Path
+from typing import Any
+
+from ... import __version__
+from .render import rendered
+from .structures import Structure, named
+
+TEXTS = ("group", "motion", "verdict", "notation", "hidden", "condition", "cure", "refused")
+"""Fields with few values: each value once, and which of them a record has."""
+LISTS = ("steps", "lost")
+"""The same of fields that are lists, joined."""
+NUMBERS = ("legs", "dof", "rank", "fewest")
+SCRIPTS = ("site.css", "index.js", "page.js")
+
+
+def write(folder: Path, structures: Iterable[Structure]) -> None:
+    """Write the index, its data, the scripts and the style; raises ``OSError``."""
+    assets = resources.files("hrsynth.catalog.site").joinpath("assets")
+    for name in SCRIPTS:
+        (folder / name).write_bytes(assets.joinpath(name).read_bytes())
+    (folder / "data.js").write_text(f"const CATALOG = {_compact(columns(structures))};\n", encoding="utf-8")
+    (folder / "index.html").write_text(rendered("index.html", version=__version__), encoding="utf-8")
+
+
+def columns(structures: Iterable[Structure]) -> dict[str, Any]:
+    """All records as columns of equal length; null, or -1 in columns of places, is what a record does not have."""
+    structures = list(structures)
+    rows = [(place, record) for place, each in enumerate(structures) for record in each.records]
+    found: dict[str, Any] = {"pages": [each.name for each in structures], "page": [place for place, _ in rows]}
+    records = [record for _, record in rows]
+    found["word"] = [record["word"] for record in records]
+    found["name"] = [named(record["word"]) for record in records]
+    for field in NUMBERS:
+        found[field] = [record.get(field) for record in records]
+    found["base"] = [None if "base_motors" not in record else int(record["base_motors"]) for record in records]
+    for field in TEXTS:
+        found[field] = _places([record.get(field) for record in records])
+    for field in LISTS:
+        found[field] = _places(["; ".join(record.get(field) or ()) or None for record in records])
+    return found
+
+
+def _places(values: list[str | None]) -> dict[str, Any]:
+    """Each value once, sorted, and for each record the place of its own."""
+    known = sorted({value for value in values if value is not None})
+    place: dict[str | None, int] = {value: i for i, value in enumerate(known)}
+    return {"values": known, "at": [place.get(value, -1) for value in values]}
+
+
+def _compact(data: object) -> str:
+    return json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)

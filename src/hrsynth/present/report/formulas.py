@@ -1,0 +1,80 @@
+"""Formulas and names as a browser sets them: MathML, indices, underlined motors."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from functools import cache
+from typing import Any
+from xml.sax.saxutils import escape
+
+_INDEXED = re.compile(r"\b(tau|[BJNnpu]|τ)(\d+|i)\b")
+_NUMBERED = re.compile(r"(.*?\D)(\d+)")
+_BARRED = re.compile("(.)\u0332")
+
+
+@cache
+def _printer() -> Any:
+    """SymPy's printer of presentation MathML, taught the products of vectors."""
+    from sympy.printing.mathml import MathMLPresentationPrinter
+
+    class Printer(MathMLPresentationPrinter):
+        def _print_dot(self, expression: Any) -> Any:
+            return self._joined(expression, "·")
+
+        def _print_cross(self, expression: Any) -> Any:
+            return self._joined(expression, "×")
+
+        def _print_Transpose(self, expression: Any) -> Any:
+            base, mark = self._print(expression.arg), self.dom.createElement("mi")
+            mark.appendChild(self.dom.createTextNode("T"))
+            low = base.nodeName == "msub"
+            found = self.dom.createElement("msubsup" if low else "msup")
+            for part in (*(base.childNodes[:] if low else [base]), mark):
+                found.appendChild(part)
+            return found
+
+        def _joined(self, expression: Any, sign: str) -> Any:
+            row = self.dom.createElement("mrow")
+            for number, each in enumerate(expression.args):
+                if number:
+                    mark = self.dom.createElement("mo")
+                    mark.appendChild(self.dom.createTextNode(sign))
+                    row.appendChild(mark)
+                row.appendChild(self._print(each))
+            return row
+
+    return Printer()
+
+
+def formula(expression: Any, said: str, zero: bool = True) -> str:
+    """An expression (SymPy) as MathML, set equal to zero if asked; ``said`` is read where no MathML is."""
+    found = _printer().doprint(expression).replace("&InvisibleTimes;", "\u2062")
+    equals = "<mo>=</mo><mn>0</mn>" if zero else ""
+    label = escape(said, {'"': "&quot;"})
+    return (f'<math xmlns="http://www.w3.org/1998/Math/MathML" display="block" aria-label="{label}">'
+            f"<mrow>{found}{equals}</mrow></math>")
+
+
+def indexed(text: str) -> str:
+    """Words with the indices of points and directions set low, as HTML."""
+    found = _INDEXED.sub(lambda m: f"{'τ' if m[1] == 'tau' else m[1]}<sub>{m[2]}</sub>", escape(text))
+    return found.replace("]x", "]<sub>×</sub>").replace("^T", "<sup>T</sup>")
+
+
+def collected(where: Mapping[str, str]) -> list[tuple[str, str]]:
+    """What symbols mean, those that differ in their index alone as one: ``Bi``, with i = 1, 2, 3."""
+    kinds: dict[tuple[str, str], list[str]] = {}
+    for symbol, meaning in where.items():
+        match = _NUMBERED.fullmatch(symbol)
+        head, number = (match[1], match[2]) if match else (symbol, "")
+        pattern = re.sub(rf"(?<!\d){number}(?!\d)", "i", meaning) if number else meaning
+        kinds.setdefault((head, pattern), []).append(number)
+    return [(f"{head}i", f"{pattern} (i = {', '.join(numbers)})") if len(numbers) > 1
+            else (head + numbers[0], pattern if not numbers[0] else where[head + numbers[0]])
+            for (head, pattern), numbers in kinds.items()]
+
+
+def barred(text: str) -> str:
+    """An architecture with its driven joints underlined, as HTML."""
+    return _BARRED.sub(r"<u>\1</u>", escape(text))

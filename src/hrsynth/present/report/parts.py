@@ -1,0 +1,83 @@
+"""What a report tells beside the derivation: leg sets, singularities, assembly modes, accuracy; or why it cannot.
+
+Each part is asked by itself, so that one that is refused leaves a sentence and the others as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TypeVar
+
+from ...analysis.accuracy.accuracy import Accuracy, sees_all
+from ...analysis.accuracy.cones import half_angles
+from ...analysis.accuracy.field import Mapper
+from ...analysis.controllability import Legs, legs
+from ...analysis.derive import Derivation
+from ...analysis.modes.modes import AssemblyModes, modes_at
+from ...analysis.setting import Setting
+from ...analysis.singularity.singular import Singularity, singular
+from ...errors import BadRequest, HrsynthError
+from ...mechanism.observation import Direction
+from ...mechanism.pose import Pose
+
+POINTS = 500
+"""Random poses at which the singularity condition is checked."""
+CONE = "0.1deg"
+"""Half-angle of the cones about the directions."""
+MANY, FEW = 101, 25
+"""Poses a side of the map, where many are evaluated together and where they are found one by one."""
+
+Answer = TypeVar("Answer")
+
+
+@dataclass(frozen=True)
+class Refused:
+    """A part that cannot be given, and why."""
+
+    reason: str
+
+
+@dataclass(frozen=True, eq=False)
+class Parts:
+    """The parts of a report, each an answer or the reason why there is none."""
+
+    legs: Legs | Refused
+    singularity: Singularity | Refused
+    modes: AssemblyModes | Refused
+    accuracy: Accuracy | Refused
+
+
+def parts(found: Derivation, observe: Sequence[str] | None, camera: str | None, seed: int,
+          tell: Callable[[str], None]) -> Parts:
+    """Ask for each part of a derivation's report; ``observe``, ``camera`` and ``seed`` are those of the derivation."""
+    setting, robot = found.setting, found.robot
+    return Parts(
+        asked(robot.name, lambda: legs(robot, camera, seed=seed, progress=lambda: tell("sets of legs"))),
+        asked(robot.name, lambda: singular(robot, observe, camera, points=POINTS, seed=seed, progress=tell)),
+        asked(robot.name, lambda: modes_at(setting, setting.everything.start, progress=tell)),
+        asked(robot.name, lambda: mapped(setting, seed, tell)))
+
+
+def asked(robot: str, question: Callable[[], Answer]) -> Answer | Refused:
+    """The answer about a robot, or why it was refused."""
+    try:
+        return question()
+    except HrsynthError as error:
+        return Refused(reason(error, robot))
+
+
+def reason(error: HrsynthError, robot: str) -> str:
+    """An error in words, without the robot's name before it and what a command line would add."""
+    return (error.what if isinstance(error, BadRequest) else str(error)).removeprefix(f"{robot}: ")
+
+
+def mapped(setting: Setting, seed: int, tell: Callable[[str], None]) -> Accuracy:
+    """The error maxima over a plane of poses through the zero configuration."""
+    if not all(isinstance(o, Direction) for o in setting.observed):
+        raise BadRequest("cones are about directions, and something else is observed")
+    cones = half_angles(CONE, setting.observed)
+    sees_all(setting)
+    mapper = Mapper(setting, cones, tell)
+    grid = mapper.plane(Pose(), FEW if mapper.batch is None else MANY)
+    return Accuracy(setting, cones, (), (), mapper.over(grid, seed))

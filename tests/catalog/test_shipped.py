@@ -1,0 +1,40 @@
+"""The catalog that is shipped: all words, small, and what would be built today."""
+
+from __future__ import annotations
+
+import pytest
+
+from hrsynth.catalog import load
+from hrsynth.catalog.check import check
+from hrsynth.catalog.groups import GROUPS
+from hrsynth.catalog.store import shipped
+from hrsynth.catalog.words import parse
+
+pytestmark = pytest.mark.skipif(not shipped().groups(), reason="no catalog is shipped yet")
+LARGEST = 10_000_000
+"""Bytes of all files."""
+
+
+def test_the_files_are_those_of_the_groups_and_small():
+    assert shipped().groups() == sorted(GROUPS)
+    assert sum(file.stat().st_size for file in shipped().path.glob("*.jsonl")) <= LARGEST
+
+
+def test_all_words_are_there_and_sorted():
+    assert check(shipped(), sample=0) == ()
+
+
+def test_words_are_canonical_and_in_one_group():
+    words = [record["word"] for record in load()]
+    assert len(set(words)) == len(words)
+    assert all(str(parse(word)) == word for word in words[::37])
+
+
+@pytest.mark.slow
+def test_some_records_are_fresh():
+    assert check(shipped(), sample=5, seed=len(load())) == ()
+
+
+@pytest.mark.long
+def test_all_records_are_fresh():
+    assert check(shipped(), workers=2) == ()

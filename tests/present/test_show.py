@@ -1,0 +1,135 @@
+"""Results at a prompt, in print and in a notebook: one line, the command line's text, the same as HTML, pictures."""
+
+from __future__ import annotations
+
+import html
+import re
+from functools import cache
+from pathlib import Path
+from xml.etree import ElementTree
+
+import pytest
+
+import hrsynth
+from hrsynth import load
+from hrsynth.cli import _run
+from hrsynth.errors import BadRequest
+from hrsynth.present import show
+from hrsynth.results import Result
+
+GOAL, OTHER = "x=0.05,y=0.3", "x=0.06,y=0.3"
+ASKED = {
+    "derive": (lambda robot: hrsynth.derive(robot), []),
+    "legs": (lambda robot: hrsynth.legs(robot), []),
+    "check": (lambda robot: hrsynth.check(robot, at=[GOAL]), ["--at", GOAL]),
+    "singular": (lambda robot: hrsynth.singular(robot, points=50), ["--points", "50"]),
+    "advise": (lambda robot: hrsynth.advise(robot), []),
+    "modes": (lambda robot: hrsynth.modes(robot, at=GOAL), ["--at", GOAL]),
+    "path": (lambda robot: hrsynth.path(robot, start=GOAL, goal=OTHER), ["--from", GOAL, "--to", OTHER]),
+    "servo": (lambda robot: hrsynth.servo(robot, start=OTHER, goal=GOAL), ["--from", OTHER, "--to", GOAL]),
+    "accuracy": (lambda robot: hrsynth.accuracy(robot, cones="0.1deg", at=[GOAL]), ["--cone", "0.1deg", "--at", GOAL]),
+    "select": (lambda robot: hrsynth.select(robot, start=GOAL, goal=OTHER, runs=0),
+               ["--from", GOAL, "--to", OTHER, "--runs", "0"]),
+}
+"""Each command's function, and the same question on the command line."""
+
+
+@cache
+def answer(command: str) -> Result:
+    return ASKED[command][0](load("rrrrr_m1"))
+
+
+def every_result() -> set[str]:
+    texts = [path.read_text(encoding="utf-8") for path in Path(hrsynth.__file__).parent.rglob("*.py")]
+    return {name for text in texts for name in re.findall(r"^class (\w+)\(Result\):", text, re.MULTILINE)}
+
+
+def test_every_kind_of_result_has_a_text():
+    assert every_result() == set(show._TEXTS)
+
+
+@pytest.mark.parametrize("command", ASKED)
+def test_a_result_is_printed_as_by_the_command_line(command: str, capsys: pytest.CaptureFixture[str]):
+    found = answer(command)
+    assert _run([command, "rrrrr_m1", *ASKED[command][1]]) == 0
+    assert str(found) == hrsynth.text(found) == capsys.readouterr().out.rstrip("\n")
+
+
+@pytest.mark.parametrize("command", ASKED)
+def test_a_result_is_one_line_at_a_prompt_and_marked_up_in_a_notebook(command: str):
+    found = answer(command)
+    assert repr(found).startswith(f"<{type(found).__name__}: rrrrr_m1")
+    assert "\n" not in repr(found)
+    assert len(repr(found)) < 300
+    marked = found._repr_html_()
+    assert marked == hrsynth.html(found)
+    inside = re.sub("<u>(.)</u>", "\\1\u0332", marked.removesuffix("</pre>").split(">", 1)[1])
+    assert html.unescape(inside) == str(found)
+    assert isinstance(found.to_dict(), dict)
+
+
+def test_parts_of_results_and_robots_are_shown_too():
+    robot = load("quattro")
+    found = hrsynth.derive(robot, observe=["1", "4"])
+    for each, words in [(robot, "leg 4"), (found.certificate, "passed at 20"), (found.verdict, "rank 4 of 4")]:
+        assert words in str(each)
+        assert "\n" not in repr(each)
+        assert words in each._repr_html_()
+    assert "\n" not in repr(found.setting)
+    assert str(found.certificate) in str(found)
+
+
+@pytest.mark.parametrize(("name", "observe"), [("rrrrr_m1", None), ("quattro", ["1", "4"]), ("3rrr_m1", None)])
+def test_a_derivation_lists_the_modes_that_the_command_lists(name: str, observe: list[str] | None):
+    robot = load(name)
+    mine, theirs = hrsynth.derive(robot, observe).modes(), hrsynth.modes(robot, observe)
+    assert mine.to_dict() == theirs.to_dict()
+    assert [repr(mode) for mode in mine.modes] == [repr(mode) for mode in theirs.modes]
+    assert mine.modes[0].goal
+
+
+def test_a_derivation_holds_the_directions_at_the_pose_it_is_given():
+    found = hrsynth.derive(load("rrrrr_m1"))
+    assert str(found.modes(at=GOAL).pose).startswith("x=0.05,y=0.3,")
+    assert found.modes(at=GOAL, real=True).kind == "real"
+
+
+@pytest.mark.parametrize("command", ["modes", "servo", "singular"])
+def test_pictures_of_results_are_shown_in_notebooks_and_saved(command: str, tmp_path):
+    options = {"steps": 9} if command == "singular" else {}
+    picture = hrsynth.draw(answer(command), **options)
+    assert picture._repr_png_().startswith(b"\x89PNG")
+    picture.save(tmp_path / "p.png")
+    assert (tmp_path / "p.png").read_bytes() == picture.content
+    assert picture._repr_svg_() is None
+    with pytest.raises(BadRequest, match=r"p\.jpg"):
+        picture.save(tmp_path / "p.jpg")
+
+
+def test_pictures_of_grids():
+    robot = load("rrrrr_m1")
+    grid = "x=-0.02:0.02:3,y=0.3:0.34:3"
+    for found in (hrsynth.check(robot, grid=grid), hrsynth.accuracy(robot, cones="0.1deg", grid=grid)):
+        assert hrsynth.draw(found)._repr_png_().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(("name", "observe"), [("rrrrr_m1", None), ("quattro", ["1", "4"]), ("3ppr_m1", None)])
+def test_a_derivation_is_drawn_as_two_schemes(name: str, observe: list[str] | None):
+    found = hrsynth.derive(load(name), observe)
+    picture = hrsynth.draw(found)
+    root = ElementTree.fromstring(picture._repr_svg_())
+    schemes = root.findall("{http://www.w3.org/2000/svg}svg")
+    assert picture._repr_png_() is None
+    assert len(schemes) == 1 + (found.hidden is not None)
+    width, height = (float(root.get(name)) for name in ("width", "height"))
+    for scheme in schemes:
+        assert float(scheme.get("x")) + float(scheme.get("width")) <= width
+        assert float(scheme.get("y")) + float(scheme.get("height")) <= height
+
+
+def test_what_has_no_picture_is_refused():
+    for found in (answer("legs"), answer("check"), answer("accuracy")):
+        with pytest.raises(BadRequest, match="no picture"):
+            hrsynth.draw(found)
+    with pytest.raises(BadRequest, match="plane"):
+        hrsynth.draw(answer("modes"), plane="z=0")
