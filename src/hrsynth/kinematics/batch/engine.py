@@ -212,7 +212,7 @@ class Batch:
                             M[..., start : start + CHUNK]) for start in range(0, max(n, 1), CHUNK)]
         whole = {"directions": u.transpose(2, 0, 1)}
         if self.stage.constant:
-            whole["matrix"] = M.reshape(3 * k, -1, n).transpose(2, 0, 1)
+            whole["matrix"] = M.reshape(3 * k, M.shape[2], n).transpose(2, 0, 1)
         return _joined(parts, whole)
 
     def _part(self, X: Array, watched: Sequence[str], cones: Array | None, u: Array, M: Array) -> Evaluation:
@@ -230,7 +230,7 @@ class Batch:
                 found, rows, there = ends[name].rows()
                 u[places], M[places] = found, rows
                 reached &= there
-        twists, rows = self._span, M.reshape(-1, *M.shape[2:])
+        twists, rows = self._span, M.reshape(3 * len(watched), *M.shape[2:])
         if not self.stage.constant:
             feasible, there = self._feasible(list(ends.values()))
             reached &= there
