@@ -17,13 +17,15 @@ from .limb import Kind
 CONSTANT, TURNING, DISTANCE, CIRCLE, LINE = (int(kind) for kind in list(Kind)[:5])
 NEWTON = 12
 """Steps after which the direct way to the maximum of two cones is given up."""
+NEIGHBOUR = 0.04
+"""Square of the slope, in parts of the maximum, up to which the answer at the pose before is a start."""
 
 
 def _jit(function: Callable[..., Any]) -> Any:
     """The function compiled when it is first called, or read from the cache of an earlier run."""
     from numba import njit
 
-    return njit(cache=True, error_model="numpy")(function)
+    return njit(cache=True, error_model="numpy", fastmath={"contract"})(function)
 
 
 @_jit
@@ -92,24 +94,22 @@ def top(B, w):  # type: ignore[no-untyped-def]
 
 
 @_jit
-def direct(B, C, S, w):  # type: ignore[no-untyped-def]
-    """The maximum of two cones by Newton's method on the sphere, if it is proved to be the maximum; −1 otherwise.
+def direct(B, C, w, warm):  # type: ignore[no-untyped-def]
+    """The maximum of two cones by Newton's method on the sphere from ``w``, if it is proved to be the maximum; −1
+    otherwise, and, where the start is ``warm`` (a neighbour's answer), if that is far from here.
 
     A stationary w is an eigenvector of S = B / t + C / (1 − t), t = a / (a + b); it is the maximum if no eigenvalue is
     larger.
     """
-    first, second = sqrt(B[0] + B[1] + B[2]), sqrt(C[0] + C[1] + C[2])
-    if first == 0.0 or second == 0.0:
-        return -1.0
-    for i in range(6):
-        S[i] = B[i] / first + C[i] / second
-    top(S, w)
+    B0, B1, B2, B3, B4, B5 = B[0], B[1], B[2], B[3], B[4], B[5]
+    C0, C1, C2, C3, C4, C5 = C[0], C[1], C[2], C[3], C[4], C[5]
+    least_a, least_b = 1e-20 * (B0 + B1 + B2), 1e-20 * (C0 + C1 + C2)
+    x, y, z = w[0], w[1], w[2]
     for _ in range(NEWTON):
-        x, y, z = w[0], w[1], w[2]
-        bx, by, bz = B[0] * x + B[3] * y + B[4] * z, B[3] * x + B[1] * y + B[5] * z, B[4] * x + B[5] * y + B[2] * z
-        cx, cy, cz = C[0] * x + C[3] * y + C[4] * z, C[3] * x + C[1] * y + C[5] * z, C[4] * x + C[5] * y + C[2] * z
+        bx, by, bz = B0 * x + B3 * y + B4 * z, B3 * x + B1 * y + B5 * z, B4 * x + B5 * y + B2 * z
+        cx, cy, cz = C0 * x + C3 * y + C4 * z, C3 * x + C1 * y + C5 * z, C4 * x + C5 * y + C2 * z
         a, b = x * bx + y * by + z * bz, x * cx + y * cy + z * cz
-        if a <= 1e-20 * first * first or b <= 1e-20 * second * second:
+        if a <= least_a or b <= least_b:
             return -1.0
         a, b = sqrt(a), sqrt(b)
         total = a + b
@@ -123,38 +123,48 @@ def direct(B, C, S, w):  # type: ignore[no-untyped-def]
         ia, ib = 1 / a, 1 / b
         be, bf = (bx * ex + by * ey + bz * ez) * ia, (bx * fx + by * fy + bz * fz) * ia
         ce, cf = (cx * ex + cy * ey + cz * ez) * ib, (cx * fx + cy * fy + cz * fz) * ib
-        for i in range(6):
-            S[i] = B[i] * ia + C[i] * ib
-        sx, sy = S[0] * ex + S[3] * ey + S[4] * ez, S[3] * ex + S[1] * ey + S[5] * ez
-        sz = S[4] * ex + S[5] * ey + S[2] * ez
+        S0, S1, S2 = B0 * ia + C0 * ib, B1 * ia + C1 * ib, B2 * ia + C2 * ib
+        S3, S4, S5 = B3 * ia + C3 * ib, B4 * ia + C4 * ib, B5 * ia + C5 * ib
+        sx, sy, sz = S0 * ex + S3 * ey + S4 * ez, S3 * ex + S1 * ey + S5 * ez, S4 * ex + S5 * ey + S2 * ez
         see, sef = sx * ex + sy * ey + sz * ez, sx * fx + sy * fy + sz * fz
-        sff = (S[0] * fx * fx + S[1] * fy * fy + S[2] * fz * fz
-               + 2 * (S[3] * fx * fy + S[4] * fx * fz + S[5] * fy * fz))
+        sff = S0 * fx * fx + S1 * fy * fy + S2 * fz * fz + 2 * (S3 * fx * fy + S4 * fx * fz + S5 * fy * fz)
         ge, gf = be + ce, bf + cf
+        if warm and ge * ge + gf * gf > NEIGHBOUR * total * total:
+            return -1.0
+        warm = False
         hee = see - be * be * ia - ce * ce * ib - total
         hef = sef - be * bf * ia - ce * cf * ib
         hff = sff - bf * bf * ia - cf * cf * ib - total
         det = hee * hff - hef * hef
         if det <= 0.0 or hee >= 0.0:
             return -1.0
-        along_e, along_f = (hef * gf - hff * ge) / det, (hef * ge - hee * gf) / det
+        short = 1 / det
+        along_e, along_f = (hef * gf - hff * ge) * short, (hef * ge - hee * gf) * short
         if along_e * ge + along_f * gf <= EXACT * total:
+            w[0], w[1], w[2] = x, y, z
             proved = (total - see) * (total - sff) >= sef * sef and total >= see
             return total if proved else -1.0
-        w[0] += along_e * ex + along_f * fx
-        w[1] += along_e * ey + along_f * fy
-        w[2] += along_e * ez + along_f * fz
-        normalise(w)
+        x, y, z = (x + along_e * ex + along_f * fx, y + along_e * ey + along_f * fy, z + along_e * ez + along_f * fz)
+        size = 1 / sqrt(x * x + y * y + z * z)
+        x, y, z = x * size, y * size, z * size
     return -1.0
 
 
 @_jit
-def two(B, C, S, w):  # type: ignore[no-untyped-def]
-    """The exact maximum of two cones: directly, or by false position on the weight (``cones._two``)."""
-    value = direct(B, C, S, w)
+def two(B, C, S, w, near):  # type: ignore[no-untyped-def]
+    """The exact maximum of two cones: directly from the pose before (``near``, made this one's w), directly from a
+    start of its own, or by false position on the weight (``cones._two``)."""
+    value = direct(B, C, near, True)
     if value >= 0.0:
         return value
     first, second = sqrt(B[0] + B[1] + B[2]), sqrt(C[0] + C[1] + C[2])
+    if first > 0.0 and second > 0.0:
+        for i in range(6):
+            S[i] = B[i] / first + C[i] / second
+        top(S, near)
+        value = direct(B, C, near, False)
+        if value >= 0.0:
+            return value
     if first + second == 0.0:
         return 0.0
     t, low, high, below, above, value = first / (first + second), 0.0, 1.0, first, -second, np.inf
@@ -253,9 +263,9 @@ def several(B, S, w, here, there, starts):  # type: ignore[no-untyped-def]
 
 
 @_jit
-def rod(kind, limbs, leg, x, y, z):  # type: ignore[no-untyped-def]
+def rod(kind, limbs, leg, watched, x, y, z):  # type: ignore[no-untyped-def]
     """1 / |BC|, u and the tangent of B's path, for C at (x, y, z) seen from the limb's centre; a negative length where
-    the leg does not reach (``plain.rod``)."""
+    the leg does not reach (``plain.rod``); no more than that is worked out of a leg that is not watched."""
     ax, ay, az = limbs[leg, 0], limbs[leg, 1], limbs[leg, 2]
     radius, length, side, sense = limbs[leg, 12], limbs[leg, 13], limbs[leg, 14], limbs[leg, 15]
     square = x * x + y * y + z * z
@@ -271,6 +281,8 @@ def rod(kind, limbs, leg, x, y, z):  # type: ignore[no-untyped-def]
         inside = length * length - square + height * height
         if not inside > 0.0:
             return -1.0, x, y, z, ax, ay, az
+        if not watched:
+            return 1.0, x, y, z, ax, ay, az
         along = height - side * sqrt(inside)
         return 1 / length, (x - ax * along) * gain, (y - ay * along) * gain, (z - az * along) * gain, ax, ay, az
     fx, fy, fz = x - ax * height, y - ay * height, z - az * height
@@ -279,6 +291,8 @@ def rod(kind, limbs, leg, x, y, z):  # type: ignore[no-untyped-def]
     inside = radius * radius * flat - along * along
     if not inside > 0.0:
         return -1.0, x, y, z, ax, ay, az
+    if not watched:
+        return 1.0, x, y, z, ax, ay, az
     across = side * sqrt(inside)
     bx = fx * along + (ay * fz - az * fy) * across
     by = fy * along + (az * fx - ax * fz) * across
@@ -327,10 +341,12 @@ def rows(kind, limbs, leg, span, p, X, U, M, i, place):  # type: ignore[no-untyp
                 M[i, row + 2, j] = wx * uy - wy * ux
         return True
     bx, by, bz = limbs[leg, 3], limbs[leg, 4], limbs[leg, 5]
-    rx = X[i, 0, 0] * bx + X[i, 0, 1] * by + X[i, 0, 2] * bz
-    ry = X[i, 1, 0] * bx + X[i, 1, 1] * by + X[i, 1, 2] * bz
-    rz = X[i, 2, 0] * bx + X[i, 2, 1] * by + X[i, 2, 2] * bz
-    short, ux, uy, uz, tx, ty, tz = rod(kind, limbs, leg, p[0] + rx + (limbs[leg, 6] - limbs[leg, 9]),
+    rx, ry, rz = 0.0, 0.0, 0.0
+    if bx != 0.0 or by != 0.0 or bz != 0.0:
+        rx = X[i, 0, 0] * bx + X[i, 0, 1] * by + X[i, 0, 2] * bz
+        ry = X[i, 1, 0] * bx + X[i, 1, 1] * by + X[i, 1, 2] * bz
+        rz = X[i, 2, 0] * bx + X[i, 2, 1] * by + X[i, 2, 2] * bz
+    short, ux, uy, uz, tx, ty, tz = rod(kind, limbs, leg, place >= 0, p[0] + rx + (limbs[leg, 6] - limbs[leg, 9]),
                                         p[1] + ry + (limbs[leg, 7] - limbs[leg, 10]),
                                         p[2] + rz + (limbs[leg, 8] - limbs[leg, 11]))
     if short < 0.0:
@@ -353,77 +369,95 @@ def rows(kind, limbs, leg, span, p, X, U, M, i, place):  # type: ignore[no-untyp
 
 @_jit
 def factor(M, pose, Q, T):  # type: ignore[no-untyped-def]
-    """M[pose] = Q T by Gram and Schmidt; False where a column depends on those before it (``spread._orthogonal``)."""
+    """M[pose] = Q T by Gram and Schmidt, the rows of a leg at a time; False where a column depends on those before it
+    (``spread._orthogonal``). The diagonal of T is left inverted."""
     m, d = Q.shape
     for i in range(m):
         for j in range(d):
             Q[i, j] = M[pose, i, j]
     whole, smallest = 0.0, np.inf
     for j in range(d):
-        size = 0.0
-        for i in range(m):
-            size += Q[i, j] * Q[i, j]
-        whole += size
-        size = sqrt(size)
+        square = 0.0
+        for i in range(0, m, 3):
+            x, y, z = Q[i, j], Q[i + 1, j], Q[i + 2, j]
+            square += x * x + y * y + z * z
+        whole += square
+        size = sqrt(square)
         smallest = min(smallest, size)
-        T[j, j] = size
-        if size > 0.0:
-            size = 1 / size
-            for i in range(m):
-                Q[i, j] *= size
+        short = 1 / size if size > 0.0 else 0.0
+        T[j, j] = short
+        for i in range(0, m, 3):
+            Q[i, j] *= short
+            Q[i + 1, j] *= short
+            Q[i + 2, j] *= short
         for k in range(j + 1, d):
             push = 0.0
-            for i in range(m):
-                push += Q[i, j] * Q[i, k]
+            for i in range(0, m, 3):
+                push += Q[i, j] * Q[i, k] + Q[i + 1, j] * Q[i + 1, k] + Q[i + 2, j] * Q[i + 2, k]
             T[j, k] = push
             whole += push * push
-            for i in range(m):
+            for i in range(0, m, 3):
                 Q[i, k] -= push * Q[i, j]
+                Q[i + 1, k] -= push * Q[i + 1, j]
+                Q[i + 2, k] -= push * Q[i + 2, j]
     return smallest > RANK_CUTOFF * sqrt(whole)
 
 
 @_jit
-def maxima(span, part, T, Q, cones, only, single, P, B, S, w, terms, weights, starts):  # type: ignore[no-untyped-def]
+def single_freedom(span, part, T, Q, cones, only, P):  # type: ignore[no-untyped-def]
+    """The largest error where it lies along ``only[part]``: one row of the same."""
+    d, total = T.shape[0], 0.0
+    for j in range(d):
+        value = (only[part, 0] * span[3 * part, j] + only[part, 1] * span[3 * part + 1, j]
+                 + only[part, 2] * span[3 * part + 2, j])
+        for m in range(j):
+            value -= P[0, m] * T[m, j]
+        P[0, j] = value * T[j, j]
+    for leg in range(len(cones)):
+        row, x, y, z = 3 * leg, 0.0, 0.0, 0.0
+        for j in range(d):
+            x, y, z = x + P[0, j] * Q[row, j], y + P[0, j] * Q[row + 1, j], z + P[0, j] * Q[row + 2, j]
+        total += cones[leg] * sqrt(x * x + y * y + z * z)
+    return total
+
+
+@_jit
+def maxima(span, part, T, Q, cones, only, single, P, B, S, w, near, terms, weights, starts):  # type: ignore[no-untyped-def]
     """Largest error and its lower bound for the rows of position (``part`` 0) or of orientation (1)
     (``spread._spread``)."""
     d, k = T.shape[0], len(cones)
     if single[part] == 0:
         return 0.0, 0.0
+    if single[part] == 1:
+        total = single_freedom(span, part, T, Q, cones, only, P)
+        return total, total
     for j in range(d):
-        short = 1 / T[j, j]
         for i in range(3):
             value = span[3 * part + i, j]
             for m in range(j):
                 value -= P[i, m] * T[m, j]
-            P[i, j] = value * short
+            P[i, j] = value * T[j, j]
     for leg in range(k):
-        for i in range(6):
-            B[leg, i] = 0.0
-        for row in range(3 * leg, 3 * leg + 3):
-            x, y, z = 0.0, 0.0, 0.0
-            for j in range(d):
-                q = Q[row, j]
-                x += P[0, j] * q
-                y += P[1, j] * q
-                z += P[2, j] * q
-            B[leg, 0] += x * x
-            B[leg, 1] += y * y
-            B[leg, 2] += z * z
-            B[leg, 3] += x * y
-            B[leg, 4] += x * z
-            B[leg, 5] += y * z
-        for i in range(6):
-            B[leg, i] *= cones[leg] * cones[leg]
-    if single[part] == 1:
-        total = 0.0
-        for leg in range(k):
-            total += along(B[leg], only[part])
-        return total, total
+        row = 3 * leg
+        ax, ay, az, bx, by, bz, cx, cy, cz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+        for j in range(d):
+            px, py, pz = P[0, j], P[1, j], P[2, j]
+            a, b, c = Q[row, j], Q[row + 1, j], Q[row + 2, j]
+            ax, ay, az = ax + px * a, ay + py * a, az + pz * a
+            bx, by, bz = bx + px * b, by + py * b, bz + pz * b
+            cx, cy, cz = cx + px * c, cy + py * c, cz + pz * c
+        scale = cones[leg] * cones[leg]
+        B[leg, 0] = scale * (ax * ax + bx * bx + cx * cx)
+        B[leg, 1] = scale * (ay * ay + by * by + cy * cy)
+        B[leg, 2] = scale * (az * az + bz * bz + cz * cz)
+        B[leg, 3] = scale * (ax * ay + bx * by + cx * cy)
+        B[leg, 4] = scale * (ax * az + bx * bz + cx * cz)
+        B[leg, 5] = scale * (ay * az + by * bz + cy * cz)
     if k == 1:
         value = sqrt(max(top(B[0], w), 0.0))
         return value, value
     if k == 2:
-        value = two(B[0], B[1], S, w)
+        value = two(B[0], B[1], S, w, near[part])
         return value, value
     return several(B, S, w, terms, weights, starts)
 
@@ -436,7 +470,7 @@ def swept(kinds, table, watched, span, X, point, cones, only, single, reached, c
     Q, T, P = np.zeros((3 * k, d)), np.zeros((d, d)), np.zeros((3, d))
     B, S, w, terms, weights, starts = (np.zeros((k, 6)), np.zeros(6), np.zeros(3), np.zeros(k), np.zeros(k),
                                        np.zeros((4, 3)))
-    p = np.zeros(3)
+    p, near = np.zeros(3), np.eye(3)[:2].copy()
     slot = np.full(len(kinds), -1)
     for place in range(k):
         slot[watched[place]] = place
@@ -458,5 +492,6 @@ def swept(kinds, table, watched, span, X, point, cones, only, single, reached, c
             clear[i] = factor(M, i, Q, T)
             if clear[i]:
                 for part in range(2):
-                    value, lower = maxima(span, part, T, Q, cones, only, single, P, B, S, w, terms, weights, starts)
+                    value, lower = maxima(span, part, T, Q, cones, only, single, P, B, S, w, near, terms, weights,
+                                          starts)
                     found[i, 2 * part], found[i, 2 * part + 1] = value, lower

@@ -135,8 +135,7 @@ class Batch:
                              f"at most {LARGEST}; sweep goes through any number of poses in parts")
         if self._quick(len(X), compiled):
             return self._compiled(X, watched, half)
-        starts = range(0, max(len(X), 1), CHUNK)
-        return _joined([self._part(X[start : start + CHUNK], watched, half) for start in starts])
+        return self._plain(X, watched, half)
 
     def reached(self, X: Array) -> Flags:
         """Where known subproblems alone reach the poses X (n, 4, 4); what else ``evaluate`` says is left out."""
@@ -205,32 +204,41 @@ class Batch:
             position, orientation = Spread(found[:, 0], found[:, 1]), Spread(found[:, 2], found[:, 3])
         return Evaluation(reached, U, M, self._span, position, orientation, tuple(self.normals[x] for x in watched))
 
-    def _part(self, X: Array, watched: Sequence[str], cones: Array | None) -> Evaluation:
+    def _plain(self, X: Array, watched: Sequence[str], cones: Array | None) -> Evaluation:
+        """In NumPy, part by part; what all poses have in one shape is filled in where it stays."""
+        n, k = len(X), len(watched)
+        u, M = np.empty((k, 3, n)), np.empty((k, 3, self._span.shape[1], n))
+        parts = [self._part(X[start : start + CHUNK], watched, cones, u[..., start : start + CHUNK],
+                            M[..., start : start + CHUNK]) for start in range(0, max(n, 1), CHUNK)]
+        whole = {"directions": u.transpose(2, 0, 1)}
+        if self.stage.constant:
+            whole["matrix"] = M.reshape(3 * k, M.shape[2], n).transpose(2, 0, 1)
+        return _joined(parts, whole)
+
+    def _part(self, X: Array, watched: Sequence[str], cones: Array | None, u: Array, M: Array) -> Evaluation:
+        """The directions u (k, 3, n) and M (k, 3, D, n) are filled in."""
         poses = Poses.of(*self.stage.place(X))
         ends = {name: self._led(chain, X) for name, chain in self.chains.items()}
         reached = np.ones(len(X), dtype=bool)
-        found: dict[str, tuple[Array, Array]] = {}
         for name, leg in self.legs.items():
-            if leg is None:
-                continue
+            places = [i for i, other in enumerate(watched) if other == name]
             if isinstance(leg, Limb):
-                u, M, there = block(leg, self._span, poses)
-            else:
-                u, M, there = ends[name].rows()
-            reached &= there
-            found[name] = (u, M)
-        u = np.concatenate([found[name][0] for name in watched])
-        M = np.concatenate([found[name][1] for name in watched])
-        twists = self._span
+                for i in places:
+                    there = block(leg, self._span, poses, u[i], M[i])
+                reached &= there if places else within(leg, poses)
+            elif leg is not None:
+                found, rows, there = ends[name].rows()
+                u[places], M[places] = found, rows
+                reached &= there
+        twists, rows = self._span, M.reshape(3 * len(watched), *M.shape[2:])
         if not self.stage.constant:
             feasible, there = self._feasible(list(ends.values()))
             reached &= there
-            M, twists = np.einsum("rcn,ncd->rdn", M, feasible), twists @ feasible
+            rows, twists = np.einsum("rcn,ncd->rdn", rows, feasible), twists @ feasible
         if not reached.all():
-            u, M = np.where(reached, u, np.nan), np.where(reached, M, np.nan)
-        position, orientation = (None, None) if cones is None else spreads(M, twists, cones)
-        U = u.T.reshape(len(X), len(watched), 3)
-        return Evaluation(reached, U, M.transpose(2, 0, 1), twists, position, orientation,
+            u[..., ~reached], rows[..., ~reached] = np.nan, np.nan
+        position, orientation = (None, None) if cones is None else spreads(rows, twists, cones)
+        return Evaluation(reached, u.transpose(2, 0, 1), rows.transpose(2, 0, 1), twists, position, orientation,
                           tuple(self.normals[name] for name in watched))
 
     def _led(self, chain: Chain, X: Array) -> Ends:
@@ -272,13 +280,15 @@ def _tangents(u: Array) -> tuple[Array, Array]:
     return first, np.cross(u, first)
 
 
-def _joined(parts: Sequence[Evaluation]) -> Evaluation:
-    """One evaluation of all poses."""
+def _joined(parts: Sequence[Evaluation], whole: Mapping[str, Array]) -> Evaluation:
+    """One evaluation of all poses; ``whole`` holds what is there in one piece."""
     if len(parts) == 1:
         return parts[0]
 
     def column(name: str) -> object:
         values = [getattr(part, name) for part in parts]
+        if name in whole:
+            return whole[name]
         if name == "normals" or values[0] is None or (name == "twists" and values[0].ndim == 2):
             return values[0]
         if isinstance(values[0], Spread):

@@ -81,7 +81,8 @@ def recognised(anatomy: Anatomy, leg: Leg, seen: Direction, stage: Stage, frames
     u = frames[seen.link][:, :3, :3] @ seen.direction
     for limb in _candidates(anatomy, leg, stage, frames, p, R, u):
         if limb is not None and _holds(limb, p, R, u):
-            return limb
+            fixed = not stage.spins.shape[1] and limb.kind is not Kind.TURNING
+            return replace(limb, b=np.zeros(3), c=R[0] @ limb.b + limb.c) if fixed else limb
     return None
 
 

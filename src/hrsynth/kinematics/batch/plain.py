@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,15 +16,21 @@ Flags = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Poses:
-    """Positions (3, n) and rotations (3, 3, n) of a platform."""
+    """Positions (3, n) and rotations (3, 3, n) of a platform; these are laid out only where something turns."""
 
     p: Array
-    R: Array
+    rotations: Array
+    """(n, 3, 3)."""
 
     @classmethod
     def of(cls, p: Array, R: Array) -> Poses:
         """From p (n, 3) and R (n, 3, 3)."""
-        return cls(np.ascontiguousarray(p.T), np.ascontiguousarray(R.transpose(1, 2, 0)))
+        return cls(np.ascontiguousarray(p.T), R)
+
+    @cached_property
+    def R(self) -> Array:
+        """Components first."""
+        return np.ascontiguousarray(self.rotations.transpose(1, 2, 0))
 
     def turned(self, b: Array) -> Array:
         """R b, (3, n)."""
@@ -49,35 +55,60 @@ def dot(a: Array, b: Array) -> Array:
     return np.asarray(a[0] * b[0] + a[1] * b[1] + a[2] * b[2])
 
 
+def along(a: Array, b: Array) -> Array:
+    """a·b for a constant vector a (3,), of which what vanishes is left out."""
+    parts = [b[i] if a[i] == 1 else a[i] * b[i] for i in range(3) if a[i]]
+    return np.asarray(sum(parts[1:], start=parts[0]))
+
+
 def cross(a: Array, b: Array) -> Array:
     """a × b over the first index."""
     return np.stack((a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]))
 
 
+def _tip(limb: Limb, poses: Poses) -> tuple[Array, Array]:
+    """The leg's tip (3, n), seen from its limb's centre, and R b."""
+    C = poses.p + (limb.c - limb.centre)[:, None]
+    if not limb.b.any():
+        return C, np.zeros((3, 1))
+    arm = poses.turned(limb.b)
+    C += arm
+    return C, arm
+
+
 def rod(limb: Limb, poses: Poses) -> Rod:
     """The leg's inverse kinematics in closed form."""
-    arm = poses.turned(limb.b) if limb.b.any() else np.zeros((3, 1))
-    C = poses.p + arm + (limb.c - limb.centre)[:, None]
+    C, arm = _tip(limb, poses)
     if limb.kind is Kind.DISTANCE:
         shortness = 1 / np.sqrt(dot(C, C))
         u = C * (limb.sense * shortness)
         return Rod(u, u, shortness, arm, np.isfinite(shortness))
-    a = limb.axis[:, None]
-    height = dot(a, C)
+    a, height = limb.axis[:, None], along(limb.axis, C)
+    inside, *found = _inside(limb, C, height)
+    reached = inside > 0
+    root = limb.side * np.sqrt(inside if reached.all() else np.where(reached, inside, np.nan))
     if limb.kind is Kind.LINE:
-        inside = limb.rod**2 - dot(C, C) + height * height
-        reached = inside > 0
-        B = a * (height - limb.side * np.sqrt(np.where(reached, inside, np.nan)))
         tangent = a
+        for i in np.flatnonzero(limb.axis):
+            C[i] -= limb.axis[i] * (height - root)
     else:
-        flat = C - a * height
-        square = dot(flat, flat)
-        along = (square + (height * height + (limb.radius**2 - limb.rod**2))) * (0.5 / square)
-        inside = limb.radius**2 / square - along * along
-        reached = inside > 0
-        B = flat * along + cross(a, flat) * (limb.side * np.sqrt(np.where(reached, inside, np.nan)))
+        flat, share = found
+        B = flat * share + cross(a, flat) * root
         tangent = cross(a, B)
-    return Rod((C - B) * (limb.sense / limb.rod), tangent, 1 / limb.rod, arm, reached)
+        C -= B
+    C *= limb.sense / limb.rod
+    return Rod(C, tangent, 1 / limb.rod, arm, reached)
+
+
+def _inside(limb: Limb, C: Array, height: Array) -> tuple[Array, ...]:
+    """What is positive where the rod reaches the tip C, seen from the limb's centre, ``height`` along its axis; for a
+    circle also C's foot in its plane, and the part of it at which B lies."""
+    if limb.kind is Kind.LINE:
+        return (limb.rod**2 - dot(C, C) + height * height,)
+    flat = C - limb.axis[:, None] * height
+    square = dot(flat, flat)
+    share = (square + (height * height + (limb.radius**2 - limb.rod**2))) * (0.5 / square)
+    return limb.radius**2 / square - share * share, flat, share
 
 
 def turning(limb: Limb, poses: Poses) -> tuple[Array, Flags, Array]:
@@ -97,33 +128,40 @@ def within(limb: Limb, poses: Poses) -> Flags:
     """Where the leg reaches, (n,)."""
     if limb.kind is Kind.CONSTANT:
         return np.ones(poses.p.shape[1], dtype=bool)
-    return turning(limb, poses)[1] if limb.kind is Kind.TURNING else rod(limb, poses).reached
-
-
-def block(limb: Limb, twists: Array, poses: Poses) -> tuple[Array, Array, Flags]:
-    """u (3, n), the leg's rows of Mᵀ (3, d, n) on the basis ``twists`` (6, d), and where the leg reaches."""
-    n, d = poses.p.shape[1], twists.shape[1]
-    if limb.kind is Kind.CONSTANT:
-        return np.broadcast_to(limb.axis[:, None], (3, n)), np.zeros((3, d, n)), np.ones(n, dtype=bool)
-    M = np.empty((3, d, n))
     if limb.kind is Kind.TURNING:
-        u, reached, _ = turning(limb, poses)
-        for j in range(d):
-            M[:, j] = cross(twists[3:, j], u)
-        return u, M, reached
+        return turning(limb, poses)[1]
+    C = _tip(limb, poses)[0]
+    return np.asarray((dot(C, C) if limb.kind is Kind.DISTANCE else _inside(limb, C, along(limb.axis, C))[0]) > 0)
+
+
+def block(limb: Limb, twists: Array, poses: Poses, u: Array, M: Array) -> Flags:
+    """Fill in u (3, n) and the leg's rows of Mᵀ, M (3, d, n), on the basis ``twists`` (6, d); where the leg reaches."""
+    if limb.kind is Kind.CONSTANT:
+        u[:], M[:] = limb.axis[:, None], 0.0
+        return np.ones(u.shape[1], dtype=bool)
+    if limb.kind is Kind.TURNING:
+        u[:], reached, _ = turning(limb, poses)
+        for j, w in enumerate(twists[3:].T):
+            M[:, j] = cross(w, u)
+        return reached
     found = rod(limb, poses)
-    u, t = found.u, found.tangent
+    u[:] = found.u
     gain = found.shortness * limb.sense
-    slip = t * (1 / dot(u, t))
-    for j in range(d):
-        v, w = twists[:3, j, None], twists[3:, j]
-        y = v + cross(w, found.arm) if w.any() and limb.b.any() else v
-        M[:, j] = (y - slip * dot(u, y)) * gain
-    return u, M, found.reached
-
-
-def stacked(limbs: Sequence[Limb], twists: Array, poses: Poses) -> tuple[Array, Array, Flags]:
-    """Directions (3 k, n), Mᵀ (3 k, d, n), reached (n,) of several legs."""
-    parts = [block(limb, twists, poses) for limb in limbs]
-    return (np.concatenate([u for u, _, _ in parts]), np.concatenate([M for _, M, _ in parts]),
-            np.logical_and.reduce([reached for _, _, reached in parts]))
+    slip = found.tangent * (gain / (along(limb.axis, u) if limb.kind is Kind.LINE else dot(found.tangent, u)))
+    for j, (v, w) in enumerate(zip(twists[:3].T, twists[3:].T, strict=True)):
+        if w.any() and limb.b.any():
+            y = v[:, None] + cross(w, found.arm)
+            M[:, j] = y * gain - slip * dot(u, y)
+            continue
+        if not v.any():
+            M[:, j] = 0.0
+            continue
+        push = along(v, u)
+        for i in range(3):
+            if limb.kind is Kind.LINE and not limb.axis[i]:
+                M[i, j] = v[i] * gain
+            else:
+                np.multiply(slip[i], -push, out=M[i, j])
+                if v[i]:
+                    M[i, j] += v[i] * gain
+    return found.reached

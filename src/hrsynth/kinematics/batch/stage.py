@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...mechanism.vectors import Array
-from ...tolerances import SAME_GEOMETRY
+from ...tolerances import SAME_DIRECTION, SAME_GEOMETRY
 from ..configuration import ClosedConfiguration
 from ..parts import PlatformMotion
 
@@ -59,14 +59,15 @@ class Stage:
 
     @property
     def twists(self) -> Array:
-        """The basis (6, d): linear rows are the velocity of the point."""
-        zero = np.zeros((3, 3))
-        return np.block([[self.shifts, zero[:, : self.spins.shape[1]]], [zero[:, : self.shifts.shape[1]], self.spins]])
+        """The basis (6, d), along the base frame's axes where these span it: linear rows are the velocity of the
+        point."""
+        shifts, spins, zero = _along_axes(self.shifts), _along_axes(self.spins), np.zeros((3, 3))
+        return np.block([[shifts, zero[:, : spins.shape[1]]], [zero[:, : shifts.shape[1]], spins]])
 
     def place(self, X: Array) -> tuple[Array, Array]:
         """p (n, 3) and R (n, 3, 3) of platform poses (n, 4, 4)."""
         R = X[:, :3, :3]
-        return X[:, :3, 3] + R @ self.point, R
+        return X[:, :3, 3] + R @ self.point if self.point.any() else X[:, :3, 3], R
 
     @classmethod
     def of(cls, motion: PlatformMotion, frames: Frames, names: Sequence[str], length: float) -> Stage:
@@ -76,6 +77,13 @@ class Stage:
         found = {name: body for name in names if motion.body
                  and (body := _body(p, X[:, :3, :3], frames[name], length)) is not None}
         return cls(motion.link, motion.point, motion.shifts, motion.spins, found, motion.dof)
+
+
+def _along_axes(basis: Array) -> Array:
+    """The axes that span the same as an orthonormal basis (3, k), if there are such; else the basis."""
+    onto = basis @ basis.T
+    kept = np.diag(onto) > 0.5
+    return np.eye(3)[:, kept] if np.max(np.abs(onto - np.diag(kept)), initial=0.0) < SAME_DIRECTION else basis
 
 
 def _body(p: Array, R: Array, X: Array, length: float) -> Body | None:

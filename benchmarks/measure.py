@@ -1,0 +1,70 @@
+"""How both sides of a benchmark are measured, and what a line of the table says."""
+
+from __future__ import annotations
+
+import resource
+import time
+from collections.abc import Callable
+
+import numpy as np
+
+from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.description import load
+from hrsynth.kinematics.batch.chain import exponentials
+from hrsynth.kinematics.batch.engine import Batch
+from hrsynth.mechanism.vectors import Array
+
+SIDE, TURNS = 201, 5
+Row = tuple[str, str, str, str]
+Run = Callable[[], object]
+
+
+def least(*runs: Run, turns: int = TURNS) -> list[float]:
+    """The least processor time of each run (s), taken in turn."""
+    best = [np.inf] * len(runs)
+    for run in runs:
+        run()
+    for _ in range(turns):
+        for i, run in enumerate(runs):
+            start = spent()
+            run()
+            best[i] = min(best[i], spent() - start)
+    return best
+
+
+def spent() -> float:
+    """Processor time until now (s), that of programs which were called included."""
+    called = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + called.ru_utime + called.ru_stime
+
+
+def compiled(robot: str) -> tuple[Setting, Batch]:
+    setting = prepare(load(robot))
+    assert setting.batch is not None
+    return setting, setting.batch
+
+
+def plane(batch: Batch, size: float, phi: float = 0.0, side: int = SIDE) -> Array:
+    """A square of poses around home, turned by phi about z; (side², 4, 4)."""
+    steps = np.linspace(-size, size, side)
+    X = np.tile(batch.home, (side * side, 1, 1))
+    X[:, 0, 3] += np.repeat(steps, side)
+    X[:, 1, 3] += np.tile(steps, side)
+    X[:, :3, :3] = exponentials(np.array([0.0, 0.0, phi])) @ X[:, :3, :3]
+    return X
+
+
+def same(ours: Array, theirs: Array, tolerance: float) -> None:
+    worst = float(np.nanmax(np.abs(ours - theirs)) / np.nanmax(np.abs(theirs)))
+    if not worst <= tolerance:
+        raise SystemExit(f"the two sides differ by {worst:.2g}, allowed: {tolerance:.2g}")
+
+
+def told(ours: str, what: str, mine: float, other: str, theirs: float, n: int, m: int | None = None) -> Row:
+    rate, their_rate = n / mine, (m or n) / theirs
+    return (what, f"{ours}: {spoken(rate)} poses/s", f"{other}: {spoken(their_rate)} poses/s",
+            f"{rate / their_rate:.{0 if rate > 20 * their_rate else 1}f}")
+
+
+def spoken(rate: float) -> str:
+    return f"{rate / 1e6:.2f} M" if rate > 1e4 else f"{rate:.0f}"

@@ -1,0 +1,150 @@
+"""Lines of the table: assembly modes, the loops' Jacobian, derivations, exact verdicts and entries of the catalog."""
+
+from __future__ import annotations
+
+import random
+import sys
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from measure import Row, least, spent
+
+sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
+
+from hrsynth.analysis.derive import derive
+from hrsynth.analysis.exact import architecture
+from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.catalog.entry import entry
+from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.groups import GROUPS
+from hrsynth.catalog.source import unmoved
+from hrsynth.catalog.words import parse
+from hrsynth.description import load, shipped
+from hrsynth.description.writers.mjcf import write
+from hrsynth.errors import HrsynthError
+from hrsynth.kinematics.locked import rezeroed
+from hrsynth.kinematics.ranks import kernel_basis, largest_angle, range_basis
+from hrsynth.kinematics.twin import Twin
+from hrsynth.mechanism.vectors import Array
+
+SYSTEMS, EXTERNAL = 12, 3
+"""Instances of each family of assembly modes, and how many of them msolve is given."""
+EVALUATIONS = 2000
+"""Evaluations of the loops' Jacobian in a turn."""
+EXACT, WHOLE = 12, 3
+"""Words of each group of the catalog of which the exact verdict, and the whole entry, is made."""
+
+
+def modes() -> Iterator[Row]:
+    """All assembly modes with proof, against Newton's method from 100 starts, which proves nothing, and msolve."""
+    from analysis.modes.draws import FAMILIES
+    from analysis.modes.laws import installed
+    from analysis.modes.newton import solutions
+    from hrsynth.analysis.modes.solve import solve, solve_by_msolve
+
+    for name in ("spatial, three lines", "spatial, three circles", "planar, three circles"):
+        systems = [FAMILIES[name].draw(np.random.default_rng(seed)).system for seed in range(SYSTEMS)]
+        what = f"all assembly modes with proof: {name}"
+        ours, theirs = least(lambda s=systems: [solve(each) for each in s],
+                             lambda s=systems: [solutions(each, 100, np.random.default_rng(0), real=True, rounds=30)
+                                                for each in s], turns=2)
+        yield (what, f"{1e3 * ours / SYSTEMS:.1f} ms",
+               f"Newton, 100 starts, without proof: {1e3 * theirs / SYSTEMS:.1f} ms", f"{theirs / ours:.0f}")
+        if not installed():
+            continue
+        few = systems[:EXTERNAL]
+        for each in few:
+            counts = len(solve(each).modes), len(solve_by_msolve(each).modes)
+            if counts[0] != counts[1]:
+                raise SystemExit(f"{name}: {counts[0]} modes of ours, {counts[1]} of msolve")
+        ours, theirs = least(lambda s=few: [solve(each) for each in s],
+                             lambda s=few: [solve_by_msolve(each) for each in s], turns=1)
+        yield (what, f"{1e3 * ours / EXTERNAL:.1f} ms",
+               f"msolve, with the same proof: {1e3 * theirs / EXTERNAL:.0f} ms", f"{theirs / ours:.0f}")
+
+
+def jacobians() -> Iterator[Row]:
+    """The Jacobian of the loops of one configuration, as an array: poses, joints' screws and loops are brought up to
+    date on both sides, nothing else (no inertia, no contacts)."""
+    try:
+        import mujoco
+    except ImportError:
+        return
+    for robot in ("quattro", "gough_stewart", "delta"):
+        here = rezeroed(prepare(load(robot), samples=3).configurations[0])
+        twin = Twin(here)
+        model = mujoco.MjModel.from_xml_string(write(here)[0])
+        model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
+        model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
+        data = mujoco.MjData(model)
+
+        def ours(twin: Twin = twin) -> Array:
+            return twin.jacobian(twin.q0.copy())
+
+        def theirs(model: Any = model, data: Any = data) -> Array:
+            data.qpos[:] = model.qpos0
+            mujoco.mj_kinematics(model, data)
+            mujoco.mj_comPos(model, data)
+            mujoco.mj_makeConstraint(model, data)
+            return np.asarray(data.efc_J).reshape(-1, model.nv)
+
+        V = np.zeros((6, model.nv))
+        J = theirs()
+        mujoco.mj_jacBody(model, data, V[:3], V[3:], model.body(here.platform).id)
+        own = twin.velocity(twin.q0, here.platform) @ kernel_basis(twin.jacobian(twin.q0))[0]
+        other = V @ kernel_basis(J)[0]
+        own[:3] *= twin.length
+        angle = largest_angle(range_basis(own, 1.0)[0], range_basis(other, 1.0)[0])
+        if not angle < 1e-5:
+            raise SystemExit(f"{robot}: the platform's twists differ by {angle:.2g} rad")
+        mine, other_time = least(lambda: [ours() for _ in range(EVALUATIONS)],
+                                 lambda: [theirs() for _ in range(EVALUATIONS)])
+        yield (f"the loops' Jacobian of one configuration, {robot}",
+               f"{1e6 * mine / EVALUATIONS:.0f} µs ({' × '.join(map(str, ours().shape))})",
+               f"MuJoCo on the written MJCF: {1e6 * other_time / EVALUATIONS:.0f} µs "
+               f"({' × '.join(map(str, J.shape))})", f"{other_time / mine:.1f}")
+
+
+def derivations() -> Row:
+    spent = []
+    for robot in shipped():
+        mechanism = load(robot)
+        start = time.process_time()
+        derive(mechanism)
+        spent.append((time.process_time() - start, robot))
+    spent.sort()
+    middle, slowest = spent[len(spent) // 2][0], spent[-1]
+    return ("the hidden robot with its certificate, each shipped robot, all legs watched",
+            f"median {middle:.2f} s, slowest {slowest[0]:.2f} s ({slowest[1]})", "nobody's", "–")
+
+
+def catalog() -> Iterator[Row]:
+    """Exact verdicts of words of all groups whose configurations are there, and whole entries."""
+    rng = random.Random(1)
+    chosen = [rng.sample(sorted({unmoved(word) for word in make()}), 3 * EXACT) for make in GROUPS.values()]
+    settings = [setting for words in chosen for setting in _prepared(words)]
+    (exact,) = least(lambda: [architecture(each).verdict(each.observed) for each in settings], turns=3)
+    yield (f"exact verdicts of {len(settings)} architectures of all groups of the catalog, their configurations given",
+           f"{len(settings) / exact:.0f} a second on one core", "nobody's", "–")
+    words = [word for group in chosen for word in group[:WHOLE]]
+    start = spent()
+    refused = sum("refused" in entry(word) for word in words)
+    rate = len(words) / (spent() - start)
+    yield (f"whole entries of {len(words)} words ({refused} refused), drawing, derivation and confirmation included",
+           f"{rate:.1f} a second on one core", "nobody's", "–")
+
+
+def _prepared(words: list[str]) -> Iterator[Setting]:
+    """The first ``EXACT`` of the words whose robots move."""
+    found = 0
+    for word in words:
+        try:
+            setting = prepare(mechanism(parse(word).driven), samples=10)
+        except HrsynthError:
+            continue
+        if setting.dof and found < EXACT:
+            found += 1
+            yield setting
