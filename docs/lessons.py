@@ -74,7 +74,7 @@ def executed(script: Path, folder: Path = EXECUTED) -> Any:
         return nbformat.read(file, as_version=4)
     made = notebook(script)
     folder.mkdir(parents=True, exist_ok=True)
-    NotebookClient(made, timeout=TIMEOUT, startup_timeout=TIMEOUT, kernel_name="python3",
+    NotebookClient(made, timeout=TIMEOUT, startup_timeout=TIMEOUT, coalesce_streams=True, kernel_name="python3",
                    resources={"metadata": {"path": str(folder)}}).execute()
     for old in folder.glob(f"{script.stem}.*.ipynb"):
         old.unlink(missing_ok=True)
