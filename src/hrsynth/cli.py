@@ -321,6 +321,8 @@ def servo(
     gain: Annotated[float, typer.Option(help="λ of the control law (1/s).")] = 0.8,
     noise: Annotated[str | None, typer.Option(metavar="AMOUNT", help="Error of measured directions, as 0.1deg; of "
                                               "edges, as 0.3px.")] = None,
+    bias: Annotated[bool, typer.Option("--bias", help="The error of each direction or edge stays the same all along.")]
+    = False,
     duration: Annotated[float | None, typer.Option(metavar="SECONDS", help="Lead the desired directions along the "
                                                    "straight way in this time (default: at once).")] = None,
     time: Annotated[float | None, typer.Option(metavar="SECONDS", help="Longest run.")] = None,
@@ -341,7 +343,8 @@ def servo(
     runs.writable(output)
     with Progress() as progress:
         found = run(robot.load(), _list(observe), camera, start=start, goal=goal, gain=gain, noise=noise,
-                    physics=physics, sense=sense, duration=duration, time=time, seed=seed, progress=progress.tell)
+                    bias=bias, physics=physics, sense=sense, duration=duration, time=time, seed=seed,
+                    progress=progress.tell)
     if output is not None:
         runs.write(found, output)
     if json:

@@ -103,13 +103,13 @@ class NotSampled(HrsynthError):
 
 
 class PoseNotReached(HrsynthError):
-    """A pose that the robot does not reach from its zero configuration: the leg that misses it most and by how much
+    """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much
     (mm, degrees), or None where each leg alone reaches it; how far the robot came (0 to 1), and to which pose."""
 
     exit_status = 3
 
     def __init__(self, robot: str, pose: str, came: float, last: str, leg: str | None = None,
-                 millimetres: float = 0.0, degrees: float = 0.0) -> None:
+                 millimetres: float = 0.0, degrees: float = 0.0, origin: str = "its zero configuration") -> None:
         self.robot, self.pose, self.came, self.last = robot, pose, came, last
         self.leg, self.millimetres, self.degrees = leg, millimetres, degrees
         if leg is None:
@@ -118,8 +118,8 @@ class PoseNotReached(HrsynthError):
         else:
             turn = f" and {degrees:.3g} degrees" if degrees > 1e-6 else ""
             reason = f"leg {leg} alone misses it by {millimetres:.4g} mm{turn}"
-        super().__init__(f"{robot}: the pose {pose} is not reached: {reason}; from its zero configuration the robot "
-                         f"comes {100 * came:.3g} % of the way, to {last}")
+        super().__init__(f"{robot}: the pose {pose} is not reached: {reason}; from {origin} the robot comes "
+                         f"{100 * came:.3g} % of the way, to {last}")
 
 
 class PlaneNotMet(HrsynthError):

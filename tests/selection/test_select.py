@@ -197,5 +197,18 @@ def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     out, err = capsys.readouterr()
     assert "partially controllable" in out
     assert err == ""
-    assert _run(["select", "quattro", "--from", "x=9", "--to", "x=0"]) == 3
+    assert _run(["select", "quattro", "--from", "x=9", "--to", "x=0"]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
+
+
+@pytest.mark.parametrize(("options", "word"), [
+    ({"focal": 100.0}, "--sight"), ({"focal": 0.0, "sight": "auto"}, "focal"), ({"sight": "here"}, "not name=value")])
+def test_cameras_that_are_none(options: dict[str, object], word: str):
+    with pytest.raises(BadRequest, match=word):
+        select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", size=1, **options)
+
+
+def test_unreachable_ends_are_bad_input():
+    with pytest.raises(PoseNotReached) as caught:
+        select(load("delta"), start="x=9", goal="x=0")
+    assert caught.value.exit_status == 2

@@ -47,14 +47,16 @@ def home(name: str) -> Scene:
     return Scene.of(load(name), None, None, start=pose, goal=pose, gain=0.8)
 
 
-def regular(name: str, seed: int, distance: float, steps: int = 12, apart: int = 1) -> Iterator[ClosedConfiguration]:
+def regular(name: str, seed: int, distance: float, steps: int = 12, apart: int = 1,
+            tried: int = 600) -> Iterator[ClosedConfiguration]:
     """Random configurations, in the working mode of the zero configuration, whose hidden robot is at least ``distance``
-    from Type 2 singularities (part of the usual distance), ``apart`` steps of a random walk from each other."""
+    from Type 2 singularities (part of the usual distance), ``apart`` steps of a random walk from each other; at most
+    ``tried`` steps are made."""
     found = setting(name)
     examiner = Examiner(found)
     question, start = found.everything.question, found.everything.start
     usual = np.median([examiner.glance(at).distances.type2 or 0.0 for at in found.configurations])
-    for at in islice(wander(start, 600, seed=seed, steps=steps), apart - 1, None, apart):
+    for at in islice(wander(start, tried, seed=seed, steps=steps), apart - 1, None, apart):
         posture = examiner.glance(at)
         if posture.hidden.state != REGULAR or (posture.distances.type2 or 0.0) < distance * usual:
             continue
@@ -67,5 +69,6 @@ def regular(name: str, seed: int, distance: float, steps: int = 12, apart: int =
 
 def far_pairs(name: str, seed: int, count: int) -> Iterator[tuple[ClosedConfiguration, ClosedConfiguration]]:
     """Pairs of random configurations that are regular, ever so slightly."""
-    found = list(islice(regular(name, seed, 0.05, steps=40, apart=15), 2 * count))
+    found = list(islice(regular(name, seed, 0.05, steps=40, apart=15, tried=300 * count + 300),
+                        2 * count))
     return zip(found[::2], found[1::2], strict=False)

@@ -4,40 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from os import environ
 
 import numpy as np
 import pytest
 
 from hrsynth.analysis.aspects.path import Aspects
-from hrsynth.analysis.modes.modes import modes
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.kinematics.configuration import ClosedConfiguration, closed
-from hrsynth.kinematics.locked import interaction
 from hrsynth.kinematics.ranks import range_basis
 from hrsynth.kinematics.reach import reach
-from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism.model import Limits
-from hrsynth.mechanism.vectors import hat
-from hrsynth.servo.desired import Step
-from hrsynth.servo.ending import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE, TIME
-from hrsynth.servo.law import Law, directions
-from hrsynth.servo.result import Servo
-from hrsynth.servo.run import FAR
-from hrsynth.servo.scene import EXACT, Scene
+from hrsynth.servo.ending import BOUNDARY, GOAL, MODE
 from hrsynth.servo.servo import servo
+from servo.far import run_between, untold, untrue
 from servo.scenes import BLIND, CONTROLLABLE, far_pairs, regular, setting
 
 FEW = ["3rpr_m1", "delta", "quattro"]
 REST = [name for name in CONTROLLABLE if name not in FEW]
-
-
-def run_between(name: str, start: ClosedConfiguration, goal: ClosedConfiguration, gain: float = 0.8) -> Servo:
-    found = setting(name)
-    law = Law(found.samples.question, found.dof, gain)
-    pose = found.motion.pose(goal.pose(found.motion.link))
-    scene = Scene(found, start, goal, law, Step(directions(goal, law.question)[0]), lambda: modes(load(name), at=pose))
-    return scene.told(scene.loop().simulate(start, scene.horizon(None, noisy=False)), EXACT, None)
 
 
 def near(name: str) -> tuple[ClosedConfiguration, ClosedConfiguration]:
@@ -71,68 +56,22 @@ def test_starts_near_the_goal_end_there_for_the_other_robots(name: str):
     check_near(name)
 
 
-def check_true(found: Servo) -> None:
-    """An ending is what its name says, by what the engine under test did not compute."""
-    last, at = found.run.commands[-1], found.run.last
-    question = found.setting.samples.question
-    u = np.array([o.value(at.pose(question.reference), at.pose(o.link)) for o in question.observations])
-    e = np.cross(u, found.desired)
-    assert np.linalg.norm(e) == pytest.approx(last.size, abs=1e-12)
-    assert found.ended in ENDINGS
-    alike = np.sum(u * found.desired, axis=1)
-    if found.ended in (GOAL, MODE):
-        assert np.linalg.norm(e) < 1e-9
-        assert np.all(alike > 0)
-        assert (max(found.from_goal) < 1e-6) == (found.ended == GOAL)
-    if found.ended == MODE and found.ending.modes is not None:
-        listed = found.ending.modes.modes
-        here = found.setting.motion.position(at.pose(found.setting.motion.link))
-        apart = [np.linalg.norm(here - [mode.pose.x, mode.pose.y, mode.pose.z]) for mode in listed]
-        assert found.ending.matched is not None
-        assert apart[found.ending.matched - 1] < 1e-6
-    if found.ended == ANTIPODAL:
-        assert np.linalg.norm(e) < 1e-9
-        assert np.any(alike < 0)
-    if found.ended in (MINIMUM, BOUNDARY, TIME):
-        assert np.linalg.norm(e) > 1e-6
-    if found.ended == MINIMUM:
-        M = interaction(at, question)
-        L = np.vstack([-hat(w) @ M[3 * i : 3 * i + 3] for i, w in enumerate(found.desired)])
-        assert np.linalg.norm(np.linalg.pinv(L, rcond=1e-4) @ e.ravel()) < 1e-5
-    if found.ended == BOUNDARY:
-        moved = np.linalg.norm(found.way[-1] - found.way[0]) / at.twin.length
-        assert moved > FAR or relation(at, question).dof.weakest < 1e-2
-
-
-def check_sides(found: Servo, aspects: Aspects) -> None:
-    """Where the condition is an expression with a sign, the sign at the end is that of the start times −1 for each
-    crossing of a Type 2 or constraint singularity (its wrenches are those of constraints as well); said of runs in
-    which no leg passes its limit."""
-    track = found.track
-    if not aspects.condition.signed or track.passages is None or track.crossings("type1") or track.crossings("limit"):
-        return
-    answer = aspects.join(found.run.configurations[0], found.run.last, budget=1)
-    ends = answer.start.value, answer.goal.value
-    if answer.signed and min(map(abs, ends)) > 1e-3 * max(map(abs, ends)):
-        assert np.sign(ends[0] * ends[1]) == (-1) ** len(track.passages)
+def check_far(name: str, seed: int, count: int) -> None:
+    aspects = Aspects.of(load(name))
+    for start, goal in far_pairs(name, seed, count):
+        found = run_between(name, start, goal)
+        assert [*untrue(found), *untold(found, aspects)] == []
 
 
 def test_far_runs_end_as_they_are_named():
-    aspects = Aspects.of(load("3rpr_m1"))
-    for start, goal in far_pairs("3rpr_m1", 3, 1):
-        found = run_between("3rpr_m1", start, goal)
-        check_true(found)
-        check_sides(found, aspects)
+    check_far("3rpr_m1", 3, 1)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", CONTROLLABLE)
 def test_more_far_runs_end_as_they_are_named(name: str):
-    aspects = Aspects.of(load(name))
-    for start, goal in far_pairs(name, 4, 5):
-        found = run_between(name, start, goal)
-        check_true(found)
-        check_sides(found, aspects)
+    """``PAIRS`` of each robot (environment; 5)."""
+    check_far(name, 4, int(environ.get("PAIRS", "5")))
 
 
 # ---- the papers' cases (theory 7: what their geometry gives)
@@ -144,14 +83,14 @@ def test_two_legs_of_the_robot_with_an_articulated_platform(legs: str, ended: st
     found = servo(load("quattro"), legs, start="x=0,y=0,z=-0.75,phi=0", goal="x=-0.2,y=0,z=-0.56,phi=0")
     assert (found.ended, found.pose.z) == (ended, pytest.approx(z, abs=1e-4))
     assert (found.ending.matched is not None) == (ended == MODE)
-    check_true(found)
+    assert list(untrue(found)) == []
 
 
 @pytest.mark.parametrize(("legs", "ended", "z"), [("1,2", MODE, -0.7023), ("1,3", GOAL, -0.7)])
 def test_two_legs_of_the_robot_with_a_rigid_platform(legs: str, ended: str, z: float):
     found = servo(load("quattro_rigid"), legs, start="x=0.1,y=0.04,z=-0.93", goal="x=0,y=-0.25,z=-0.7", gain=5)
     assert (found.ended, found.pose.z) == (ended, pytest.approx(z, abs=1e-4))
-    check_true(found)
+    assert list(untrue(found)) == []
 
 
 # ---- noise, trajectories, limits
@@ -177,6 +116,32 @@ def test_a_trajectory_is_followed_with_a_small_error():
     assert (led.ended, at_once.ended) == (GOAL, GOAL)
     assert led.errors.max() < 0.01 * at_once.errors.max()
     assert led.run.times[-1] > 4
+
+
+@pytest.mark.parametrize(("name", "start", "goal"), [
+    ("rrrrr_m1", "x=0.02,y=0.2195", "x=0.03,y=0.23"), ("3rps", "x=0,y=0,z=0.3", "x=0,y=0,z=0.4")])
+def test_a_trajectory_is_followed_where_parts_of_the_pose_depend_on_each_other(name: str, start: str, goal: str):
+    found = servo(load(name), start=start, goal=goal, duration=2.0)
+    assert found.ended == GOAL
+    assert found.errors.max() < 1e-3
+
+
+def test_a_blocked_trajectory_tells_that_it_began_at_the_start(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("hrsynth.servo.desired.led", lambda here, motion, goal: (here, 0.5))
+    with pytest.raises(PoseNotReached, match="from the start the robot comes"):
+        servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", duration=2.0)
+
+
+def test_a_bias_holds_the_platform_where_the_measured_directions_are_the_desired_ones():
+    found = servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65", noise="1deg", bias=True, gain=4,
+                  time=5.0)
+    last = found.run.commands[-1]
+    assert found.ended == GOAL
+    assert found.spread is not None
+    assert found.spread.aside
+    assert found.spread.metres > 1e-3
+    assert last.speed < 1e-4 < last.size
+    assert "the same all along" in str(found.noise)
 
 
 def test_a_joint_limit_is_a_boundary():
@@ -207,6 +172,13 @@ REFUSED: list[tuple[str, Callable[[], object], type[Exception], str]] = [
     ("wide cone", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="90deg"), BadRequest, "90deg"),
     ("no cone", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="0deg"), BadRequest, "more than zero"),
     ("pixels of directions", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="1px"), BadRequest, "px"),
+    ("edges as wide as pictures", lambda: servo(load("delta"), start="x=0", goal="x=0.1", sense="edges", noise="1e9px"),
+     BadRequest, "50px"),
+    ("a bias of nothing", lambda: servo(load("delta"), start="x=0", goal="x=0.1", bias=True), BadRequest, "bias"),
+    ("endless noise", lambda: servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", noise="1deg",
+                                    time=1e12), BadRequest, "at most 10000"),
+    ("endless physics", lambda: servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", physics=True,
+                                      gain=1e-9), BadRequest, "a larger gain"),
     ("no such sense", lambda: servo(load("delta"), start="x=0", goal="x=0.1", sense="touch"), BadRequest, "touch")]
 
 

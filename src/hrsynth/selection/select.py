@@ -18,7 +18,7 @@ from ..analysis.controllability import CONTROLLABLE, verdict_of
 from ..analysis.modes.modes import modes_at
 from ..analysis.posture import Examiner
 from ..analysis.setting import Setting, prepare, silent
-from ..errors import BadRequest, HrsynthError
+from ..errors import BadRequest, HrsynthError, PoseNotReached
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.reach import reach
 from ..mechanism import Mechanism
@@ -30,7 +30,7 @@ from ..servo.camera import cylinders, placed
 from ..servo.ending import GOAL
 from ..servo.servo import servo
 from .candidate import Candidate, Decision, Modes, singular_at
-from .sight import ENOUGH, Sight, camera_at
+from .sight import ENOUGH, Sight, camera_at, of_focal
 
 SIZE = 4
 """Legs of the largest sets."""
@@ -93,9 +93,11 @@ def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, go
     and goal are proved to lie in different aspects, and where a simulated run ends elsewhere. Runs are made from the
     best set on, until ``runs`` of them ended at the goal. After ``seconds`` nothing more is asked about any set.
 
-    Raises ``BadRequest``, ``PoseNotReached``.
+    Raises ``BadRequest``, ``PoseNotReached`` (exit status 2).
     """
     wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
+    if sight is None and focal != FOCAL:
+        raise BadRequest("focal length without a camera", focal, "together with --sight")
     for what, value, least in (("legs of the largest sets", size, 1), ("number of runs", runs, 0)):
         if value < least:
             raise BadRequest(what, value, f"at least {least}")
@@ -108,7 +110,11 @@ def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, go
     setting = replace(setting, observed=directions)
     half = half_angles(cones, directions)
     everything = setting.everything
-    ends = [reach(everything.start, everything.question, pose, setting.motion) for pose in wanted]
+    try:
+        ends = [reach(everything.start, everything.question, pose, setting.motion) for pose in wanted]
+    except PoseNotReached as error:
+        error.exit_status = 2
+        raise
     work = _Work(setting, ends[0], ends[1], half, _sight(setting, ends, sight, focal), time.monotonic() + seconds, seed,
                  tell)
     sets = [legs for count in range(1, min(size, len(directions)) + 1) for legs in combinations(directions, count)]
@@ -124,7 +130,8 @@ def _sight(setting: Setting, ends: Sequence[ClosedConfiguration], text: str | No
         return None
     rods = cylinders(setting.mechanism, setting.observed)
     reference = setting.mechanism.reference
-    camera = placed(rods, reference, [at.pose for at in ends]) if text == AUTO else camera_at(text, focal)
+    camera = (placed(rods, reference, [at.pose for at in ends], of_focal(focal)) if text == AUTO
+              else camera_at(text, focal))
     return Sight(camera, reference, {o.leg: rod for o, rod in zip(setting.observed, rods, strict=True)})
 
 

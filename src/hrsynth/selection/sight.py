@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -78,9 +78,16 @@ def hidden(points: Array, segment: Array, radius: float) -> Flags:
 def camera_at(text: str, focal: float) -> Camera:
     """The camera at a pose in the frame of the link that carries it: x right in the picture, y down, z ahead; 640 by
     480 pixels, focal length in pixels. Raises ``BadRequest``."""
+    blank = of_focal(focal)
     wanted = Pose.parse(text)
     if None in (wanted.x, wanted.y, wanted.z) or wanted.rotation is None:
-        raise BadRequest("pose of the camera: a part is missing", text, "x, y, z and rpy")
+        raise BadRequest("pose of the camera: a part is missing", text, "x, y, z and rpy; or auto")
+    return replace(blank, place=pose([float(wanted.x or 0), float(wanted.y or 0), float(wanted.z or 0)],
+                                     wanted.rotation))
+
+
+def of_focal(focal: float) -> Camera:
+    """A camera of a focal length in pixels, not placed; raises ``BadRequest``."""
     if not 0 < focal < np.inf:
         raise BadRequest("focal length (pixels)", focal, "a positive number")
-    return Camera(pose([float(wanted.x or 0), float(wanted.y or 0), float(wanted.z or 0)], wanted.rotation), focal)
+    return Camera(np.eye(4), focal)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -12,8 +12,9 @@ from ..errors import PoseNotReached
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.parts import Goal, PlatformMotion
 from ..kinematics.relation import Question
-from ..kinematics.steps import led
+from ..kinematics.steps import led, nearest
 from ..mechanism.vectors import Array
+from ..tolerances import NEAREST
 from .law import directions
 
 POSES = 24
@@ -59,17 +60,30 @@ class Trajectory:
 
 def straight(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, question: Question,
              duration: float) -> tuple[Trajectory, ClosedConfiguration]:
-    """The trajectory of the directions on the straight way from ``start`` to a goal of the whole pose, and the
-    configuration at its end; raises ``PoseNotReached`` where the way is blocked."""
+    """The trajectory of the directions on the straight way from ``start`` to a goal of the whole pose (where parts of
+    the pose depend on each other, along the poses nearest to it), and the configuration at its end; raises
+    ``PoseNotReached`` where the way is blocked."""
     X = start.pose(motion.link)
     here, marks = start, [directions(start, question)[0]]
     for fraction in np.linspace(0, 1, POSES + 1)[1:]:
-        here, came = led(here, motion, goal.towards(X, float(fraction)))
-        if came < 1:
+        here, came = _towards(here, motion, goal.towards(X, float(fraction)), last=fraction == 1)
+        if not came:
             at = motion.pose(here.pose(motion.link))
-            raise PoseNotReached(start.twin.mechanism.name, str(motion.pose(goal_pose(goal))), float(fraction), str(at))
+            raise PoseNotReached(start.twin.mechanism.name, str(motion.pose(goal_pose(goal))), float(fraction), str(at),
+                                 origin="the start")
         marks.append(directions(here, question)[0])
     return Trajectory(np.array(marks), duration), here
+
+
+def _towards(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last: bool
+             ) -> tuple[ClosedConfiguration, bool]:
+    """The configuration at a goal of the whole pose nearby, and whether it was reached: where parts of the pose depend
+    on each other the nearest one, which is to be the goal's only at the ``last``."""
+    if motion.dof >= motion.shifts.shape[1] + motion.spins.shape[1]:
+        there, came = led(here, motion, goal)
+        return there, came == 1
+    there = nearest(here, replace(goal, directions=np.zeros((0, 3)), values=np.zeros(0), rotation=None), goal)
+    return there, not last or float(np.linalg.norm(goal.rows(there.twin, there.q)[0])) < NEAREST
 
 
 def whole(motion: PlatformMotion, X: Array) -> Goal:

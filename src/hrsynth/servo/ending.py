@@ -62,8 +62,9 @@ class Referee:
     def _served(self, at: ClosedConfiguration, directions: Array) -> Ending:
         opposite = np.sum(directions * self.directions, axis=1) < 0
         if opposite.any():
+            there = "; the pose is the goal's" if self.same_pose(at, self.goal.pose(self.platform)) else ""
             return Ending(ANTIPODAL, f"{int(opposite.sum())} of {len(opposite)} directions end opposite to the desired "
-                                     "ones, where the error vanishes as well")
+                                     f"ones, where the error vanishes as well{there}")
         if self.same_pose(at, self.goal.pose(self.platform)):
             return Ending(GOAL, "the directions and the pose are those of the goal")
         try:

@@ -48,13 +48,15 @@ class Run:
 @dataclass(frozen=True, eq=False)
 class Loop:
     """The closed loop of a law and a robot: desired directions, steady from ``steady`` (s) on; what is sensed (None:
-    the true directions); ``moving`` is the question whose motions are all that counts."""
+    the true directions) and whether that changes smoothly with the pose (``smooth``); ``moving`` is the question whose
+    motions are all that counts."""
 
     law: Law
     moving: Question
     desired: Desired
     steady: float = 0.0
     sensed: Sense | None = None
+    smooth: bool = True
 
     def simulate(self, start: ClosedConfiguration, horizon: float) -> Run:
         """Run until it ends by itself, or ``horizon`` (s)."""
@@ -117,7 +119,7 @@ class _Stretch:
         states: list[tuple[ClosedConfiguration, Command]] = []
         try:
             y = np.zeros(self.chart.basis.shape[1])
-            solver = (LSODA(self.rate, start, y, until, **tolerances) if loop.sensed is None
+            solver = (LSODA(self.rate, start, y, until, **tolerances) if loop.smooth
                       else RK23(self.rate, start, y, until, max_step=PERIOD, **tolerances))
             while solver.status == "running":
                 solver.step()

@@ -30,6 +30,8 @@ from .result import Servo, Spread
 from .run import Loop, Run
 from .track import tracked
 
+LONGEST = 10_000.0
+"""Seconds that a run with noise or on the physics bench may take: these go on to their end."""
 LASTS, NOISY_LASTS = 60.0, 16.0
 """Time constants 1 / λ that a run may take; that it takes where measurements are noisy."""
 SETTLED = 0.5
@@ -88,28 +90,31 @@ class Scene:
 
     def horizon(self, time: float | None, noisy: bool) -> float:
         """How long a run may take (s)."""
-        if time is not None:
-            if not 0 < time < math.inf:
-                raise BadRequest("time", time, "a positive number of seconds")
-            return time
+        if time is not None and not 0 < time < math.inf:
+            raise BadRequest("time", time, "a positive number of seconds")
         steady = self.desired.duration if isinstance(self.desired, Trajectory) else 0.0
-        return steady + (NOISY_LASTS if noisy else LASTS) / self.law.gain
+        found = time or steady + (NOISY_LASTS if noisy else LASTS) / self.law.gain
+        if noisy and found > LONGEST:
+            raise BadRequest("seconds of a run with noise or physics", found,
+                             f"at most {LONGEST:g}: a shorter time, a larger gain")
+        return found
 
-    def loop(self, sensed: Sense | None = None) -> Loop:
-        """The closed loop with what is sensed."""
+    def loop(self, sensed: Sense | None = None, smooth: bool = True) -> Loop:
+        """The closed loop with what is sensed, smoothly or not."""
         steady = self.desired.duration if isinstance(self.desired, Trajectory) else 0.0
-        return Loop(self.law, self.setting.everything.question, self.desired, steady, sensed)
+        return Loop(self.law, self.setting.everything.question, self.desired, steady, sensed, smooth)
 
     def sense(self, kind: str, amount: Amount | None, lens: Camera | None, horizon: float, seed: int) -> Sense:
         """What measures the directions, and how wrong."""
         if kind == EXACT and amount is not None:
-            return Cones(amount.value, Shocks.drawn(len(self.directions), horizon, seed))
+            return Cones(amount.value, Shocks.drawn(len(self.directions), horizon, seed, amount.bias))
         mechanism, question = self.setting.mechanism, self.law.question
         rods = cylinders(mechanism, question.observations)
         eye = lens or placed(rods, question.reference, (self.start.pose, self.goal.pose))
         if kind == EDGES:
-            shocks = Shocks.drawn(2 * len(rods), horizon, seed)
-            return Edges(eye, question.reference, rods, 0.0 if amount is None else amount.value, shocks)
+            edge = amount or Amount(0.0, pixels=True)
+            shocks = Shocks.drawn(2 * len(rods), horizon, seed, edge.bias)
+            return Edges(eye, question.reference, rods, edge.value, shocks)
         drawing()
         vision()
         return Pictures(Stage(mechanism, eye, question.reference, rods))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 
 from ..analysis.setting import silent
 from ..errors import BadRequest
@@ -20,28 +21,35 @@ GAIN = 0.8
 
 def servo(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
           start: Pose | str, goal: Pose | str, gain: float = GAIN, noise: Amount | str | None = None,
-          physics: bool = False, sense: str = EXACT, lens: Camera | None = None, duration: float | None = None,
-          time: float | None = None, seed: int = 0, progress: Callable[[str], None] | None = None) -> Servo:
+          bias: bool = False, physics: bool = False, sense: str = EXACT, lens: Camera | None = None,
+          duration: float | None = None, time: float | None = None, seed: int = 0,
+          progress: Callable[[str], None] | None = None) -> Servo:
     """The servo loop of MMT 2.3 from the pose ``start`` towards the directions at ``goal``.
 
     Without dynamics, or with ``physics`` on a mock-up in MuJoCo. ``sense`` is how the directions are measured:
     ``exact`` (or with ``noise`` such as ``0.1deg`` in a cone about the true ones), ``edges`` (from the edges of the
     legs before a camera, their ends wrong by ``noise`` such as ``0.3px``) or ``pictures`` (from rendered ones);
-    ``lens`` is that camera, its pose in the link that carries it (default: where it sees all legs well). ``duration``
-    leads the desired directions along the straight way of poses in so many seconds instead of at once, ``time`` (s)
-    bounds the run. ``observe`` and ``camera`` as for ``derive``.
+    ``bias`` keeps the errors of ``noise`` as they are at first. ``lens`` is that camera, its pose in the link that
+    carries it (default: where it sees all legs well). ``duration`` leads the desired directions along the straight way
+    of poses in so many seconds instead of at once, ``time`` (s) bounds the run. ``observe`` and ``camera`` as for
+    ``derive``.
 
     Raises ``BadRequest`` for names that there are not, legs that do not see the platform, singular poses;
     ``PoseNotReached`` (exit status 2) for poses out of reach; ``MissingExtra``.
     """
     amount = Amount.parse(noise) if isinstance(noise, str) else noise
+    if bias:
+        if amount is None:
+            raise BadRequest("a bias without noise", "none", "an amount of noise, such as 0.1deg")
+        amount = replace(amount, bias=True)
     _fits(sense, amount)
     tell = progress or silent
     tell("sampling")
     scene = Scene.of(robot, observe, camera, start=start, goal=goal, gain=gain, duration=duration, seed=seed)
     noisy = sense != EXACT or amount is not None
     horizon = scene.horizon(time, noisy=noisy or physics)
-    loop = scene.loop(scene.sense(sense, amount, lens, horizon, seed) if noisy else None)
+    sensed = scene.sense(sense, amount, lens, horizon, seed) if noisy else None
+    loop = scene.loop(sensed, smooth=not noisy or (amount is not None and amount.bias))
     tell("run")
     if not physics:
         return scene.told(loop.simulate(scene.start, horizon), sense, amount)
