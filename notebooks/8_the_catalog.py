@@ -1,0 +1,137 @@
+# %% [markdown]
+# # 8. Reading the catalog
+#
+# The robots of the notebooks before are those of the papers. The catalog has some thousand architectures more: planar
+# robots, pods, deltas and spatial ones, each with its hidden robot, its verdict and the legs that must be watched.
+# This notebook puts one question to it, and reads the answer with care:
+#
+# > Which robots with three translations and motors on the base can be servoed from two observed legs?
+
+# %%
+from collections import Counter
+
+import matplotlib.pyplot as plt
+
+import hrsynth
+from hrsynth.catalog.drawing import drawing
+from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.words import parse
+
+catalog = hrsynth.catalog.load()
+print(len(catalog), "architectures")
+for (group, verdict), count in catalog.count("group", "verdict").items():
+    print(f"   {group:10}{verdict or 'refused':24}{count}")
+
+# %% [markdown]
+# An architecture is a word. It says the joints of each leg, how their axes lie, and which have motors (`*`), and says
+# nothing of lengths. Here is the Delta:
+
+# %%
+print(drawing(parse("3(Rt*-2SSt)")))
+delta = catalog["3(Rt*-2SSt)"]
+for name in ("word", "notation", "motion", "hidden", "verdict", "exact", "fewest", "minimal", "condition"):
+    print(f"{name:12}{delta.get(name)}")
+
+# %% [markdown]
+# `Rt` is a revolute joint whose axis is tangential at the leg's foot, `2SSt` the two parallel rods with their balls
+# apart along the same direction. The verdict does not belong to one geometry. *Exact* means that ranks were taken in
+# whole numbers, at a random geometry with the word's relations; where the verdict is *controllable* that proves it
+# for almost all geometries of the word.
+#
+# ## The question
+#
+# Three translations are `motion="3T"`. `base_motors` says that every motor stands on the base. `fewest` is the number
+# of legs in the smallest set that sees all that can be seen. The motors should also drive all three freedoms,
+# `driven`:
+
+# %%
+fitting = catalog.where(dof=3, motion="3T", base_motors=True, verdict="controllable", fewest=2)
+driven = [record for record in fitting if record["driven"]]
+print(len(fitting), "architectures fit,", len(driven), "of them are driven in all three freedoms")
+
+# %% [markdown]
+# That is a lot, because the catalog mixes legs of different kinds in one robot. Robots with equal legs are the usual
+# ones:
+
+# %%
+equal = [record for record in driven if "+" not in record["word"] and "|" not in record["word"]]
+print(f"{'word':36}{'notation':18}{'hidden robot':34}{'legs':6}needed")
+for record in equal:
+    sets = "  ".join("{" + ", ".join(each) + "}" for each in record["minimal"])
+    print(f"{record['word']:36}{record['notation']:18}{record['hidden']:34}{record['legs']:<6}{sets}")
+
+# %% [markdown]
+# ## How common is it?
+#
+# Of all translational robots with motors on the base, how many legs must be watched?
+
+# %%
+wanted = [record for record in catalog.where(dof=3, motion="3T", base_motors=True) if record.get("driven")]
+counts = Counter((record["verdict"], record["fewest"]) for record in wanted)
+for (verdict, fewest), count in sorted(counts.items()):
+    print(f"{count:5} {verdict}, with {fewest} legs watched")
+figure, place = plt.subplots(figsize=(6, 3.2))
+for verdict, colour in (("controllable", "tab:green"), ("partially controllable", "tab:orange"), ("uncontrollable", "tab:red")):
+    sizes = sorted({fewest for each, fewest in counts if each == verdict})
+    place.bar([str(size) for size in sizes], [counts[verdict, size] for size in sizes], color=colour, label=verdict)
+place.set(xlabel="legs of the smallest set", ylabel="architectures")
+place.legend(frameon=False)
+plt.show()
+
+# %% [markdown]
+# Two legs make sense: a direction is two numbers, and three freedoms need two of them. The robots that are not
+# controllable lose a freedom whatever is watched. Why, says the field `lost`, and what would help says `cure`:
+
+# %%
+for record in [each for each in wanted if each["verdict"] != "controllable"][:8]:
+    print(f"{record['word']:42}loses {'; '.join(record['lost'])}; cure: {record.get('cure')}")
+
+# %% [markdown]
+# ## From a word to a robot
+#
+# A word has no lengths. `mechanism` draws some, always the same for a word, and makes a robot of it. Whatever the
+# notebooks before did with a file can be done with it. Does the catalog say the truth?
+
+# %%
+robot = mechanism(parse("3(Rt*-2SSt)"), delta.get("attempt", 0))
+hidden = hrsynth.derive(robot, observe=delta["minimal"][0])
+print(hidden.hidden_architecture, "–", hidden.verdict.verdict, "–", hidden.certificate)
+hrsynth.draw(hidden)
+
+# %% [markdown]
+# The shipped Delta has the same word with the paper's dimensions, and the same verdicts. (Where legs are equal, the
+# catalog names one set for all that are like it.)
+
+# %%
+shipped = hrsynth.legs(hrsynth.load("delta"))
+print(shipped.smallest, " / ", delta["minimal"])
+
+# %% [markdown]
+# ## Exercises
+#
+# 1. Which robots of the group `pods` with equal legs have three translations, wherever their motors are?
+# 2. Which planar robots with three equal legs (`3(…)`) can be servoed at all? Compare with the table of notebook 3.
+# 3. Take a word from the list of robots that are not controllable, make a robot of it, and let `advise` find the
+#    cure. Is it that of the catalog?
+
+# %% [markdown]
+# ## Solutions
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 1. equal legs: no sum of legs in the word
+for record in catalog.where(group="pods", motion="3T"):
+    if "+" not in record["word"]:
+        print(f"{record['word']:28}{record['notation']:14}{record['verdict']:24}{record['fewest']} legs")
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 2. legs whose last segment only slides, or that meet the platform in a slide, cannot be servoed
+planar = [record for record in catalog.where(group="planar", dof=3, legs=3) if "+" not in record["word"]]
+for verdict in ("controllable", "partially controllable", "uncontrollable"):
+    print(f"{verdict:24}", *sorted({record["notation"] for record in planar if record["verdict"] == verdict}))
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 3. the catalog keeps one of the smallest cures, advise lists all of them
+record = next(each for each in wanted if each["verdict"] != "controllable" and each.get("cure"))
+advice = hrsynth.advise(mechanism(parse(record["word"]), record.get("attempt", 0)))
+print(record["word"], "– catalog:", record["cure"])
+print(advice)
