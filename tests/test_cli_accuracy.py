@@ -61,3 +61,11 @@ def test_refusals_are_one_line(capsys: pytest.CaptureFixture[str], arguments: tu
     (line,) = err.splitlines()
     assert line.startswith("hrsynth: ")
     assert word in line
+
+
+def test_a_planar_robot_has_the_plane_in_which_it_moves(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    robot = ("accuracy", "rrrrr_m1", "--cone", "0.1deg", "--steps", "9")
+    status, out, _ = told(capsys, *robot, "--plane", "z=0", "-o", str(tmp_path / "map.png"))
+    assert (status, "9 x × 9 y" in out) == (0, True)
+    status, _, err = told(capsys, *robot, "--plane", "z=0.1")
+    assert (status, "cannot change z" in err) == (2, True)

@@ -113,6 +113,8 @@ def line(name: str, count: int, seed: int) -> str:
     for pairs, (start, goal) in enumerate(far_pairs(name, seed, count), 1):
         found = run_between(name, start, goal)
         endings[found.ended] += 1
+        if pairs % 10 == 0:
+            print(f"{name}: {pairs} of {count}, {dict(endings)}, untrue {len(wrong)}", file=sys.stderr, flush=True)
         wrong += [f"  pair {pairs}, {found.start} to {found.goal}: {each}"
                   for each in [*untrue(found), *untold(found, aspects)]]
     told = ", ".join(f"{ended} {endings[ended]}" for ended in ENDINGS if endings[ended])

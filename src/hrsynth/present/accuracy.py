@@ -107,7 +107,7 @@ def _maps(field: Field, shown: list[tuple[Array, str]]) -> Any:
                 place.set_aspect("equal")
         bar = figure.colorbar(ScalarMappable(norm, COLOURS), ax=list(places), label=f"{label}, logarithmic",
                               extend="max" if np.nanmax(values) > high else "neither", shrink=0.9)
-        ticks = np.geomspace(low, high, 6)
+        ticks = np.geomspace(low, high, 6) if high > 1.3 * low else np.array([np.nanmin(values)])
         bar.set_ticks(list(ticks), labels=[np.format_float_positional(value, 2, fractional=False, trim="-")
                                          for value in ticks])
         bar.minorticks_off()

@@ -134,15 +134,14 @@ def framed(start: ClosedConfiguration, question: Question, motion: PlatformMotio
 
 
 def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None) -> tuple[Pose, tuple[str, ...]]:
-    """The plane's fixed parts and the two that vary."""
+    """The plane's fixed parts, without those that never change, and the two that vary."""
     plane = plane or Pose()
     name = start.twin.mechanism.name
+    motion.goal(plane, name)
+    plane = replace(plane, **dict.fromkeys(part for part in plane.given if part not in motion.parts))
     fixed = set(plane.given)
     turned = bool(fixed & {"phi", "rpy"})
     parts = [part for part in motion.parts if part != "rpy" and not (part == "phi" and turned)]
-    unknown = [part for part in fixed if part not in motion.parts]
-    if unknown:
-        raise BadRequest(f"{name}: the platform cannot change {unknown[0]}", str(plane), motion.parts)
     if not fixed and motion.planar:
         plane, turned = replace(plane, phi=0.0), True
     places = [part for part in parts if part in "xyz" and part not in fixed]
