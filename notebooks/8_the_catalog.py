@@ -71,7 +71,8 @@ counts = Counter((record["verdict"], record["fewest"]) for record in wanted)
 for (verdict, fewest), count in sorted(counts.items()):
     print(f"{count:5} {verdict}, with {fewest} legs watched")
 figure, place = plt.subplots(figsize=(6, 3.2))
-for verdict, colour in (("controllable", "tab:green"), ("partially controllable", "tab:orange"), ("uncontrollable", "tab:red")):
+colours = {"controllable": "tab:green", "partially controllable": "tab:orange", "uncontrollable": "tab:red"}
+for verdict, colour in colours.items():
     sizes = sorted({fewest for each, fewest in counts if each == verdict})
     place.bar([str(size) for size in sizes], [counts[verdict, size] for size in sizes], color=colour, label=verdict)
 place.set(xlabel="legs of the smallest set", ylabel="architectures")
