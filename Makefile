@@ -13,7 +13,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 COMMA := ,
-# the view of a robot in the browser, as docs/pictures/view_NAME.png
+# the view of a robot in the browser as a picture, by the name after the comma
 VIEWED = $(BIN)/hrsynth view $(1) --static $(VENV)/view.html > /dev/null && \
 	$(BIN)/python tests/browser.py $(VENV)/view.html docs/pictures/view_$(2).png 1100 760
 

@@ -11,6 +11,8 @@ import pytest
 
 from hrsynth.cli import _run
 
+pytest.importorskip("meshcat")
+
 
 def ask(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
     status = _run(["view", *arguments])

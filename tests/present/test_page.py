@@ -17,6 +17,8 @@ from browser import Tab
 from hrsynth.present.view import page
 from present.views import FIVE, seen, serving
 
+pytest.importorskip("meshcat")
+
 READY = "document.body.dataset.ready == 'yes'"
 PANEL = 300
 """Width of the panel beside the picture (pixels)."""

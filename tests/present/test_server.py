@@ -17,6 +17,8 @@ from hrsynth.present.view.server import serve
 from hrsynth.present.view.view import View
 from present.views import miss, moved, seen, serving
 
+pytest.importorskip("meshcat")
+
 FIVE_BAR = "rrrrr_m1"
 
 
