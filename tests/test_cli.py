@@ -437,6 +437,7 @@ def test_singular_refuses_in_one_line_and_writes_nothing(run, tmp_path: Path, mo
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_singular_answers_3_where_condition_and_rank_disagree(run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr("hrsynth.analysis.singularity.agreement.RANK_CUTOFF", 1e-30)
     picture = tmp_path / "locus.png"

@@ -32,7 +32,7 @@ SHIPPED = {
 """Shipped robots of which every special relation is said by a word."""
 
 
-QUICK = ("3rps", "3upu", "quattro", "uranesx")
+QUICK = ("3rps", "uranesx")
 
 
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in SHIPPED])

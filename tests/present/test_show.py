@@ -94,7 +94,7 @@ def test_a_derivation_holds_the_directions_at_the_pose_it_is_given():
     assert found.modes(at=GOAL, real=True).kind == "real"
 
 
-@pytest.mark.parametrize("command", ["modes", "servo", "singular"])
+@pytest.mark.parametrize("command", ["modes", "servo", pytest.param("singular", marks=pytest.mark.slow)])
 def test_pictures_of_results_are_shown_in_notebooks_and_saved(command: str, tmp_path):
     options = {"steps": 9} if command == "singular" else {}
     picture = hrsynth.draw(answer(command), **options)
