@@ -155,8 +155,11 @@ def test_a_name_cannot_break_the_page():
 
 def test_an_interrupt_ends_the_server_quietly():
     command = [sys.executable, "-m", "hrsynth.cli", "view", "rrrrr_m1", "--no-open"]
+    # a test run that was put into the background ignores interrupts, and its children with it
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                                env={**os.environ, "PYTHONUNBUFFERED": "1"})
+    signal.signal(signal.SIGINT, before)
     assert process.stdout is not None
     lines = []
     while "Ctrl-C" not in (line := process.stdout.readline()):
