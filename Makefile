@@ -65,7 +65,7 @@ docs: setup-all  ## run the notebooks that changed and build the site in build/s
 	@NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mkdocs build --quiet --strict
 
 bench: setup-all  ## run the benchmarks and write their table in docs/pages (some minutes)
-	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/python benchmarks/table.py docs/pages/batches.md
+	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python benchmarks/table.py docs/pages/batches.md
 
 pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again
 	@mkdir -p build docs/pictures

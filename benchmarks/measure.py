@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import resource
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from unittest import mock
 
 import numpy as np
 
 from hrsynth.analysis.setting import Setting, prepare
 from hrsynth.description import load
+from hrsynth.kinematics.batch import compiled as quick
 from hrsynth.kinematics.batch.chain import exponentials
 from hrsynth.kinematics.batch.engine import Batch
 from hrsynth.mechanism.vectors import Array
@@ -19,23 +22,30 @@ Row = tuple[str, str, str, str]
 Run = Callable[[], object]
 
 
-def least(*runs: Run, turns: int = TURNS) -> list[float]:
-    """The least processor time of each run (s), taken in turn."""
+def spent() -> float:
+    """Processor time until now (s), that of programs which were called included."""
+    called = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return time.process_time() + called.ru_utime + called.ru_stime
+
+
+@contextmanager
+def threads(count: int) -> Iterator[None]:
+    """numba's sweeps on so many threads."""
+    with mock.patch.object(quick, "THREADS", count):
+        yield
+
+
+def least(*runs: Run, turns: int = TURNS, clock: Callable[[], float] = spent) -> list[float]:
+    """The least processor time of each run (s), or time by another ``clock``, taken in turn."""
     best = [np.inf] * len(runs)
     for run in runs:
         run()
     for _ in range(turns):
         for i, run in enumerate(runs):
-            start = spent()
+            start = clock()
             run()
-            best[i] = min(best[i], spent() - start)
+            best[i] = min(best[i], clock() - start)
     return best
-
-
-def spent() -> float:
-    """Processor time until now (s), that of programs which were called included."""
-    called = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return time.process_time() + called.ru_utime + called.ru_stime
 
 
 def compiled(robot: str) -> tuple[Setting, Batch]:

@@ -7,6 +7,7 @@ prints the time and the memory of one sweep.
 
 from __future__ import annotations
 
+import os
 import resource
 import subprocess
 import sys
@@ -16,7 +17,7 @@ from dataclasses import replace
 
 import by_hand
 import numpy as np
-from measure import Row, Run, compiled, least, plane, same, told
+from measure import Row, Run, compiled, least, plane, same, threads, told
 
 from hrsynth.analysis.setting import Setting
 from hrsynth.kinematics.batch.engine import Batch
@@ -80,6 +81,9 @@ def exact_maxima() -> Iterator[Row]:
     yield told("NumPy", what, plain, mine, own, len(X))
     yield told("numba", what, numba, "a loop over Pinocchio", looped, len(X), len(some))
     yield told("NumPy", what, plain, "a loop over Pinocchio", looped, len(X), len(some))
+    with threads(cores := len(os.sched_getaffinity(0))):
+        numba, own = least(ours(True), tuned, clock=time.perf_counter)
+    yield told(f"numba, {cores} threads, by the clock", what, numba, mine, own, len(X))
 
 
 def matrices() -> Iterator[Row]:

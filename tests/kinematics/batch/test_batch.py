@@ -131,6 +131,24 @@ def test_numba_gives_the_same_numbers(robot: str, watched: int) -> None:
             assert np.all(np.abs(ours[finite] - theirs[finite]) <= allowed[finite])
 
 
+def test_threads_change_no_digit(monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("numba")
+    from hrsynth.kinematics.batch import compiled
+
+    _, batch = shipped_batch("quattro")
+    X = poses_near(batch, 10_000, 0.6)
+    found = []
+    for count in (1, 3):
+        monkeypatch.setattr(compiled, "THREADS", count)
+        found.append(batch.evaluate(X, ["1", "4"], 0.01, compiled=True))
+    one, several = found
+    assert one.position is not None
+    assert several.position is not None
+    assert 0 < one.reached.sum() < len(X)
+    assert np.array_equal(one.matrix, several.matrix, equal_nan=True)
+    assert np.array_equal(one.position.largest, several.position.largest, equal_nan=True)
+
+
 def sampled_error(M: Array, rows: Array, u: Array, cone: float, rng: np.random.Generator) -> float:
     """The largest error over random admissible errors of the directions, by definition."""
     J = rows @ np.linalg.pinv(M)

@@ -21,11 +21,27 @@ NEIGHBOUR = 0.04
 """Square of the slope, in parts of the maximum, up to which the answer at the pose before is a start."""
 
 
-def _jit(function: Callable[..., Any]) -> Any:
+def _jit(function: Callable[..., Any], **options: Any) -> Any:
     """The function compiled when it is first called, or read from the cache of an earlier run."""
     from numba import njit
 
-    return njit(cache=True, error_model="numpy", fastmath={"contract"})(function)
+    return njit(cache=True, nogil=True, error_model="numpy", fastmath={"contract"}, **options)(function)
+
+
+def _threads() -> int:
+    """The cores that the process may use, or fewer if NUMBA_NUM_THREADS says so."""
+    from numba import config
+
+    return int(vars(config)["NUMBA_NUM_THREADS"])
+
+
+def _inlined(function: Callable[..., Any]) -> Any:
+    """The same, written out where it is called: an array that is handed over costs numba more than a few products."""
+    return _jit(function, inline="always")
+
+
+THREADS = _threads()
+"""Threads that go through a sweep."""
 
 
 @_jit
@@ -93,7 +109,7 @@ def top(B, w):  # type: ignore[no-untyped-def]
     return ee - half + size
 
 
-@_jit
+@_inlined
 def direct(B, C, w, warm):  # type: ignore[no-untyped-def]
     """The maximum of two cones by Newton's method on the sphere from ``w``, if it is proved to be the maximum; −1
     otherwise, and, where the start is ``warm`` (a neighbour's answer), if that is far from here.
@@ -150,7 +166,7 @@ def direct(B, C, w, warm):  # type: ignore[no-untyped-def]
     return -1.0
 
 
-@_jit
+@_inlined
 def two(B, C, S, w, near):  # type: ignore[no-untyped-def]
     """The exact maximum of two cones: directly from the pose before (``near``, made this one's w), directly from a
     start of its own, or by false position on the weight (``cones._two``)."""
@@ -262,7 +278,7 @@ def several(B, S, w, here, there, starts):  # type: ignore[no-untyped-def]
     return max(upper, lower), lower
 
 
-@_jit
+@_inlined
 def rod(kind, limbs, leg, watched, x, y, z):  # type: ignore[no-untyped-def]
     """1 / |BC|, u and the tangent of B's path, for C at (x, y, z) seen from the limb's centre; a negative length where
     the leg does not reach (``plain.rod``); no more than that is worked out of a leg that is not watched."""
@@ -301,7 +317,7 @@ def rod(kind, limbs, leg, watched, x, y, z):  # type: ignore[no-untyped-def]
             ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx)
 
 
-@_jit
+@_inlined
 def from_centre(limbs, leg, X, p, i):  # type: ignore[no-untyped-def]
     """The leg's tip at pose i, seen from its limb's centre."""
     bx, by, bz = limbs[leg, 3], limbs[leg, 4], limbs[leg, 5]
@@ -310,7 +326,7 @@ def from_centre(limbs, leg, X, p, i):  # type: ignore[no-untyped-def]
             p[2] + X[i, 2, 0] * bx + X[i, 2, 1] * by + X[i, 2, 2] * bz + (limbs[leg, 8] - limbs[leg, 11]))
 
 
-@_jit
+@_inlined
 def rows(kind, limbs, leg, span, p, X, U, M, i, place):  # type: ignore[no-untyped-def]
     """u and the leg's rows of Mᵀ at pose i, where it is watched (``place`` ≥ 0); False where the leg does not reach
     (``plain.block``)."""
@@ -367,7 +383,7 @@ def rows(kind, limbs, leg, span, p, X, U, M, i, place):  # type: ignore[no-untyp
     return True
 
 
-@_jit
+@_inlined
 def factor(M, pose, Q, T):  # type: ignore[no-untyped-def]
     """M[pose] = Q T by Gram and Schmidt, the rows of a leg at a time; False where a column depends on those before it
     (``spread._orthogonal``). The diagonal of T is left inverted."""
@@ -403,7 +419,7 @@ def factor(M, pose, Q, T):  # type: ignore[no-untyped-def]
     return smallest > RANK_CUTOFF * sqrt(whole)
 
 
-@_jit
+@_inlined
 def single_freedom(span, part, T, Q, cones, only, P):  # type: ignore[no-untyped-def]
     """The largest error where it lies along ``only[part]``: one row of the same."""
     d, total = T.shape[0], 0.0
@@ -421,7 +437,7 @@ def single_freedom(span, part, T, Q, cones, only, P):  # type: ignore[no-untyped
     return total
 
 
-@_jit
+@_inlined
 def maxima(span, part, T, Q, cones, only, single, P, B, S, w, near, terms, weights, starts):  # type: ignore[no-untyped-def]
     """Largest error and its lower bound for the rows of position (``part`` 0) or of orientation (1)
     (``spread._spread``)."""

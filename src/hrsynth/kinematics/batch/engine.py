@@ -182,7 +182,9 @@ class Batch:
         return compiled
 
     def _compiled(self, X: Array, watched: Sequence[str], cones: Array | None) -> Evaluation:
-        from .compiled import swept
+        from concurrent.futures import ThreadPoolExecutor
+
+        from .compiled import THREADS, swept
 
         limbs = {name: leg for name, leg in self.legs.items() if isinstance(leg, Limb)}
         n, k, d = len(X), len(watched), self._span.shape[1]
@@ -192,10 +194,19 @@ class Batch:
         half = np.zeros(0) if cones is None else np.ascontiguousarray(cones)
         only = [freedom(part[:, :, None]) for part in (self._span[:3], self._span[3:])]
         single = np.array([2 if each is None else int(each.any()) for each in only])
-        swept(np.array([int(limb.kind) for limb in limbs.values()]), np.array([limb.row() for limb in limbs.values()]),
-              np.array([names.index(name) for name in watched]), self._span, np.ascontiguousarray(X),
-              np.array(self.stage.point), half, np.array([np.zeros(3) if each is None else each for each in only]),
-              single, reached, clear, U, M, found)
+        robot = (np.array([int(limb.kind) for limb in limbs.values()]),
+                 np.array([limb.row() for limb in limbs.values()]),
+                 np.array([names.index(name) for name in watched]), self._span)
+        cone = (np.array(self.stage.point), half,
+                np.array([np.zeros(3) if each is None else each for each in only]), single)
+        X = np.ascontiguousarray(X)
+
+        def part(start: int) -> None:
+            here = slice(start, start + CHUNK)
+            swept(*robot, X[here], *cone, *(each[here] for each in (reached, clear, U, M, found)))
+
+        with ThreadPoolExecutor(THREADS) as pool:
+            list(pool.map(part, range(0, n, CHUNK)))
         position = orientation = None
         if cones is not None:
             if not clear.all():
