@@ -57,6 +57,7 @@ def test_every_exercise_has_its_solution(script: Path):
     assert all("source_hidden" in cell.splitlines()[0] for cell in solutions)
 
 
+@pytest.mark.slow
 def test_the_first_notebook_runs_as_a_script(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]):
     """As plain Python, for which no Jupyter is needed."""
     monkeypatch.setenv("MPLBACKEND", "Agg")

@@ -72,10 +72,10 @@ def test_newton_on_the_pose_finds_the_same_solutions(name: str):
 
 
 @pytest.mark.slow
+@pytest.mark.parametrize("seed", [100, *(pytest.param(seed, marks=pytest.mark.long) for seed in (101, 102))])
 @pytest.mark.parametrize("name", ALL)
-def test_newton_on_the_pose_finds_the_same_solutions_everywhere(name: str):
-    for seed in range(100, 103):
-        check_by_newton(name, seed, 2500)
+def test_newton_on_the_pose_finds_the_same_solutions_everywhere(name: str, seed: int):
+    check_by_newton(name, seed, 2500)
 
 
 def planar_by_sympy(centres: list[tuple[int, int]], radii: list[int], tips: list[tuple[int, int]]) -> sympy.Poly:

@@ -112,8 +112,8 @@ REAL = {
 CASES = {**{(name, None, False): each for name, each in WHOLE.items()},
          **{(name, legs, False): each for (name, legs), each in SOME.items()},
          **{(name, None, True): each for name, each in REAL.items()}}
-HEAVY = {"6pus", "hexa", "gough_stewart"}
-"""Six watched legs on a free platform: seconds of search for a singular pose."""
+HEAVY = {"6pus", "hexa", "gough_stewart", "quattro"}
+"""Many watched legs: seconds of search for a singular pose."""
 
 
 def test_the_table_has_every_shipped_robot() -> None:
