@@ -74,8 +74,7 @@ def maxima(M: Array, cone: float) -> tuple[Array, Array]:
 
 
 def maxima_tuned(M: Array, cone: float) -> tuple[Array, Array]:
-    """The same by the package's own method, written out for this robot: Gram and Schmidt, and eigenvalues in closed
-    form, components first."""
+    """The same, tuned: Gram and Schmidt, and eigenvalues in closed form, components first."""
     Q, R = np.ascontiguousarray(M.transpose(1, 2, 0)), np.zeros((4, 4, len(M)))
     for j in range(4):
         R[j, j] = np.sqrt(np.einsum("rn,rn->n", Q[:, j], Q[:, j]))

@@ -74,7 +74,7 @@ def exact_maxima() -> Iterator[Row]:
     (looped,) = least(loop, turns=3)
     what = "Mᵀ and both exact error maxima, quattro, two legs, 40,401 poses"
     linear = "NumPy for this robot, `linalg`"
-    mine = "NumPy for this robot, our own method"
+    mine = "NumPy for this robot, eigenvalues in closed form"
     yield told("numba", what, numba, linear, by, len(X))
     yield told("NumPy", what, plain, linear, by, len(X))
     yield told("numba", what, numba, mine, own, len(X))

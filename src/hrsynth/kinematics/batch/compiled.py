@@ -11,12 +11,10 @@ from typing import Any
 import numpy as np
 
 from ...tolerances import RANK_CUTOFF
-from .cones import BISECTIONS, CLIMBS, EXACT, HALVINGS, MEETING, ROUNDS, TIGHT
+from .cones import BISECTIONS, CLIMBS, EXACT, HALVINGS, MEETING, NEWTON, NOTHING, ROUNDS, STARTS, TIGHT
 from .limb import Kind
 
 CONSTANT, TURNING, DISTANCE, CIRCLE, LINE = (int(kind) for kind in list(Kind)[:5])
-NEWTON = 12
-"""Steps after which the direct way to the maximum of two cones is given up."""
 NEIGHBOUR = 0.04
 """Square of the slope, in parts of the maximum, up to which the answer at the pose before is a start."""
 
@@ -111,15 +109,12 @@ def top(B, w):  # type: ignore[no-untyped-def]
 
 @_inlined
 def direct(B, C, w, warm):  # type: ignore[no-untyped-def]
-    """The maximum of two cones by Newton's method on the sphere from ``w``, if it is proved to be the maximum; −1
-    otherwise, and, where the start is ``warm`` (a neighbour's answer), if that is far from here.
-
-    A stationary w is an eigenvector of S = B / t + C / (1 − t), t = a / (a + b); it is the maximum if no eigenvalue is
-    larger.
-    """
+    """The maximum of two cones by Newton's method on the sphere from ``w``, which becomes where it ended, if it is
+    proved to be the maximum (``cones._direct``); −1 otherwise, and, where the start is ``warm`` (a neighbour's answer),
+    if that is far from here."""
     B0, B1, B2, B3, B4, B5 = B[0], B[1], B[2], B[3], B[4], B[5]
     C0, C1, C2, C3, C4, C5 = C[0], C[1], C[2], C[3], C[4], C[5]
-    least_a, least_b = 1e-20 * (B0 + B1 + B2), 1e-20 * (C0 + C1 + C2)
+    least_a, least_b = NOTHING * (B0 + B1 + B2), NOTHING * (C0 + C1 + C2)
     x, y, z = w[0], w[1], w[2]
     for _ in range(NEWTON):
         bx, by, bz = B0 * x + B3 * y + B4 * z, B3 * x + B1 * y + B5 * z, B4 * x + B5 * y + B2 * z
@@ -152,35 +147,42 @@ def direct(B, C, w, warm):  # type: ignore[no-untyped-def]
         hef = sef - be * bf * ia - ce * cf * ib
         hff = sff - bf * bf * ia - cf * cf * ib - total
         det = hee * hff - hef * hef
-        if det <= 0.0 or hee >= 0.0:
-            return -1.0
-        short = 1 / det
-        along_e, along_f = (hef * gf - hff * ge) * short, (hef * ge - hee * gf) * short
-        if along_e * ge + along_f * gf <= EXACT * total:
-            w[0], w[1], w[2] = x, y, z
-            proved = (total - see) * (total - sff) >= sef * sef and total >= see
-            return total if proved else -1.0
-        x, y, z = (x + along_e * ex + along_f * fx, y + along_e * ey + along_f * fy, z + along_e * ez + along_f * fz)
+        if det > 0.0 and hee < 0.0:
+            short = 1 / det
+            along_e, along_f = (hef * gf - hff * ge) * short, (hef * ge - hee * gf) * short
+            if along_e * ge + along_f * gf <= EXACT * total:
+                w[0], w[1], w[2] = x, y, z
+                proved = (total - see) * (total - sff) >= sef * sef and total >= see
+                return total if proved else -1.0
+            x, y, z = (x + along_e * ex + along_f * fx, y + along_e * ey + along_f * fy,
+                       z + along_e * ez + along_f * fz)
+        else:
+            x, y, z = bx * ia + cx * ib, by * ia + cy * ib, bz * ia + cz * ib
         size = 1 / sqrt(x * x + y * y + z * z)
         x, y, z = x * size, y * size, z * size
+    w[0], w[1], w[2] = x, y, z
     return -1.0
 
 
 @_inlined
 def two(B, C, S, w, near):  # type: ignore[no-untyped-def]
-    """The exact maximum of two cones: directly from the pose before (``near``, made this one's w), directly from a
-    start of its own, or by false position on the weight (``cones._two``)."""
+    """The exact maximum of two cones: directly from the pose before (``near``, made this one's w), directly from starts
+    of its own (``cones._two``), or by false position on the weight (``cones._weighed``)."""
     value = direct(B, C, near, True)
     if value >= 0.0:
         return value
     first, second = sqrt(B[0] + B[1] + B[2]), sqrt(C[0] + C[1] + C[2])
-    if first > 0.0 and second > 0.0:
+    a, b = first, second
+    for _ in range(STARTS):
+        if a <= 0.0 or b <= 0.0:
+            break
         for i in range(6):
-            S[i] = B[i] / first + C[i] / second
+            S[i] = B[i] / a + C[i] / b
         top(S, near)
         value = direct(B, C, near, False)
         if value >= 0.0:
             return value
+        a, b = along(B, near), along(C, near)
     if first + second == 0.0:
         return 0.0
     t, low, high, below, above, value = first / (first + second), 0.0, 1.0, first, -second, np.inf

@@ -17,6 +17,12 @@ from ...mechanism.vectors import Array
 
 EXACT = 1e-14
 """Gap between the bounds, relative, at which a maximum of two cones is found."""
+NEWTON = 12
+"""Steps after which the direct way to the maximum of two cones is given up."""
+STARTS = 3
+"""Starts of that way: the later ones from the end of the one before, where another maximum is larger."""
+NOTHING = 1e-20
+"""Part of a cone's largest squared error below which its term has no derivative worth the name."""
 HALVINGS = 60
 """Evaluations after which the search of two cones' weights ends."""
 MEETING = -0.9
@@ -83,14 +89,9 @@ def _null(x: Array, y: Array, z: Array, f: Array, g: Array, h: Array) -> Array:
 def _upper_two(B: Array, smallest: Array) -> tuple[Array, Array]:
     """The largest eigenvalue and its eigenvector from the smallest eigenvalue."""
     v = _null(B[0] - smallest, B[1] - smallest, B[2] - smallest, B[3], B[4], B[5])
-    flat = np.abs(v[2]) < 0.7
-    zero = np.zeros_like(v[0])
-    e = np.stack((np.where(flat, -v[1], zero), np.where(flat, v[0], -v[2]), np.where(flat, zero, v[1])))
-    e /= np.sqrt(e[0] * e[0] + e[1] * e[1] + e[2] * e[2])
-    f = np.stack((v[1] * e[2] - v[2] * e[1], v[2] * e[0] - v[0] * e[2], v[0] * e[1] - v[1] * e[0]))
-    Be = np.stack((B[0] * e[0] + B[3] * e[1] + B[4] * e[2], B[3] * e[0] + B[1] * e[1] + B[5] * e[2],
-                   B[4] * e[0] + B[5] * e[1] + B[2] * e[2]))
-    ee, ef = e[0] * Be[0] + e[1] * Be[1] + e[2] * Be[2], f[0] * Be[0] + f[1] * Be[1] + f[2] * Be[2]
+    e, f = _tangents(v)
+    Be = _times(B, e)
+    ee, ef = _dot(e, Be), _dot(f, Be)
     half = (ee - (B[0] + B[1] + B[2] - smallest - ee)) / 2
     size = np.sqrt(half * half + ef * ef)
     cosine, sine = np.where(half >= 0, half + size, ef), np.where(half >= 0, ef, size - half)
@@ -99,7 +100,79 @@ def _upper_two(B: Array, smallest: Array) -> tuple[Array, Array]:
     return ee - half + size, e * cosine + f * (sine / np.where(length > 0, length, 1.0))
 
 
+def _tangents(v: Array) -> tuple[Array, Array]:
+    """Two unit vectors (3, n) that make a right-handed triad with unit vectors v."""
+    flat = np.abs(v[2]) < 0.7
+    zero = np.zeros_like(v[0])
+    e = np.stack((np.where(flat, -v[1], zero), np.where(flat, v[0], -v[2]), np.where(flat, zero, v[1])))
+    e /= np.sqrt(_dot(e, e))
+    return e, np.stack((v[1] * e[2] - v[2] * e[1], v[2] * e[0] - v[0] * e[2], v[0] * e[1] - v[1] * e[0]))
+
+
+def _dot(v: Array, w: Array) -> Array:
+    return np.asarray(v[0] * w[0] + v[1] * w[1] + v[2] * w[2])
+
+
+def _times(B: Array, w: Array) -> Array:
+    """B w, (3, n)."""
+    x, y, z = w
+    return np.stack((B[0] * x + B[3] * y + B[4] * z, B[3] * x + B[1] * y + B[5] * z, B[4] * x + B[5] * y + B[2] * z))
+
+
 def _two(B: Array, C: Array) -> tuple[Array, Array]:
+    """The exact maximum of two cones: by Newton's method, started again where another maximum is larger, and by the
+    weights of its dual where that proves nothing."""
+    value, rest, here, there = np.full(B.shape[1], np.nan), np.arange(B.shape[1]), B, C
+    a, b = np.sqrt(B[0] + B[1] + B[2]), np.sqrt(C[0] + C[1] + C[2])
+    for _ in range(STARTS):
+        w = top(here / np.where(a > 0, a, 1.0) + there / np.where(b > 0, b, 1.0))[1]
+        value[rest], w = _direct(here, there, w)
+        open_ = np.isnan(value[rest])
+        if not open_.any():
+            return value, value
+        rest, here, there, w = rest[open_], here[:, open_], there[:, open_], w[:, open_]
+        a, b = along(here, w), along(there, w)
+    value[rest] = _weighed(here, there)
+    return value, value
+
+
+@np.errstate(divide="ignore", invalid="ignore")
+def _direct(B: Array, C: Array, w: Array) -> tuple[Array, Array]:
+    """The maximum of two cones by Newton's method on the sphere from w (3, n), NaN where it is not proved, and the w
+    where it ended; where the sum is not concave, a step of the ascent is made instead.
+
+    A stationary w is an eigenvector of S = B / a + C / b, a = √(wᵀBw) and b = √(wᵀCw), to the eigenvalue a + b; it is
+    the maximum if no other is larger.
+    """
+    value, ends, live = np.full(B.shape[1], np.nan), w.copy(), np.arange(B.shape[1])
+    for _ in range(NEWTON):
+        Bw, Cw = _times(B, w), _times(C, w)
+        aa, bb = _dot(w, Bw), _dot(w, Cw)
+        sound = (aa > NOTHING * (B[0] + B[1] + B[2])) & (bb > NOTHING * (C[0] + C[1] + C[2]))
+        a, b = np.sqrt(aa), np.sqrt(bb)
+        total, S, (e, f) = a + b, B / a + C / b, _tangents(w)
+        be, bf, ce, cf = _dot(Bw, e) / a, _dot(Bw, f) / a, _dot(Cw, e) / b, _dot(Cw, f) / b
+        Se = _times(S, e)
+        ee, ef, ff = _dot(Se, e) - total, _dot(Se, f), _dot(_times(S, f), f) - total
+        hee, hef, hff = ee - be * be / a - ce * ce / b, ef - be * bf / a - ce * cf / b, ff - bf * bf / a - cf * cf / b
+        ge, gf, det = be + ce, bf + cf, hee * hff - hef * hef
+        onto_e, onto_f = (hef * gf - hff * ge) / det, (hef * ge - hee * gf) / det
+        rising = sound & (det > 0) & (hee < 0)
+        there = rising & (onto_e * ge + onto_f * gf <= EXACT * total)
+        proved = there & (ee * ff >= ef * ef) & (ee <= 0)
+        value[live[proved]] = total[proved]
+        open_ = sound & ~there
+        if not open_.any():
+            break
+        w = np.where(rising, w + onto_e * e + onto_f * f, Bw / a + Cw / b)
+        w = w / np.sqrt(_dot(w, w))
+        ends[:, live] = w
+        if not open_.all():
+            live, B, C, w = live[open_], B[:, open_], C[:, open_], w[:, open_]
+    return value, ends
+
+
+def _weighed(B: Array, C: Array) -> Array:
     """The exact maximum of two cones, the least upper bound: at the weight t where a (1 − t) − b t changes its sign, by
     the rule of false position on a bracket; a and b are the two terms at the eigenvector. Where the largest eigenvalue
     is double there, the sign changes by a jump."""
@@ -130,7 +203,7 @@ def _two(B: Array, C: Array) -> tuple[Array, Array]:
         if not open_.all():
             live, B, C = live[open_], B[:, open_], C[:, open_]
             t, low, high, below, above = t[open_], low[open_], high[open_], below[open_], above[open_]
-    return value, value
+    return value
 
 
 def _several(B: Sequence[Array]) -> tuple[Array, Array]:

@@ -246,9 +246,9 @@ class Batch:
             feasible, there = self._feasible(list(ends.values()))
             reached &= there
             rows, twists = np.einsum("rcn,ncd->rdn", rows, feasible), twists @ feasible
+        position, orientation = (None, None) if cones is None else _where(reached, rows, twists, cones)
         if not reached.all():
             u[..., ~reached], rows[..., ~reached] = np.nan, np.nan
-        position, orientation = (None, None) if cones is None else spreads(rows, twists, cones)
         return Evaluation(reached, u.transpose(2, 0, 1), rows.transpose(2, 0, 1), twists, position, orientation,
                           tuple(self.normals[name] for name in watched))
 
@@ -275,6 +275,16 @@ class Batch:
         ends = [self._led(chain, self.home[None]) for chain in self.chains.values()]
         rows = np.concatenate([each.wrenches() for each in ends], axis=1)[0]
         return np.linalg.svd(rows)[2][rows.shape[1] - self.stage.dof :].T
+
+
+def _where(reached: Flags, rows: Array, twists: Array, cones: Array) -> tuple[Spread, Spread]:
+    """The error maxima at the poses that are reached, NaN at the others."""
+    if reached.all():
+        return spreads(rows, twists, cones)
+    found = spreads(rows[..., reached], twists if twists.ndim == 2 else twists[reached], cones)
+    columns = np.full((4, len(reached)), np.nan)
+    columns[:, reached] = [each for spread in found for each in (spread.largest, spread.lower)]
+    return Spread(*columns[:2]), Spread(*columns[2:])
 
 
 def _axis_of(u: Array) -> Array | None:
