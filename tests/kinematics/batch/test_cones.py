@@ -1,4 +1,4 @@
-"""The maximum of two cones is the best end of an ascent from everywhere, of all kinds of forms, in NumPy and by numba."""
+"""The maximum of two cones is the best end of an ascent from everywhere, for all kinds of forms, in NumPy and numba."""
 
 from __future__ import annotations
 
