@@ -18,7 +18,7 @@ VIEWED = $(BIN)/hrsynth view $(1) --static $(VENV)/view.html > /dev/null && \
 	$(BIN)/python tests/browser.py $(VENV)/view.html docs/pictures/view_$(2).png 1100 760
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz bounds bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long fuzz bounds endings bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -63,6 +63,9 @@ notebooks: setup-all  ## write notebooks/*.ipynb from their scripts, without out
 
 docs: setup-all  ## run the notebooks that changed and build the site in build/site
 	@NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mkdocs build --quiet --strict
+
+endings: setup-dev  ## how 100 far servo runs of every robot end, checked, as the table in docs/pages (half an hour)
+	@cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m servo.far 100 -o ../docs/pages/endings.md
 
 bench: setup-all  ## run the benchmarks and write their table in docs/pages (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python benchmarks/table.py docs/pages/batches.md

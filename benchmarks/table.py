@@ -8,7 +8,6 @@ has compiled. Both sides compute the same thing, which is checked. Without a fil
 
 from __future__ import annotations
 
-import re
 import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
@@ -17,7 +16,9 @@ from measure import Row
 from others import catalog, derivations, jacobians, modes
 from sweeps import exact_maxima, growth, matrices
 
-MARKS = re.compile(r"(<!-- generated: benchmarks -->\n).*?(<!-- end -->)", re.DOTALL)
+from hrsynth.present.readme import replaced
+
+START = "<!-- generated: benchmarks -->"
 
 
 def main(arguments: Sequence[str]) -> None:
@@ -27,10 +28,8 @@ def main(arguments: Sequence[str]) -> None:
         print(table)
         return
     file = Path(arguments[0])
-    text = file.read_text(encoding="utf-8")
-    if not MARKS.search(text):
-        raise SystemExit(f"{file}: no marks of the table")
-    file.write_text(MARKS.sub(lambda match: match[1] + table + match[2], text), encoding="utf-8", newline="\n")
+    made = replaced(file.read_text(encoding="utf-8"), table, START)
+    file.write_text(made, encoding="utf-8", newline="\n")
 
 
 def lines() -> Iterator[Row]:

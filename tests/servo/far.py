@@ -1,7 +1,7 @@
 """Far pairs: how runs between random poses end, and which endings are not what their names say.
 
-``python -m servo.far 100 3rpr_m1 delta`` (from ``tests/``) runs so many pairs of each robot and prints a table; without
-names of all controllable robots.
+``python -m servo.far 100 3rpr_m1 delta`` (from ``tests/``) runs so many pairs of each robot and prints a table, without
+names of all controllable robots; ``-o FILE`` writes it between the marks of a page. Two robots at a time.
 """
 
 from __future__ import annotations
@@ -9,6 +9,8 @@ from __future__ import annotations
 import sys
 from collections import Counter
 from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
 
 import numpy as np
 
@@ -20,6 +22,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction
 from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism.vectors import hat, rotation_from_rpy
+from hrsynth.present.readme import replaced
 from hrsynth.servo.desired import Step
 from hrsynth.servo.ending import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
 from hrsynth.servo.law import Law, directions
@@ -28,6 +31,7 @@ from hrsynth.servo.run import FAR
 from hrsynth.servo.scene import EXACT, Scene
 from servo.scenes import CONTROLLABLE, far_pairs, setting
 
+START = "<!-- generated: endings -->"
 VANISHED, THERE = 1e-9, 1e-6
 """‖e‖ that counts as zero; how far (m, rotation matrices) the pose may be from the mode it is said to be."""
 
@@ -107,25 +111,39 @@ def untold(found: Servo, aspects: Aspects) -> Iterator[str]:
         yield f"{len(crossed)} crossings, the condition goes from {values[0]:.3g} to {values[1]:.3g}"
 
 
-def line(name: str, count: int, seed: int) -> str:
-    """A robot's line of the table; what is untrue is told below it."""
+def line(name: str, count: int, seed: int = 4) -> tuple[str, list[str]]:
+    """A robot's line of the table, and what is untrue in it."""
     aspects, endings, wrong, pairs = Aspects.of(load(name)), Counter[str](), [], 0
     for pairs, (start, goal) in enumerate(far_pairs(name, seed, count), 1):
         found = run_between(name, start, goal)
         endings[found.ended] += 1
+        wrong += [f"{name}, pair {pairs}, {found.start} to {found.goal}: {each}"
+                  for each in [*untrue(found), *untold(found, aspects)]]
         if pairs % 10 == 0:
             print(f"{name}: {pairs} of {count}, {dict(endings)}, untrue {len(wrong)}", file=sys.stderr, flush=True)
-        wrong += [f"  pair {pairs}, {found.start} to {found.goal}: {each}"
-                  for each in [*untrue(found), *untold(found, aspects)]]
-    told = ", ".join(f"{ended} {endings[ended]}" for ended in ENDINGS if endings[ended])
-    return "\n".join([f"{name}: {pairs} pairs, {told}; untrue {len(wrong)}", *wrong])
+    return row(f"`{name}`", pairs, *(endings[ended] or "–" for ended in ENDINGS), len(wrong)), wrong
+
+
+def row(*cells: object) -> str:
+    return f"| {' | '.join(map(str, cells))} |\n"
 
 
 def main(arguments: list[str]) -> None:
-    """Print the table."""
-    count, *names = arguments
-    for name in names or CONTROLLABLE:
-        print(line(name, int(count), 4), flush=True)
+    """Print or write the table; the exit status is 1 where something is untrue."""
+    page = arguments.pop() if "-o" in arguments else None
+    count, *names = [each for each in arguments if each != "-o"]
+    names = names or CONTROLLABLE
+    with ProcessPoolExecutor(2) as pool:
+        found = list(pool.map(line, names, [int(count)] * len(names)))
+    heads = ("robot", "pairs", *ENDINGS, "untrue")
+    table = row(*heads) + row("---", *["---:"] * (len(heads) - 1)) + "".join(told for told, _ in found)
+    if page is None:
+        print(table)
+    else:
+        text = Path(page).read_text(encoding="utf-8")
+        Path(page).write_text(replaced(text, table, START), encoding="utf-8", newline="\n")
+    wrong = [each for _, some in found for each in some]
+    sys.exit("\n".join(wrong) or None)
 
 
 if __name__ == "__main__":
