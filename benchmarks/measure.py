@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import os
 import resource
+import subprocess
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from unittest import mock
 
@@ -46,6 +48,14 @@ def least(*runs: Run, turns: int = TURNS, clock: Callable[[], float] = spent) ->
             run()
             best[i] = min(best[i], clock() - start)
     return best
+
+
+def alone(command: Sequence[str]) -> tuple[float, float]:
+    """Processor time (s) and most memory (MB) of a command."""
+    _, status, used = os.wait4(subprocess.Popen(command, stdout=subprocess.DEVNULL).pid, 0)
+    if status:
+        raise SystemExit(f"{' '.join(command)}: status {status}")
+    return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
 
 
 def compiled(robot: str) -> tuple[Setting, Batch]:

@@ -8,10 +8,11 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
-from measure import Row, least, spent
+from measure import Row, alone, least, spent
 
 sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
@@ -35,6 +36,8 @@ SYSTEMS, EXTERNAL = 12, 3
 """Instances of each family of assembly modes, and how many of them msolve is given."""
 EVALUATIONS = 2000
 """Evaluations of the loops' Jacobian in a turn."""
+GROWTH = (500, 1600, 5000)
+"""Words of the catalog that are made in one build."""
 EXACT, WHOLE, CORES = 12, 3, 2
 """Words of each group of the catalog of which the exact verdict is made on each core, and the whole entry; cores."""
 
@@ -135,6 +138,11 @@ def catalog() -> Iterator[Row]:
     rate = len(words) / (spent() - start)
     yield (f"whole entries of {len(words)} words ({refused} refused), drawing, derivation and confirmation included",
            f"{rate:.1f} a second on one core", "nobody's", "–")
+    with TemporaryDirectory() as folder:
+        cells = ["{:.0f} s, {:.0f} MB".format(*alone([
+            sys.executable, "-m", "hrsynth.cli", "catalog", "build", "planar", "-o", f"{folder}/{count}", "--limit",
+            str(count)])) for count in GROWTH]
+    yield f"catalog build planar, the first {', '.join(f'{count:,}' for count in GROWTH)}", "; ".join(cells), "–", "–"
 
 
 def verdicts(seed: int) -> float:

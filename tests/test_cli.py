@@ -14,7 +14,7 @@ import pytest
 import hrsynth
 from description.samples import FOUR_BAR
 from description.test_defects import DEFECTS, edited
-from hrsynth.cli import _run
+from hrsynth.cli import execute
 from hrsynth.description import shipped
 
 FIELDS = {
@@ -68,7 +68,7 @@ def run(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
 
     def call(*arguments: str | Path) -> Answer:
         capfd.readouterr()
-        status = _run([str(argument) for argument in arguments])
+        status = execute([str(argument) for argument in arguments])
         return Answer(status, *capfd.readouterr())
 
     return call

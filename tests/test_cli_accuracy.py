@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from hrsynth.cli import _run
+from hrsynth.cli import execute
 
 QUATTRO = ("accuracy", "quattro", "--observe", "1,4", "--cone", "0.1deg")
 
 
 def told(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    status = _run(list(arguments))
+    status = execute(list(arguments))
     out, err = capsys.readouterr()
     return status, out, err
 

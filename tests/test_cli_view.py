@@ -9,13 +9,13 @@ from pathlib import Path
 
 import pytest
 
-from hrsynth.cli import _run
+from hrsynth.cli import execute
 
 pytest.importorskip("meshcat")
 
 
 def ask(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
-    status = _run(["view", *arguments])
+    status = execute(["view", *arguments])
     out, err = capfd.readouterr()
     return status, out, err
 

@@ -29,7 +29,7 @@ FOLDERS = [
     {"selection"},
     {"present"},
     {"catalog"},
-    {"cli", "cli_catalog", "__main__"},
+    {"cli", "__main__"},
 ]
 LEVEL = {name: level for level, names in enumerate(FOLDERS) for name in names}
 

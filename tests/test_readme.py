@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 from hrsynth.catalog import readme as catalog
-from hrsynth.cli import _run
+from hrsynth.cli import execute
 from hrsynth.description import shipped
 from hrsynth.families.replays import REPLAYS, SIMULATED
 from hrsynth.present import readme, replays
@@ -83,7 +83,7 @@ def test_the_commands_print_what_the_readme_shows(command: str, capsys: pytest.C
     if command.startswith("view "):
         pytest.importorskip("meshcat")
     monkeypatch.chdir(tmp_path)
-    assert _run(shlex.split(command)) == 0
+    assert execute(shlex.split(command)) == 0
     printed = {_plain(line) for line in capsys.readouterr().out.splitlines()}
     shown = re.search(re.escape(f"$ hrsynth {command}\n") + r"(.*?)\n(?:```|\n?\$ )", TEXT, re.DOTALL)[1]
     missing = [line for line in shown.splitlines() if line.strip() not in ("", "…") and _plain(line) not in printed]

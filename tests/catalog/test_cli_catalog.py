@@ -17,8 +17,8 @@ from hrsynth.catalog import load
 from hrsynth.catalog.build import build
 from hrsynth.catalog.drawing import drawing
 from hrsynth.catalog.words import parse
-from hrsynth.cli import _run
-from hrsynth.cli_catalog import Meter
+from hrsynth.cli import execute
+from hrsynth.cli.progress import Meter
 
 
 @pytest.fixture
@@ -30,7 +30,7 @@ def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
 
     def call(*arguments: str | Path) -> tuple[int, str, str]:
         capsys.readouterr()
-        return _run(["catalog", *map(str, arguments)]), *capsys.readouterr()
+        return execute(["catalog", *map(str, arguments)]), *capsys.readouterr()
 
     return call
 

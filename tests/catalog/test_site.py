@@ -26,7 +26,7 @@ from hrsynth.catalog.site.pages import trace
 from hrsynth.catalog.site.render import notation, rendered
 from hrsynth.catalog.site.structures import Structure, named, structures
 from hrsynth.catalog.words import parse
-from hrsynth.cli import _run
+from hrsynth.cli import execute
 from hrsynth.errors import BadRequest, BuildStopped
 from hrsynth.rewrite.strategy import Step
 
@@ -333,15 +333,15 @@ def test_on_the_command_line(few, tmp_path, capsys, monkeypatch):
     head = json.dumps({"format": 1, "catalog": 1, "group": "none", "count": len(lines)})
     (kept / "none.jsonl").write_text("\n".join([head, *lines]) + "\n")
     common = ["catalog", "site", "--catalog", str(kept)]
-    assert _run([*common, "-o", str(tmp_path / "site"), "--legs", "2", "--json"]) == 0
+    assert execute([*common, "-o", str(tmp_path / "site"), "--legs", "2", "--json"]) == 0
     out, err = capsys.readouterr()
     said = json.loads(out)
     assert (said["command"], said["architectures"], said["pages"], err) == ("catalog site", 1, 1, "")
     assert Path(said["index"]).is_file()
-    assert _run([*common, "-o", str(tmp_path / "site"), "--legs", "2"]) == 0
+    assert execute([*common, "-o", str(tmp_path / "site"), "--legs", "2"]) == 0
     assert str(tmp_path / "site" / "index.html") in capsys.readouterr().out
     for arguments in (["-o", str(tmp_path / "kept")], ["-o", str(tmp_path / "site"), "--dof", "17"]):
-        assert _run([*common, *arguments]) == 2
+        assert execute([*common, *arguments]) == 2
         out, err = capsys.readouterr()
         assert out == ""
         assert re.fullmatch(r"hrsynth: [^\n]+\n", err)

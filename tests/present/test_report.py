@@ -14,7 +14,7 @@ import pytest
 from lxml import etree
 
 from hrsynth.analysis.derive import Derivation, derive
-from hrsynth.cli import _run
+from hrsynth.cli import execute
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet
 from hrsynth.present.drawings import svg
@@ -234,7 +234,7 @@ def test_symbols_that_differ_in_their_index_are_told_once():
 
 def test_the_command_writes_a_page_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     page = tmp_path / "report.html"
-    assert _run(["derive", "3prp", "--report", str(page)]) == 0
+    assert execute(["derive", "3prp", "--report", str(page)]) == 0
     assert f"report        {page}" in capsys.readouterr().out
     assert read(page.read_text(encoding="utf-8")).xpath("//tr[@data-step]")
     assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
@@ -243,7 +243,7 @@ def test_the_command_writes_a_page_and_says_so(tmp_path: Path, capsys: pytest.Ca
 @pytest.mark.parametrize(("file", "words"), [("report.pdf", ".html"), ("none/report.html", "no such folder")])
 def test_a_page_that_cannot_be_written_is_refused_at_once(tmp_path: Path, capsys: pytest.CaptureFixture[str],
                                                           file: str, words: str):
-    assert _run(["derive", "quattro", "--report", str(tmp_path / file)]) == 2
+    assert execute(["derive", "quattro", "--report", str(tmp_path / file)]) == 2
     said = capsys.readouterr()
     assert said.out == ""
     assert words in said.err

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from browser import Tab
-from hrsynth.cli import _run
+from hrsynth.cli import execute
 
 pytestmark = pytest.mark.browser
 
@@ -21,7 +21,7 @@ WIDE = "document.documentElement.scrollWidth <= document.documentElement.clientW
 @pytest.mark.parametrize(("name", "legs"), FIVE, ids=[name for name, _ in FIVE])
 def test_a_report_is_shown(tab: Tab, tmp_path: Path, name: str, legs: str):
     page = tmp_path / "report.html"
-    assert _run(["derive", name, "--observe", legs, "--report", str(page)]) == 0
+    assert execute(["derive", name, "--observe", legs, "--report", str(page)]) == 0
     tab.open(page, "document.readyState == 'complete'")
     for law in (PICTURES, DRAWN, WIDE):
         assert tab.page.evaluate(law), law
@@ -33,7 +33,7 @@ def test_a_report_is_shown(tab: Tab, tmp_path: Path, name: str, legs: str):
 
 def test_a_report_is_read_on_a_small_screen_and_on_paper(tab: Tab, tmp_path: Path):
     page = tmp_path / "report.html"
-    assert _run(["derive", "uranesx", "--report", str(page)]) == 0
+    assert execute(["derive", "uranesx", "--report", str(page)]) == 0
     tab.page.set_viewport_size({"width": 400, "height": 800})
     tab.open(page, "document.readyState == 'complete'")
     assert tab.page.evaluate(WIDE)

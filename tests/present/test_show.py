@@ -12,7 +12,7 @@ import pytest
 
 import hrsynth
 from hrsynth import load
-from hrsynth.cli import _run
+from hrsynth.cli import execute
 from hrsynth.errors import BadRequest
 from hrsynth.present import show
 from hrsynth.results import Result
@@ -51,7 +51,7 @@ def test_every_kind_of_result_has_a_text():
 @pytest.mark.parametrize("command", ASKED)
 def test_a_result_is_printed_as_by_the_command_line(command: str, capsys: pytest.CaptureFixture[str]):
     found = answer(command)
-    assert _run([command, "rrrrr_m1", *ASKED[command][1]]) == 0
+    assert execute([command, "rrrrr_m1", *ASKED[command][1]]) == 0
     assert str(found) == hrsynth.text(found) == capsys.readouterr().out.rstrip("\n")
 
 

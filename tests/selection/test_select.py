@@ -16,7 +16,7 @@ from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.setting import prepare
-from hrsynth.cli import _run
+from hrsynth.cli import execute
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.kinematics.reach import reach
@@ -188,16 +188,16 @@ def test_a_camera_has_a_whole_pose() -> None:
 
 def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["select", "rrrrr_m1", "--from", "x=0.05", "--to", "x=-0.01,y=0.03", "--runs", "1"]
-    assert _run([*arguments, "--sight", "auto", "--json"]) == 0
+    assert execute([*arguments, "--sight", "auto", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["command"] == "select"
     assert data["best"] == next(each["legs"] for each in data["sets"] if each["discarded"] is None)
     assert {"legs", "verdict", "discarded", "position_mm", "modes", "aspect", "run", "seen"} <= data["sets"][0].keys()
-    assert _run([*arguments, "--size", "1"]) == 0
+    assert execute([*arguments, "--size", "1"]) == 0
     out, err = capsys.readouterr()
     assert "partially controllable" in out
     assert err == ""
-    assert _run(["select", "quattro", "--from", "x=9", "--to", "x=0"]) == 2
+    assert execute(["select", "quattro", "--from", "x=9", "--to", "x=0"]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 

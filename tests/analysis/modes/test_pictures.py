@@ -15,7 +15,7 @@ from PIL import Image
 
 from hrsynth.analysis.modes.curves import Circle, Line, Point
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
-from hrsynth.cli import _run
+from hrsynth.cli import execute
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism.vectors import rotation_about
@@ -234,7 +234,7 @@ def test_bad_files_are_refused_before_any_work(path: str, tmp_path: Path, monkey
                                                capsys: pytest.CaptureFixture[str]):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr("hrsynth.analysis.modes.modes.prepare", lambda *a, **k: pytest.fail("work was begun"))
-    assert _run(["modes", "rrrrr_m1", "-o", path]) == 2
+    assert execute(["modes", "rrrrr_m1", "-o", path]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
     writable(None)
@@ -245,7 +245,7 @@ def test_a_continuum_is_not_drawn(name: str, observe: str | None, tmp_path: Path
     with pytest.raises(BadRequest, match=r"nothing to draw: .*continuum"):
         shown(found(name, observe))
     arguments = [] if observe is None else ["--observe", observe]
-    assert _run(["modes", name, *arguments, "-o", str(tmp_path / "x.png")]) == 0
+    assert execute(["modes", name, *arguments, "-o", str(tmp_path / "x.png")]) == 0
     out, err = capsys.readouterr()
     assert "a continuum of dimension" in out
     assert "is not drawn" in err
@@ -254,7 +254,7 @@ def test_a_continuum_is_not_drawn(name: str, observe: str | None, tmp_path: Path
 
 def test_the_command_draws_and_the_file_says_what_it_holds(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     file = tmp_path / "x.png"
-    assert _run(["modes", "3rrr_m1", "-o", str(file), "--json"]) == 0
+    assert execute(["modes", "3rrr_m1", "-o", str(file), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["file"] == str(file)
     assert held(file) == json.loads(json.dumps(described(found("3rrr_m1"), drawn("3rrr_m1"))))
 

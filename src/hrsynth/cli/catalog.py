@@ -8,32 +8,21 @@ Their records, besides ``command`` ("catalog build" …) and ``version``: ``buil
 
 from __future__ import annotations
 
-import sys
-import time
 from pathlib import Path
-from types import TracebackType
 from typing import Annotated, Any
 
 import typer
 
+from .options import Filter, Json, unfolded
+from .progress import Meter
+
 catalog = typer.Typer(name="catalog", invoke_without_command=True, rich_markup_mode=None,
                       help="The catalog of architectures: what can be controlled by watching legs.")
 
-Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
 Kept = Annotated[str | None, typer.Option("--catalog", metavar="PATH", help="A folder or SQLite file (default: what is "
                                           "shipped).")]
 
 Workers = Annotated[int, typer.Option(min=1, help="Processes that share the work.")]
-Legs = Annotated[str | None, typer.Option(metavar="LEGS", help="Number of legs, or a pattern of the notation or of one "
-                                          "leg's chain: 3-R*, PUS.")]
-Dof = Annotated[int | None, typer.Option(help="Freedoms of the platform.")]
-Motion = Annotated[str | None, typer.Option(help="Its translations and turns, as 3T or 2T1R.")]
-Verdict = Annotated[str | None, typer.Option(help="controllable, partially controllable, uncontrollable.")]
-Group = Annotated[str | None, typer.Option(help="planar, pods, deltas, spatial.")]
-BaseMotors = Annotated[bool | None, typer.Option("--base-motors/--moving-motors", help="All motors on the base, or "
-                                                 "not.")]
-Fewest = Annotated[int | None, typer.Option(help="Legs to watch to see all that can be seen.")]
-Text = Annotated[str | None, typer.Option(help="What occurs in any field.")]
 
 
 @catalog.callback()
@@ -64,9 +53,9 @@ def build(
     if check:
         _check(groups or [], output, workers, cluster, sample, seed, json)
         return
-    from .catalog.build import build as run
-    from .present import records
-    from .present.text.catalog import built
+    from ..catalog.build import build as run
+    from ..present import records
+    from ..present.text.catalog import built
 
     target = _target(output)
     with Meter() as meter:
@@ -77,7 +66,7 @@ def build(
 
 def _require_together(check: bool, with_it: dict[str, bool], without: dict[str, bool]) -> None:
     """Raise ``BadRequest`` for options that mean nothing with, or without, ``--check``."""
-    from .errors import BadRequest
+    from ..errors import BadRequest
 
     for option, given in (without if check else with_it).items():
         if given:
@@ -86,10 +75,10 @@ def _require_together(check: bool, with_it: dict[str, bool], without: dict[str, 
 
 def _check(groups: list[str], target: str | None, workers: int, cluster: str | None, sample: int | None, seed: int,
            json: bool) -> None:
-    from .catalog.check import check
-    from .catalog.store import shipped
-    from .errors import CatalogStale
-    from .present import records
+    from ..catalog.check import check
+    from ..catalog.store import shipped
+    from ..errors import CatalogStale
+    from ..present import records
 
     with Meter() as meter:
         stale = check(target or shipped(), groups, workers=workers, cluster=cluster, sample=sample, seed=seed,
@@ -103,27 +92,19 @@ def _check(groups: list[str], target: str | None, workers: int, cluster: str | N
 
 
 @catalog.command("list")
+@unfolded
 def list_(
-    legs: Legs = None,
-    dof: Dof = None,
-    motion: Motion = None,
-    verdict: Verdict = None,
-    group: Group = None,
-    base_motors: BaseMotors = None,
-    fewest: Fewest = None,
-    text: Text = None,
+    fits: Filter,
     kept: Kept = None,
     json: Json = False,
 ) -> None:
     """The architectures that fit."""
-    from .catalog import load
-    from .present import records
-    from .present.text.catalog import entries
+    from ..catalog import load
+    from ..present import records
+    from ..present.text.catalog import entries
 
-    asked = {"legs": legs, "dof": dof, "motion": motion, "verdict": verdict, "group": group, "base_motors": base_motors,
-             "fewest": fewest, "text": text}
     every = load(kept)
-    found = every.where(**asked)
+    found = every.where(**fits.asked())
     if json:
         fields = {"total": len(every), "entries": [dict(each) for each in found]}
         typer.echo(records.record("catalog list", None, fields))
@@ -140,18 +121,18 @@ def show(
     json: Json = False,
 ) -> None:
     """One architecture, drawn and in full; one that is not in the catalog is studied now."""
-    from .catalog.drawing import drawing
-    from .catalog.words import parse
-    from .description import save, targets
-    from .present import records
-    from .present.text.catalog import entry
+    from ..catalog.drawing import drawing
+    from ..catalog.words import parse
+    from ..description import save, targets
+    from ..present import records
+    from ..present.text.catalog import entry
 
     architecture = parse(word)
     if output is not None:
         targets(output)
     record, note = _known(str(architecture), kept)
     if output is not None:
-        from .catalog.geometry import mechanism
+        from ..catalog.geometry import mechanism
 
         for warning in save(mechanism(architecture, record.get("attempt", 0)), output):
             typer.echo(f"hrsynth: {warning}", err=True)
@@ -164,30 +145,23 @@ def show(
 
 
 @catalog.command()
+@unfolded
 def site(
     output: Annotated[str, typer.Option("-o", "--output", metavar="DIR", help="A new or empty folder, or an older "
                                         "site, which is replaced.")],
-    legs: Legs = None,
-    dof: Dof = None,
-    motion: Motion = None,
-    verdict: Verdict = None,
-    group: Group = None,
-    base_motors: BaseMotors = None,
-    fewest: Fewest = None,
-    text: Text = None,
+    fits: Filter,
     workers: Workers = 1,
     anew: Annotated[bool, typer.Option("--anew", help="Forget what a build that was broken off has made.")] = False,
     kept: Kept = None,
     json: Json = False,
 ) -> None:
     """Pages of the architectures that fit: a list that filters, drawings, derivations, robot files; needs no server."""
-    from .catalog import load
-    from .catalog.site import site as run
-    from .present import records
-    from .present.text.catalog import sited
+    from ..catalog import load
+    from ..catalog.site import site as run
+    from ..present import records
+    from ..present.text.catalog import sited
 
-    found = load(kept, legs=legs, dof=dof, motion=motion, verdict=verdict, group=group, base_motors=base_motors,
-                 fewest=fewest, text=text)
+    found = load(kept, **fits.asked())
     with Meter() as meter:
         done = run(found, output, workers=workers, anew=anew, tell=meter.tell)
     if done.differ:
@@ -199,11 +173,11 @@ def site(
 
 def _known(word: str, kept: str | None) -> tuple[Any, str]:
     """The record of a word, and where it comes from if not from the catalog."""
-    from .catalog import load
-    from .catalog.groups import group
-    from .catalog.source import architectures, made
-    from .catalog.store import shipped
-    from .catalog.words import parse
+    from ..catalog import load
+    from ..catalog.groups import group
+    from ..catalog.source import architectures, made
+    from ..catalog.store import shipped
+    from ..catalog.words import parse
 
     if kept is not None or shipped().groups():
         found = load(kept)
@@ -220,7 +194,7 @@ def _target(output: str | None) -> Path:
     """Where to build: what was named, or ``catalog/`` of the checkout; never an installed package."""
     from importlib import resources
 
-    from .errors import BadRequest
+    from ..errors import BadRequest
 
     if output is None and not (Path("catalog").is_dir() and Path("pyproject.toml").is_file()):
         raise BadRequest("nowhere to build", None, "-o FOLDER or -o FILE.sqlite")
@@ -229,43 +203,3 @@ def _target(output: str | None) -> Path:
     if target.resolve().is_relative_to(package):
         raise BadRequest("cannot build into the package", str(target), "another folder")
     return target
-
-
-class Meter:
-    """A bar with the time left on standard error once a build has taken a second; nothing where that is no terminal."""
-
-    SPEED_OVER = 600.0
-    """Seconds over which the speed is averaged: words differ much."""
-
-    def __init__(self, wait: float = 1.0) -> None:
-        self._start = time.monotonic() + wait
-        self._bar: Any = None
-        self._groups: dict[str, tuple[int, int]] = {}
-
-    def __enter__(self) -> Meter:
-        return self
-
-    def tell(self, group: str, done: int, total: int) -> None:
-        """So many records of a group are there."""
-        self._groups[group] = done, total
-        if self._bar is None and time.monotonic() > self._start and sys.stderr.isatty():
-            self._bar = self._started()
-        if self._bar is not None:
-            there, every = map(sum, zip(*self._groups.values(), strict=True))
-            self._bar.update(self._bar.task_ids[0], description=group, completed=there, total=every)
-
-    def _started(self) -> Any:
-        from rich.console import Console
-        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-        bar = Progress(TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn(),
-                       TextColumn("left"), console=Console(stderr=True), transient=True,
-                       speed_estimate_period=self.SPEED_OVER)
-        bar.start()
-        bar.add_task("", total=None, completed=sum(done for done, _ in self._groups.values()))
-        return bar
-
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
-                 trace: TracebackType | None) -> None:
-        if self._bar is not None:
-            self._bar.stop()

@@ -1,0 +1,90 @@
+"""The command line: thin. Text to standard output, progress and warnings to standard error; exit status 0, 2 or 3."""
+
+from __future__ import annotations
+
+import gc
+import os
+import sys
+from typing import Annotated
+
+import typer
+
+from . import derivations, files, loop, poses
+from .catalog import catalog
+from .options import unfolded
+
+COMMANDS = (derivations.derive, derivations.legs, poses.check, poses.singular, derivations.advise, poses.modes,
+            poses.path, loop.servo, loop.accuracy, loop.select, files.view, files.robots, files.convert)
+
+app = typer.Typer(
+    name="hrsynth", invoke_without_command=True, add_completion=False, rich_markup_mode=None,
+    pretty_exceptions_enable=False,
+    help="Hidden robots of parallel robots that are controlled by watching the directions of their legs.")
+for command in COMMANDS:
+    app.command()(unfolded(command))
+app.add_typer(catalog)
+
+
+def _version(wanted: bool) -> None:
+    if wanted:
+        from .. import __version__
+
+        typer.echo(f"hrsynth {__version__}")
+        raise typer.Exit()
+
+
+@app.callback()
+def _options(
+    context: typer.Context,
+    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")]
+    = False,
+) -> None:
+    if context.invoked_subcommand is None:
+        typer.echo(context.get_help())
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run the command line; every failure is one line a defect, never a traceback."""
+    for library in ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"):
+        os.environ.setdefault(library, "1")
+    gc.set_threshold(50_000)
+    for stream in (sys.stdout, sys.stderr):
+        if hasattr(stream, "reconfigure"):
+            stream.reconfigure(encoding="utf-8", errors="replace")
+    sys.exit(execute(arguments))
+
+
+def execute(arguments: list[str] | None = None) -> int:
+    """Run a command; the exit status."""
+    try:
+        status = app(args=arguments, standalone_mode=False)
+        sys.stdout.flush()
+        return int(status or 0)
+    except BrokenPipeError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
+    except KeyboardInterrupt:
+        return 130
+    except Exception as error:
+        return _told(error)
+
+
+def _told(error: Exception) -> int:
+    """Say what went wrong; the exit status."""
+    from ..errors import HrsynthError
+
+    if isinstance(error, HrsynthError):
+        for line in error.lines():
+            typer.echo(f"hrsynth: {line}", err=True)
+        return error.exit_status
+    usage = getattr(error, "format_message", None)
+    if usage is not None:
+        message = " ".join(str(usage()).split())
+        if message:
+            typer.echo(f"hrsynth: {message}", err=True)
+        return 2
+    if os.environ.get("HRSYNTH_DEBUG"):
+        raise error
+    what = " ".join(f"{type(error).__name__}: {error}".split())
+    typer.echo(f"hrsynth: a defect of hrsynth itself, please report it: {what}", err=True)
+    return 3

@@ -1,0 +1,5 @@
+"""``python -m hrsynth.cli``."""
+
+from . import main
+
+main()
