@@ -5,7 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import shutil
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from ..errors import BadRequest
@@ -36,11 +36,12 @@ def require_same(path: Path, content: bytes) -> None:
                          "another name, or that file moved away")
 
 
-def write_whole(path: str | Path, content: bytes) -> None:
-    """Write a file under a temporary name, then rename it; raises ``BadRequest`` where it cannot be written."""
+def write_whole(path: str | Path, content: bytes | Iterable[bytes]) -> None:
+    """Write a file, at once or piece by piece, under a temporary name, then rename it; raises ``BadRequest`` where it
+    cannot be written."""
     try:
-        with drafted(path) as draft:
-            draft.write_bytes(content)
+        with drafted(path) as draft, draft.open("wb") as file:
+            file.writelines([content] if isinstance(content, bytes) else content)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
         raise BadRequest(f"cannot write the file: {reason}", str(path)) from None

@@ -87,8 +87,9 @@ class Grid:
     fixed: Pose
 
     @classmethod
-    def parse(cls, text: str) -> Grid:
-        """The grid that ``x=-0.3:0.3:21,y=0:0.1:5,z=-0.7`` says (from:to:count); raises ``BadRequest``."""
+    def parse(cls, text: str, largest: int = LARGEST_GRID) -> Grid:
+        """The grid that ``x=-0.3:0.3:21,y=0:0.1:5,z=-0.7`` says (from:to:count), of at most ``largest`` poses; raises
+        ``BadRequest``."""
         axes: list[tuple[str, Array]] = []
         single: list[str] = []
         for name, value in _fields(text, "grid"):
@@ -97,12 +98,12 @@ class Grid:
             elif name == "rpy":
                 raise BadRequest("grid: a range of rpy", value, "ranges of " + ", ".join(SCALARS))
             else:
-                axes.append((name, _range(value, name, text)))
+                axes.append((name, _range(value, name, text, largest)))
         if not 1 <= len(axes) <= 3:
             raise BadRequest("grid: number of ranges", text, "one to three, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7")
         cells = math.prod(len(values) for _, values in axes)
-        if cells > LARGEST_GRID:
-            raise BadRequest("grid: number of poses", cells, f"at most {LARGEST_GRID}")
+        if cells > largest:
+            raise BadRequest("grid: number of poses", cells, f"at most {largest}")
         fixed = Pose.parse(",".join(single)) if single else Pose()
         if fixed.rpy is not None and "phi" in dict(axes):
             raise BadRequest("grid: both phi and rpy are given", text, "one of them")
@@ -122,6 +123,10 @@ class Grid:
     def names(self) -> tuple[str, ...]:
         """The parts that vary, in order."""
         return tuple(name for name, _ in self.axes)
+
+    def places(self) -> Array:
+        """The values of the parts that vary at all cells, (n, ndim), the last axis running fastest."""
+        return np.stack(np.meshgrid(*(values for _, values in self.axes), indexing="ij"), -1).reshape(-1, self.ndim)
 
     def poses(self) -> tuple[Pose, ...]:
         """The poses of all cells, the last axis running fastest."""
@@ -178,10 +183,10 @@ def _triple(value: str, text: str) -> Sequence[float]:
     return tuple(_number(entry.strip(), "rpy", text) for entry in entries)
 
 
-def _range(value: str, name: str, text: str) -> Array:
+def _range(value: str, name: str, text: str, largest: int) -> Array:
     entries = [entry.strip() for entry in value.split(":")]
-    if len(entries) != 3 or not entries[2].isdecimal() or not 2 <= int(entries[2]) <= LARGEST_GRID:
-        raise BadRequest(f"grid {text!r}: range of {name}", value, "from:to:count with a count of 2 or more")
+    if len(entries) != 3 or not entries[2].isdecimal() or not 2 <= int(entries[2]) <= largest:
+        raise BadRequest(f"grid {text!r}: range of {name}", value, f"from:to:count with a count of 2 to {largest}")
     low, high = (_number(entry, name, text) for entry in entries[:2])
     if low == high:
         raise BadRequest(f"grid {text!r}: range of {name} has no extent", value, "two different ends")

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import csv
-import io
+from collections.abc import Iterator
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -38,21 +38,18 @@ def writable(path: str | None, cells: str | None) -> None:
 def write(found: Accuracy, path: str) -> None:
     """Write the errors, whole or not at all."""
     assert found.field is not None
-    write_whole(path, error_map(found) if Path(path).suffix.lower() == ".png" else table(found.field).encode())
+    write_whole(path, error_map(found) if Path(path).suffix.lower() == ".png" else table(found.field))
 
 
-def table(field: Field) -> str:
+def table(field: Field) -> Iterator[bytes]:
     """Comma-separated values: a line a pose (metres, radians), empty where it is not reached, inf where a freedom is
     lost."""
-    stream = io.StringIO()
-    lines = csv.writer(stream, lineterminator="\n")
-    lines.writerow([*field.grid.names, "position_mm", "orientation_deg"])
-    axes = np.meshgrid(*(values for _, values in field.grid.axes), indexing="ij")
-    columns = [1e3 * field.position.ravel(), np.degrees(field.orientation.ravel())]
-    for *place, position, orientation in zip(*(axis.ravel() for axis in axes), *columns, strict=True):
-        lines.writerow([*(repr(float(value)) for value in place),
-                        *("" if np.isnan(value) else repr(float(value)) for value in (position, orientation))])
-    return stream.getvalue()
+    yield ",".join((*field.grid.names, "position_mm", "orientation_deg")).encode() + b"\n"
+    columns = 1e3 * field.position.ravel(), np.degrees(field.orientation.ravel())
+    for place, *errors in zip(product(*(values.tolist() for _, values in field.grid.axes)),
+                              *(column.tolist() for column in columns), strict=True):
+        cells = [*map(repr, place), *("" if error != error else repr(error) for error in errors)]
+        yield ",".join(cells).encode() + b"\n"
 
 
 def error_map(found: Accuracy) -> bytes:

@@ -179,6 +179,18 @@ def test_a_grid_by_the_batch_is_that_by_pinocchio() -> None:
     assert quick.smallest.ravel() == pytest.approx(slow.smallest(), rel=1e-8)
 
 
+def test_a_grid_in_parts_is_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
+    grid = "x=-0.9:0.9:23,y=-0.9:0.9:23,z=-0.7"
+    found = []
+    for part in (10_000, 50):
+        monkeypatch.setattr("hrsynth.analysis.accuracy.field.PART", part)
+        found.append(accuracy(load("quattro_rigid"), "1,2,3", cones=0.002, grid=grid).field)
+    whole, parts = found
+    assert 0 < whole.reached.sum() < whole.reached.size
+    for name in ("reached", "position", "smallest"):
+        assert np.array_equal(getattr(whole, name), getattr(parts, name), equal_nan=True), name
+
+
 def test_a_plane_of_a_robot_whose_legs_are_iterated() -> None:
     field = accuracy(load("3rps"), cones=CONE, grid="z=0.4:0.5:4").field
     assert field is not None

@@ -23,6 +23,8 @@ from .field import Field, Mapper
 from .gauge import PoseErrors, measured
 from .sampled import Sampled, sampled
 
+LARGEST_FIELD = 10_000_000
+"""Cells of a grid beyond which it is taken for a slip: about a gigabyte and ten seconds by the batch."""
 WORST = 3
 """Poses of a grid, those of the largest errors, at which the linear law is checked by samples."""
 
@@ -80,7 +82,7 @@ def accuracy(robot: Mechanism, observe: Sequence[str] | str | None = None, camer
     if samples < 0:
         raise BadRequest("number of samples", samples, "none or more")
     held = Pose.parse(plane) if isinstance(plane, str) else plane
-    cells = Grid.parse(grid) if isinstance(grid, str) else grid
+    cells = Grid.parse(grid, LARGEST_FIELD) if isinstance(grid, str) else grid
     tell("sampling")
     setting = prepare(robot, observe, camera, seed=seed)
     if not all(isinstance(o, Direction) for o in setting.observed):

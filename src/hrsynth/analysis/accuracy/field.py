@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,13 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...errors import Disagreement, HrsynthError, PlaneNotMet
+from ...errors import BadRequest, Disagreement, HrsynthError, PlaneNotMet
 from ...kinematics.batch.engine import Batch, Evaluation
 from ...kinematics.batch.grids import poses_over
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.reach import reach, sweep
 from ...kinematics.relation import Question
-from ...mechanism.pose import SCALARS, Grid, Pose
+from ...mechanism.pose import LARGEST_GRID, SCALARS, Grid, Pose
 from ...mechanism.vectors import Array
 from ...tolerances import SAME_RELATION
 from ..setting import Setting
@@ -26,6 +27,8 @@ from .gauge import maxima, reading
 Flags = NDArray[np.bool_]
 PART = 25_000
 """Poses, at least, that are evaluated between two signs of progress."""
+MANY = 500_000
+"""Poses of a sweep that make up for numba's start."""
 SPOTS = 10
 """Poses of a grid at which the batch is held against Pinocchio."""
 USUAL = 100.0
@@ -140,7 +143,7 @@ class Mapper:
 
         def met(first: ClosedConfiguration, coarse: Grid) -> Flags:
             if self.batch is not None:
-                X, possible = poses_over(motion, coarse, self.setting.robot.name)
+                X, possible = poses_over(motion, coarse, self.setting.robot.name, coarse.places())
                 return possible & self.batch.evaluate(X).reached
             return np.array([at is not None for at in sweep(first, everything.question, coarse, motion,
                                                             lambda: self.progress("how far the plane is reached"))])
@@ -149,50 +152,63 @@ class Mapper:
         return framed(everything.start, everything.question, motion, plane, count, met)
 
     def over(self, grid: Grid, seed: int) -> Field:
-        """The error maxima over a grid; raises ``PlaneNotMet`` where no pose of it is reached."""
-        seen = self._one_by_one(grid) if self.batch is None else self._together(grid)
+        """The error maxima over a grid; raises ``PlaneNotMet`` where no pose of it is reached, ``BadRequest`` where
+        poses have to be found one by one and are too many for that."""
+        name = self.setting.robot.name
+        if self.batch is None and math.prod(grid.shape) > LARGEST_GRID:
+            raise BadRequest(f"{name}: poses are found one by one; number of poses", math.prod(grid.shape),
+                             f"at most {LARGEST_GRID}")
+        seen = self._one_by_one(grid) if self.batch is None else self._together(grid, grid.places())
         if not seen.reached.any():
-            raise PlaneNotMet(self.setting.robot.name, str(grid.fixed), "none of the grid's poses is")
+            raise PlaneNotMet(name, str(grid.fixed), "none of the grid's poses is")
         spots = again = None
         if self.batch is not None:
             spots = self._spots(grid, seen, seed)
 
             def again(places: Array) -> Seen:
-                return self._at(*poses_over(self.setting.motion, grid, self.setting.robot.name, places))
+                return self._together(grid, places)
 
         shape = grid.shape
         return Field(grid, seen.reached.reshape(shape), seen.position.reshape(shape), seen.orientation.reshape(shape),
                      seen.gap, seen, spots, again)
 
-    def _together(self, grid: Grid) -> Seen:
-        return self._at(*poses_over(self.setting.motion, grid, self.setting.robot.name))
-
-    def _at(self, X: Array, possible: Flags) -> Seen:
-        """Poses by the batch in NumPy: no grid is so large that it makes up for numba's start."""
-        assert self.batch is not None
-        parts: list[Evaluation] = []
-        size = -(-len(X) // max(1, len(X) // PART))
-        for start in range(0, len(X), size):
-            self.progress("poses")
-            parts.append(self.batch.evaluate(X[start : start + size], self.setting.labels, self.cones, compiled=False))
-        reached = possible & np.concatenate([part.reached for part in parts])
-        position, orientation = (np.where(reached, np.concatenate(column), np.nan) for column in (
-            [part.position.largest for part in parts if part.position is not None],
-            [part.orientation.largest for part in parts if part.orientation is not None]))
-        gaps = [_gap(spread.largest, spread.lower) for part in parts for spread in (part.position, part.orientation)
-                if spread is not None]
+    def _together(self, grid: Grid, places: Array) -> Seen:
+        """Poses by the batch; of a part of them no more is kept than their errors."""
+        reached, gaps = [], []
+        columns: tuple[list[Array], list[Array]] = [], []
+        for possible, part in self._parts(grid, places, self.cones):
+            reached.append(possible & part.reached)
+            for column, spread in zip(columns, (part.position, part.orientation), strict=True):
+                assert spread is not None
+                column.append(np.where(reached[-1], spread.largest, np.nan))
+                gaps.append(_gap(spread.largest, spread.lower))
 
         def determinant() -> Array | None:
-            with np.errstate(invalid="ignore"):
-                found = [part.determinant for part in parts]
-            known = [np.where(part.reached, each, np.nan) for part, each in zip(parts, found, strict=True)
-                     if each is not None]
-            return np.where(possible, np.concatenate(known), np.nan) if len(known) == len(parts) else None
+            found = []
+            for possible, part in self._parts(grid, places, None):
+                with np.errstate(invalid="ignore"):
+                    if part.determinant is None:
+                        return None
+                found.append(np.where(possible & part.reached, part.determinant, np.nan))
+            return np.concatenate(found)
 
         def smallest() -> Array:
-            return np.where(possible, np.concatenate([part.singular_values[:, -1] for part in parts]), np.nan)
+            return np.concatenate([np.where(possible, part.singular_values[:, -1], np.nan)
+                                   for possible, part in self._parts(grid, places, None)])
 
-        return Seen(reached, position, orientation, determinant, smallest, max(gaps))
+        position, orientation = map(np.concatenate, columns)
+        return Seen(np.concatenate(reached), position, orientation, determinant, smallest, max(gaps))
+
+    def _parts(self, grid: Grid, places: Array, cones: Array | None) -> Iterator[tuple[Flags, Evaluation]]:
+        """Which poses of each part the platform can have at all, and what the batch says of them; in NumPy where they
+        do not make up for numba's start."""
+        assert self.batch is not None
+        size = -(-len(places) // max(1, len(places) // PART))
+        for start in range(0, len(places), size):
+            self.progress("poses")
+            X, possible = poses_over(self.setting.motion, grid, self.setting.robot.name, places[start : start + size])
+            yield possible, self.batch.evaluate(X, self.setting.labels, cones,
+                                                compiled=None if len(places) >= MANY else False)
 
     def _one_by_one(self, grid: Grid) -> Seen:
         everything = self.setting.everything

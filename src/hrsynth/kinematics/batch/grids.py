@@ -47,13 +47,11 @@ def pose_of(motion: PlatformMotion, goal: Goal) -> Array:
     return X
 
 
-def poses_over(motion: PlatformMotion, grid: Grid, robot: str, places: Array | None = None) -> tuple[Array, Flags]:
-    """The platform poses (n, 4, 4) over a grid, in its order, or at other values (n, ndim) of its parts; free parts are
-    as at home. Also which of them the platform can have at all. Raises ``BadRequest`` for parts that it cannot
+def poses_over(motion: PlatformMotion, grid: Grid, robot: str, places: Array) -> tuple[Array, Flags]:
+    """The platform poses (n, 4, 4) where the parts of a grid that vary have the values ``places`` (n, ndim); free parts
+    are as at home. Also which of them the platform can have at all. Raises ``BadRequest`` for parts that it cannot
     change."""
     first = motion.goal(grid.poses_at([(0,) * grid.ndim])[0], robot)
-    if places is None:
-        places = np.stack(np.meshgrid(*(values for _, values in grid.axes), indexing="ij"), -1).reshape(-1, grid.ndim)
     columns = dict(zip(grid.names, places.T, strict=True))
     X = np.tile(pose_of(motion, first), (len(places), 1, 1))
     if "phi" in columns:
