@@ -82,7 +82,7 @@ pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again
 	@$(BIN)/hrsynth modes delta --real -o docs/pictures/modes_delta_real.png > /dev/null
 	@$(BIN)/hrsynth servo quattro --observe 1,4 --from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0 -o docs/pictures/servo_quattro.png > /dev/null
 	@$(BIN)/hrsynth servo 3rpr_m1 --from x=-0.08,y=-0.06,phi=-10deg --to x=0.034,y=0.23,phi=23deg -o docs/pictures/servo_3rpr.png > /dev/null
-	@$(BIN)/hrsynth servo quattro --observe 1,4 --from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0 -o docs/pictures/servo_quattro.gif > /dev/null
+	@$(BIN)/hrsynth servo quattro --observe 1,4 --from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0 --physics --sense pictures -o docs/pictures/servo_quattro.gif > /dev/null
 	@$(BIN)/hrsynth accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7 -o docs/pictures/accuracy_quattro.png > /dev/null
 	@$(BIN)/hrsynth derive rrrrr_m1 --report build/rrrrr_m1.html > /dev/null
 	@$(BIN)/python tests/browser.py build/rrrrr_m1.html docs/pictures/report_rrrrr_m1.png 1200 1500
