@@ -95,7 +95,8 @@ def check_valid(robot: Mechanism) -> None:
     for link in robot.links.values():
         assert np.all(np.isfinite(link.pose))
         assert np.allclose(link.pose[:3, :3] @ link.pose[:3, :3].T, np.eye(3), atol=1e-8)
-    scale = max(float(np.max(np.abs(link.pose))) for link in robot.links.values())
+    scale = max(float(np.max(np.abs(each))) for each in (*(link.pose for link in robot.links.values()),
+                                                         *(joint.point for joint in robot.joints.values())))
     again = native.parse(native.write(robot))
     assert again.differences(spanning(robot), 1e-6 + 1e-11 * scale) == []
 
