@@ -123,13 +123,13 @@ class PoseNotReached(HrsynthError):
 
 
 class PlaneNotMet(HrsynthError):
-    """A plane of poses of which the robot reaches none: why."""
+    """A plane or grid of poses of which the robot reaches none: why."""
 
     exit_status = 3
 
     def __init__(self, robot: str, plane: str, reason: str) -> None:
         self.robot, self.plane, self.reason = robot, plane, reason
-        super().__init__(f"{robot}: no pose of the plane {plane} is reached: {reason}")
+        super().__init__(f"{robot}: no pose of {plane} is reached: {reason}")
 
 
 class Disagreement(HrsynthError):

@@ -14,7 +14,8 @@ SHARP = 1e-15
 """Residual that is asked for where a singular pose is wanted as exactly as numbers allow."""
 
 AS_PRINTED = 1e-5
-"""Difference (metres, radians) at which a part of a pose that never changes is taken as its printed value."""
+"""Difference (metres, radians; characteristic lengths) at which a part of a pose that never changes, or a pose of more
+parts than there are freedoms, is taken as its printed value."""
 
 PASSED_BY = 1e-3
 """Residual at which a configuration on the way to another is near enough to go on from."""

@@ -10,6 +10,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.kinematics.configuration import ClosedConfiguration, closed
 from hrsynth.kinematics.parts import PlatformMotion, rotation_vector, turn_about
@@ -19,7 +20,7 @@ from hrsynth.mechanism.vectors import Array
 from hrsynth.tolerances import CLOSED
 from kinematics.robots import ROBOTS, setting_of, state_of
 from oracle import Oracle, exponential
-from strategies import parallel_robots, planar
+from strategies import parallel_robots, planar, random_rotation, transformed
 
 quick = settings(max_examples=8, deadline=None, derandomize=True,
                  suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
@@ -63,6 +64,27 @@ def test_poses_of_samples_are_reached_again(robot: str) -> None:
         found = setting.everything.question.target(at)
         for (_, value), (_, wanted) in zip(found.measured, first.measured, strict=True):
             np.testing.assert_allclose(value, wanted, atol=1e-8)
+
+
+def check_printed(setting: Setting) -> None:
+    motion, everything = motion_of(setting), setting.everything
+    for member in setting.everything.members[:3]:
+        printed = Pose.parse(str(motion.pose(member.way[0].pose)))
+        at = reach(everything.start, everything.question, printed, motion)
+        apart = motion.position(at.pose(motion.link)) - motion.position(member.way[0].pose)
+        assert np.linalg.norm(apart) < 1e-5 * max(1.0, float(np.abs(motion.position(motion.home)).max()))
+        assert at.residual <= CLOSED
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_pose_can_be_typed_as_it_is_printed(robot: str) -> None:
+    check_printed(setting_of(robot))
+
+
+@pytest.mark.parametrize("robot", ["3rrr_m1", "rrrrr_m1", "delta", "3rps", "quattro"])
+def test_a_pose_of_a_robot_that_stands_aslant_can_be_typed_as_it_is_printed(robot: str) -> None:
+    rng = np.random.default_rng(7)
+    check_printed(prepare(transformed(load(robot), random_rotation(rng), rng.normal(size=3)), samples=4))
 
 
 @pytest.mark.parametrize(("robot", "parts"), [

@@ -64,8 +64,8 @@ def accuracy(
     grid: Annotated[str | None, typer.Option(metavar="GRID", help="A line, plane or box of poses, such as "
                                              "x=-0.3:0.3:21,y=0,z=-0.7 (from:to:count).")] = None,
     steps: Annotated[int | None, typer.Option(min=5, max=300, help="Poses a side of the plane.")] = None,
-    samples: Annotated[int, typer.Option("--nonlinear", min=0, metavar="COUNT", help="Try so many true errors at each "
-                                         "pose, of a plane or grid at its worst ones.")] = 0,
+    samples: Annotated[int, typer.Option("--nonlinear", min=0, metavar="COUNT", help="Try so many true errors (four "
+                                         "at least) at each pose, of a plane or grid at its worst ones.")] = 0,
     output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Write the plane or grid: "
                                                "map.png, map.csv.")] = None,
     json: Json = False,

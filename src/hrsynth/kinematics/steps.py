@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..mechanism.vectors import Array
-from ..tolerances import CLOSED, FOLLOWED, NEAREST, PASSED_BY, RANK_CUTOFF, SOLVED
+from ..tolerances import AS_PRINTED, CLOSED, FOLLOWED, NEAREST, PASSED_BY, RANK_CUTOFF, SOLVED
 from .configuration import Aim, ClosedConfiguration, closed, limited, system
 from .parts import Goal, PlatformMotion
 from .ranks import kernel_basis, range_basis
@@ -32,7 +32,7 @@ LONGEST = 0.3
 def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Aim,
         halvings: int = HALVINGS) -> tuple[ClosedConfiguration, float]:
     """Lead a configuration to a goal by small steps: where it comes to, and the part of the way that it came (1: all of
-    it)."""
+    it). A goal of more parts than there are freedoms is met where it is missed by no more than printed digits."""
     X = here.pose(motion.link)
     home = motion.at_home()
     error, rows = goal.rows(here.twin, here.q)
@@ -40,7 +40,10 @@ def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Aim,
     if range_basis(rows @ here.kernel()[0], 1.0)[1].value < len(rows):
         here = _eased(here, goal, X, longest)
         there = _stepped(here, goal, home)
-        left = float(np.linalg.norm(goal.rows(here.twin, here.q)[0]) / max(float(np.linalg.norm(error)), SOLVED))
+        miss = float(np.linalg.norm(goal.rows(here.twin, here.q)[0]))
+        if there is None and miss <= AS_PRINTED:
+            there = here
+        left = miss / max(float(np.linalg.norm(error)), SOLVED)
         return (here, max(0.0, 1 - left)) if there is None else (there, 1.0)
     came, step = 0.0, longest
     while came < 1:
@@ -110,7 +113,9 @@ def _corrected(here: ClosedConfiguration, step: Array, goal: Aim | None) -> Clos
 
 def nearest(here: ClosedConfiguration, goal: Aim, home: Goal) -> ClosedConfiguration:
     """The configuration at ``goal`` whose platform pose is nearest to ``home``: the projected gradient vanishes, the
-    loops are closed as well as floating point can."""
+    loops are closed as well as floating point can; ``here`` itself where the goal is met but for its printed digits."""
+    if np.linalg.norm(goal.rows(here.twin, here.q)[0]) > SOLVED:
+        return here
     return polished(_drawn_home(here, goal, home, 100), goal)
 
 

@@ -109,6 +109,10 @@ class Grid:
             raise BadRequest("grid: both phi and rpy are given", text, "one of them")
         return cls(tuple(axes), fixed)
 
+    def __str__(self) -> str:
+        ranges = [f"{name}={values[0]:.6g}:{values[-1]:.6g}:{len(values)}" for name, values in self.axes]
+        return ",".join([*ranges, *([str(self.fixed)] if self.fixed.given else [])])
+
     @property
     def shape(self) -> tuple[int, ...]:
         """Number of values on each axis."""

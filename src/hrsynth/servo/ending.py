@@ -14,7 +14,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.vectors import Array
 from ..tolerances import DAMPED, SAME_RELATION
 from .law import Command
-from .run import AWAY, LIMIT, OPEN, REST, SERVED_AT, Run, margins
+from .run import AWAY, EFFORT, LIMIT, MOST, OPEN, REST, SERVED_AT, Run, margins
 
 GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME = "goal", "mode", "antipodal", "local minimum", "boundary", "time"
 ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME)
@@ -57,7 +57,8 @@ class Referee:
             return Ending(BOUNDARY, "the loops cannot follow the command any further")
         if run.stopped == AWAY:
             return Ending(BOUNDARY, "the platform runs away, nothing limits its slides")
-        return Ending(TIME, f"the time was over with ‖e‖ = {last.size:.3g}")
+        over = f"more than {MOST:,} configurations would be needed" if run.stopped == EFFORT else "the time was over"
+        return Ending(TIME, f"{over}, with ‖e‖ = {last.size:.3g}")
 
     def _served(self, at: ClosedConfiguration, directions: Array) -> Ending:
         opposite = np.sum(directions * self.directions, axis=1) < 0

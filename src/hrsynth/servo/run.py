@@ -17,13 +17,15 @@ from ..tolerances import AT_REST, SERVED
 from .law import Command, Desired, Law, Sense
 from .noise import PERIOD
 
-SERVED_AT, REST, LIMIT, OPEN, AWAY, TIME = "served", "rest", "limit", "open", "away", "time"
+SERVED_AT, REST, LIMIT, OPEN, AWAY, TIME, EFFORT = "served", "rest", "limit", "open", "away", "time", "effort"
 TOLERANCE = 1e-6
 """Relative tolerance of the integrator, for coordinates of a chart as for errors at the start of a stretch."""
 CLOSER = 1e-2
 """Part of its first error at which a stretch ends, so that the tolerance follows the error."""
 FAR = 20.0
 """Characteristic lengths from its start at which a platform has run away."""
+MOST = 20_000
+"""Configurations that the integrator may ask for in a run."""
 HALVINGS = 40
 """Bisections that find the moment at which a joint meets its limit."""
 
@@ -32,7 +34,8 @@ HALVINGS = 40
 class Run:
     """What happened: times (n,), the configurations and commands at them, and why it stopped: the error vanished
     (``served``), the command did (``rest``), a joint met its limit (``limit``), the loops could not be closed further
-    (``open``), the platform ran away (``away``), or the time was over (``time``)."""
+    (``open``), the platform ran away (``away``), the time was over (``time``), or the integrator's ``MOST``
+    configurations were (``effort``)."""
 
     times: Array
     configurations: tuple[ClosedConfiguration, ...]
@@ -61,10 +64,11 @@ class Loop:
     def simulate(self, start: ClosedConfiguration, horizon: float) -> Run:
         """Run until it ends by itself, or ``horizon`` (s)."""
         times, found = [0.0], [(start, self._command(0.0, start))]
-        stopped = None
+        stopped, left = None, MOST
         while stopped is None:
-            stretch = _Stretch(self, Chart.around(found[-1][0], self.moving), found[-1][0])
+            stretch = _Stretch(self, Chart.around(found[-1][0], self.moving), found[-1][0], left)
             reached, states, stopped = stretch.integrate(times[-1], horizon)
+            left = stretch.left
             times += reached
             found += states
             if stopped is None and self._shift(start, found[-1][0]) > FAR:
@@ -83,8 +87,8 @@ class Loop:
 class _Stretch:
     """One stretch of a run, in one chart; configurations are remembered while the integrator works around them."""
 
-    def __init__(self, loop: Loop, chart: Chart, start: ClosedConfiguration) -> None:
-        self.loop, self.chart, self.near = loop, chart, start.q
+    def __init__(self, loop: Loop, chart: Chart, start: ClosedConfiguration, left: int) -> None:
+        self.loop, self.chart, self.near, self.left = loop, chart, start.q, left
         self.margin = clearance(start)
         self._memory: dict[tuple[float, bytes], tuple[ClosedConfiguration, Command]] = {}
 
@@ -93,7 +97,7 @@ class _Stretch:
         key = (time, y.tobytes())
         if key not in self._memory:
             at = self.chart.at(y, self.near)
-            self.near = at.q
+            self.near, self.left = at.q, self.left - 1
             self._memory[key] = at, self.loop._command(time, at)
         return self._memory[key]
 
@@ -134,6 +138,8 @@ class _Stretch:
                     return times, states, LIMIT
                 if settling and (stopped := self._over(state[1])):
                     return times, states, stopped
+                if self.left <= 0:
+                    return times, states, EFFORT
                 if np.linalg.norm(solver.y) > WIDE or (settling and state[1].size < CLOSER * scale):
                     return times, states, None
         except LoopsNotClosed:

@@ -27,11 +27,11 @@ from .law import Law, Sense, directions
 from .noise import Amount, Cones, Shocks
 from .pictures import Pictures, Stage, drawing, vision
 from .result import Servo, Spread
-from .run import Loop, Run
+from .run import EFFORT, MOST, Loop, Run
 from .track import tracked
 
 LONGEST = 10_000.0
-"""Seconds that a run with noise or on the physics bench may take: these go on to their end."""
+"""Seconds that a run with noise, on the physics bench or along a way may take: these go on to their end."""
 LASTS, NOISY_LASTS = 60.0, 16.0
 """Time constants 1 / λ that a run may take; that it takes where measurements are noisy."""
 SETTLED = 0.5
@@ -58,6 +58,8 @@ class Scene:
         for what, value in (("gain", gain), ("duration", duration)):
             if value is not None and not 0 < value < math.inf:
                 raise BadRequest(what, value, "a positive number")
+        if duration is not None and duration > LONGEST:
+            raise BadRequest("duration", duration, f"at most {LONGEST:g} seconds")
         wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
         setting = prepare(robot, observe, camera, seed=seed)
         _sees(setting)
@@ -136,6 +138,8 @@ class Scene:
 
     def _notes(self, run: Run, still: Run, noisy: bool, simulated: Array | None) -> Iterator[str]:
         """What was measured on the benches."""
+        if run.stopped == EFFORT:
+            yield f"the run was broken off after {MOST:,} configurations, at {run.times[-1]:.3g} s"
         if noisy:
             angles = np.degrees(np.array([np.arccos(np.clip(np.sum(each.directions * each.seen, axis=1), -1, 1))
                                           for each in run.commands]))

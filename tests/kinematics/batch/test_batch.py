@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache
+from importlib.util import find_spec
 
 import numpy as np
 import pytest
@@ -129,6 +130,33 @@ def test_numba_gives_the_same_numbers(robot: str, watched: int) -> None:
             proved = one.lower >= one.largest * (1 - 1e-9)
             allowed = np.where(proved, 1e-12 * np.maximum(ill, 1.0), BOUND) * ours
             assert np.all(np.abs(ours[finite] - theirs[finite]) <= allowed[finite])
+
+
+@pytest.mark.parametrize("robot", ["delta", "gough_stewart", "3rrr_m1", "rrrrr_m1"])
+@pytest.mark.parametrize("bad", [np.nan, np.inf])
+def test_a_pose_that_is_not_finite_is_not_reached(robot: str, bad: float) -> None:
+    _, batch = shipped_batch(robot)
+    X = np.repeat(batch.home[None], 14, axis=0)
+    for i in range(12):
+        X[i, i // 4, i % 4] = bad
+    engines = (False, True) if find_spec("numba") is not None and robot != "rrrrr_m1" else (False,)
+    for compiled in engines:
+        found = batch.evaluate(X, cones=0.01, compiled=compiled)
+        assert found.position is not None
+        assert found.reached.tolist() == 12 * [False] + 2 * [True]
+        for values in (found.directions, found.matrix, found.position.largest):
+            assert np.isnan(values[:12]).all()
+            assert np.isfinite(values[12:]).all()
+
+
+@pytest.mark.parametrize(("legs", "cones", "word"), [
+    ("1,4", [0.1, 0.1, 0.1], "how many"), ("1,4", -1.0, "more than 0"), ("1,4", 0.0, "more than 0"),
+    ("1,4", np.pi / 2, "right angle"), ("1,4", np.nan, "right angle"), ("1,4", [0.1, np.inf], "right angle"),
+    (["1", "1"], 0.1, "twice"), ("14", 0.1, "a leg of the batch"), ([], 0.1, "nothing is observed")])
+def test_legs_and_cones_that_are_none_are_refused(legs: str | list[str], cones: float | list[float], word: str) -> None:
+    _, batch = shipped_batch("quattro")
+    with pytest.raises(BadRequest, match=word):
+        batch.evaluate(batch.home[None], legs, cones)
 
 
 def test_threads_change_no_digit(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -160,7 +160,7 @@ class Mapper:
                              f"at most {LARGEST_GRID}")
         seen = self._one_by_one(grid) if self.batch is None else self._together(grid, grid.places())
         if not seen.reached.any():
-            raise PlaneNotMet(name, str(grid.fixed), "none of the grid's poses is")
+            raise PlaneNotMet(name, f"the grid {grid}", f"none of {math.prod(grid.shape)} is")
         spots = again = None
         if self.batch is not None:
             spots = self._spots(grid, seen, seed)

@@ -85,7 +85,7 @@ def locus(hidden: Measured, real: Measured | None, plane: Pose | None, steps: in
     grid = framed(start, question, motion, plane, steps, met)
     configurations = sweep(start, question, grid, motion, progress, placer)
     if not any(configurations):
-        raise PlaneNotMet(start.twin.mechanism.name, str(grid.fixed), "none of its poses is reached")
+        raise PlaneNotMet(start.twin.mechanism.name, f"the plane {grid.fixed}", "none of its poses is reached")
 
     def field(measured: Measured) -> Field:
         condition = measured.condition
@@ -115,7 +115,8 @@ def framed(start: ClosedConfiguration, question: Question, motion: PlatformMotio
     try:
         first = reach(start, question, plane, motion) if plane.given else start
     except PoseNotReached as error:
-        raise PlaneNotMet(start.twin.mechanism.name, str(plane), str(error)) from None
+        name = start.twin.mechanism.name
+        raise PlaneNotMet(name, f"the plane {plane}", str(error).removeprefix(f"{name}: ")) from None
     centre = _coordinates(motion, first, names)
     for wide in WIDE:
         half = [np.pi if name == "phi" else wide * start.twin.length for name in names]
@@ -150,7 +151,7 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
         plane, places, count = replace(plane, z=round(_coordinates(motion, start, ("z",))[0], 9)), places[:2], 2
     if count == 2:
         return plane, max(combinations(places, 2), key=lambda pair: _spread(motion, pair))
-    if count == 1 and "phi" in parts and not turned:
+    if count == 1 and "phi" in parts and not turned and motion.dof > motion.shifts.shape[1]:
         return plane, (places[0], "phi")
     raise BadRequest(f"{name}: a plane of poses leaves two parts free", str(plane) or "none", parts)
 

@@ -5,7 +5,7 @@ compiled is kept between runs.
 from __future__ import annotations
 
 from collections.abc import Callable
-from math import acos, cos, pi, sqrt
+from math import acos, cos, isfinite, pi, sqrt
 from typing import Any
 
 import numpy as np
@@ -495,8 +495,11 @@ def swept(kinds, table, watched, span, X, point, cones, only, single, reached, c
     for i in range(n):
         for row in range(3):
             p[row] = (X[i, row, 3] + X[i, row, 0] * point[0] + X[i, row, 1] * point[1] + X[i, row, 2] * point[2])
-        there = True
-        for leg in range(len(kinds)):
+        total = 0.0
+        for row in range(4):
+            total += (X[i, row, 0] + X[i, row, 1]) + (X[i, row, 2] + X[i, row, 3])
+        there = isfinite(total)
+        for leg in range(len(kinds) if there else 0):
             if not rows(kinds[leg], table, leg, span, p, X, U, M, i, slot[leg]):
                 there = False
                 break

@@ -116,19 +116,21 @@ class Batch:
         """Whether every leg is compiled: then ``reached`` says whether the robot reaches a pose."""
         return all(leg is not None for leg in self.legs.values())
 
-    def evaluate(self, X: ArrayLike, legs: Sequence[str] | None = None, cones: ArrayLike | None = None, *,
+    def evaluate(self, X: ArrayLike, legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None, *,
                  compiled: bool | None = None) -> Evaluation:
         """Everything at platform poses X (n, 4, 4) with ``legs`` watched (default: all), ``cones`` their half-angles
         (rad; one, or one a leg).
 
-        ``compiled`` asks for numba, or forbids it (default: where it is installed, from many poses on). Raises
-        ``BadRequest`` for legs that are not compiled, poses of another shape, and results that are too large.
+        X are poses that the platform can take as far as its own freedoms go; that is not checked. A pose that is not
+        finite is not reached. ``compiled`` asks for numba, or forbids it (default: where it is installed, from many
+        poses on). Raises ``BadRequest`` for legs that are not compiled, poses of another shape, cones that are none,
+        and results that are too large.
         """
         X = np.asarray(X, dtype=float)
         if X.ndim != 3 or X.shape[1:] != (4, 4):
             raise BadRequest("poses of a batch: shape", X.shape, "(n, 4, 4)")
         watched = self._watched(legs)
-        half = None if cones is None else np.broadcast_to(np.asarray(cones, dtype=float), (len(watched),))
+        half = None if cones is None else _half_angles(cones, len(watched))
         need = 8 * len(X) * (3 * len(watched) * (self.stage.dof + 1) + 5)
         if need > LARGEST:
             raise BadRequest("the result of a batch takes too much memory (bytes)", need,
@@ -150,17 +152,19 @@ class Batch:
                 there &= within(leg, poses)
         return there
 
-    def sweep(self, parts: Iterable[Array], legs: Sequence[str] | None = None, cones: ArrayLike | None = None
+    def sweep(self, parts: Iterable[Array], legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None
               ) -> Iterator[Evaluation]:
         """The evaluations of parts of a sweep, (n, 4, 4) each, one after the other: memory is that of one part."""
         return (self.evaluate(X, legs, cones) for X in parts)
 
-    def _watched(self, legs: Sequence[str] | None) -> list[str]:
-        names = list(self.legs) if legs is None else list(legs)
+    def _watched(self, legs: Sequence[str] | str | None) -> list[str]:
+        names = list(self.legs) if legs is None else legs.split(",") if isinstance(legs, str) else list(legs)
         known = [name for name, leg in self.legs.items() if leg is not None]
         for name in names:
             if name not in known:
                 raise BadRequest("a leg of the batch", name, known)
+            if names.count(name) > 1:
+                raise BadRequest("a leg is watched twice", name, known)
         if not names:
             raise BadRequest("nothing is observed", "no leg", known)
         return names
@@ -228,9 +232,12 @@ class Batch:
 
     def _part(self, X: Array, watched: Sequence[str], cones: Array | None, u: Array, M: Array) -> Evaluation:
         """The directions u (k, 3, n) and M (k, 3, D, n) are filled in."""
+        finite: Flags = np.asarray(np.isfinite(X).all(axis=(1, 2)))
+        if not finite.all():
+            X = np.where(finite[:, None, None], X, self.home)
         poses = Poses.of(*self.stage.place(X))
         ends = {name: self._led(chain, X) for name, chain in self.chains.items()}
-        reached = np.ones(len(X), dtype=bool)
+        reached = finite
         for name, leg in self.legs.items():
             places = [i for i, other in enumerate(watched) if other == name]
             if isinstance(leg, Limb):
@@ -285,6 +292,17 @@ def _where(reached: Flags, rows: Array, twists: Array, cones: Array) -> tuple[Sp
     columns = np.full((4, len(reached)), np.nan)
     columns[:, reached] = [each for spread in found for each in (spread.largest, spread.lower)]
     return Spread(*columns[:2]), Spread(*columns[2:])
+
+
+def _half_angles(cones: ArrayLike, k: int) -> Array:
+    """Half-angles (k,) of the cones of k legs (rad)."""
+    half = np.asarray(cones, dtype=float)
+    if half.shape not in ((), (k,)):
+        raise BadRequest("half-angles of cones: how many", half.size, f"one, or {k}")
+    for value in half.ravel():
+        if not 0 < value < np.pi / 2:
+            raise BadRequest("half-angle of a cone (rad)", float(value), "more than 0, less than a right angle")
+    return np.broadcast_to(half, (k,))
 
 
 def _axis_of(u: Array) -> Array | None:

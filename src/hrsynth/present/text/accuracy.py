@@ -67,7 +67,8 @@ def _pose(errors: PoseErrors, true: Sampled | None) -> list[tuple[str, str]]:
     if true is None:
         return rows
     largest = f"{1e3 * true.position:.4g} mm, {np.degrees(true.orientation):.4g} degrees"
-    rows.append(("samples", f"{true.count} true errors give up to {largest}"))
+    rows.append(("samples", f"{true.count} true errors give up to {largest}" if true.missed < true.count
+                 else f"{true.count} true errors were tried"))
     if true.missed:
         rows.append(("", f"for {true.missed} of them there is no pose near: a singularity is near, the maxima above "
                          "are not to be relied on"))
