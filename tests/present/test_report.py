@@ -126,7 +126,7 @@ def test_what_is_refused_is_one_sentence():
 
 def test_a_part_that_fails_leaves_its_reason():
     def fails() -> None:
-        raise PlaneNotMet("r", "z=1", "too high")
+        raise PlaneNotMet("r", "the plane z=1", "too high")
 
     assert parts.asked("r", fails) == parts.Refused("no pose of the plane z=1 is reached: too high")
     with pytest.raises(ZeroDivisionError):
