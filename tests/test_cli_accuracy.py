@@ -65,6 +65,7 @@ def test_refusals_are_one_line(capsys: pytest.CaptureFixture[str], arguments: tu
     assert word in line
 
 
+@pytest.mark.slow
 def test_a_planar_robot_has_the_plane_in_which_it_moves(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     robot = ("accuracy", "rrrrr_m1", "--cone", "0.1deg", "--steps", "9")
     status, out, _ = told(capsys, *robot, "--plane", "z=0", "-o", str(tmp_path / "map.png"))

@@ -40,7 +40,7 @@ def test_the_same_robot_written_differently_has_the_same_hidden_robot(name: str,
 
 
 @given(st.data(), st.integers(0, 2**31))
-@settings(max_examples=12, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
+@settings(max_examples=4, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 def test_random_robots_are_certified_and_keep_their_hidden_robot(data: st.DataObject, seed: int) -> None:
     robot = data.draw(strategies.parallel_robots())
     found = derive(robot)

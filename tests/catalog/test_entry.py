@@ -33,6 +33,8 @@ SHIPPED = {
 
 
 QUICK = ("3rps", "uranesx")
+TWO_FIRST = [pytest.param(name, marks=pytest.mark.slow) if name in ("pods", "deltas") else name for name in GROUPS]
+"""The groups, two left to the slow tests."""
 
 
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.slow) for n in SHIPPED])
@@ -105,7 +107,7 @@ def test_fifty_entries_are_the_same_in_another_process():
     assert there == [json.dumps(entry(word), sort_keys=True) for word in reversed(chosen)]
 
 
-@pytest.mark.parametrize("name", GROUPS)
+@pytest.mark.parametrize("name", TWO_FIRST)
 def test_verdicts_are_exact_and_confirmed(name):
     for text in random.Random(2).sample(words(name), 3):
         found = entry(text)
@@ -121,7 +123,7 @@ def test_what_does_not_move_has_no_verdict():
         entry("3(Rz*-Q-Rz)")
 
 
-@pytest.mark.parametrize("name", GROUPS)
+@pytest.mark.parametrize("name", TWO_FIRST)
 def test_screws_without_pinocchio_see_the_same(name):
     """At the zero configuration, in maximal coordinates: dof, mobility and rank of all legs and of a smallest set."""
     for text in random.Random(7).sample(words(name), 3):

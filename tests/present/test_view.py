@@ -30,7 +30,8 @@ def law_joints_hold(found: View) -> None:
             assert worst < CLOSED, (machine.key, worst)
 
 
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name == "quattro" else name
+                                  for name in ROBOTS])
 def test_all_loops_are_closed_at_every_position_of_every_slider(name: str):
     found = seen(name)
     assert len(found.sliders) == found.setting.dof

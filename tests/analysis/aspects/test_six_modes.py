@@ -98,6 +98,7 @@ def check_instance(instance: SixModes, points: int, followed: int) -> tuple[int,
     return sum(values[i] * values[j] > 0 for i, j in PAIRS), decided
 
 
+@pytest.mark.slow
 def test_modes_of_one_sign_are_joined_and_of_opposite_signs_separated():
     counts = np.array([check_instance(instance, 100, 1) for instance in islice(six_modes(1), 2)])
     assert np.all(counts[:, 1] >= 0.9 * counts[:, 0])

@@ -78,6 +78,7 @@ def test_a_condition_whose_sign_changes_has_poses_on_its_locus(robot: str, legs:
     assert len(answer.examples) > 0
 
 
+@pytest.mark.slow
 @given(robot=st.one_of(strategies.planar_robots(point=None), strategies.delta_like()), seed=st.integers(0, 2**31),
        real=st.booleans())
 @settings(max_examples=3, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
