@@ -495,10 +495,7 @@ def swept(kinds, table, watched, span, X, point, cones, only, single, reached, c
     for i in range(n):
         for row in range(3):
             p[row] = (X[i, row, 3] + X[i, row, 0] * point[0] + X[i, row, 1] * point[1] + X[i, row, 2] * point[2])
-        total = 0.0
-        for row in range(4):
-            total += (X[i, row, 0] + X[i, row, 1]) + (X[i, row, 2] + X[i, row, 3])
-        there = isfinite(total)
+        there = isfinite(p[0] + p[1] + p[2])
         for leg in range(len(kinds) if there else 0):
             if not rows(kinds[leg], table, leg, span, p, X, U, M, i, slot[leg]):
                 there = False

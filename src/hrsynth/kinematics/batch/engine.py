@@ -232,7 +232,7 @@ class Batch:
 
     def _part(self, X: Array, watched: Sequence[str], cones: Array | None, u: Array, M: Array) -> Evaluation:
         """The directions u (k, 3, n) and M (k, 3, D, n) are filled in."""
-        finite: Flags = np.asarray(np.isfinite(X).all(axis=(1, 2)))
+        finite: Flags = np.asarray(np.isfinite(X[:, :3]).all(axis=(1, 2)))
         if not finite.all():
             X = np.where(finite[:, None, None], X, self.home)
         poses = Poses.of(*self.stage.place(X))
