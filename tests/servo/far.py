@@ -6,6 +6,7 @@ names of all controllable robots; ``-o FILE`` writes it between the marks of a p
 
 from __future__ import annotations
 
+import argparse
 import sys
 from collections import Counter
 from collections.abc import Iterator
@@ -128,23 +129,26 @@ def row(*cells: object) -> str:
     return f"| {' | '.join(map(str, cells))} |\n"
 
 
-def main(arguments: list[str]) -> None:
+def main() -> None:
     """Print or write the table; the exit status is 1 where something is untrue."""
-    page = arguments.pop() if "-o" in arguments else None
-    count, *names = [each for each in arguments if each != "-o"]
-    names = names or CONTROLLABLE
+    parser = argparse.ArgumentParser(prog="python -m servo.far", description=__doc__)
+    parser.add_argument("count", type=int, help="pairs of each robot")
+    parser.add_argument("names", nargs="*", help="robots (default: all that are controllable)")
+    parser.add_argument("-o", dest="page", type=Path, help="the page whose table is written")
+    asked = parser.parse_args()
+    names = asked.names or CONTROLLABLE
+    text = None if asked.page is None else asked.page.read_text(encoding="utf-8")
     with ProcessPoolExecutor(2) as pool:
-        found = list(pool.map(line, names, [int(count)] * len(names)))
+        found = list(pool.map(line, names, [asked.count] * len(names)))
     heads = ("robot", "pairs", *ENDINGS, "untrue")
     table = row(*heads) + row("---", *["---:"] * (len(heads) - 1)) + "".join(told for told, _ in found)
-    if page is None:
+    if text is None:
         print(table)
     else:
-        text = Path(page).read_text(encoding="utf-8")
-        Path(page).write_text(replaced(text, table, START), encoding="utf-8", newline="\n")
+        asked.page.write_text(replaced(text, table, START), encoding="utf-8", newline="\n")
     wrong = [each for _, some in found for each in some]
     sys.exit("\n".join(wrong) or None)
 
 
 if __name__ == "__main__":
-    main(sys.argv[1:])
+    main()

@@ -6,12 +6,12 @@ from typing import Annotated
 
 import typer
 
-from .options import Camera, Json, Observe, Seed, Source, listed
+from .options import Camera, Json, Observe, Seed, Source, Start, listed
 from .progress import Progress
 
 
 def servo(
-    start: Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")],
+    start: Start,
     goal: Annotated[str, typer.Option("--to", metavar="POSE", help="Pose whose directions are desired.")],
     observe: Observe = "all",
     camera: Camera = None,
@@ -92,7 +92,7 @@ def accuracy(
 
 
 def select(
-    start: Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")],
+    start: Start,
     goal: Annotated[str, typer.Option("--to", metavar="POSE", help="Where it is to end.")],
     cone: Annotated[str, typer.Option(metavar="ANGLE", help="Half-angle of the cone about each direction, or one a "
                                       "leg: 1=0.1deg,2=0.2deg,…")] = "0.1deg",

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
 Observe = Annotated[str, typer.Option("--observe", metavar="LEGS", help="Legs to watch (1,4), links, or all.")]
 Camera = Annotated[str | None, typer.Option("--camera", metavar="LINK", help="The link that carries the camera.")]
+Start = Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")]
 Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random configurations.")]
 
 

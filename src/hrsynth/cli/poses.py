@@ -6,7 +6,7 @@ from typing import Annotated
 
 import typer
 
-from .options import Camera, Json, Observe, Seed, Source, listed
+from .options import Camera, Json, Observe, Seed, Source, Start, listed
 from .progress import Progress
 
 
@@ -114,7 +114,7 @@ def modes(
 
 
 def path(
-    start: Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")],
+    start: Start,
     goal: Annotated[str, typer.Option("--to", metavar="POSE", help="Where it ends.")],
     observe: Observe = "all",
     camera: Camera = None,

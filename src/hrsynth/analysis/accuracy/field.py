@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -67,8 +67,8 @@ class Spots:
 @dataclass(frozen=True, eq=False)
 class Field:
     """The error maxima over a grid, in its shape: position (m) and orientation (rad), NaN where no pose is reached,
-    infinite where a freedom is lost. ``again`` evaluates other poses of the same grid (values of its axes (n, ndim));
-    None where poses are found one by one."""
+    infinite where a freedom is lost. ``smallest_at`` gives the smallest singular value of Mᵀ (n,) at other poses of the
+    same grid (values of its axes (n, ndim)); None where poses are found one by one."""
 
     grid: Grid
     reached: Flags
@@ -77,7 +77,7 @@ class Field:
     gap: float
     seen: Seen
     spots: Spots | None
-    again: Callable[[Array], Seen] | None
+    smallest_at: Callable[[Array], Array] | None
 
     @cached_property
     def determinant(self) -> Array | None:
@@ -161,16 +161,12 @@ class Mapper:
         seen = self._one_by_one(grid) if self.batch is None else self._together(grid, grid.places())
         if not seen.reached.any():
             raise PlaneNotMet(name, f"the grid {grid}", f"none of {math.prod(grid.shape)} is")
-        spots = again = None
+        spots = smallest_at = None
         if self.batch is not None:
-            spots = self._spots(grid, seen, seed)
-
-            def again(places: Array) -> Seen:
-                return self._together(grid, places)
-
+            spots, smallest_at = self._spots(grid, seen, seed), partial(self._smallest, grid)
         shape = grid.shape
         return Field(grid, seen.reached.reshape(shape), seen.position.reshape(shape), seen.orientation.reshape(shape),
-                     seen.gap, seen, spots, again)
+                     seen.gap, seen, spots, smallest_at)
 
     def _together(self, grid: Grid, places: Array) -> Seen:
         """Poses by the batch; of a part of them no more is kept than their errors."""
@@ -183,21 +179,24 @@ class Mapper:
                 column.append(np.where(reached[-1], spread.largest, np.nan))
                 gaps.append(_gap(spread.largest, spread.lower))
 
-        def determinant() -> Array | None:
-            found = []
-            for possible, part in self._parts(grid, places, None):
-                with np.errstate(invalid="ignore"):
-                    if part.determinant is None:
-                        return None
-                found.append(np.where(possible & part.reached, part.determinant, np.nan))
-            return np.concatenate(found)
-
-        def smallest() -> Array:
-            return np.concatenate([np.where(possible, part.singular_values[:, -1], np.nan)
-                                   for possible, part in self._parts(grid, places, None)])
-
         position, orientation = map(np.concatenate, columns)
-        return Seen(np.concatenate(reached), position, orientation, determinant, smallest, max(gaps))
+        return Seen(np.concatenate(reached), position, orientation, partial(self._determinant, grid, places),
+                    partial(self._smallest, grid, places), max(gaps))
+
+    def _determinant(self, grid: Grid, places: Array) -> Array | None:
+        """The determinant of the directions' rates by the batch."""
+        found = []
+        for possible, part in self._parts(grid, places, None):
+            with np.errstate(invalid="ignore"):
+                if part.determinant is None:
+                    return None
+            found.append(np.where(possible & part.reached, part.determinant, np.nan))
+        return np.concatenate(found)
+
+    def _smallest(self, grid: Grid, places: Array) -> Array:
+        """The smallest singular value of Mᵀ by the batch."""
+        return np.concatenate([np.where(possible, part.singular_values[:, -1], np.nan)
+                               for possible, part in self._parts(grid, places, None)])
 
     def _parts(self, grid: Grid, places: Array, cones: Array | None) -> Iterator[tuple[Flags, Evaluation]]:
         """Which poses of each part the platform can have at all, and what the batch says of them; in NumPy where they

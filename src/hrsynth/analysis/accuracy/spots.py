@@ -26,12 +26,12 @@ FEW = 12
 
 def singular_poses(field: Field) -> Array:
     """Singular poses (n, 2) of a plane, as values of its two parts: along the lines of its cells, and isolated ones."""
-    if field.again is None or field.grid.ndim != 2:
+    if field.smallest_at is None or field.grid.ndim != 2:
         return np.zeros((0, 2))
-    again = field.again
+    smallest_at = field.smallest_at
 
     def value(places: Array) -> Array:
-        found = again(places).smallest()
+        found = smallest_at(places)
         return np.where(np.isfinite(found), found, np.inf)
 
     table = np.where(np.isfinite(field.smallest), field.smallest, np.inf)

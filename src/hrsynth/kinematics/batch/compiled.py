@@ -1,5 +1,6 @@
-"""The batch compiled by numba: the same closed forms as in NumPy, pose by pose. Imported only where it is used; what is
-compiled is kept between runs.
+"""The batch compiled by numba: the same closed forms as in NumPy, pose by pose. Imported only where it is used.
+
+What is compiled is kept between runs. It is one file because numba notices changes only in the file of what it kept.
 """
 
 from __future__ import annotations

@@ -89,7 +89,7 @@ def _null(x: Array, y: Array, z: Array, f: Array, g: Array, h: Array) -> Array:
 def _upper_two(B: Array, smallest: Array) -> tuple[Array, Array]:
     """The largest eigenvalue and its eigenvector from the smallest eigenvalue."""
     v = _null(B[0] - smallest, B[1] - smallest, B[2] - smallest, B[3], B[4], B[5])
-    e, f = _tangents(v)
+    e, f = tangents(v)
     Be = _times(B, e)
     ee, ef = _dot(e, Be), _dot(f, Be)
     half = (ee - (B[0] + B[1] + B[2] - smallest - ee)) / 2
@@ -100,7 +100,7 @@ def _upper_two(B: Array, smallest: Array) -> tuple[Array, Array]:
     return ee - half + size, e * cosine + f * (sine / np.where(length > 0, length, 1.0))
 
 
-def _tangents(v: Array) -> tuple[Array, Array]:
+def tangents(v: Array) -> tuple[Array, Array]:
     """Two unit vectors (3, n) that make a right-handed triad with unit vectors v."""
     flat = np.abs(v[2]) < 0.7
     zero = np.zeros_like(v[0])
@@ -150,7 +150,7 @@ def _direct(B: Array, C: Array, w: Array) -> tuple[Array, Array]:
         aa, bb = _dot(w, Bw), _dot(w, Cw)
         sound = (aa > NOTHING * (B[0] + B[1] + B[2])) & (bb > NOTHING * (C[0] + C[1] + C[2]))
         a, b = np.sqrt(aa), np.sqrt(bb)
-        total, S, (e, f) = a + b, B / a + C / b, _tangents(w)
+        total, S, (e, f) = a + b, B / a + C / b, tangents(w)
         be, bf, ce, cf = _dot(Bw, e) / a, _dot(Bw, f) / a, _dot(Cw, e) / b, _dot(Cw, f) / b
         Se = _times(S, e)
         ee, ef, ff = _dot(Se, e) - total, _dot(Se, f), _dot(_times(S, f), f) - total

@@ -22,6 +22,7 @@ from ...tolerances import RANK_CUTOFF
 from ..configuration import ClosedConfiguration
 from ..parts import PlatformMotion
 from .chain import Chain, Ends
+from .cones import tangents
 from .limb import Limb, recognised
 from .plain import Flags, Poses, block, within
 from .spread import Spread, freedom, spreads
@@ -66,8 +67,8 @@ class Evaluation:
         u, M = self.directions, self.matrix.reshape(len(self.matrix), len(self.normals), 3, -1)
         rows = []
         for i, normal in enumerate(self.normals):
-            bases = [np.cross(normal, u[:, i])] if normal is not None else _tangents(u[:, i])
-            rows += [np.einsum("nr,nrd->nd", basis, M[:, i]) for basis in bases]
+            bases = [np.cross(normal, u[:, i]).T] if normal is not None else tangents(u[:, i].T)
+            rows += [np.einsum("rn,nrd->nd", basis, M[:, i]) for basis in bases]
         square = np.stack(rows, axis=1)
         return np.linalg.det(square) if square.shape[1] == square.shape[2] else None
 
@@ -309,14 +310,6 @@ def _axis_of(u: Array) -> Array | None:
     """The axis about which directions (m, 3) turn, where they keep their angle to it (a plane or a cone)."""
     _, s, right = np.linalg.svd(u - u[0])
     return right[2] if s[1] > RANK_CUTOFF > s[2] else None
-
-
-def _tangents(u: Array) -> tuple[Array, Array]:
-    """Two unit vectors (n, 3) that make a right-handed triad with unit vectors u."""
-    far = np.eye(3)[np.argmin(np.abs(u), axis=1)]
-    first = np.cross(u, far)
-    first /= np.linalg.norm(first, axis=1, keepdims=True)
-    return first, np.cross(u, first)
 
 
 def _joined(parts: Sequence[Evaluation], whole: Mapping[str, Array]) -> Evaluation:
