@@ -54,6 +54,7 @@ robots: setup  ## regenerate robots/*.urdf from the families
 readme: setup  ## regenerate the tables of the README and of docs/pages
 	@$(BIN)/python -m hrsynth.present.readme README.md docs/pages/papers.md
 	@$(BIN)/python -m hrsynth.catalog.readme README.md
+	@$(BIN)/python -m hrsynth.claims docs/pages/claims.md
 
 catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS= processes; hours)
 	@$(BIN)/hrsynth catalog build --workers $(JOBS)

@@ -18,7 +18,7 @@ PACKAGE = ROOT / "src" / "hrsynth"
 
 # A module imports only from its own folder and from those above it here.
 FOLDERS = [
-    {"errors", "tolerances", "results"},
+    {"errors", "tolerances", "results", "claims"},
     {"mechanism"},
     {"description"},
     {"families"},

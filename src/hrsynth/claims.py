@@ -1,0 +1,159 @@
+"""Every word of certainty that the program prints: what it stands for, by which computation, on which assumptions, and
+the test that would fail if it were false.
+
+``python -m hrsynth.claims FILE`` writes the page of claims. A test (``tests/test_claims.py``) goes through all texts in
+the code and all templates of pages: one that holds a word of certainty (:data:`CERTAIN`) and is covered neither by a
+row of :data:`CLAIMS` nor by :data:`NO_CLAIMS` fails, as does a row that no text needs.
+
+To print a new one: write what computes it, its test, and then its row here.
+"""
+
+from __future__ import annotations
+
+import re
+import sys
+from dataclasses import dataclass
+from pathlib import Path
+
+CERTAIN = re.compile(r"\b(prove[ns]?|proved|proofs?|certif\w+|complete\w*|cannot|never|always|exact\w*|enclose[sd]?|"
+                     r"enclosures?|guarantee\w*|impossible|unique\w*|rigorous\w*|isolated|necessarily|separated|"
+                     r"same aspect|controllable|uncontrollable)\b", re.IGNORECASE)
+"""The words that make a text a claim."""
+
+
+@dataclass(frozen=True)
+class Claim:
+    """One word or phrase: ``texts`` are patterns of the texts that say it, ``test`` is ``file::function``."""
+
+    phrase: str
+    command: str
+    means: str
+    computation: str
+    assumes: str
+    test: str
+    texts: tuple[str, ...]
+
+
+EXACT_GEOMETRY = "the file's numbers are the robot's geometry"
+
+CLAIMS = (
+    Claim("controllable, partially controllable, uncontrollable", "derive, legs, check, singular, advise, catalog",
+          "at generic configurations on the branch of the zero configuration the watched directions show all, some "
+          "or none "
+          "of the platform's small motions",
+          "the ranks of the closed loops' Jacobian at 20 configurations, each with its gap, all of which must agree",
+          "numerical, no proof: the configurations are generic, and the gap (1000 at least) tells the rank",
+          "tests/analysis/test_legs.py::test_all_sets_obey", (r"controllable",)),
+    Claim("certificate passed", "derive",
+          "the hidden robot follows the real one at the sampled configurations and has the same relation between the "
+          "platform's twist and the rates of the watched directions there",
+          "both robots are assembled at the same pose and directions (residual below 1e-9) and their relations "
+          "compared "
+          "(largest principal angle below 1e-6) at every sample",
+          "numerical, no proof: sampled configurations stand for all",
+          "tests/kinematics/test_certificate.py::test_a_longer_rod_is_caught",
+          (r"certificate", r"certified form", r"no hidden robot passed the certificate")),
+    Claim("cannot follow the real robot", "derive (why a step was refused)",
+          "the rewritten mechanism was not assembled at a pose and directions of the real robot",
+          "Newton's method on its loops, led along the way on which the real robot came, leaves a residual above 1e-9",
+          "not found, rather than proved: the step is refused, which is safe",
+          "tests/kinematics/test_certificate.py::test_a_longer_rod_is_caught", (r"cannot follow the real robot",)),
+    Claim("proved in exact arithmetic", "derive, legs, catalog",
+          "the architecture is controllable: almost all geometries with its relations are",
+          "the ranks of an instance with rational centres and axes that has all its relations, over the rationals",
+          "the relations named (see the line itself) are the architecture's",
+          "tests/analysis/test_exact.py::test_exact_ranks_are_the_numerical_ones",
+          (r"proved in exact arithmetic", r"exact at ", r"not decided in exact arithmetic",
+           r"freedoms in exact arithmetic", r"gears are not part of exact geometry", r"^proved$",
+           r"Exact in %d instances", r'scope="col">exact<')),
+    Claim("cannot turn about its own direction, and …", "derive (why a rule does not apply)",
+          "the observed link has no turn about the watched direction with all other links at rest",
+          "the kernel of the loops' Jacobian at the samples", "numerical; the rule is not used, which is safe",
+          "tests/rewrite/test_rules.py::test_takeover_of_a_skew_elbow_is_caught",
+          (r"cannot turn about its own direction",)),
+    Claim("proved to be all among …", "modes, path, servo, select, report",
+          "no other pose of the named kind has the same measurements",
+          "an exact resultant whose roots are isolated, on all curves that the held legs' ends can follow",
+          EXACT_GEOMETRY,
+          "tests/analysis/modes/test_bounds.py::test_a_robot_reaches_the_bound",
+          (r"proved to be all", r"exact resultant", r" isolated", r"nothing proved", r"not complete", r"^<p>Proof: ",
+           r"the controller cannot$")),
+    Claim("enclosed to …", "modes",
+          "exactly one mode lies within the radius that is told",
+          "Krawczyk's operator in ball arithmetic", EXACT_GEOMETRY,
+          "tests/analysis/modes/test_bounds.py::test_a_robot_reaches_the_bound",
+          (r"enclosed to ", r"each enclosed with existence and uniqueness proved", r"not proved, ")),
+    Claim("the real robot cannot be assembled there", "modes, view, report",
+          "no closed configuration of the whole real robot has the platform at this pose",
+          "each leg is closed alone from its known closed forms, or from random starts",
+          "random starts find a closure where there is one",
+          "tests/kinematics/test_assembly.py::test_a_pose_far_away_names_the_legs_that_do_not_close",
+          (r"robot cannot be assembled", r"\(cannot be assembled\)", r"^impossible: ")),
+    Claim("same aspect (certified)", "path, select",
+          "the path that is printed joins the two poses, and the hidden robot meets no Type 2 singularity on it",
+          "interval arithmetic along the path", EXACT_GEOMETRY,
+          "tests/analysis/aspects/test_aspects.py::test_a_certified_path_is_free_of_singularities_and_within_reach",
+          (r"same aspect", r"^(not )?certified$", r"enclosed away from zero", r"no path was proved",
+           r"path shown is proved but for its last part", r"not proved$", r"no path can be certified")),
+    Claim("separated", "path, select",
+          "every path between the two poses meets a Type 2 singularity of the hidden robot",
+          "the condition's expression is enclosed with opposite signs at the two poses", EXACT_GEOMETRY,
+          "tests/analysis/aspects/test_aspects.py::test_opposite_signs_are_separated_and_equal_signs_never",
+          (r"^separated$", r"enclosed with opposite signs", r"not certified by intervals")),
+    Claim("never (Type 2 singularities)", "singular",
+          "the hidden robot has no Type 2 singularity",
+          "the vectors of the condition are constant and not parallel", EXACT_GEOMETRY,
+          "tests/analysis/test_legs.py::test_all_sets_obey",
+          (r"never: ", r"never zero", r"^never$")),
+    Claim("always … never seen", "singular, path",
+          "the robot's watched directions never show these freedoms", "as for *partially controllable*", "numerical",
+          "tests/analysis/test_legs.py::test_all_sets_obey", (r"always: ", r" never seen", r"^always$",
+          r"never seen: ")),
+)
+"""What is claimed, in the order of the page."""
+
+
+@dataclass(frozen=True)
+class NoClaim:
+    """Texts with such a word that claim nothing of a robot, and why not."""
+
+    why: str
+    texts: tuple[str, ...]
+
+
+NO_CLAIMS = (
+    NoClaim("a file or a request is refused", (
+        r"cannot (be read|write|draw|serve|build|read|all be parallel)", r"cannot (be asked for|be used|be rendered)",
+        r"name cannot be written", r"assembly modes cannot be listed", r"cannot do the work",
+        r"a link cannot meet itself",
+        r"the platform cannot change ", r" cannot be closed at the zero configuration",
+        r"visual shapes cannot be read")),
+    NoClaim("says how sensing is simulated", (r"exact, edges \(of the legs", r"^exact$")),
+    NoClaim("tells a limit of what was done", (
+        r"cannot tell it from a singularity", r"cannot be moved to see where its tip goes",
+        r"cannot be enclosed away from",
+        r"follow the command any further", r"are made exact, largest change")),
+    NoClaim("names of fields, modules and styles", (
+        r"^[\w.]*(certificate|Certificate|complete|proof|proved|always)\w*$",
+        r"task\.completed", r"isolated modes$", r"drawings, proof,",
+        r"^\{.*proof.*\}$")),
+    NoClaim("promises what a page is about", (r"what the controller can and cannot do",)),
+)
+
+
+def page() -> str:
+    """The page of claims, Markdown."""
+    lines = ["# What each word of certainty stands for", "",
+             "Each word of certainty that the program prints stands in this table, which is made from the code's own "
+             "(`src/hrsynth/claims.py`). A test fails if a text holds such a word and is not listed there. What is "
+             "not in "
+             "this table is not claimed.", ""]
+    for claim in CLAIMS:
+        lines += [f"## {claim.phrase}", "", f"`{claim.command}`" if " " not in claim.command else claim.command, "",
+                  f"* **Stands for:** {claim.means}.", f"* **Computed by:** {claim.computation}.",
+                  f"* **Assumes:** {claim.assumes}.", f"* **Would fail:** `{claim.test}`.", ""]
+    return "\n".join(lines)
+
+
+if __name__ == "__main__":
+    Path(sys.argv[1]).write_text(page(), encoding="utf-8", newline="\n")
