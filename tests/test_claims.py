@@ -1,4 +1,4 @@
-"""No word of certainty without its reason: each text that holds one is in the table of claims, and it has a test.
+"""No word of certainty without its reason: each text that holds one is in the table of claims, and it has a test."""
 
 from __future__ import annotations
 
