@@ -51,9 +51,9 @@ types: setup-dev  ## type check
 robots: setup  ## regenerate robots/*.urdf from the families
 	@$(BIN)/python -m hrsynth.families
 
-readme: setup  ## regenerate the tables of the README and of docs/pages
-	@$(BIN)/python -m hrsynth.present.readme README.md docs/pages/papers.md
-	@$(BIN)/python -m hrsynth.catalog.readme README.md
+readme: setup  ## regenerate the tables of robots/README.md and of docs/pages
+	@$(BIN)/python -m hrsynth.present.readme robots/README.md docs/pages/papers.md
+	@$(BIN)/python -m hrsynth.catalog.readme docs/pages/catalog.md
 	@$(BIN)/python -m hrsynth.claims docs/pages/claims.md
 
 catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS= processes; hours)

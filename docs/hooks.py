@@ -18,7 +18,7 @@ import lessons
 ROOT = lessons.ROOT
 PACKAGE = ROOT / "src" / "hrsynth"
 LINKS = {"docs/pictures/": "pictures/", "docs/pages/": "", "CONTRIBUTING.md": "contributing.md",
-         "CHANGELOG.md": "changelog.md", "notebooks/README.md": "notebooks/index.md"}
+         "CHANGELOG.md": "changelog.md", "notebooks/README.md": "notebooks/index.md", "robots/README.md": "robots.md"}
 """Where what the README links to lies in the site."""
 QUICK = "HRSYNTH_DOCS_QUICK"
 """Environment variable: notebooks of which no executed copy is kept are shown without outputs."""
@@ -38,7 +38,7 @@ def on_files(files: Any, config: Any) -> Any:
 def made() -> Iterator[tuple[str, str | bytes]]:
     """Name and content of each page and picture that is made."""
     for name, source in (("index.md", "README.md"), ("contributing.md", "CONTRIBUTING.md"),
-                         ("changelog.md", "CHANGELOG.md")):
+                         ("changelog.md", "CHANGELOG.md"), ("robots.md", "robots/README.md")):
         yield name, relinked((ROOT / source).read_text(encoding="utf-8"))
     overview = (lessons.FOLDER / "README.md").read_text(encoding="utf-8")
     yield "notebooks/index.md", underlined(overview.replace(".ipynb)", ".md)"))
@@ -50,6 +50,11 @@ def made() -> Iterator[tuple[str, str | bytes]]:
     for folder in FOLDERS:
         if (PACKAGE / folder).is_dir():
             yield f"reference/{folder}.md", modules(folder)
+
+
+def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
+    """A page of ``docs/pages`` with its pictures where the site has them."""
+    return markdown.replace("](../pictures/", "](pictures/")
 
 
 def relinked(text: str) -> str:

@@ -1,4 +1,4 @@
-"""The README's table of the catalog; ``python -m hrsynth.catalog.readme README.md`` writes it between its marks."""
+"""The table of the catalog; ``python -m hrsynth.catalog.readme docs/pages/catalog.md`` writes it between its marks."""
 
 from __future__ import annotations
 
