@@ -12,11 +12,6 @@ PYTEST = OMP_NUM_THREADS=1 $(BIN)/pytest -q -n $(JOBS)
 LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
-COMMA := ,
-# the view of a robot in the browser as a picture, by the name after the comma
-VIEWED = $(BIN)/hrsynth view $(1) --static $(VENV)/view.html > /dev/null && \
-	$(BIN)/python tests/browser.py $(VENV)/view.html docs/pictures/view_$(2).png 1100 760
-
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-all test-long fuzz bounds endings bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
@@ -71,37 +66,8 @@ endings: setup-dev  ## how 100 far servo runs of every robot end, checked, as th
 bench: setup-all  ## run the benchmarks and write their table in docs/pages (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python benchmarks/table.py docs/pages/batches.md
 
-pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again
-	@mkdir -p build docs/pictures
-	@$(BIN)/python -c 'import hrsynth; hrsynth.draw(hrsynth.derive(hrsynth.load("quattro"), ["1", "4"])).save("docs/pictures/derivation_quattro.svg")'
-	@$(BIN)/hrsynth modes rrrrr_m1 -o docs/pictures/modes_rrrrr.png > /dev/null
-	@$(BIN)/hrsynth modes 3rrr_m1 -o docs/pictures/modes_3rrr.png > /dev/null
-	@$(BIN)/hrsynth modes gough_stewart --observe 1,3,5 --at x=-0.03,y=-0.06,z=0.37,rpy=-0.1/0.5/0.1 -o docs/pictures/modes_gough_stewart.png > /dev/null
-	@$(BIN)/hrsynth modes hexa --observe 1,3,5 -o docs/pictures/modes_hexa.png > /dev/null
-	@$(BIN)/hrsynth modes quattro --observe 1,4 -o docs/pictures/modes_quattro.png > /dev/null
-	@$(BIN)/hrsynth modes delta -o docs/pictures/modes_delta.png > /dev/null
-	@$(BIN)/hrsynth modes delta --real -o docs/pictures/modes_delta_real.png > /dev/null
-	@$(BIN)/hrsynth servo quattro --observe 1,4 --from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0 -o docs/pictures/servo_quattro.png > /dev/null
-	@$(BIN)/hrsynth servo 3rpr_m1 --from x=-0.08,y=-0.06,phi=-10deg --to x=0.034,y=0.23,phi=23deg -o docs/pictures/servo_3rpr.png > /dev/null
-	@$(BIN)/hrsynth servo quattro --observe 1,4 --from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0 --physics --sense pictures -o docs/pictures/servo_quattro.gif > /dev/null
-	@$(BIN)/hrsynth accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7 -o docs/pictures/accuracy_quattro.png > /dev/null
-	@$(BIN)/hrsynth derive rrrrr_m1 --report build/rrrrr_m1.html > /dev/null
-	@$(BIN)/python tests/browser.py build/rrrrr_m1.html docs/pictures/report_rrrrr_m1.png 1200 1500
-	@$(BIN)/hrsynth derive 3rrr_m1 --report build/3rrr_m1.html > /dev/null
-	@$(BIN)/python tests/browser.py build/3rrr_m1.html docs/pictures/report_3rrr_m1.png 1200 1500
-	@$(BIN)/hrsynth derive gough_stewart --report build/gough_stewart.html > /dev/null
-	@$(BIN)/python tests/browser.py build/gough_stewart.html docs/pictures/report_gough_stewart.png 1200 1500
-	@$(BIN)/hrsynth derive quattro --observe 1,4 --report build/quattro.html > /dev/null
-	@$(BIN)/python tests/browser.py build/quattro.html docs/pictures/report_quattro.png 1200 1500
-	@$(BIN)/hrsynth derive uranesx --report build/uranesx.html > /dev/null
-	@$(BIN)/python tests/browser.py build/uranesx.html docs/pictures/report_uranesx.png 1200 1500
-	@$(BIN)/hrsynth catalog site --group planar --legs '3-R*RR' -o build/pages > /dev/null
-	@$(BIN)/python tests/browser.py build/pages/p/96081be379a6.html docs/pictures/catalog.png 1000 1100
-	@$(call VIEWED,rrrrr_m1 --hidden,rrrrr)
-	@$(call VIEWED,3rrr_m1 --hidden,3rrr)
-	@$(call VIEWED,gough_stewart --hidden --observe 1$(COMMA)3$(COMMA)5,gough_stewart)
-	@$(call VIEWED,quattro --hidden --observe 1$(COMMA)4,quattro)
-	@$(call VIEWED,uranesx --hidden,uranesx)
+pictures: setup-all setup-browser  ## draw the pictures in docs/pictures again (ten minutes)
+	@$(BIN)/python docs/pictures.py
 
 lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the newest versions)
 	@$(LOCK) --output-file requirements/main.txt

@@ -29,6 +29,16 @@ def test_the_architecture_page_tells_of_every_folder():
     assert {name for name in folders if f"`{name}/`" not in text} == set()
 
 
+def test_every_picture_has_its_command_and_is_shown():
+    sys.path.insert(0, str(ROOT / "docs"))
+    import pictures
+
+    kept = {path.name for path in (ROOT / "docs" / "pictures").iterdir()}
+    assert kept == set(pictures.PICTURES)
+    shown = "\n".join(page.read_text(encoding="utf-8") for page in (*PAGES, ROOT / "README.md"))
+    assert [name for name in kept if f"pictures/{name}" not in shown] == []
+
+
 @pytest.mark.slow
 def test_the_site_is_built_strictly_and_needs_no_network(tmp_path: Path):
     pytest.importorskip("mkdocs")

@@ -1,0 +1,101 @@
+"""The pictures in ``docs/pictures``, each by the command that draws it.
+
+``python docs/pictures.py [NAME ...]`` draws them again (default: all), as ``make pictures`` does. A picture of a page
+is taken in a headless Chromium. A test compares the names with the folder.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import shlex
+import subprocess
+import sys
+import tempfile
+from dataclasses import dataclass
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parent.parent
+FOLDER = ROOT / "docs" / "pictures"
+FAR = "--from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0"
+"""The displacement of MMT 5.1.3."""
+
+
+@dataclass(frozen=True)
+class Page:
+    """A page that ``hrsynth COMMAND OPTION PATH`` writes, taken at ``width`` × ``height`` pixels; ``inner`` is the
+    file in it where PATH is a folder."""
+
+    command: str
+    option: str
+    width: int
+    height: int
+    inner: str = ""
+
+
+def report(command: str) -> Page:
+    return Page(f"derive {command}", "--report", 1200, 1500)
+
+
+def view(command: str) -> Page:
+    return Page(f"view {command} --hidden", "--static", 1100, 760)
+
+
+PICTURES: dict[str, str | Page] = {
+    "accuracy_quattro.png": "accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7",
+    "catalog.png": Page("catalog site --group planar --legs '3-R*RR'", "-o", 1000, 1100, "p/96081be379a6.html"),
+    "derivation_quattro.svg": "quattro 1,4",
+    "modes_3rrr.png": "modes 3rrr_m1",
+    "modes_delta.png": "modes delta",
+    "modes_delta_real.png": "modes delta --real",
+    "modes_gough_stewart.png": "modes gough_stewart --observe 1,3,5 --at x=-0.03,y=-0.06,z=0.37,rpy=-0.1/0.5/0.1",
+    "modes_hexa.png": "modes hexa --observe 1,3,5",
+    "modes_quattro.png": "modes quattro --observe 1,4",
+    "modes_rrrrr.png": "modes rrrrr_m1",
+    "report_3rrr_m1.png": report("3rrr_m1"),
+    "report_gough_stewart.png": report("gough_stewart"),
+    "report_quattro.png": report("quattro --observe 1,4"),
+    "report_rrrrr_m1.png": report("rrrrr_m1"),
+    "report_uranesx.png": report("uranesx"),
+    "servo_3rpr.png": "servo 3rpr_m1 --from x=-0.08,y=-0.06,phi=-10deg --to x=0.034,y=0.23,phi=23deg",
+    "servo_quattro.gif": f"servo quattro --observe 1,4 {FAR} --physics --sense pictures",
+    "servo_quattro.png": f"servo quattro --observe 1,4 {FAR}",
+    "view_3rrr.png": view("3rrr_m1"),
+    "view_gough_stewart.png": view("gough_stewart --observe 1,3,5"),
+    "view_quattro.png": view("quattro --observe 1,4"),
+    "view_rrrrr.png": view("rrrrr_m1"),
+    "view_uranesx.png": view("uranesx"),
+}
+"""Each picture: what draws it with ``-o``, the page that it is of, or (the derivation) robot and legs."""
+
+
+def draw(name: str) -> None:
+    """Draw one picture again."""
+    import hrsynth
+
+    what, file = PICTURES[name], FOLDER / name
+    if isinstance(what, Page):
+        with tempfile.TemporaryDirectory() as folder:
+            page = Path(folder) / ("page.html" if not what.inner else "pages")
+            _run(f"{what.command} {what.option} {page}")
+            subprocess.run([sys.executable, str(ROOT / "tests" / "browser.py"), str(page / what.inner), str(file),
+                            str(what.width), str(what.height)], check=True)
+    elif name.startswith("derivation_"):
+        robot, legs = what.split()
+        hrsynth.draw(hrsynth.derive(hrsynth.load(robot), legs.split(","))).save(str(file))
+    else:
+        _run(f"{what} -o {file}")
+
+
+def _run(command: str) -> None:
+    from hrsynth.cli import execute
+
+    with contextlib.redirect_stdout(io.StringIO()) as output:
+        status = execute(shlex.split(command))
+    if status:
+        raise SystemExit(f"hrsynth {command}: exit status {status}\n{output.getvalue()}")
+
+
+if __name__ == "__main__":
+    for each in sys.argv[1:] or PICTURES:
+        draw(each)
