@@ -4,6 +4,7 @@ JOBS ?= 2
 MUTATIONS ?= 100000
 SEED ?= 0
 INSTANCES ?= 10000
+COUNT ?= 300
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --quiet --no-input --disable-pip-version-check
@@ -13,7 +14,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz bounds endings bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long fuzz adversary bounds endings bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -36,6 +37,10 @@ fuzz: setup-dev  ## 100,000 mutations of robot files (MUTATIONS=, SEED=): each i
 
 bounds: setup-dev  ## 10,000 random instances of every family of assembly modes (INSTANCES=10000; half an hour)
 	@cd tests && OMP_NUM_THREADS=1 ../$(BIN)/python -m analysis.modes.bounds $(INSTANCES)
+
+adversary: setup-dev  ## brute force against the answers for random robots (COUNT=300, SEED=0); a broken-off run goes on
+	@mkdir -p build && cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m adversary.run \
+		--count $(COUNT) --seed $(SEED) --workers $(JOBS) --log ../build/adversary.jsonl
 
 lint: setup-dev  ## style and import order
 	@$(BIN)/ruff check --quiet . && echo "lint: no complaint"

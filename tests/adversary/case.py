@@ -1,0 +1,146 @@
+"""A robot under attack: its file, the engine's mechanism, the own reading of it; and what a check says of a claim."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from adversary.robot import Array, Items, Robot, State, things
+from adversary.search import Study, polished, scattered, solve
+
+HELD, WRONG, UNCLEAR, REFUSED, SILENT = "held", "wrong", "unclear", "refused", "silent"
+"""A claim that the search confirms; that it refutes; that it cannot judge; no answer with a reason; no claim made."""
+
+
+@dataclass(frozen=True)
+class Said:
+    """What was found of one claim."""
+
+    claim: str
+    outcome: str
+    detail: str = ""
+
+
+@dataclass
+class Case:
+    """One random robot. ``bars``: pairs of links that are the equal bars of a parallelogram; ``turned``: pairs that one
+    keeps from turning against each other."""
+
+    kind: str
+    seed: int
+    path: Path
+    rng: np.random.Generator
+    bars: Sequence[tuple[str, str]] = ()
+    turned: Sequence[tuple[str, str]] = ()
+    found: list[Said] = field(default_factory=list)
+
+    @cached_property
+    def engine(self) -> Any:
+        """The mechanism as the engine reads it."""
+        import hrsynth
+
+        return hrsynth.load(self.path)
+
+    @cached_property
+    def robot(self) -> Robot:
+        """The robot as read here."""
+        return Robot.read(self.path)
+
+    @cached_property
+    def study(self) -> Study:
+        """The robot under study."""
+        return Study(self.robot, self.robot.point)
+
+    @cached_property
+    def walked(self) -> tuple[State, Array]:
+        """Configurations to which small steps lead from zero, those that stayed on one sheet; how far the zero
+        configuration's own ranks are clear."""
+        at, good = self.study.walk(self.rng, self.robot.zero(), 6, 14, 0.05)
+        return at[good], good
+
+    def say(self, claim: str, outcome: str, detail: str = "") -> None:
+        """Note what was found of a claim."""
+        self.found.append(Said(claim, outcome, detail))
+
+    def asked(self, claim: str, question: Callable[[], Any]) -> Any:
+        """The engine's answer; None where it refuses with a reason. Anything else that it raises is wrong."""
+        from hrsynth.errors import HrsynthError
+
+        try:
+            return question()
+        except HrsynthError as error:
+            text = " ".join(error.lines()).replace(str(self.path), "")
+            reason = re.sub(r"[-+]?\d[\d.e+-]*|'[^']*'|\"[^\"]*\"", "#", text)
+            self.say(claim, REFUSED, f"{type(error).__name__}: {reason[-90:]}")
+        except Exception as error:
+            import traceback
+
+            last = traceback.extract_tb(error.__traceback__)[-1]
+            self.say(claim, WRONG, f"{type(error).__name__}: {error} ({Path(last.filename).name}:{last.lineno})")
+        return None
+
+    def directions(self, observed: Sequence[Any], robot: Robot | None = None) -> Items | None:
+        """The observed directions as vectors fixed in links of the own reading; None where a link is not there, or the
+        measurement is no direction."""
+        given = []
+        for each in observed:
+            if type(each).__name__ != "Direction" or each.link not in self.robot.links or each.seen_from is not None:
+                return None
+            given.append((each.link, np.asarray(each.direction, dtype=float), False))
+        return things(robot or self.robot, given)
+
+    def fitted(self, configuration: Any, start: State | None = None) -> State | None:
+        """The own configuration in which all links lie as in the engine's; None if there is none."""
+        robot = self.robot
+        names = [name for name in configuration.twin.mechanism.links if name in robot.links and name != robot.links[0]]
+        given, values = [], []
+        for name in names:
+            X = np.asarray(configuration.pose(name))
+            given += [(name, np.zeros(3), True), *((name, e, False) for e in np.eye(3)[:2])]
+            values += [X[:3, 3], X[:3, 0], X[:3, 1]]
+        rows = robot.held(things(robot, given), np.array(values))
+        starts = robot.zero() if start is None else start
+        at, residual = solve(robot, rows, starts)
+        if not residual.min() < 1e-7:
+            at, residual = solve(robot, rows, scattered(robot, self.rng, 24, robot.zero()))
+        best = int(np.argmin(residual))
+        if not residual[best] < 1e-7:
+            return None
+        at, residual = polished(robot, robot.loops, at[[best]])
+        return at if residual[0] < 1e-11 else None
+
+    def text_of(self, at: State) -> str:
+        """The platform's whole pose of a configuration as a user writes it."""
+        x, R = (each[0] for each in self.study.poses(at))
+        place = ",".join(f"{name}={float(v)!r}" for name, v in zip("xyz", x, strict=True))
+        return place if self.robot.point is not None else f"{place},rpy={'/'.join(repr(float(a)) for a in rpy_of(R))}"
+
+
+def rpy_of(R: Array) -> tuple[float, float, float]:
+    """Roll, pitch, yaw about fixed axes."""
+    return (float(np.arctan2(R[2, 1], R[2, 2])), float(np.arctan2(-R[2, 0], np.hypot(R[0, 0], R[1, 0]))),
+            float(np.arctan2(R[1, 0], R[0, 0])))
+
+
+def matrix_of(pose: Any) -> tuple[Array, Array | None]:
+    """Position (3,) and rotation (3, 3) of a pose that the engine tells (None of a point)."""
+    x = np.array([pose.x, pose.y, pose.z], dtype=float)
+    if pose.rpy is None:
+        return x, None
+    (cr, cp, cy), (sr, sp, sy) = np.cos(pose.rpy), np.sin(pose.rpy)
+    return x, np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+                        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr], [-sp, cp * sr, cp * cr]])
+
+
+def apart(case: Case, pose: Any, at: State) -> float:
+    """How far a told pose is from the platform's at a configuration: characteristic lengths, rotation matrices."""
+    x, R = matrix_of(pose)
+    here, turned = (each[0] for each in case.study.poses(at))
+    away = float(np.max(np.abs(x - here))) / case.robot.length
+    return away if R is None or case.robot.point is not None else max(away, float(np.max(np.abs(R - turned))))
