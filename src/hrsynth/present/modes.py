@@ -30,6 +30,9 @@ MOST, FEW = 16, 6
 SIDE, LEFT, GAP, BELOW, ABOVE, TITLE = 5.2, 0.8, 0.3, 1.05, 0.9, 0.25
 """The side of the drawing of curves, and the spaces about it and above each robot (inches)."""
 
+WIDEST, SIGN = 112, 6
+"""Letters of a legend in one row at most, and what the sign of an entry takes of them."""
+
 
 def writable(output: str | None) -> None:
     """Raise ``BadRequest`` where the file's ending is no format, or its folder is not there."""
@@ -200,5 +203,6 @@ def _legend(whole: Any, drawn: Scene) -> None:
         mark, size, words = MARKS[state]
         entries[words] = Line2D([], [], linestyle="", marker=mark, markersize=0.8 * size, color="0.6",
                                 markeredgecolor="black")
-    columns = len(entries) if len(entries) <= 5 else -(-len(entries) // 2)
+    long = sum(len(words) + SIGN for words in entries) > WIDEST
+    columns = -(-len(entries) // 2) if long else len(entries)
     whole.legend(list(entries.values()), list(entries), loc="lower center", ncols=columns, frameon=False, fontsize=9)
