@@ -50,8 +50,8 @@ class Extent:
 
     def to_dict(self, unit: float) -> dict[str, Any]:
         """The record of the command line, lengths or angles in another unit; null where infinite."""
-        return {"largest": _finite(unit * self.largest), "direction": _listed(self.direction),
-                "least": _finite(unit * self.least), "least_direction": _listed(self.least_direction),
+        return {"largest": finite(unit * self.largest), "direction": _listed(self.direction),
+                "least": finite(unit * self.least), "least_direction": _listed(self.least_direction),
                 "anisotropy": self.anisotropy}
 
 
@@ -158,7 +158,8 @@ def _descended(blocks: Array) -> Array:
     return w
 
 
-def _finite(value: float) -> float | None:
+def finite(value: float) -> float | None:
+    """A number of the record: null where infinite."""
     return float(value) if np.isfinite(value) else None
 
 

@@ -9,10 +9,13 @@ from ...analysis.accuracy.field import Field
 from ...analysis.accuracy.gauge import Extent, PoseErrors
 from ...analysis.accuracy.sampled import Sampled
 from ...mechanism.vectors import Array
+from ...tolerances import DAMPED
 from .tables import listing
 
 FAR = 0.1
 """Relative difference from which samples are said to part from the linear law."""
+NEAR = 0.1
+"""Part of its value at the pose below which a smallest singular value is said to be near zero."""
 
 
 def accuracy(found: Accuracy, file: str | None = None) -> str:
@@ -64,15 +67,21 @@ def _range(errors: Array, unit: str) -> str:
 def _pose(errors: PoseErrors, true: Sampled | None) -> list[tuple[str, str]]:
     rows = [*_extent("position", errors.position, 1e3, "mm"),
             *_extent("orientation", errors.orientation, 180 / np.pi, "degrees")]
-    if true is None:
-        return rows
-    largest = f"{1e3 * true.position:.4g} mm, {np.degrees(true.orientation):.4g} degrees"
-    rows.append(("samples", f"{true.count} true errors give up to {largest}" if true.missed < true.count
-                 else f"{true.count} true errors were tried"))
-    if true.missed:
-        rows.append(("", f"for {true.missed} of them there is no pose near: a singularity is near, the maxima above "
-                         "are not to be relied on"))
-    elif _apart(true.position, errors.position) or _apart(true.orientation, errors.orientation):
+    return rows if true is None else rows + _samples(errors, true)
+
+
+def _samples(errors: PoseErrors, true: Sampled) -> list[tuple[str, str]]:
+    rows = [("samples", f"{true.count} true errors give up to {1e3 * true.position:.4g} mm, "
+                        f"{np.degrees(true.orientation):.4g} degrees"),
+            ("", f"smallest singular value of Mᵀ met {true.weakest:.3g}, at the pose {true.usual:.3g}"
+                 + (": a singularity is near" if not true.weakest >= max(NEAR * true.usual, DAMPED) else ""))]
+    if true.ended:
+        rows.append(("", f"for {len(true.ended)} of them the best fit becomes flat on the way, first at "
+                         f"{true.ended[0]:.2g} of the error: a controller slips away there, and further than is told"))
+    if true.not_found:
+        rows.append(("", f"{true.not_found} of them were not followed to the end: the solver gave up, which says "
+                         "nothing of the robot"))
+    if _apart(true.position, errors.position) or _apart(true.orientation, errors.orientation):
         rows.append(("", "they part from the maxima above, which are not to be relied on here"))
     return rows
 

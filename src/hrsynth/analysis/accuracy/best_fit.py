@@ -1,0 +1,163 @@
+"""The pose at which a controller rests when its directions are wrong, followed from the pose where they are right.
+
+The law rests at critical points of F = ½ Σ ‖u_i × û_i‖² over the closed configurations (theory 11). û_i(s) is u_i
+turned by the part s of its error. At s = 0 the pose itself is a strict minimum, F = 0, where all freedoms are seen; by
+the implicit function theorem it goes on as one smooth curve of strict minima while the Hessian of F is positive
+definite. The curve is followed by Newton steps with the whole Hessian, not that of Gauss and Newton, which need not
+converge where errors are large.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ...errors import LoopsNotClosed
+from ...kinematics.chart import Chart
+from ...kinematics.configuration import ClosedConfiguration, measure
+from ...kinematics.relation import Question, relation
+from ...mechanism.vectors import Array, hat
+from ...tolerances import FOLLOWED, INVERTED
+from ..classes import interaction_matrix
+
+FIT, ENDS, NOT_FOUND = "fit", "ends", "not found"
+LONGEST = 0.25
+"""Part of the error that the first step makes."""
+SHORTEST = 2.0**-22
+"""Part of the error below which a step is not shortened any more."""
+SLOPE = 1e-4
+"""Step of the Hessian's differences, whose own error is its square."""
+CORRECTIONS = 8
+"""Newton steps within which a prediction is to be corrected."""
+MOST = 200
+"""Steps that are tried on one curve."""
+ALIKE = 0.5
+"""How far the Hessian may change over a step, relative to itself: evenly changed, it is definite all along below 1."""
+AIMED = 0.35
+"""The change at which the next step's length aims."""
+FLAT = 0.05
+"""Curvature, as part of that at the start, below which a minimum that cannot be followed further is called flat."""
+
+Wanted = Callable[[float], Array]
+"""The directions û (k, 3) at a part of the error."""
+
+
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """A curve of best fits: the configurations on it, up to the part ``reached`` of the error, the smallest singular
+    value of Mᵀ met, and how it ended: at the whole error (``fit``), where the minimum becomes flat, which is where a
+    controller slips away (``ends``), or where the solver gave up, which says nothing of the robot (``not found``)."""
+
+    way: tuple[ClosedConfiguration, ...]
+    reached: float
+    weakest: float
+    outcome: str
+
+
+@dataclass(frozen=True, eq=False)
+class _Bowl:
+    """F around a configuration, in the coordinates y (n,) of a chart there."""
+
+    at: ClosedConfiguration
+    question: Question
+
+    @cached_property
+    def chart(self) -> Chart:
+        return Chart.around(self.at, self.question)
+
+    def slope(self, at: ClosedConfiguration, wanted: Array) -> Array:
+        """∇F (n,) in y at a configuration."""
+        u, rates = seen(at, self.question)
+        kernel, _ = at.kernel()
+        forth = kernel @ np.linalg.pinv(self.chart.slope(at.q) @ kernel, rcond=INVERTED)
+        rows = np.vstack([-hat(w) @ r for w, r in zip(wanted, rates, strict=True)]) @ forth
+        return np.asarray(np.cross(u, wanted).ravel() @ rows)
+
+    def hessian(self, wanted: Array) -> Array:
+        """∇²F (n, n) at y = 0, by central differences of ∇F."""
+        columns = []
+        for step in SLOPE * np.eye(self.chart.basis.shape[1]):
+            ahead, behind = (self.slope(self.chart.at(each, self.at.q), wanted) for each in (step, -step))
+            columns.append((ahead - behind) / (2 * SLOPE))
+        H = np.array(columns)
+        return np.asarray((H + H.T) / 2)
+
+    def minimum(self, H: Array, wanted: Array, guess: Array) -> ClosedConfiguration | None:
+        """The critical point next to ``guess`` (n,) by Newton steps with a Hessian; None where they do not contract, or
+        lead further away than the guess did."""
+        y, at, last = guess, self.chart.at(guess, self.at.q), float(np.linalg.norm(guess))
+        for _ in range(CORRECTIONS):
+            step = np.linalg.solve(H, -self.slope(at, wanted))
+            size = float(np.linalg.norm(step))
+            if size <= FOLLOWED:
+                return at
+            if size > ALIKE * last:
+                return None
+            y, last = y + step, size
+            at = self.chart.at(y, at.q)
+        return None
+
+
+def seen(at: ClosedConfiguration, question: Question) -> tuple[Array, list[Array]]:
+    """The observed directions (k, 3) and the rates (3, nv) of each."""
+    _, _, values, rates = measure(at.twin, at.q, question.reference, question.observations)
+    return np.array(values), rates
+
+
+def weakest(at: ClosedConfiguration, question: Question) -> float:
+    """The smallest singular value of Mᵀ (characteristic lengths), infinite where Mᵀ does not exist."""
+    M = interaction_matrix(relation(at, question))
+    return np.inf if M is None else float(np.linalg.svd(M, compute_uv=False)[-1])
+
+
+def best_fits(at: ClosedConfiguration, question: Question, wanted: Wanted) -> Fit:
+    """The curve of best fits from a configuration whose directions are ``wanted(0)``, led to ``wanted(1)``."""
+    way, done, step = [at], 0.0, LONGEST
+    bowl = _Bowl(at, question)
+    H = first = bowl.hessian(wanted(0.0))
+    if _least(H) <= 0:
+        return Fit((at,), 0.0, weakest(at, question), NOT_FOUND)
+    for _ in range(MOST):
+        if done == 1.0 or step < SHORTEST:
+            break
+        ahead = min(1.0, done + step)
+        found = _stepped(bowl, H, wanted, ahead)
+        change = np.inf if found is None else _change(bowl, H, *found)
+        if found is not None and change <= ALIKE:
+            (bowl, H), done = found, ahead
+            way.append(bowl.at)
+        step *= float(np.clip(AIMED / max(change, 1e-12), 0.25, 2.0))
+    outcome = FIT if done == 1.0 else ENDS if _least(H) < FLAT * _least(first) else NOT_FOUND
+    return Fit(tuple(way), done, min(weakest(each, question) for each in way), outcome)
+
+
+def _stepped(bowl: _Bowl, H: Array, wanted: Wanted, ahead: float) -> tuple[_Bowl, Array] | None:
+    """The bowl around the best fit a step further, and its Hessian; None where Newton steps do not contract near the
+    prediction."""
+    try:
+        guess = np.asarray(np.linalg.solve(H, -bowl.slope(bowl.at, wanted(ahead))), dtype=float)
+        found = bowl.minimum(H, wanted(ahead), guess)
+        if found is None:
+            return None
+        there = _Bowl(found, bowl.question)
+        return there, there.hessian(wanted(ahead))
+    except LoopsNotClosed:
+        return None
+
+
+def _change(bowl: _Bowl, H: Array, there: _Bowl, other: Array) -> float:
+    """‖H^{-1/2} (H′ − H) H^{-T/2}‖, H′ the Hessian a step further in the same coordinates: where it stays below 1 all
+    along, so does every Hessian definite."""
+    across = there.chart.basis.T @ bowl.chart.basis
+    if across.shape[0] != across.shape[1] or _least(other) <= 0:
+        return np.inf
+    back = np.linalg.inv(np.linalg.cholesky(H))
+    return float(np.linalg.norm(back @ (across.T @ other @ across - H) @ back.T, 2))
+
+
+def _least(H: Array) -> float:
+    """The least curvature."""
+    return float(np.linalg.eigvalsh(H)[0])
