@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy, errors_at, sees_all
 from hrsynth.analysis.accuracy.cones import half_angles
 from hrsynth.analysis.accuracy.field import Mapper
-from hrsynth.analysis.accuracy.gauge import reading
+from hrsynth.analysis.accuracy.gauge import _descended, _width, reading
 from hrsynth.analysis.accuracy.sampled import sampled
 from hrsynth.analysis.accuracy.spots import singular_poses
 from hrsynth.analysis.setting import Setting, prepare, silent
@@ -247,3 +247,18 @@ def test_cones_by_link_and_by_leg() -> None:
     sees_all(setting)
     link = setting.observed[0].link
     assert half_angles({link: 0.1, "4": 0.2}, setting.observed).tolist() == [0.1, 0.2]
+
+
+def test_the_least_error_is_the_least_of_many_directions() -> None:
+    """Narrow valleys, and blocks that (nearly) vanish in a direction, where the width has a corner."""
+    rng = np.random.default_rng(0)
+    for _ in range(40):
+        k, d = int(rng.integers(1, 6)), int(rng.integers(2, 4))
+        blocks = rng.normal(size=(k, 3, d)) @ np.diag(10.0 ** rng.uniform(-3, 0, d)) @ np.linalg.qr(
+            rng.normal(size=(d, d)))[0]
+        U, s, Vt = np.linalg.svd(blocks, full_matrices=False)
+        s[:, -1] *= rng.choice([0, 1e-3, 1], size=k)
+        blocks = U * s[:, None] @ Vt
+        views = rng.normal(size=(d, 20_000))
+        views /= np.linalg.norm(views, axis=0)
+        assert _width(blocks, _descended(blocks)[:, None])[0] <= _width(blocks, views).min() * (1 + 1e-6)

@@ -17,9 +17,9 @@ from ...tolerances import INVERTED, RANK_CUTOFF
 VIEWS = 2000
 """Directions on the half-sphere from which the largest and the least error are sought."""
 CLIMBS = 200
-"""Steps of the ascent to the largest error."""
-ZOOMS = 60
-"""Times the search for the least error is narrowed."""
+"""Steps of the ascent to the largest error, and of the descent to the least."""
+DESCENTS = 60
+"""Views from which the least error is sought."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,20 +142,19 @@ def _ascended(blocks: Array) -> Array:
 
 
 def _descended(blocks: Array) -> Array:
-    """The direction (d,) of the least error: from the best view, ever nearer around it."""
-    views = _views(blocks.shape[2])
-    w = np.asarray(views[:, np.argmin(_width(blocks, views))])
-    if len(w) == 1:
-        return w
-    reach = 4 / np.sqrt(VIEWS)
-    across = np.linalg.svd(w[None])[2][1:]
-    around = np.stack(np.meshgrid(*[np.linspace(-1, 1, 5)] * len(across))).reshape(len(across), -1)
-    for _ in range(ZOOMS):
-        near = w[:, None] + reach * across.T @ around
-        near /= np.linalg.norm(near, axis=0)
-        w = np.asarray(near[:, np.argmin(_width(blocks, near))])
-        across, reach = np.linalg.svd(w[None])[2][1:], 0.7 * reach
-    return w
+    """The direction (d,) of the least error that was found: from views spread evenly and from the axes of each block,
+    w ← the least eigenvector of Σ A_iᵀ A_i / ‖A_i w‖, which never makes Σ ‖A_i w‖ larger (Weiszfeld)."""
+    d = blocks.shape[2]
+    views = _views(d)
+    axes = np.linalg.svd(blocks)[2].reshape(-1, d)
+    w = np.concatenate([views[:, :: max(1, views.shape[1] // DESCENTS)].T, axes])
+    squares = np.einsum("kcd,kce->kde", blocks, blocks)
+    floor = np.finfo(float).eps * float(np.linalg.norm(blocks))
+    for _ in range(CLIMBS):
+        sizes = np.linalg.norm(np.einsum("kcd,nd->nkc", blocks, w), axis=2)
+        w = np.linalg.eigh(np.einsum("nk,kde->nde", 1 / np.maximum(sizes, floor), squares))[1][:, :, 0]
+    w = np.concatenate([w, axes, views.T])
+    return np.asarray(w[np.argmin(_width(blocks, w.T))])
 
 
 def finite(value: float) -> float | None:
