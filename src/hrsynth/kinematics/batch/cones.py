@@ -2,7 +2,9 @@
 
 With B_i = ψ_i² A_i A_iᵀ (A_i: from the error of direction i to the platform's), the largest error is the maximum over
 unit w of Σ √(wᵀ B_i w). For weights t of the simplex, √λmax(Σ B_i / t_i) is an upper bound, Σ √(wᵀ B_i w) at its
-eigenvector w a lower one; for one cone and for two the least upper bound is the maximum itself.
+eigenvector w a lower one. For one cone and for two the least upper bound is the maximum itself: the bound is that over
+the convex hull of the points (wᵀ B₁ w, wᵀ B₂ w), and on the unit sphere of ℝ³ these make up a convex set (L. Brickman,
+On the field of values of a matrix, Proc. AMS 12, 1961).
 
 Symmetric matrices are given by their six entries xx, yy, zz, xy, xz, yz, shape (6, n).
 """
