@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
+import ast
 import json
-import re
 import shlex
 from dataclasses import replace
 from functools import cache
@@ -287,6 +287,15 @@ def words(record: object) -> object:
     return None if isinstance(record, float) else record
 
 
+def commands() -> dict[str, str]:
+    """The table of ``docs/pictures.py``."""
+    table = next(node.value for node in ast.parse((ROOT / "docs" / "pictures.py").read_text("utf-8")).body
+                 if isinstance(node, ast.AnnAssign) and ast.unparse(node.target) == "PICTURES")
+    assert isinstance(table, ast.Dict)
+    return {ast.literal_eval(name): ast.literal_eval(what) for name, what in zip(table.keys, table.values, strict=True)
+            if isinstance(what, ast.Constant)}
+
+
 def test_there_are_kept_pictures():
     assert len(KEPT) >= 5
 
@@ -294,10 +303,8 @@ def test_there_are_kept_pictures():
 @pytest.mark.parametrize("file", [
     pytest.param(file, id=file.stem, marks=[pytest.mark.slow] if file.stem == "modes_hexa" else []) for file in KEPT])
 def test_kept_pictures_are_fresh_and_small(file: Path):
-    """Drawn again with the Makefile's own command, the picture would hold the same numbers."""
-    line = re.search(rf"modes (.*) -o docs/pictures/{re.escape(file.name)}", (ROOT / "Makefile").read_text())
-    assert line is not None, "no command of the Makefile draws it"
-    robot, *options = shlex.split(line[1])
+    """Drawn again with its own command, the picture would hold the same numbers."""
+    _, robot, *options = shlex.split(commands()[file.name])
     valued = [option for option in options if option != "--real"]
     given = dict(zip(valued[::2], valued[1::2], strict=True))
     result = modes(load(shipped()[robot]), given.get("--observe"), at=given.get("--at"), real="--real" in options)
@@ -305,10 +312,3 @@ def test_kept_pictures_are_fresh_and_small(file: Path):
     assert words(fresh) == words(kept), "stale: make pictures"
     assert numbers(fresh) == pytest.approx(numbers(kept), abs=1e-6 * result.goal.twin.length), "stale: make pictures"
     assert file.stat().st_size < 150_000
-
-
-def test_every_picture_that_is_drawn_is_kept_and_shown():
-    makefile = (ROOT / "Makefile").read_text()
-    drawn_there = re.findall(r"docs/pictures/(\w+\.\w+)", makefile)
-    drawn_there += [f"view_{name}.png" for name in re.findall(r"call VIEWED,.*,(\w+)\)", makefile)]
-    assert sorted(drawn_there) == [file.name for file in PICTURES]
