@@ -142,8 +142,8 @@ def _translating(found: AssemblyModes, confined: Confinement) -> _Plot:
     plot = _platform(found, confined)
     X = found.goal.pose(plot.body)
     p = X[:3, :3] @ plot.place + X[:3, 3]
-    reaches = tuple((shifted(tip.curve, p - _at_goal(found, tip)), f"platform on leg {tip.leg}")
-                    for tip in confined.tips if not isinstance(tip.curve, Point))
+    reaches = tuple((shifted(curve, p - _at_goal(found, tip)), f"platform on leg {tip.leg}")
+                    for tip in confined.tips for curve in (tip.curve, *tip.others) if not isinstance(curve, Point))
     return _Plot(plot.body, plot.place, (), reaches)
 
 
@@ -209,7 +209,9 @@ def _on(tip: Tip, legs: Sequence[Tip]) -> str:
 
 def _deciding(found: AssemblyModes, confined: Confinement, count: int) -> tuple[int, ...]:
     """The places of this many legs on curves for which the modes were solved, tips at rest first, and last the moving
-    tip whose places at the modes are farthest apart. Empty where there are none."""
+    tip whose places at the modes are farthest apart. Empty where there are none or legs have several branches."""
+    if any(tip.others for tip in confined.tips):
+        return ()
     legs = next((legs for mode in found.found.modes if len(legs := mode.legs) == count
                  and all(isinstance(confined.tips[k].curve, Curve) for k in legs)), ())
 

@@ -21,8 +21,9 @@ from ...tolerances import SAME_RELATION
 from ..setting import Setting, prepare, silent
 from ..singularity.agreement import weakest
 from ..singularity.measured import Measured
-from .build import Model, model
-from .solve import Mode, Modes, continuum, solve
+from .branches import solve_all
+from .build import Model
+from .solve import Mode, Modes, continuum
 from .tips import Confinement, confinement
 
 WITHIN = {"translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
@@ -150,8 +151,7 @@ def modes_at(setting: Setting, goal: ClosedConfiguration, *, real: bool = False,
                              (), ())
     progress("modes")
     confined = confinement(setting.anatomy, measured.question, measured.structure, goal)
-    made = model(confined)
-    found = solve(made.system)
+    made, found = solve_all(confined)
     reader = _Reader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
@@ -164,7 +164,7 @@ def counted(measured: Measured, at: ClosedConfiguration) -> Modes:
     """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
     as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
     confined = confinement(measured.setting.anatomy, measured.question, measured.structure, at)
-    return solve(model(confined).system, near=False)
+    return solve_all(confined, near=False)[1]
 
 
 class _Reader:

@@ -14,7 +14,7 @@ from .certify import Equation
 from .conics import Conic, Numbers, spatial_frame
 from .curves import Point, Surface, cross, curves_of, extent, length
 from .quadrics import Chart
-from .squares import Square, distance, on_sphere
+from .squares import Square, distance, on_sphere, single
 from .study import rotation_vector, study
 from .systems import System
 
@@ -40,17 +40,18 @@ class Spatial(System):
         return study(self.curves, self.tips, self.size, number)
 
     def squares(self) -> Iterator[Square]:
-        """A tip at rest and two curves, or three curves, with tips not on one line."""
+        """Three tips at rest; two, one or none and as many curves as make three, with tips not on one line."""
         points = [k for k, curve in enumerate(self.curves) if isinstance(curve, Point)]
         moving = [k for k in curves_of(self.curves) if k not in points]
-        choices = [(i, j, k) for k in points for i, j in combinations(moving, 2)] + list(combinations(moving, 3))
+        choices = list(combinations(points, 3)) + [(i, j, k) for j, k in combinations(points, 2) for i in moving]
+        choices += [(i, j, k) for k in points for i, j in combinations(moving, 2)] + list(combinations(moving, 3))
         for legs in choices:
             a, b, c = self.tips[list(legs)]
             if length(cross(b - a, c - a)) > SAME_POINT * self.size ** 2:
                 yield self._square(legs, len(moving) == len(self.curves) == 3)
 
     def _square(self, legs: tuple[int, ...], whole: bool) -> Square:
-        """Three distances between three tips; with a tip at rest, given last, the two that decide the others."""
+        """Three distances between three tips; with tips at rest, given last, those that decide the others."""
         curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
         b = self.tips[list(legs)]
         unknowns = tuple(curve for curve in curves if not isinstance(curve, Point))
@@ -59,6 +60,11 @@ class Spatial(System):
         def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
             tips = [numbers.vector(tip / frame.size) for tip in b]
             arms = [(i, j, tips[j] - tips[i]) for i, j in ((0, 1), (1, 2), (2, 0))]
+            if not unknowns:
+                return []
+            if len(unknowns) == 1:
+                held = numbers.vector(frame.point(curves[1].centre))
+                return [single(on_sphere(conics[0], held, arms[0][2] @ arms[0][2]))]
             if len(unknowns) == 2:
                 held = numbers.vector(frame.point(curves[2].centre))
                 reach = on_sphere(conics[1], held, arms[1][2] @ arms[1][2])

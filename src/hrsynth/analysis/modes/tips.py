@@ -1,14 +1,15 @@
-"""Where the tips of a hidden robot can be while its directions are held, found from the mechanism itself.
+"""Where the tips of a hidden robot can be while its directions are held, from the mechanism itself.
 
-The pattern of the held legs names the tangent of each tip's path, or the normal of the surface that it stays on; here
-the whole path or surface is written down, as a line or a circle, a sphere or a plane, and checked by moving the leg on
-its own along all of its freedoms.
+Each leg's joints say it, all branches of it (:mod:`.reaches`). Where they do not by the known laws, the pattern of the
+held legs names the tangent of the tip's path, or the normal of the surface that it stays on; then the path or surface
+through the goal is written down and checked by moving the leg on its own along all of its freedoms: found, and not
+known to be all.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -26,7 +27,9 @@ from ...mechanism.vectors import Array
 from ...tolerances import CLOSED, SAME_POINT, SAME_RELATION, SOLVED
 from ..singularity.features import Carried, Feature, Spot, Tangent, poses_at
 from ..singularity.structure import HeldLeg, Structure
+from .chain import Underived, chain
 from .curves import Circle, Line, Plane, Point, Reach, Sphere
+from .reaches import reaches
 
 MOVES = (-0.4, -0.15, 0.15, 0.4)
 """How far a leg is moved along a freedom to check where its tip can be (characteristic lengths, radians)."""
@@ -38,12 +41,17 @@ MIXED = 4
 @dataclass(frozen=True, eq=False)
 class Tip:
     """The tip of a held leg: the body that carries it, where (3,) in the body's frame (m), and the curve or surface in
-    the base frame (m) that it stays on."""
+    the base frame (m) on which it is at the goal.
+
+    ``others`` are those of the leg's other branches; ``doubt`` says why there may be more, None where these are all.
+    """
 
     leg: str
     body: str
     place: Array
     curve: Reach
+    others: tuple[Reach, ...] = ()
+    doubt: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,24 +79,43 @@ def confinement(anatomy: Anatomy, question: Question, structure: Structure, goal
     name = anatomy.mechanism.name
     if structure.motion == "other":
         raise NotConfined(name, "the pattern of its legs is none of those known")
-    tips = tuple(_tip(anatomy, question, leg, goal) for leg in structure.legs)
     plane = None if structure.plane is None else _value(structure.plane, goal)
+    end = (plane if plane is not None and structure.motion == "planar" else
+           "free" if structure.motion == "spatial" or anatomy.point is not None else "kept")
+    tips = tuple(_tip(anatomy, question, leg, goal, end) for leg in structure.legs)
     slide = None if structure.slide is None else _slide(structure, goal)
     return Confinement(goal, structure.motion, tips, structure.bodies, plane, slide)
 
 
-def _tip(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfiguration) -> Tip:
+def _tip(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfiguration, end: Array | str) -> Tip:
     B = _value(leg.tip, goal) * goal.twin.length
     X = goal.pose(leg.body)
     place = X[:3, :3].T @ (B - X[:3, 3])
-    paths = _held_paths(anatomy, question, leg, goal, place)
+    own = [o for o in question.observations if o.leg == leg.label]
+    try:
+        found = reaches(chain(anatomy, anatomy.leg(leg.label), own, goal, B, end))
+    except Underived as error:
+        return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=str(error)),
+                       leg, goal)
+    freedoms = 0 if leg.fixed else 1 if leg.line is not None else 2 if leg.normal is not None else 3
+    if found[0].freedoms == freedoms and np.linalg.norm(found[0].miss(B)) <= SAME_RELATION * goal.twin.length:
+        return Tip(leg.label, leg.body, place, found[0], tuple(found[1:]))
+    doubt = f"its joints taken one by one leave {found[0].freedoms} freedoms, together {freedoms}"
+    return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=doubt), leg, goal)
+
+
+def _fitted(anatomy: Anatomy, own: Sequence[Observation], reference: str, tip: Tip, leg: HeldLeg,
+            goal: ClosedConfiguration) -> Tip:
+    """A tip's curve or surface as the pattern names it, to which the leg's moves keep."""
+    B = _value(leg.tip, goal) * goal.twin.length
+    paths = _held_paths(anatomy, own, reference, leg, goal, tip.place)
     if not leg.fixed and not paths:
         raise NotConfined(anatomy.mechanism.name, f"leg {leg.label} cannot be moved to see where its tip goes")
     worst = np.inf
     for curve in _candidates(anatomy, leg, B, goal):
         miss = max((float(np.linalg.norm(curve.miss(point))) for point in paths), default=0.0) / goal.twin.length
         if miss <= SAME_RELATION:
-            return Tip(leg.label, leg.body, place, curve)
+            return replace(tip, curve=curve)
         worst = min(worst, miss)
     what = ("is confined to no curve or surface that has a name" if worst == np.inf else
             f"leaves its curve or surface by {worst:.2g} characteristic lengths")
@@ -176,15 +203,14 @@ class _Held:
         return np.concatenate(errors), np.vstack(rates)
 
 
-def _held_paths(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfiguration,
+def _held_paths(anatomy: Anatomy, own: Sequence[Observation], reference: str, leg: HeldLeg, goal: ClosedConfiguration,
                 place: Array) -> list[Array]:
     """Positions of a tip when its leg alone, with what is measured held, is moved along each of its freedoms, and along
     some random combinations of them."""
-    own = [o for o in question.observations if o.leg == leg.label]
     rest = dissect(rezeroed(goal))
     twin = Twin(alone(rest, rest.leg(leg.label)), goal.twin.length)
-    values = measure(twin, twin.q0, question.reference, own)[2] if own else []
-    held = _Held(question.reference, tuple(zip(own, values, strict=True)))
+    values = measure(twin, twin.q0, reference, own)[2] if own else []
+    held = _Held(reference, tuple(zip(own, values, strict=True)))
     start = ClosedConfiguration.of(twin, twin.q0, SAME_RELATION)
     free, _ = kernel_basis(np.vstack([twin.jacobian(start.q), held.rows(twin, start.q)[1]]))
     found = []

@@ -1,0 +1,85 @@
+"""All modes over all branches of the held legs: one system for each choice of a branch of every leg."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import islice, product
+
+import numpy as np
+
+from ...tolerances import SAME_POINT
+from .build import Model, model
+from .solve import Mode, Modes, solve
+from .tips import Confinement, Tip
+
+MOST = 256
+"""Choices of branches that are solved; where there are more the list is not complete."""
+
+
+def choices(confined: Confinement) -> Iterator[Confinement]:
+    """The platform with each tip on one of its reaches, in all combinations, the goal's own first."""
+    for reaches in product(*((tip.curve, *tip.others) for tip in confined.tips)):
+        tips = tuple(replace(tip, curve=reach, others=()) for tip, reach in zip(confined.tips, reaches, strict=True))
+        yield replace(confined, tips=tips)
+
+
+def solve_all(confined: Confinement, *, near: bool = True) -> tuple[Model, Modes]:
+    """The goal's own system, and the modes of all choices of branches together, each pose once."""
+    made = [model(each) for each in islice(choices(confined), MOST)]
+    size = made[0].system.size
+    found = [_scaled(solve(each.system, near=near), each.system.size / size) for each in made]
+    total = int(np.prod([1 + len(tip.others) for tip in confined.tips]))
+    modes = found[0] if len(found) == 1 else _together(found, confined.tips, size)
+    doubts = [f"leg {tip.leg}: {tip.doubt}" for tip in confined.tips if tip.doubt is not None]
+    if total > len(made):
+        doubts.append(f"only {len(made)} of {total} choices of the legs' branches were solved")
+    if doubts and modes.continuum is None:
+        proof = f"{modes.proof}; there may be other branches ({'; '.join(doubts)})"
+        modes = replace(modes, complete=False, proof=proof)
+    return made[0], modes
+
+
+def _scaled(modes: Modes, factor: float) -> Modes:
+    """Radii and residuals in sizes of another system."""
+    if factor == 1.0:
+        return modes
+
+    def scaled(each: Sequence[Mode]) -> tuple[Mode, ...]:
+        return tuple(replace(mode, radius=mode.radius * factor, residual=mode.residual * factor) for mode in each)
+
+    return replace(modes, modes=scaled(modes.modes), near=scaled(modes.near))
+
+
+def _together(found: Sequence[Modes], tips: Sequence[Tip], size: float) -> Modes:
+    """One list of the modes of several systems, the goal's own first; a pose that is in two of them counts once.
+
+    A continuum on the goal's own branches is all that is told; on others it leaves the list open.
+    """
+    if found[0].continuum is not None:
+        return found[0]
+    modes = _once([mode for each in found for mode in each.modes], size)
+    near = tuple(mode for mode in _once([mode for each in found for mode in (*each.modes, *each.near)], size)
+                 if mode not in modes)
+    twice = sum(len(each.modes) for each in found) - len(modes)
+    legs = ", ".join(f"leg {tip.leg}: {1 + len(tip.others)}" for tip in tips if tip.others)
+    proofs = [f"{count} × ({text})" if count > 1 else text for text, count in Counter(e.proof for e in found).items()]
+    proof = (f"{len(found)} choices of the held legs' branches ({legs}), "
+             f"{' + '.join(str(each.complex) for each in found)} complex"
+             + (f", {twice} in two of them" if twice else "") + f": {'; '.join(proofs)}")
+    special = found[0].degenerate or next((f"on other branches of the legs: {each.degenerate}" for each in found
+                                           if each.degenerate is not None), None)
+    return Modes(sum(each.complex for each in found) - twice, modes, all(each.complete for each in found), proof, near,
+                 special)
+
+
+def _once(modes: Sequence[Mode], size: float) -> tuple[Mode, ...]:
+    """Each pose once, the first of those that are alike."""
+    found: list[Mode] = []
+    scale = np.ones((4, 4))
+    scale[:3, 3] = 1 / size
+    for mode in modes:
+        if not any(np.max(np.abs((mode.pose - other.pose) * scale)) <= SAME_POINT for other in found):
+            found.append(mode)
+    return tuple(found)

@@ -1,0 +1,201 @@
+"""A leg with its measurements held, read from its joints: bodies that turn one against the next, and what they carry.
+
+All directions and points are those at the configuration whose measurements are held (the goal), in the base frame (m);
+the orientation Q of a body is counted from there. So Q_i = Q_{i-1} R(a_i, θ_i), with a_i the axis at the goal, and the
+leg's end is at p₁ + Σ Q_i w_i plus what slides. A planar parallelogram carries a body without turning it; parallel rods
+are one rod. A joint that a motor holds joins two bodies to one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.locked import carried
+from ...mechanism import Joint, JointType, Observation, lines
+from ...mechanism.composites import Edge
+from ...mechanism.legs import Anatomy, Leg
+from ...mechanism.notation import Rods
+from ...mechanism.observation import Direction, Encoder
+from ...mechanism.screws import normals
+from ...mechanism.vectors import Array, unit
+from ...tolerances import SAME_POINT
+
+
+class Underived(Exception):
+    """What a held leg's end can do does not follow from its joints by the known laws; the text says why."""
+
+
+@dataclass(frozen=True, eq=False)
+class Crank:
+    """The crank of a parallelogram on a body: its axis, from pivot to pivot, the directions watched in it, and whether
+    a motor holds it."""
+
+    axis: Array
+    vector: Array
+    watched: tuple[Array, ...] = ()
+    held: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A body that turns against the one before about ``axis`` (None: about all, in a ball; the base: not at all).
+
+    ``point`` is on that axis; ``shift`` leads from there to the next body's, cranks left out; ``slides`` are directions
+    fixed in it along which it carries what follows.
+    """
+
+    axis: Array | None
+    point: Array
+    shift: Array = field(default_factory=lambda: np.zeros(3))
+    slides: tuple[Array, ...] = ()
+    cranks: tuple[Crank, ...] = ()
+    watched: tuple[Array, ...] = ()
+
+    @property
+    def rigid(self) -> bool:
+        """Whether what follows is fixed in it."""
+        return not self.slides and not self.cranks
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """The bodies from the base to the leg's end, the base first; the end's ``tip`` is at the last one's shift.
+
+    ``kept``: whether the last body keeps the orientation that it has at the goal; ``length`` is the robot's.
+    """
+
+    bodies: tuple[Body, ...]
+    kept: bool
+    length: float
+
+
+def chain(anatomy: Anatomy, leg: Leg, held: Sequence[Observation], goal: ClosedConfiguration, tip: Array,
+          end: Array | str) -> Chain:
+    """The chain of a leg to its ``tip`` (3,); ``end`` is ``free``, ``kept`` (its body's orientation) or the normal of
+    the plane in which that turns. Raises :class:`Underived`."""
+    walk = _Walk(anatomy, leg, held, goal)
+    bodies = walk.bodies(tip)
+    if isinstance(end, str):
+        return Chain(bodies, end == "kept", goal.twin.length)
+    return Chain((*bodies, Body(end, tip)), True, goal.twin.length)
+
+
+class _Walk:
+    """The path from the base to a leg's end, step by step."""
+
+    def __init__(self, anatomy: Anatomy, leg: Leg, held: Sequence[Observation], goal: ClosedConfiguration) -> None:
+        self.anatomy, self.leg, self.goal = anatomy, leg, goal
+        self.watched: dict[str, list[Array]] = {}
+        self.coordinates: dict[str, int] = {}
+        """How many coordinates of a joint a motor holds."""
+        base = anatomy.mechanism.base
+        for each in held:
+            if isinstance(each, Encoder):
+                self.coordinates[each.joint] = self.coordinates.get(each.joint, 0) + 1
+            elif isinstance(each, Direction) and (each.seen_from or anatomy.mechanism.reference) == base:
+                self.watched.setdefault(each.link, []).append(goal.pose(each.link)[:3, :3] @ each.direction)
+            else:
+                raise Underived("what is measured is no direction seen from the base")
+
+    def bodies(self, tip: Array) -> tuple[Body, ...]:
+        """The bodies, shifts included; every measurement must be met on the way."""
+        at = self.anatomy.mechanism.base
+        found = [Body(None, np.zeros(3), watched=self._seen(at))]
+        for edge in self.anatomy.path(self.leg):
+            there = edge.other(at)
+            if len(edge.joints) == 1:
+                self._joint(found, self.anatomy.mechanism.joints[edge.joints[0]], at)
+            elif isinstance(edge.word.items[0], Rods):
+                self._rods(found, edge, at)
+            else:
+                self._parallelogram(found, edge, at)
+            found[-1] = replace(found[-1], watched=found[-1].watched + self._seen(there))
+            at = there
+        for what in (*self.watched, *self.coordinates):
+            raise Underived(f"what is measured at {what} is not on the way from the base to the leg's end")
+        return _shifted(found, tip, SAME_POINT * self.goal.twin.length)
+
+    def _seen(self, link: str) -> tuple[Array, ...]:
+        return tuple(self.watched.pop(link, ()))
+
+    def _geometry(self, joint: Joint, at: str) -> tuple[Array, list[Array]]:
+        """Centre (m) and axes of a joint, in the order in which they are met from the link ``at``."""
+        point, axes = carried(self.anatomy.mechanism, joint, self.goal.pose)
+        return point, axes if joint.predecessor == at else axes[::-1]
+
+    def _joint(self, found: list[Body], joint: Joint, at: str) -> None:
+        point, axes = self._geometry(joint, at)
+        held = self.coordinates.pop(joint.name, 0)
+        if held:
+            if held != len(axes) + (joint.type is JointType.CYLINDRICAL):
+                raise Underived(f"a motor holds a part of joint {joint.name}")
+            return
+        if joint.type is JointType.SPHERICAL:
+            found.append(Body(None, point))
+            return
+        if joint.type not in _TURNS:
+            raise Underived(f"joint {joint.name} of type {joint.type.value}")
+        slides = axes if joint.type.slides else normals(axes[0]) if joint.type is JointType.PLANAR else ()
+        found[-1] = replace(found[-1], slides=(*found[-1].slides, *(unit(s) for s in slides)))
+        found.extend(Body(axis, point) for axis in axes if _TURNS[joint.type])
+
+    def _parallelogram(self, found: list[Body], edge: Edge, at: str) -> None:
+        """Both cranks are one: they stay parallel (a parallelogram is not crossed)."""
+        joints = [self.anatomy.mechanism.joints[name] for name in edge.joints]
+        near, far = joints[:2] if edge.tail == at else joints[1::-1]
+        (start, axes), (end, _) = self._geometry(near, at), self._geometry(far, at)
+        held = any([self.coordinates.pop(joint.name, 0) for joint in joints])
+        axis, way = axes[0], end - start
+        watched = tuple(d for link in edge.inside for d in self._seen(link))
+        crank = Crank(axis, way - axis * float(axis @ way), watched, held)
+        found[-1] = replace(found[-1], cranks=(*found[-1].cranks, crank))
+
+    def _rods(self, found: list[Body], edge: Edge, at: str) -> None:
+        """The rod that is watched, or the first: all have one direction."""
+        if any(name in self.coordinates for name in edge.joints):
+            raise Underived("a motor holds a rod")
+        number = next((k for k, link in enumerate(edge.inside) if link in self.watched), 0)
+        joints = [self.anatomy.mechanism.joints[name] for name in edge.joints[2 * number : 2 * number + 2]]
+        near, far = joints if edge.tail == at else joints[::-1]
+        watched = tuple(d for link in edge.inside for d in self._seen(link))
+        found.append(Body(None, self._geometry(near, at)[0], watched=watched))
+        found.append(Body(None, self._geometry(far, at)[0]))
+
+
+_TURNS = {JointType.REVOLUTE: True, JointType.UNIVERSAL: True, JointType.CYLINDRICAL: True, JointType.PLANAR: True,
+          JointType.PRISMATIC: False, JointType.FIXED: False}
+"""Joints that are read axis by axis, and whether those are axes of turns."""
+
+
+def _shifted(bodies: Sequence[Body], tip: Array, small: float) -> tuple[Body, ...]:
+    """Bodies with their shifts, counted from points of their axes that neighbours share where axes meet."""
+    points = [bodies[0].point]
+    for k, body in enumerate(bodies[1:], 1):
+        before = bodies[k - 1] if bodies[k - 1].rigid and k > 1 else None
+        after = bodies[k + 1] if k + 1 < len(bodies) and body.rigid else None
+        points.append(body.point if body.axis is None else
+                      _meeting(body, before, after, tip if k + 1 == len(bodies) and body.rigid else None, small))
+    found = []
+    for body, start, end in zip(bodies, points, [*points[1:], tip], strict=True):
+        cranks = sum((crank.vector for crank in body.cranks), np.zeros(3))
+        found.append(replace(body, point=start, shift=end - start - cranks))
+    return tuple(found)
+
+
+def _meeting(body: Body, before: Body | None, after: Body | None, tip: Array | None, small: float) -> Array:
+    """The point of a body's axis that a ball, the tip or a neighbour's axis has as well, else its own."""
+    assert body.axis is not None
+    balls = [each.point for each in (before, after) if each is not None and each.axis is None]
+    for point in [*balls, *([] if tip is None else [tip])]:
+        if lines.distance(point, body.point, body.axis) <= small:
+            return point
+    for other in (before, after):
+        if other is not None and other.axis is not None:
+            met = lines.meeting_point([(body.point, body.axis), (other.point, other.axis)], small)
+            if met is not None:
+                return met
+    return body.point

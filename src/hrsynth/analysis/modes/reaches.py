@@ -1,0 +1,168 @@
+"""All that the tip of a held leg can reach, from the leg's own joints: p₁ + Σ Q_i w_i, one reach a branch.
+
+What each body adds is a fixed vector, a circle (it turns about a fixed direction), a sphere (it turns freely) or a line
+(it slides). The sum holds all places of the tip; where its dimension is that which the leg's screws give, it is the
+whole of each branch, since it is irreducible.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...mechanism import lines
+from ...mechanism.vectors import Array
+from ...tolerances import SAME_POINT
+from .chain import Body, Chain, Underived
+from .curves import Circle, Line, Plane, Point, Reach, Sphere
+from .turns import Known, groups, orientations, ways
+
+
+def reaches(chain: Chain) -> list[Reach]:
+    """All components of the places of the tip, each once, the goal's own first. Raises :class:`Underived`."""
+    found: list[Reach] = []
+    for known in orientations(chain):
+        reach = _sum(chain, known)
+        if not any(same_reach(reach, other, SAME_POINT * chain.length) for other in found):
+            found.append(reach)
+    return found
+
+
+@dataclass(eq=False)
+class _Sum:
+    """Fixed vectors, and the circles (axis, spoke), lines and spheres that are added to them."""
+
+    small: float
+    centre: Array = field(default_factory=lambda: np.zeros(3))
+    circles: list[tuple[Array, Array]] = field(default_factory=list)
+    lines: list[Array] = field(default_factory=list)
+    spheres: list[float] = field(default_factory=list)
+
+    def turn(self, axis: Array, vector: Array) -> None:
+        """A vector that turns about a fixed direction."""
+        along = axis * float(axis @ vector)
+        self.centre = self.centre + along
+        spoke = vector - along
+        if np.linalg.norm(spoke) > self.small:
+            self.circles.append((axis, spoke))
+
+    def ball(self, vector: Array) -> None:
+        """A vector that turns freely."""
+        radius = float(np.linalg.norm(vector))
+        if radius > self.small:
+            self.spheres.append(radius)
+
+    def reach(self) -> Reach:
+        """Its name. Raises :class:`Underived` where it has none."""
+        if self.spheres and (len(self.spheres) > 1 or self.circles or self.lines):
+            raise Underived("a part that turns freely and another that moves")
+        if self.spheres:
+            return Sphere(self.centre, self.spheres[0])
+        if not self.circles and not self.lines:
+            return Point(self.centre)
+        if not self.circles and all(lines.parallel(d, self.lines[0]) for d in self.lines):
+            return Line(self.centre, self.lines[0])
+        if len(self.circles) == 1 and not self.lines:
+            axis, spoke = self.circles[0]
+            return Circle(self.centre, axis, float(np.linalg.norm(spoke)), spoke)
+        first = [axis for axis, _ in self.circles] or [_normal(self.lines)]
+        normal = first[0]
+        if (all(lines.parallel(axis, normal) for axis in first)
+                and all(lines.perpendicular(d, normal) for d in self.lines)):
+            return Plane(self.centre, normal)
+        raise Underived("circles and lines that lie in no common plane")
+
+
+def _normal(directions: Sequence[Array]) -> Array:
+    crossed = max((np.cross(directions[0], d) for d in directions[1:]), key=lambda n: float(np.linalg.norm(n)))
+    return np.asarray(crossed / np.linalg.norm(crossed))
+
+
+def _sum(chain: Chain, known: Known) -> Reach:
+    """The reach in one branch of orientations."""
+    total = _Sum(SAME_POINT * chain.length, chain.bodies[0].point)
+    for k, body in enumerate(chain.bodies):
+        Q = known[k]
+        if Q is not None:
+            _rests(total, body, Q)
+            continue
+        alone = [(R, parts[0][0][1]) for R, way in ways(chain, known, k) if len(parts := groups(way)) == 1]
+        if alone:
+            _turns(total, body, *alone[0])
+        elif body.watched:
+            _spins(total, body)
+        elif not body.rigid:
+            raise Underived("a body that turns freely and carries a slide or a parallelogram")
+        else:
+            total.ball(body.shift)
+    return total.reach()
+
+
+def _rests(total: _Sum, body: Body, Q: Array) -> None:
+    """A body of fixed orientation."""
+    total.centre = total.centre + Q @ body.shift
+    total.lines += [Q @ slide for slide in body.slides]
+    for crank in body.cranks:
+        if crank.held:
+            total.centre = total.centre + Q @ crank.vector
+        else:
+            _crank(total, Q, Q @ crank.axis, crank.vector, crank.watched)
+
+
+def _crank(total: _Sum, Q: Array, axis: Array, vector: Array, watched: Sequence[Array]) -> None:
+    """A crank that turns about a fixed direction, from the orientation Q of what carries it."""
+    for d in watched:
+        if not lines.parallel(axis, d):
+            start, end = Q @ d, d
+            angle = np.arctan2(axis @ np.cross(start, end), start @ end - (axis @ start) * (axis @ end))
+            v = Q @ vector
+            across = v - axis * float(axis @ v)
+            total.centre = (total.centre + v - across + across * np.cos(angle)
+                            + np.cross(axis, across) * np.sin(angle))
+            return
+    total.turn(axis, Q @ vector)
+
+
+def _turns(total: _Sum, body: Body, Q: Array, a: Array) -> None:
+    """A body that turns about the fixed direction Q a, counted from the orientation Q."""
+    axis = Q @ a
+    total.turn(axis, Q @ body.shift)
+    for slide in body.slides:
+        if lines.parallel(slide, a):
+            total.lines.append(axis)
+        elif lines.perpendicular(slide, a):
+            first = Q @ slide
+            total.lines += [first, np.cross(axis, first)]
+        else:
+            raise Underived("a slide that turns about an axis oblique to it")
+    for crank in body.cranks:
+        if crank.held or not lines.parallel(crank.axis, a):
+            raise Underived("a parallelogram that turns about another axis than its own")
+        _crank(total, Q, axis, crank.vector, crank.watched)
+
+
+def _spins(total: _Sum, body: Body) -> None:
+    """A body with a direction held that turns about it."""
+    d = body.watched[0]
+    total.turn(d, body.shift)
+    if body.cranks or any(not lines.parallel(slide, d) for slide in body.slides):
+        raise Underived("a body that spins about its watched direction and carries more than a slide along it")
+    total.lines += [d] * len(body.slides)
+
+
+def same_reach(one: Reach, other: Reach, small: float) -> bool:
+    """Whether two reaches are one, to a length."""
+    if type(one) is not type(other):
+        return False
+    if isinstance(one, Line) and isinstance(other, Line):
+        return lines.parallel(one.direction, other.direction) and float(np.linalg.norm(one.miss(other.centre))) <= small
+    if isinstance(one, Plane) and isinstance(other, Plane):
+        return lines.parallel(one.normal, other.normal) and float(np.linalg.norm(one.miss(other.centre))) <= small
+    if isinstance(one, Circle) and isinstance(other, Circle) and not lines.parallel(one.axis, other.axis):
+        return False
+    apart = [float(np.linalg.norm(one.centre - other.centre))]
+    if isinstance(one, Circle | Sphere) and isinstance(other, Circle | Sphere):
+        apart.append(abs(one.radius - other.radius))
+    return max(apart) <= small

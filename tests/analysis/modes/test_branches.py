@@ -1,0 +1,74 @@
+"""Held legs with several branches: no mode of a robot lies outside a list that is said to be complete."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from analysis.modes.pods import displacements, pods
+from hrsynth.analysis.modes.modes import AssemblyModes, modes
+from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.words import parse
+from hrsynth.mechanism.vectors import Array
+
+SAME = 1e-6
+"""Distance (m, pure numbers) at which two poses are one."""
+
+KINDS = {("RRPS", "RRPS", "RRPS"): 64, ("PRRS", "PRRS", "PRRS"): 64, ("RPRS", "RPRS", "RUS"): 48,
+         ("UPS", "UPS", "UPS"): 64, ("RRPS", "RUS", "PUS"): 24, ("RRS", "RRS", "RRS"): 1}
+"""Words of legs, and how many complex modes there are with all of them watched."""
+
+
+def check(words: tuple[str, ...], seed: int, complex_count: int | None, starts: int = 100) -> AssemblyModes:
+    """Every pose that is found by brute force is listed, at most as many times as the list is long."""
+    robot, legs = pods(words, seed)
+    found = modes(robot, ",".join(str(k) for k in range(1, len(words) + 1)))
+    assert found.found.complete
+    assert complex_count in (None, found.found.complex)
+    met = {nearest(found, D) for D in displacements(legs, starts, seed)}
+    assert None not in met
+    assert found.modes[0].goal
+    assert not any(found.modes[k].open for k in met if k is not None)
+    return found
+
+
+def nearest(found: AssemblyModes, D: Array) -> int | None:
+    """The place of the mode to which the platform is displaced, or None."""
+    X = D @ found.setting.mechanism.links["platform"].pose
+    apart = [float(np.abs(X - mode.bodies["platform"]).max()) for mode in found.modes if mode.bodies is not None]
+    return int(np.argmin(apart)) if min(apart) < SAME else None
+
+
+@pytest.mark.parametrize("words", KINDS, ids="+".join)
+def test_all_branches_of_random_legs_are_listed(words: tuple[str, ...]):
+    """An offset U holds a direction in two ways, a skew pair RR in two; each way has its own line, circle or point."""
+    check(words, 0, KINDS[words])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("words", KINDS, ids="+".join)
+def test_all_branches_of_many_random_legs_are_listed(words: tuple[str, ...]):
+    for seed in range(1, 9):
+        check(words, seed, KINDS[words], 200)
+
+
+def test_a_word_of_the_catalog_has_all_its_modes():
+    """3-RRPS with oblique axes: eight choices of branches, of degree 8 each."""
+    found = modes(mechanism(parse("3(Ra*-Rb-Pl*-S)")))
+    assert (found.found.complex, len(found.modes), found.found.complete) == (64, 8, True)
+    assert all(mode.reachable for mode in found.modes)
+
+
+def test_a_hexapod_with_offset_joints_has_eight_branches():
+    robot, legs = pods(["RRPS"] * 6, 1)
+    found = modes(robot, "1,2,3")
+    assert found.found.complete
+    assert found.found.complex == 64
+    assert len(found.modes) == len(set(map(str, found.modes))) > 8
+    assert {nearest(found, D) for D in displacements(legs[:3], 100)} <= set(range(len(found.modes)))
+
+
+def test_legs_that_rest_leave_the_pose_itself():
+    """3-RRS with skew axes: with the directions held no tip moves."""
+    found = check(("RRS", "RRS", "RRS"), 3, 1)
+    assert [mode.goal for mode in found.modes] == [True]
