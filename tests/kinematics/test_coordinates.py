@@ -11,10 +11,10 @@ from hrsynth.kinematics.coordinates import Coordinates
 
 EXPECTED = {
     "rrrrr_m1": ("x", "y"),
-    "3rrr_m1": ("x", "y", "turn about z"),
+    "3rrr_m1": ("x", "y", "phi"),
     "3rps": ("z", "turn about x", "turn about y"),
     "delta": ("x", "y", "z"),
-    "quattro": ("x", "y", "z", "turn about z"),
+    "quattro": ("x", "y", "z", "phi"),
     "gough_stewart": ("x", "y", "z", "turn about x", "turn about y", "turn about z"),
 }
 

@@ -13,9 +13,10 @@ from hrsynth.analysis.setting import Setting, prepare
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.kinematics.configuration import ClosedConfiguration, closed
-from hrsynth.kinematics.parts import PlatformMotion, rotation_vector, turn_about
+from hrsynth.kinematics.parts import PlatformMotion
 from hrsynth.kinematics.reach import generic_motion, reach, sweep
 from hrsynth.mechanism.pose import Grid, Pose
+from hrsynth.mechanism.so3 import logarithm, turn_about
 from hrsynth.mechanism.vectors import Array
 from hrsynth.tolerances import CLOSED
 from kinematics.robots import ROBOTS, setting_of, state_of
@@ -131,7 +132,7 @@ def test_free_parts_are_nearest_to_zero(robot: str, text: str) -> None:
     def distance(q: Array) -> float:
         X = twin.pose(q, motion.link)
         shift = (motion.position(X) - motion.position(motion.home)) / twin.length
-        turn = rotation_vector(X[:3, :3] @ motion.home[:3, :3].T) if motion.body else np.zeros(3)
+        turn = logarithm(X[:3, :3] @ motion.home[:3, :3].T) if motion.body else np.zeros(3)
         return float(np.linalg.norm([*shift, *turn]))
 
     rng = np.random.default_rng(1)

@@ -13,7 +13,7 @@ import pytest
 
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism import JointType
-from hrsynth.present.view.server import serve
+from hrsynth.present.view.server import Handler, Server, serve
 from hrsynth.present.view.view import View
 from present.views import miss, moved, seen, serving
 
@@ -35,7 +35,8 @@ def address(found: View) -> Iterator[str]:
 
 def ask(address: str, body: object) -> dict:
     data = body if isinstance(body, bytes) else json.dumps(body).encode()
-    with urllib.request.urlopen(urllib.request.Request(address + "pose", data), timeout=20) as reply:
+    question = urllib.request.Request(address + "pose", data, {"Origin": address.removesuffix("/")})
+    with urllib.request.urlopen(question, timeout=20) as reply:
         return json.load(reply)
 
 
@@ -88,6 +89,87 @@ def test_only_the_page_can_be_read(found: View, address: str):
         urllib.request.urlopen(address + "etc/passwd", timeout=20)
     with error.value:
         assert error.value.code == 404
+
+
+QUESTION = json.dumps({"values": [0.02, 0.24]})
+
+
+def sent(address: str, lines: list[str], body: str = "") -> int:
+    """The status of the answer to a request written by hand; 0 where there is none."""
+    port = address.removesuffix("/").rpartition(":")[2]
+    text = "\r\n".join(lines).replace("PORT", port) + "\r\n\r\n" + body
+    with socket.create_connection(("127.0.0.1", int(port)), timeout=20) as line:
+        line.sendall(text.encode())
+        line.shutdown(socket.SHUT_WR)
+        reply = line.makefile("rb").read()
+    return int(reply.split()[1]) if reply.startswith(b"HTTP/") else 0
+
+
+def posted(address: str, hosts: list[str], origins: list[str], body: str = QUESTION, size: str | None = None) -> int:
+    return sent(address, ["POST /pose HTTP/1.1", *(f"Host: {each}" for each in hosts),
+                          *(f"Origin: {each}" for each in origins), f"Content-Length: {size or len(body)}"], body)
+
+
+HERE, OWN = ["127.0.0.1:PORT"], ["http://127.0.0.1:PORT"]
+ELSEWHERE = ["", "evil.example", "evil.example:PORT", "127.0.0.1", "127.0.0.1:1", "127.0.0.1:PORT.evil.example",
+             "127.0.0.1:PORT@evil.example", "localhost", "localhost.:PORT", "0.0.0.0:PORT", "127.0.0.2:PORT",
+             "[::]:PORT", "127.0.0.1:0PORT", "127.1:PORT", "LOCALHOST.evil:PORT", "127.0.0.1:PORT, 127.0.0.1:PORT"]
+FOREIGN = ["null", "", "http://evil.example", "https://127.0.0.1:PORT", "http://127.0.0.1", "http://127.0.0.1:1",
+           "http://127.0.0.1:PORT/", "http://127.0.0.1:PORT.evil.example", "http://127.0.0.1:PORT@evil.example",
+           "file://", "127.0.0.1:PORT", "http://evil.example http://127.0.0.1:PORT", "*"]
+
+
+@pytest.mark.parametrize("found", [FIVE_BAR], indirect=True)
+def test_the_page_itself_is_answered(found: View, address: str):
+    for name in ("127.0.0.1:PORT", "localhost:PORT", "[::1]:PORT"):
+        assert sent(address, ["GET / HTTP/1.1", f"Host: {name}"]) == 200
+        assert posted(address, [name], [f"http://{name}"]) == 200
+
+
+@pytest.mark.parametrize("found", [FIVE_BAR], indirect=True)
+def test_other_names_of_this_machine_and_other_pages_are_refused(found: View, address: str):
+    """A foreign name that leads here, and requests of a foreign page, whatever they look like."""
+    for host in ELSEWHERE:
+        assert sent(address, ["GET / HTTP/1.1", f"Host: {host}"]) == 403, host
+        assert posted(address, [host], OWN) == 403, host
+    for hosts in ([], HERE * 2, [*HERE, "evil.example"], ["evil.example", *HERE]):
+        assert sent(address, ["GET / HTTP/1.1", *(f"Host: {each}" for each in hosts)]) == 403, hosts
+        assert posted(address, hosts, OWN) == 403, hosts
+    assert sent(address, ["GET / HTTP/1.0"]) == 403
+    assert sent(address, ["GET http://evil.example/ HTTP/1.1", "Host: evil.example"]) == 403
+    for origin in FOREIGN:
+        assert posted(address, HERE, [origin]) == 403, origin
+    for origins in ([], OWN * 2, [*OWN, "null"], ["http://evil.example", *OWN]):
+        assert posted(address, HERE, origins) == 403, origins
+    for method in ("OPTIONS", "PUT", "DELETE", "HEAD"):
+        assert sent(address, [f"{method} /pose HTTP/1.1", "Host: 127.0.0.1:PORT", "Origin: http://evil.example"]) == 403
+
+
+@pytest.mark.parametrize("found", [FIVE_BAR], indirect=True)
+@pytest.mark.parametrize("size", ["-1", "+5", "1_0", "٣", "1e1", "10001", "99999999999999999999", ""])
+def test_a_size_that_is_none_or_too_large_is_refused(found: View, address: str, size: str):
+    assert posted(address, HERE, OWN, size=size or " ") == 400
+
+
+@pytest.mark.parametrize("found", [FIVE_BAR], indirect=True)
+def test_a_question_that_does_not_end_is_given_up(found: View, address: str, monkeypatch: pytest.MonkeyPatch,
+                                                   capfd: pytest.CaptureFixture[str]):
+    monkeypatch.setattr(Handler, "timeout", 0.2)
+    port = int(address.removesuffix("/").rpartition(":")[2])
+    for text in ("GET /", f"POST /pose HTTP/1.1\r\nHost: 127.0.0.1:{port}\r\nOrigin: http://127.0.0.1:{port}\r\n"
+                          "Content-Length: 100\r\n\r\n{"):
+        with socket.create_connection(("127.0.0.1", port), timeout=20) as line:
+            line.sendall(text.encode())
+            assert b"200" not in line.makefile("rb").read()
+    assert sent(address, ["GET / HTTP/1.1", "Host: 127.0.0.1:PORT"]) == 200
+    assert capfd.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("found", [FIVE_BAR], indirect=True)
+def test_it_listens_on_this_machine_alone(found: View):
+    server = Server(found, 0)
+    with server:
+        assert server.socket.getsockname()[0] == "127.0.0.1"
 
 
 @pytest.mark.parametrize("found", [FIVE_BAR], indirect=True)

@@ -56,6 +56,9 @@ def test_a_slider_moves_one_coordinate_and_keeps_the_others(name: str):
             for k, each in enumerate("xyz"):
                 if point is not None and each in shown:
                     assert point[k] == pytest.approx(value if slider.name == each else start[k], abs=DRAWN)
+                if "phi" in shown:
+                    wanted = value if slider.name == "phi" else 0.0
+                    assert angle * axis[k] == pytest.approx(wanted * found.setting.motion.normal[k], abs=DRAWN)
                 if f"turn about {each}" in shown:
                     wanted = value if slider.name == f"turn about {each}" else 0.0
                     assert angle * axis[k] == pytest.approx(wanted, abs=DRAWN)

@@ -16,7 +16,8 @@ import numpy as np
 
 from ..errors import LoopsNotClosed
 from ..mechanism.observation import Observation
-from ..mechanism.vectors import Array, frozen, hat, vee
+from ..mechanism.so3 import logarithm
+from ..mechanism.vectors import Array, frozen, hat
 from ..tolerances import CLOSED
 from .ranks import Rank, kernel_basis
 from .twin import Twin
@@ -91,7 +92,7 @@ class Target:
                       / twin.length]
             blocks = [point_velocity(V, X, self.point, twin.length)]
         else:
-            errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length, vee(X[:3, :3] @ self.pose[:3, :3].T)]
+            errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length, logarithm(X[:3, :3] @ self.pose[:3, :3].T)]
             blocks = [V]
         errors += [value - wanted for value, (_, wanted) in zip(values, self.measured, strict=True)]
         return np.concatenate(errors), np.concatenate([*blocks, *rates])

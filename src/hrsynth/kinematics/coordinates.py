@@ -1,6 +1,7 @@
 """As many coordinates of a platform as it has freedoms, and what can be reached by changing one of them.
 
-Components of its position, and of the rotation vector of its turn since the zero configuration, in base axes.
+Components of its position in base axes, and its turn since the zero configuration: the angle where it turns about one
+axis only, else components of the rotation vector.
 """
 
 from __future__ import annotations
@@ -10,9 +11,11 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mechanism.vectors import Array, hat
+from ..mechanism.so3 import logarithm, logarithm_rate, turn_about, wrapped
+from ..mechanism.vectors import Array
+from ..tolerances import SAME_DIRECTION
 from .configuration import ClosedConfiguration, point_velocity
-from .parts import PlatformMotion, rotation_vector
+from .parts import PlatformMotion
 from .relation import Question, relation
 from .steps import led
 from .twin import Twin
@@ -43,6 +46,8 @@ class Coordinates:
         twists = relation(start, replace(question, observations=(), bodies=())).twists
         if twists.shape[1] != motion.dof:
             twists = motion.twists
+        if motion.spins.shape[1] == 1:
+            twists = np.vstack([twists[:3], _axis(motion) @ twists[3:]])
         chosen: list[int] = []
         for place in range(len(twists) if motion.body else 3):
             before = twists[chosen]
@@ -55,26 +60,46 @@ class Coordinates:
     @property
     def names(self) -> tuple[str, ...]:
         """What the coordinates are called."""
-        return tuple(NAMES[place] for place in self.places)
+        names: tuple[str, ...] = NAMES
+        if self.motion.spins.shape[1] == 1:
+            axis = _axis(self.motion)
+            plain = abs(axis @ self.motion.normal) > 1 - SAME_DIRECTION
+            names = *NAMES[:3], "phi" if plain else f"turn about {' '.join(f'{x:.3g}' for x in axis)}"
+        return tuple(names[place] for place in self.places)
 
     def read(self, X: Array) -> Array:
         """The coordinates (n,) of a platform pose X (4, 4)."""
-        turn = rotation_vector(X[:3, :3] @ self.motion.home[:3, :3].T)
-        return np.concatenate([self.motion.position(X), turn])[list(self.places)]
+        return np.concatenate([self.motion.position(X), self._turn(X)[0]])[list(self.places)]
+
+    def apart(self, X: Array) -> Array:
+        """By how much a platform pose X (4, 4) is off the coordinates (n,), metres, radians; a turn about one axis is
+        the same after a whole one."""
+        found = self.read(X) - self.values
+        if self.motion.spins.shape[1] == 1:
+            found = np.array([wrapped(x) if place == 3 else x for x, place in zip(found, self.places, strict=True)])
+        return found
+
+    def _turn(self, X: Array) -> tuple[Array, Array]:
+        """The turn since the zero configuration, and the map from the angular velocity to its rate."""
+        R = X[:3, :3] @ self.motion.home[:3, :3].T
+        if self.motion.spins.shape[1] == 1:
+            angle, row = turn_about(_axis(self.motion), R)
+            return np.array([angle]), row[None]
+        turn = logarithm(R)
+        return turn, logarithm_rate(turn)
 
     def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) in characteristic lengths and radians, and its Jacobian."""
         frames, velocities = twin.frames(q, (self.motion.link,))
         X, V = frames[0], velocities[0]
         J = np.vstack([point_velocity(V, X, self.motion.point, twin.length),
-                       _rate(rotation_vector(X[:3, :3] @ self.motion.home[:3, :3].T)) @ V[3:]])
+                       self._turn(X)[1] @ V[3:]])
         scale = np.where(np.array(self.places) < 3, twin.length, 1.0)
-        return (self.read(X) - self.values) / scale, J[list(self.places)]
+        return self.apart(X) / scale, J[list(self.places)]
 
     def towards(self, X: Array, fraction: float) -> Coordinates:
         """The coordinates that lie ``fraction`` of the way from the pose X (4, 4) to these."""
-        here = self.read(X)
-        return replace(self, values=here + fraction * (self.values - here))
+        return replace(self, values=self.values + (1 - fraction) * self.apart(X))
 
     def along(self, start: ClosedConfiguration, index: int, spans: tuple[float, float], count: int
               ) -> tuple[tuple[float, ClosedConfiguration], ...]:
@@ -103,8 +128,7 @@ class Coordinates:
         return replace(self, values=values)
 
 
-def _rate(vector: Array) -> Array:
-    """The map (3, 3) from the angular velocity to the rate of the rotation vector."""
-    angle, K = float(np.linalg.norm(vector)), hat(vector)
-    factor = 1 / 12 if angle < 1e-4 else 1 / angle**2 - (1 + np.cos(angle)) / (2 * angle * np.sin(angle))
-    return np.asarray(np.eye(3) - 0.5 * K + factor * K @ K)
+def _axis(motion: PlatformMotion) -> Array:
+    """The one axis about which a platform turns, (3,), with the sense of phi where that turns about it."""
+    axis = motion.spins[:, 0]
+    return axis * np.sign(axis[np.argmax(np.abs(axis))])

@@ -12,7 +12,8 @@ import numpy as np
 
 from ..errors import BadRequest
 from ..mechanism.pose import Pose
-from ..mechanism.vectors import Array, hat, rotation_about, vee
+from ..mechanism.so3 import between, exponential, logarithm, turn_about, wrapped
+from ..mechanism.vectors import Array
 from ..tolerances import AS_PRINTED, RANK_CUTOFF
 from .configuration import ClosedConfiguration, point_velocity
 from .ranks import range_basis
@@ -48,14 +49,28 @@ class Goal:
             errors.append(np.array([wrapped(angle - self.phi)]))
             blocks.append(row[None] @ V[3:])
         if self.rotation is not None:
-            errors.append(rotation_vector(R @ self.rotation.T))
+            errors.append(logarithm(R @ self.rotation.T))
             blocks.append(V[3:])
         if self.axis is not None:
             moved = R @ self.zero.T @ self.axis
             across = np.linalg.svd(self.axis[None])[2][1:]
-            errors.append(across @ moved)
-            blocks.append(across @ -hat(moved) @ V[3:])
+            errors.append(across @ between(self.axis, moved))
+            blocks.append(across @ V[3:])
         return np.concatenate(errors), np.vstack(blocks)
+
+    def met(self, X: Array, tolerance: float) -> bool:
+        """Whether the pose X (4, 4) of the link is one that is wanted, to a difference of positions (m) and of rotation
+        matrices: no error vanishes at another pose unseen."""
+        R = X[:3, :3]
+        apart = [self.directions @ (R @ self.point + X[:3, 3]) - self.values]
+        if self.phi is not None:
+            swing = logarithm(R @ self.zero.T @ exponential(-self.phi * self.normal))
+            apart.append(np.array([self.normal @ swing if np.linalg.norm(swing) < np.pi - tolerance else np.inf]))
+        if self.rotation is not None:
+            apart.append((R - self.rotation).ravel())
+        if self.axis is not None:
+            apart.append(R @ self.zero.T @ self.axis - self.axis)
+        return all(float(np.max(np.abs(each), initial=0.0)) <= tolerance for each in apart)
 
     @property
     def lengths(self) -> int:
@@ -73,7 +88,7 @@ class Goal:
             angle = turn_about(self.normal, R @ self.zero.T)[0]
             phi = angle + fraction * (phi - angle)
         if rotation is not None:
-            way = rotation_vector(rotation @ R.T)
+            way = logarithm(rotation @ R.T)
             rotation = exponential(fraction * way) @ R
         return replace(self, values=start + fraction * (self.values - start), phi=phi, rotation=rotation)
 
@@ -151,15 +166,16 @@ class PlatformMotion:
             if not self._as_at_home(pose, name):
                 raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts or "no part")
         pose = replace(pose, **dict.fromkeys(constant))
-        if pose.rotation is not None and self.spins.shape[1] == 1:
-            turn = pose.rotation @ self.home[:3, :3].T
-            if np.linalg.norm(turn @ self.spins[:, 0] - self.spins[:, 0]) > AS_PRINTED:
+        normal, phi, rotation = self.normal, pose.phi, pose.rotation
+        if rotation is not None and self.spins.shape[1] == 1:
+            turn, normal = rotation @ self.home[:3, :3].T, self.spins[:, 0]
+            phi, rotation = turn_about(normal, turn)[0], None
+            if np.linalg.norm(turn @ normal - normal) > AS_PRINTED:
                 raise BadRequest(f"{robot}: the platform turns about one axis only, rpy is no such turn", str(pose),
                                  "phi, or a turn about " + " ".join(f"{x:.4g}" for x in self.spins[:, 0]))
         placed = [i for i, name in enumerate("xyz") if name in pose.given]
         values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)
-        return Goal(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, self.normal, pose.phi,
-                    pose.rotation)
+        return Goal(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, normal, phi, rotation)
 
     def _as_at_home(self, pose: Pose, name: str) -> bool:
         """Whether a part that never changes is given as it is at the zero configuration, to the digits printed."""
@@ -183,41 +199,3 @@ class PlatformMotion:
         if not self.body or self.spins.shape[1] > 1:
             return goal
         return replace(goal, axis=self.spins[:, 0]) if self.spins.shape[1] else replace(goal, rotation=R)
-
-
-def rotation_vector(R: Array) -> Array:
-    """The rotation vector (3,) of a rotation by less than π; where it is zero its rate is the angular velocity."""
-    across = vee(R)
-    sine, cosine = float(np.linalg.norm(across)), 0.5 * (float(np.trace(R)) - 1)
-    return across if sine < 1e-12 else across * (float(np.arctan2(sine, cosine)) / sine)
-
-
-def exponential(vector: Array) -> Array:
-    """The rotation (3, 3) of a rotation vector."""
-    angle = float(np.linalg.norm(vector))
-    return rotation_about(vector, angle) if angle > 0 else np.eye(3)
-
-
-def turn_about(normal: Array, R: Array) -> tuple[float, Array]:
-    """The turn of a rotation about ``normal`` (its twist, the swing left out), in (−π, π], and the row (3,) that makes
-    its rate of the angular velocity."""
-    w, v = _quaternion(R)
-    along = float(normal @ v)
-    row = (w * w * normal + w * (hat(v) @ normal) + along * v) / (w * w + along * along)
-    return wrapped(2 * float(np.arctan2(along, w))), row
-
-
-def wrapped(angle: float) -> float:
-    """An angle modulo 2π, in (−π, π]."""
-    return float(-((np.pi - angle) % (2 * np.pi)) + np.pi)
-
-
-def _quaternion(R: Array) -> tuple[float, Array]:
-    """A unit quaternion (w, v) of a rotation, from the largest of its four components."""
-    products = np.empty((4, 4))
-    products[0, 0] = 1 + np.trace(R)
-    products[0, 1:] = products[1:, 0] = R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]
-    products[1:, 1:] = R + R.T + (1 - np.trace(R)) * np.eye(3)
-    best = int(np.argmax(np.diag(products)))
-    found = products[best] / (2 * np.sqrt(products[best, best]))
-    return float(found[0]), found[1:]

@@ -9,11 +9,12 @@ import numpy as np
 
 from ..errors import PoseNotReached
 from ..mechanism.pose import Grid, Pose
+from ..tolerances import AS_PRINTED
 from .batch.grids import ready
 from .batch.placing import Placer
 from .configuration import ClosedConfiguration
 from .misses import worst_leg
-from .parts import PlatformMotion
+from .parts import Goal, PlatformMotion
 from .relation import Question
 from .sampling import wander
 from .steps import HALVINGS, led, nearest
@@ -41,11 +42,17 @@ def reach(start: ClosedConfiguration, question: Question, pose: Pose,
     robot = start.twin.mechanism.name
     goal = motion.goal(pose, robot)
     here, came = led(start, motion, goal)
-    if came < 1:
+    found = nearest(here, goal, motion.at_home()) if came == 1 else here
+    if came < 1 or not _arrived(found, goal):
         leg, lengths, angles = worst_leg(start.twin, motion, goal)
         last = str(motion.pose(here.pose(motion.link)))
         raise PoseNotReached(robot, str(pose), came, last, leg, 1e3 * lengths, float(np.degrees(angles)))
-    return nearest(here, goal, motion.at_home())
+    return found
+
+
+def _arrived(at: ClosedConfiguration, goal: Goal) -> bool:
+    """Whether a configuration is at the wanted pose, by its matrix."""
+    return goal.met(at.pose(goal.link), AS_PRINTED * max(1.0, at.twin.length))
 
 
 def sweep(start: ClosedConfiguration, question: Question, grid: Grid, motion: PlatformMotion | None = None,
@@ -68,7 +75,9 @@ def sweep(start: ClosedConfiguration, question: Question, grid: Grid, motion: Pl
             return
         there, came = (at_once[cell], 1.0) if cell in at_once else led(origin, motion, goals[cell], halvings)
         if came == 1:
-            found[cell] = there if cell in at_once else nearest(there, goals[cell], home)
+            there = there if cell in at_once else nearest(there, goals[cell], home)
+        if came == 1 and _arrived(there, goals[cell]):
+            found[cell] = there
             queue.extend((other, cell) for other in _neighbours(cell, grid.shape) if other not in found)
             if progress is not None:
                 progress()

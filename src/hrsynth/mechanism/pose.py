@@ -75,8 +75,7 @@ class Pose:
         return record if self.phi is None else {**record, "phi": self.phi}
 
     def __str__(self) -> str:
-        return ",".join(f"{name}={'/'.join(f'{round(v, 9) + 0.0:.6g}' for v in values)}"
-                        for name, values in self.given.items())
+        return ",".join(f"{name}={'/'.join(map(_written, values))}" for name, values in self.given.items())
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,12 +144,18 @@ class Grid:
 
 
 def rpy_of(R: Array) -> tuple[float, float, float]:
-    """Fixed-axis roll, pitch, yaw of a rotation (3, 3); yaw is zero where the pitch is a right angle."""
+    """Fixed-axis roll, pitch, yaw of a rotation (3, 3); yaw is zero where the pitch is a right angle.
+
+    The roll is read after the yaw is turned back, so that the two fit together next to there as well."""
     level = math.hypot(R[0, 0], R[1, 0])
-    pitch = math.atan2(-R[2, 0], level)
-    if level < 1e-12:
-        return math.atan2(-R[1, 2], R[1, 1]), pitch, 0.0
-    return math.atan2(R[2, 1], R[2, 2]), pitch, math.atan2(R[1, 0], R[0, 0])
+    pitch, yaw = math.atan2(-R[2, 0], level), math.atan2(R[1, 0], R[0, 0]) if level > 1e-12 else 0.0
+    s, c = math.sin(yaw), math.cos(yaw)
+    return math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1]), pitch, yaw
+
+
+def _written(value: float) -> str:
+    """Six digits, and six decimals, so that a pose is met again to ``AS_PRINTED`` when it is typed back."""
+    return f"{round(value, 6) + 0.0:.15g}" if abs(value) >= 1 else f"{round(value, 9) + 0.0:.6g}"
 
 
 def _fields(text: str, what: str) -> list[tuple[str, str]]:

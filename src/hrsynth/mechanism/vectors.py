@@ -40,9 +40,13 @@ def hat(vector: ArrayLike) -> Array:
     return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
 
 
-def vee(matrix: Array) -> Array:
-    """The vector v of the skew part [v]ₓ of a matrix (3, 3): of a rotation, its axis times the sine of its angle."""
-    return 0.5 * np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+def hats(vectors: Array) -> Array:
+    """The matrices [v]ₓ (..., 3, 3) of vectors (..., 3)."""
+    found = np.zeros((*vectors.shape, 3))
+    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
+        found[..., k, j] = vectors[..., i]
+        found[..., j, k] = -vectors[..., i]
+    return found
 
 
 def pose(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Array:

@@ -10,8 +10,8 @@ import numpy as np
 
 from ..analysis.setting import Setting
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.parts import rotation_vector
 from ..mechanism.pose import Pose
+from ..mechanism.so3 import angle_of
 from ..mechanism.vectors import Array
 from ..results import Result
 from .ending import Ending
@@ -125,7 +125,7 @@ class Servo(Result):
     def _turn(self, at: ClosedConfiguration) -> float:
         motion = self.setting.motion
         R = at.pose(motion.link)[:3, :3] @ self.target.pose(motion.link)[:3, :3].T
-        return float(np.linalg.norm(rotation_vector(R))) if motion.body else 0.0
+        return angle_of(R) if motion.body else 0.0
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""

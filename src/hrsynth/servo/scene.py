@@ -14,10 +14,10 @@ from ..analysis.posture import REGULAR, UNDECIDED, Examiner
 from ..analysis.setting import Setting, prepare
 from ..errors import BadRequest, PoseNotReached, RankUndecided
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.parts import rotation_vector
 from ..kinematics.reach import reach
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
+from ..mechanism.so3 import angle_of
 from ..mechanism.vectors import Array
 from ..tolerances import RANK_GAP
 from .camera import Camera, Edges, cylinders, placed
@@ -159,7 +159,7 @@ class Scene:
         moved = np.array([motion.position(each) for each in late]) - motion.position(X)
         lengths, middle = np.linalg.norm(moved, axis=1), moved.mean(axis=0)
         x, y, z = map(float, motion.position(X) + middle)
-        turns = np.array([np.linalg.norm(rotation_vector(each[:3, :3] @ X[:3, :3].T)) if motion.body else 0.0
+        turns = np.array([angle_of(each[:3, :3] @ X[:3, :3].T) if motion.body else 0.0
                           for each in late])
         return Spread(float(lengths.max()), float(turns.max()), float(np.sqrt(np.mean(lengths**2))),
                       float(np.sqrt(np.mean(turns**2))), (x, y, z), float(np.linalg.norm(middle)))

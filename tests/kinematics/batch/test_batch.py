@@ -39,7 +39,7 @@ def shipped_batch(robot: str) -> tuple[Setting, Batch]:
 
 def poses_near(batch: Batch, count: int, size: float = 0.2, seed: int = 0) -> Array:
     """Poses of the platform's own freedoms around its home."""
-    from hrsynth.kinematics.batch.chain import exponentials
+    from hrsynth.mechanism.so3 import exponential
 
     rng = np.random.default_rng(seed)
     stage = batch.stage
@@ -47,7 +47,7 @@ def poses_near(batch: Batch, count: int, size: float = 0.2, seed: int = 0) -> Ar
     spins = rng.uniform(-size, size, (count, stage.spins.shape[1])) @ stage.spins.T
     shifts = rng.uniform(-size, size, (count, stage.shifts.shape[1])) @ stage.shifts.T
     X[:, :3, 3] += batch.length * shifts
-    X[:, :3, :3] = exponentials(spins) @ X[:, :3, :3]
+    X[:, :3, :3] = exponential(spins) @ X[:, :3, :3]
     return X
 
 
@@ -235,9 +235,9 @@ def test_the_determinant_has_the_size_of_the_singular_values_and_one_sign_around
 def test_the_determinant_changes_its_sign_where_a_singular_value_vanishes() -> None:
     _, batch = shipped_batch("3rpr_m1")
     X = np.tile(batch.home, (400, 1, 1))
-    from hrsynth.kinematics.batch.chain import exponentials
+    from hrsynth.mechanism.so3 import exponential
 
-    X[:, :3, :3] = exponentials(np.linspace(0, np.pi, 400)[:, None] * batch.stage.spins[:, 0]) @ X[:, :3, :3]
+    X[:, :3, :3] = exponential(np.linspace(0, np.pi, 400)[:, None] * batch.stage.spins[:, 0]) @ X[:, :3, :3]
     found = batch.evaluate(X)
     assert found.determinant is not None
     flips = np.flatnonzero(np.diff(np.sign(found.determinant)))

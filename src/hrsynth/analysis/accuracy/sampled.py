@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.parts import PlatformMotion, rotation_vector
+from ...kinematics.parts import PlatformMotion
 from ...kinematics.relation import Question
+from ...mechanism.so3 import angle_of
 from ...mechanism.vectors import Array, rotation_about
 from .best_fit import ENDS, NOT_FOUND, best_fits, seen, weakest
 from .gauge import PoseErrors, finite
@@ -70,7 +71,7 @@ def sampled(at: ClosedConfiguration, question: Question, motion: PlatformMotion,
             X = there.pose(motion.link)
             position = max(position, float(np.linalg.norm(motion.position(X) - motion.position(home))))
             if motion.body:
-                orientation = max(orientation, float(np.linalg.norm(rotation_vector(X[:3, :3] @ home[:3, :3].T))))
+                orientation = max(orientation, angle_of(X[:3, :3] @ home[:3, :3].T))
     return Sampled(len(ways), position, orientation, tuple(sorted(ended)), not_found, least, usual)
 
 

@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.parts import PlatformMotion, exponential, rotation_vector
+from ...kinematics.parts import PlatformMotion
 from ...kinematics.relation import Question, relation
 from ...mechanism.legs import Anatomy
-from ...mechanism.vectors import Array, inverse
+from ...mechanism.so3 import exponential, logarithm
+from ...mechanism.vectors import Array, hats, inverse
 from ...tolerances import FOLLOWED, RANK_CUTOFF
 from .balls import Field, widened
 
@@ -74,8 +75,8 @@ class Stretch:
 
     @classmethod
     def between(cls, one: tuple[Array, Array], two: tuple[Array, Array]) -> Stretch:
-        """The way from a pose (3,), (3, 3) to another; turns by less than π."""
-        return cls(*one, two[0] - one[0], rotation_vector(two[1] @ one[1].T))
+        """The way from a pose (3,), (3, 3) to another."""
+        return cls(*one, two[0] - one[0], logarithm(two[1] @ one[1].T))
 
     def at(self, fractions: Field) -> tuple[Field, Field]:
         """Poses (n, 3), (n, 3, 3) at fractions (n,); of balls, with all poses nearer than ``FOLLOWED``."""
@@ -83,8 +84,7 @@ class Stretch:
         angle = float(np.linalg.norm(self.turn))
         R: Field = np.broadcast_to(self.R, (len(fractions), 3, 3))
         if angle > 0:
-            K = self.turn / angle
-            K = np.array([[0, -K[2], K[1]], [K[2], 0, -K[0]], [-K[1], K[0], 0]])
+            K = hats(self.turn / angle)
             sines, cosines = np.sin(fractions * angle), np.cos(fractions * angle)
             R = self.R + sines[:, None, None] * (K @ self.R) + (1 - cosines)[:, None, None] * (K @ K @ self.R)
         if p.dtype == object:
@@ -100,27 +100,10 @@ class Stretch:
 def stretched(p: Array, R: Array, q: Array, S: Array, fractions: Array) -> tuple[Array, Array, Array]:
     """Poses (n, k, 3), (n, k, 3, 3) on the ways from poses (p, R) to (q, S), (n, 3) and (n, 3, 3), at fractions (k,);
     and the ways' lengths (n,) (characteristic lengths, radians)."""
-    turns = rotation_vectors(S @ R.transpose(0, 2, 1))
+    turns = logarithm(S @ R.transpose(0, 2, 1))
     places = p[:, None] + fractions[:, None] * (q - p)[:, None]
-    turned = exponentials((fractions[:, None] * turns[:, None]).reshape(-1, 3)).reshape(len(p), -1, 3, 3) @ R[:, None]
+    turned = exponential(fractions[:, None] * turns[:, None]) @ R[:, None]
     return places, turned, np.hypot(np.linalg.norm(q - p, axis=1), np.linalg.norm(turns, axis=1))
-
-
-def rotation_vectors(R: Array) -> Array:
-    """The rotation vectors (n, 3) of rotations (n, 3, 3) by less than π."""
-    vee = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], axis=1)
-    sine, cosine = np.linalg.norm(vee, axis=1), 0.5 * (np.trace(R, axis1=1, axis2=2) - 1)
-    small = sine < FOLLOWED
-    return np.asarray(vee * np.where(small, 1.0, np.arctan2(sine, cosine) / np.where(small, 1.0, sine))[:, None])
-
-
-def exponentials(vectors: Array) -> Array:
-    """The rotations (n, 3, 3) of rotation vectors (n, 3)."""
-    angles = np.linalg.norm(vectors, axis=1)
-    x, y, z = (vectors / np.where(angles > 0, angles, 1.0)[:, None]).T
-    o = np.zeros_like(x)
-    K = np.stack([o, -z, y, z, o, -x, -y, x, o], axis=1).reshape(-1, 3, 3)
-    return np.asarray(np.eye(3) + np.sin(angles)[:, None, None] * K + (1 - np.cos(angles))[:, None, None] * K @ K)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kinematics.parts import wrapped
 from ...mechanism import Joint, JointType, Limits, Mechanism
+from ...mechanism.so3 import wrapped
 from ...mechanism.vectors import Array
 from ...tolerances import FOLLOWED, SAME_RELATION
 from ..singularity.features import axis_of

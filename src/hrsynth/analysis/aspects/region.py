@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...kinematics.parts import rotation_vector
+from ...mechanism.so3 import exponential, logarithm
 from ...mechanism.vectors import Array
-from .carriage import Carriage, Place, exponentials
+from .carriage import Carriage, Place
 
 WIDER = 1.5
 """How much wider than the known poses the region is from which poses are drawn."""
@@ -28,7 +28,7 @@ class Region:
         """The region that is wider than known poses (n, 3), (n, 3, 3), around the first."""
         motion = carriage.motion
         shifts = (p - p[0]) @ motion.shifts
-        turns = np.array([rotation_vector(each @ R[0].T) for each in R]) @ motion.spins
+        turns = logarithm(R @ R[0].T) @ motion.spins
         middle = p[0] + motion.shifts @ ((shifts.max(axis=0) + shifts.min(axis=0)) / 2)
         exact = cls(carriage, (middle, R[0]), np.ptp(shifts, axis=0) / 2,
                     np.max(np.abs(turns), axis=0, initial=0.0))
@@ -44,4 +44,4 @@ class Region:
         motion = self.carriage.motion
         p = self.centre[0] + (rng.uniform(-1, 1, (count, len(self.shift))) * self.shift) @ motion.shifts.T
         turns = (rng.uniform(-1, 1, (count, len(self.turn))) * self.turn) @ motion.spins.T
-        return p, exponentials(turns) @ self.centre[1]
+        return p, exponential(turns) @ self.centre[1]

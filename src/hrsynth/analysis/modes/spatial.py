@@ -8,14 +8,15 @@ from itertools import combinations
 
 import numpy as np
 
-from ...mechanism.vectors import Array, pose, rotation_about
+from ...mechanism.so3 import exponential, logarithm
+from ...mechanism.vectors import Array, pose
 from ...tolerances import SAME_POINT
 from .certify import Equation
 from .conics import Conic, Numbers, spatial_frame
 from .curves import Point, Surface, cross, curves_of, extent, length
 from .quadrics import Chart
 from .squares import Square, distance, on_sphere, single
-from .study import rotation_vector, study
+from .study import study
 from .systems import System
 
 
@@ -27,8 +28,7 @@ class Spatial(System):
 
     def pose(self, q: Array) -> Array:
         """The platform's frame in the base frame; shape (4, 4)."""
-        angle = length(q[3:])
-        return pose(q[:3], rotation_about(q[3:], angle) if angle > 0 else None)
+        return pose(q[:3], exponential(q[3:]))
 
     def reached(self, q: Array) -> Array:
         """Where the tips are at a pose; shape (legs, 3), metres."""
@@ -76,7 +76,7 @@ class Spatial(System):
             free = iter(parameters)
             three = np.array([curve.at(0.0 if isinstance(curve, Point) else next(free)) for curve in curves])
             R = _triad(three) @ _triad(b).T
-            return np.array([*(three.mean(axis=0) - R @ b.mean(axis=0)), *rotation_vector(R)])
+            return np.array([*(three.mean(axis=0) - R @ b.mean(axis=0)), *logarithm(R)])
 
         return Square(legs, unknowns, frame, build, place, whole)
 

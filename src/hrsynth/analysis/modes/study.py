@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from ...mechanism.so3 import logarithm
 from ...mechanism.vectors import Array
 from .certify import Quadric
 from .conics import UNIT, Numbers, spatial_frame
@@ -49,7 +50,7 @@ def study(reaches: tuple[Reach, ...], b: Array, size: float, number: int) -> Cha
         norm = float(q @ q)
         p = 2.0 * (q[0] * t[1:] - t[0] * q[1:] + cross(q[1:], t[1:])) / norm
         turned = frame.R.T @ rotation_of(q / math.sqrt(norm))
-        return np.array([*(frame.origin + frame.size * (p @ frame.R)), *rotation_vector(turned)])
+        return np.array([*(frame.origin + frame.size * (p @ frame.R)), *logarithm(turned)])
 
     normal = sum(_product(u, v) for u, v in zip(e, g, strict=True))
     return Chart(frame, COUNT, reaches, tips, (normal,), place, Quadric(w))
@@ -94,16 +95,3 @@ def rotation_of(q: Array) -> Array:
     return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
                      [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
                      [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
-
-
-def rotation_vector(R: Array) -> Array:
-    """The axis of a rotation times its angle in [0, π], by the best of four forms of its quaternion; shape (3,)."""
-    (a, b, c), (d, e, f), (g, h, i) = R.tolist()
-    w, x, y, z = max(((1 + a + e + i, h - f, c - g, d - b), (h - f, 1 + a - e - i, b + d, c + g),
-                      (c - g, b + d, 1 - a + e - i, f + h), (d - b, c + g, f + h, 1 - a - e + i)),
-                     key=lambda form: sum(v * v for v in form))
-    sine = math.hypot(x, y, z)
-    if sine == 0.0:
-        return np.zeros(3)
-    angle = 2.0 * math.atan2(sine, abs(w))
-    return np.array([x, y, z]) * (math.copysign(angle, w) / sine)

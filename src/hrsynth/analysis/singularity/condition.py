@@ -15,11 +15,11 @@ import numpy as np
 
 from ...kinematics.locked import interaction
 from ...kinematics.relation import Question
-from ...mechanism.vectors import Array
+from ...mechanism.vectors import Array, hats
 from ...tolerances import SAME_RELATION
 from .algebra import evaluate, products, vector
 from .features import Carried, Feature
-from .structure import HeldLeg, Scene, Structure, forbidden, hats, projectors
+from .structure import HeldLeg, Scene, Structure, forbidden, projectors
 
 Values = Mapping[str, Array]
 

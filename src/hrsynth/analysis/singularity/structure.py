@@ -20,7 +20,7 @@ from ...kinematics.relation import Question, relation
 from ...mechanism import JointType, Mechanism, Observation
 from ...mechanism.legs import Anatomy, Leg
 from ...mechanism.observation import Direction
-from ...mechanism.vectors import Array, frozen
+from ...mechanism.vectors import Array, frozen, hats
 from ...tolerances import SAME_RELATION
 from .features import Carried, Feature, Segment, Spot, Tangent, axis_of, centre_of, poses_at
 
@@ -123,13 +123,6 @@ def forbidden(leg: HeldLeg, values: Mapping[str, Array]) -> Array:
         n = values[leg.normal.symbol]
         return np.asarray(n[:, :, None] * n[:, None, :])
     return np.broadcast_to(np.eye(3), (len(values[leg.tip.symbol]), 3, 3))
-
-
-def hats(vectors: Array) -> Array:
-    """[v]ₓ for many vectors, (n, 3, 3)."""
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    o = np.zeros_like(x)
-    return np.stack([np.stack([o, -z, y], -1), np.stack([z, o, -x], -1), np.stack([-y, x, o], -1)], -2)
 
 
 def projectors(vectors: Array) -> Array:

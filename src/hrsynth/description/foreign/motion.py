@@ -9,7 +9,8 @@ import numpy as np
 
 from ...mechanism.model import JointType
 from ...mechanism.screws import rotation, translation
-from ...mechanism.vectors import Array, perpendicular, pose, rotation_about
+from ...mechanism.so3 import exponential, logarithm
+from ...mechanism.vectors import Array, hat, perpendicular, pose, rotation_about
 from ..draft import Edge
 
 _MATRIX = (JointType.SPHERICAL, JointType.FREE)
@@ -50,10 +51,8 @@ def moved(edge: Edge, value: Array, step: Array, R_predecessor: Array) -> Array:
     if kind_of(edge) not in _MATRIX:
         return value + step
     angular = R_predecessor.T @ step[-3:]
-    angle = float(np.linalg.norm(angular))
-    turn = rotation_about(angular, angle) if angle > 0 else np.eye(3)
     shift = R_predecessor.T @ step[:3] if kind_of(edge) is JointType.FREE else np.zeros(3)
-    return pose(value[:3, 3] + shift, turn @ value[:3, :3])
+    return pose(value[:3, 3] + shift, exponential(angular) @ value[:3, :3])
 
 
 def screws(edge: Edge, X_P: Array, X_S: Array) -> list[Array]:
@@ -86,20 +85,20 @@ def opening(edge: Edge, X_P: Array, X_S: Array) -> tuple[Array, Array]:
         return np.zeros(0), np.zeros((0, 6))
     R, p = X_P[:3, :3], X_S[:3, 3]
     gap, D = R.T @ (p - X_P[:3, 3]), R.T @ X_S[:3, :3]
-    gap_rows = np.hstack([R.T, -R.T @ _hat(p)])
+    gap_rows = np.hstack([R.T, -R.T @ hat(p)])
     turn_rows = np.hstack([np.zeros((3, 3)), R.T])
     if kind in (JointType.PRISMATIC, JointType.FIXED):
-        turn, turned = _vector(D), turn_rows
+        turn, turned = logarithm(D), turn_rows
     elif kind is JointType.SPHERICAL:
         turn, turned = np.zeros(0), np.zeros((0, 6))
     elif kind is JointType.UNIVERSAL:
         second = D @ edge.axes[1]
         turn = np.array([edge.axes[0] @ second])
-        turned = (edge.axes[0] @ -_hat(second) @ turn_rows)[None]
+        turned = (edge.axes[0] @ -hat(second) @ turn_rows)[None]
     else:
         moving, across = D @ edge.axes[0], np.array(_plane(edge))
         turn = _beyond(across @ moving) if edge.axes[0] @ moving < 0 else across @ moving
-        turned = across @ -_hat(moving) @ turn_rows
+        turned = across @ -hat(moving) @ turn_rows
     if kind in (JointType.PRISMATIC, JointType.CYLINDRICAL):
         across = np.array(_plane(edge))
         gap, gap_rows = across @ gap, across @ gap_rows
@@ -117,19 +116,3 @@ def _beyond(turn: Array) -> Array:
     """The error of an axis that points the opposite way: it grows with the angle, as it does on the near side."""
     size = float(np.linalg.norm(turn))
     return turn * ((2 - size) / size) if size > 1e-9 else np.array([2.0, 0.0])
-
-
-def _hat(v: Array) -> Array:
-    return np.array([[0.0, -v[2], v[1]], [v[2], 0.0, -v[0]], [-v[1], v[0], 0.0]])
-
-
-def _vector(D: Array) -> Array:
-    """The rotation vector of a rotation; near half a turn only its direction is rough."""
-    vee = np.array([D[2, 1] - D[1, 2], D[0, 2] - D[2, 0], D[1, 0] - D[0, 1]]) / 2
-    sine, cosine = float(np.linalg.norm(vee)), (float(np.trace(D)) - 1) / 2
-    if sine > 1e-12:
-        return np.asarray(vee * (np.arctan2(sine, cosine) / sine))
-    if cosine > 0:
-        return vee
-    axis = np.sqrt(np.maximum((np.diag(D) + 1) / 2, 0))
-    return np.asarray(np.pi * axis)

@@ -7,7 +7,6 @@ products α·β of directions fixed in its two links.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -17,7 +16,8 @@ from numpy.typing import NDArray
 from ...mechanism import Joint, JointType, Mechanism
 from ...mechanism.legs import Leg
 from ...mechanism.observation import Direction
-from ...mechanism.vectors import Array, inverse, perpendicular
+from ...mechanism.so3 import exponential, logarithm
+from ...mechanism.vectors import Array, hats, inverse, perpendicular
 from ...tolerances import CLOSED, RANK_CUTOFF, SOLVED
 from .stage import Stage
 
@@ -170,7 +170,7 @@ class Chain:
         twists = np.zeros((len(X), len(self.links), 6, 6))
         twists[:, given] = np.eye(6)
         twists[:, self.free] = -(back @ end).reshape(len(X), len(self.free), 6, 6)
-        minus = -_hats(u)
+        minus = -hats(u)
         _, s, right = np.linalg.svd(np.concatenate([wrenches, np.zeros((len(X), 6, 6))], axis=1), full_matrices=False)
         return u, minus @ twists[:, number, 3:], right * (s > RANK_CUTOFF)[:, :, None]
 
@@ -178,13 +178,13 @@ class Chain:
         """The chain at platform poses X (n, 4, 4), led there from ``home`` in small steps, all poses abreast."""
         p, R = stage.place(X)
         (p0,), (R0,) = stage.place(home[None])
-        turn = logarithms(R @ R0.T) if self.turns(stage) else np.zeros_like(p)
+        turn = logarithm(R @ R0.T) if self.turns(stage) else np.zeros_like(p)
         far = np.max(np.linalg.norm(p - p0, axis=1) / self.length + np.linalg.norm(turn, axis=1), initial=0.0)
         steps = max(1, int(np.ceil(far / STRIDE)))
         state, residual = self.start(len(X)), np.zeros(len(X))
         for step in range(1, steps + 1):
             part = step / steps
-            there = self.end(stage, p0 + part * (p - p0), exponentials(part * turn) @ R0 if step < steps else R)
+            there = self.end(stage, p0 + part * (p - p0), exponential(part * turn) @ R0 if step < steps else R)
             state, residual = self.led(state, there, ITERATIONS if step == steps else FEW)
         return Ends(self, stage, state, residual, R, span)
 
@@ -233,7 +233,7 @@ class Ends:
         moves = np.broadcast_to(v, (len(self.R), *v.shape))
         if body is None:
             return np.concatenate([moves / self.chain.length, np.zeros_like(moves)], axis=1)
-        moves = moves - _hats(self.R @ body.b) @ w
+        moves = moves - hats(self.R @ body.b) @ w
         turns = np.broadcast_to(w if body.turns else np.zeros_like(w), moves.shape)
         return np.concatenate([moves / self.chain.length, turns], axis=1)
 
@@ -251,32 +251,5 @@ def moved(X: Array, twists: Array) -> Array:
     """Poses (..., 4, 4) after twists (..., 6) of their origins for a unit of time."""
     found = X.copy()
     found[..., :3, 3] += twists[..., :3]
-    found[..., :3, :3] = exponentials(twists[..., 3:]) @ X[..., :3, :3]
+    found[..., :3, :3] = exponential(twists[..., 3:]) @ X[..., :3, :3]
     return found
-
-
-def exponentials(vectors: Array) -> Array:
-    """Rotations (..., 3, 3) of rotation vectors (..., 3)."""
-    square = np.sum(vectors**2, axis=-1)[..., None, None]
-    angle = np.sqrt(square)
-    small = angle < 1e-6
-    safe = np.where(small, 1.0, angle)
-    K = _hats(vectors)
-    sine = np.where(small, 1 - square / 6, np.sin(safe) / safe)
-    versine = np.where(small, 0.5 - square / 24, (1 - np.cos(safe)) / safe**2)
-    return np.asarray(np.eye(3) + sine * K + versine * (K @ K))
-
-
-def logarithms(R: Array) -> Array:
-    """Rotation vectors (..., 3) of rotations (..., 3, 3) by less than π."""
-    vee = 0.5 * np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1)
-    sine = np.linalg.norm(vee, axis=-1)
-    angle = np.arctan2(sine, 0.5 * (np.trace(R, axis1=-2, axis2=-1) - 1))
-    return np.asarray(vee * np.where(sine > 1e-12, angle / np.where(sine > 1e-12, sine, 1.0), 1.0)[..., None])
-
-
-def _hats(vectors: Array) -> Array:
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    o = np.zeros_like(x)
-    rows: Iterable[Array] = (np.stack(row, -1) for row in ((o, -z, y), (z, o, -x), (-y, x, o)))
-    return np.stack(list(rows), -2)

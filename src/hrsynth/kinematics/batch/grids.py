@@ -7,11 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...mechanism.pose import Grid
+from ...mechanism.so3 import exponential
 from ...mechanism.vectors import Array
 from ...tolerances import FOLLOWED, RANK_CUTOFF
 from ..configuration import ClosedConfiguration
-from ..parts import Goal, PlatformMotion, exponential
-from .chain import exponentials
+from ..parts import Goal, PlatformMotion
 from .placing import Placer
 from .plain import Flags
 
@@ -55,7 +55,7 @@ def poses_over(motion: PlatformMotion, grid: Grid, robot: str, places: Array) ->
     columns = dict(zip(grid.names, places.T, strict=True))
     X = np.tile(pose_of(motion, first), (len(places), 1, 1))
     if "phi" in columns:
-        X[:, :3, :3] = exponentials(columns["phi"][:, None] * motion.normal) @ motion.home[:3, :3]
+        X[:, :3, :3] = exponential(columns["phi"][:, None] * motion.normal) @ motion.home[:3, :3]
     values = np.tile(first.values, (len(places), 1))
     for row, direction in enumerate(first.directions):
         values[:, row] = columns.get("xyz"[int(np.argmax(direction))], values[:, row])
@@ -82,7 +82,7 @@ def _some_turn(placer: Placer, motion: PlatformMotion, X: Array) -> Flags:
     """Whether some turn about the platform's one axis makes each of the poses X (n, 4, 4) one that is reached, (n,)."""
     if len(X) == 0:
         return np.zeros(0, dtype=bool)
-    turns = exponentials(np.linspace(-np.pi, np.pi, TURNS)[:, None] * motion.spins[:, 0])
+    turns = exponential(np.linspace(-np.pi, np.pi, TURNS)[:, None] * motion.spins[:, 0])
     p = X[:, :3, 3] + X[:, :3, :3] @ motion.point
     poses = np.tile(np.eye(4), (len(X), TURNS, 1, 1))
     poses[..., :3, :3] = turns @ X[:, None, :3, :3]

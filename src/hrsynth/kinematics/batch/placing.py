@@ -16,11 +16,12 @@ from ...errors import NotSampled
 from ...mechanism import Joint, JointType, Mechanism
 from ...mechanism.legs import Anatomy, Leg
 from ...mechanism.observation import Direction
+from ...mechanism.so3 import between, exponential, quaternions
 from ...mechanism.vectors import Array, frozen, inverse
 from ...tolerances import CLOSED
 from ..configuration import ClosedConfiguration
 from ..twin import Twin
-from .chain import Chain, exponentials
+from .chain import Chain
 from .engine import CHUNK, Batch
 from .limb import Kind, Limb
 from .plain import Flags, Poses, rod, turning
@@ -103,7 +104,7 @@ class Placer:
             shift, spin = np.split(STEP * velocity, [stage.shifts.shape[1]], axis=1)
             p, R = stage.place(X)
             X = X.copy()
-            X[:, :3, :3] = exponentials(spin @ stage.spins.T) @ R
+            X[:, :3, :3] = exponential(spin @ stage.spins.T) @ R
             X[:, :3, 3] = p + length * (shift @ stage.shifts.T) - X[:, :3, :3] @ stage.point
             found = self.batch.evaluate(X, compiled=False)
             kept = np.flatnonzero(found.reached & ~(found.singular_values[:, 0] > limit))
@@ -153,7 +154,7 @@ class Placer:
             found = rod(limb, poses)
             there, u = found.reached, np.where(found.reached, found.u, zero[:, None]).T
             first = _first(limb, limb.tip(p, R) - u * (limb.sense * limb.rod), there)
-        turn = _between(zero, u)
+        turn = exponential(between(zero, u))
         guess = {name: frames[name] for name in (mechanism.base, leg.attach)}
         for name in _outwards(mechanism, leg, limb.crank):
             pose = mechanism.links[name].pose
@@ -177,18 +178,10 @@ def _first(limb: Limb, B: Array, there: Flags) -> Array:
     elif limb.radius:
         a, start, arm = limb.pivot, limb.place - limb.centre, B - limb.centre
         angle = np.arctan2(arm @ np.cross(a, start), arm @ start)
-        X[:, :3, :3] = exponentials(angle[:, None] * a)
+        X[:, :3, :3] = exponential(angle[:, None] * a)
         X[:, :3, 3] = limb.centre - X[:, :3, :3] @ limb.centre
     X[~there] = np.eye(4)
     return X
-
-
-def _between(a: Array, b: Array) -> Array:
-    """The smallest rotations (n, 3, 3) that turn the unit vector a (3,) to unit vectors b (n, 3)."""
-    across = np.cross(a, b)
-    sine = np.linalg.norm(across, axis=1)
-    angle = np.arctan2(sine, b @ a)
-    return exponentials(across * np.where(sine > 0, angle / np.where(sine > 0, sine, 1.0), 0.0)[:, None])
 
 
 def _outwards(mechanism: Mechanism, leg: Leg, crank: str) -> list[str]:
@@ -243,10 +236,10 @@ def _coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
             normal = np.cross(first, second)
             carried = R @ second
             one = np.arctan2(carried @ normal, carried @ np.cross(normal, first))[:, None]
-            rest = exponentials(-one * first) @ R
+            rest = exponential(-one * first) @ R
             return [one, _angle(rest, second)]
         case JointType.SPHERICAL:
-            return [_quaternions(R)]
+            return [quaternions(R)[:, [1, 2, 3, 0]]]
         case JointType.PLANAR:
             x = np.linalg.svd(joint.axis[None, :])[2][1]
             return [shift @ x[:, None], shift @ np.cross(joint.axis, x)[:, None], _angle(R, joint.axis)]
@@ -258,17 +251,3 @@ def _angle(R: Array, axis: Array) -> Array:
     """The angle (n, 1) of rotations about an axis."""
     sine = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], 1) @ axis
     return np.arctan2(sine, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1))[:, None]
-
-
-def _quaternions(R: Array) -> Array:
-    """Unit quaternions (n, 4) as (x, y, z, w), from the largest of the four components."""
-    trace = np.trace(R, axis1=1, axis2=2)
-    products = np.empty((len(R), 4, 4))
-    products[:, 3, 3] = 1 + trace
-    vee = np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], 1)
-    products[:, 3, :3] = products[:, :3, 3] = vee
-    products[:, :3, :3] = R + R.transpose(0, 2, 1) + (1 - trace)[:, None, None] * np.eye(3)
-    best = np.argmax(np.diagonal(products, axis1=1, axis2=2), axis=1)
-    found = products[np.arange(len(R)), best]
-    found /= np.linalg.norm(found, axis=1, keepdims=True)
-    return found * np.where(found[:, 3:] < 0, -1.0, 1.0)

@@ -1,4 +1,8 @@
-"""The view with a server behind it, on this machine alone: any sliders together, the loops solved at every move."""
+"""The view with a server behind it, on this machine alone: any sliders together, the loops solved at every move.
+
+Other pages in the same browser can send requests here too, under a name of their own for this machine or from a foreign
+origin: what does not come from the page itself is answered 403.
+"""
 
 from __future__ import annotations
 
@@ -7,6 +11,7 @@ import json
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from http import HTTPStatus
+from http.client import HTTP_PORT
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from threading import Lock
 from typing import Any
@@ -20,8 +25,12 @@ from .states import Posed
 from .view import View
 
 HOST = "127.0.0.1"
+NAMES = (HOST, "localhost", "[::1]")
+"""What a browser on this machine may call it."""
 LONGEST = 10_000
 """Bytes of a question at most."""
+PATIENCE = 10.0
+"""Seconds that a question may pause while it is sent."""
 ARRIVED = 1e-6
 """Difference (metres, radians) within which the platform has come to where it was sent."""
 
@@ -65,12 +74,35 @@ class Server(ThreadingHTTPServer):
     def __init__(self, found: View, port: int) -> None:
         self.session, self.shown = Session(found), page(found, live=True).encode()
         super().__init__((HOST, port), Handler)
+        plain = NAMES if self.server_port == HTTP_PORT else ()
+        hosts = {*plain, *(f"{name}:{self.server_port}" for name in NAMES)}
+        self.hosts, self.origins = frozenset(hosts), frozenset(f"http://{host}" for host in hosts)
+
+    def handle_error(self, request: Any, client_address: Any) -> None:
+        """Nothing: a question that breaks off has no answer, and the library never prints."""
 
 
 class Handler(BaseHTTPRequestHandler):
     """One question to a :class:`Server`."""
 
     server: Server
+    timeout = PATIENCE
+
+    def parse_request(self) -> bool:
+        """Whether there is a question, and it comes from the page or opens it; else it is answered here."""
+        if not super().parse_request():
+            return False
+        trusted = self._only("Host") in self.server.hosts
+        if self.command != "GET":
+            trusted = trusted and self._only("Origin") in self.server.origins
+        if not trusted:
+            self._reply(HTTPStatus.FORBIDDEN)
+        return trusted
+
+    def _only(self, name: str) -> str | None:
+        """The value of a header that is given once."""
+        found = self.headers.get_all(name, [])
+        return found[0].strip() if len(found) == 1 else None
 
     def do_GET(self) -> None:
         """The page, and nothing else."""
@@ -82,10 +114,10 @@ class Handler(BaseHTTPRequestHandler):
     def do_POST(self) -> None:
         """A question of the page's sliders."""
         try:
-            size = int(self.headers.get("Content-Length", ""))
-            if self.path != "/pose" or not 0 <= size <= LONGEST:
+            size = self._only("Content-Length") or ""
+            if self.path != "/pose" or not (size.isascii() and size.isdecimal()) or int(size) > LONGEST:
                 raise ValueError(self.path)
-            answer = self.server.session.answer(json.loads(self.rfile.read(size)))
+            answer = self.server.session.answer(json.loads(self.rfile.read(int(size))))
         except (ValueError, KeyError, TypeError, AttributeError):
             self._reply(HTTPStatus.BAD_REQUEST)
         else:

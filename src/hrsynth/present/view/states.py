@@ -110,7 +110,7 @@ class Mover:
         there, _ = led(here.real, self.setting.motion, aim)
         followed = self._followed(here, [there])
         found = followed[-1] if followed else here
-        return found, aim.read(found.real.pose(self.setting.motion.link))
+        return found, values + aim.apart(found.real.pose(self.setting.motion.link))
 
     def sliders(self) -> tuple[Slider, ...]:
         """Each coordinate alone changed from home, as far as the robot, and the hidden one with it, goes."""

@@ -34,6 +34,9 @@ def proposals(state: State, evidence: Evidence, leg: str, trust: bool, *,
     for chain in state.chain(leg):
         if chain.taken or (chain.before == evidence.reference) != on_reference:
             continue
+        if chain.knee is not None and chain.knee not in state.mechanism.joints:
+            notes.append(f"{chain.knee!r} before {chain.link!r} is taken over already")
+            continue
         result = _taken(state, evidence, chain, trust)
         if isinstance(result, Refusal):
             yield result

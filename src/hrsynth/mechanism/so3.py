@@ -1,0 +1,98 @@
+"""The rotations of space: exponential and logarithm of SO(3), right at every angle up to and including half a turn.
+
+Rotations are read through unit quaternions, from the largest of their four components (S. W. Shepperd, J. Guid. Control
+1, 1978): the skew part of a rotation, its axis times the sine of its angle, vanishes at half a turn as it does at none.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from .vectors import Array, hats
+
+
+def exponential(vectors: Array) -> Array:
+    """The rotations (..., 3, 3) of rotation vectors (..., 3): I + sin θ / θ [v]ₓ + (1 − cos θ) / θ² [v]ₓ²."""
+    angle = np.linalg.norm(vectors, axis=-1)[..., None, None] / np.pi
+    K = hats(vectors)
+    return np.asarray(np.eye(3) + np.sinc(angle) * K + 0.5 * np.sinc(0.5 * angle) ** 2 * (K @ K))
+
+
+def logarithm(R: Array) -> Array:
+    """The rotation vectors (..., 3) of rotations (..., 3, 3), no longer than π; either of the two at half a turn."""
+    if R.ndim == 2:
+        w, x, y, z = _quaternion(R)
+        sine = math.hypot(x, y, z)
+        factor = 2.0 * math.copysign(math.atan2(sine, abs(w)), w) / sine if sine > 0.0 else 0.0
+        return np.array([factor * x, factor * y, factor * z])
+    q = quaternions(R)
+    sines = np.linalg.norm(q[..., 1:], axis=-1)
+    factors = 2.0 * np.arctan2(sines, q[..., 0]) / np.where(sines > 0.0, sines, 1.0)
+    return np.asarray(factors[..., None] * q[..., 1:])
+
+
+def angle_of(R: Array) -> float:
+    """The angle by which a rotation (3, 3) turns, from 0 to π."""
+    return float(np.linalg.norm(logarithm(R)))
+
+
+def logarithm_rate(vector: Array) -> Array:
+    """The map (3, 3) from the angular velocity to the rate of the rotation vector, shorter than 2π:
+    I − [v]ₓ/2 + (1/θ² − cot(θ/2) / 2θ) [v]ₓ²."""
+    angle, K = float(np.linalg.norm(vector)), hats(vector)
+    factor = 1 / 12 if angle < 1e-3 else 1 / angle**2 - 1 / (2 * angle * math.tan(angle / 2))
+    return np.asarray(np.eye(3) - 0.5 * K + factor * K @ K)
+
+
+def between(a: Array, b: Array) -> Array:
+    """The rotation vectors (..., 3) of the smallest turns that bring unit vectors a (..., 3) to b (..., 3); of opposite
+    ones half a turn about some normal."""
+    across = np.cross(a, b)
+    sines = np.linalg.norm(across, axis=-1)[..., None]
+    cosines = np.sum(a * b, axis=-1)[..., None]
+    normals = np.cross(a, np.eye(3)[np.argmin(np.abs(a), axis=-1)])
+    opposite = (sines == 0.0) & (cosines < 0.0)
+    ways = np.where(opposite, normals / np.linalg.norm(normals, axis=-1)[..., None], across)
+    return np.asarray(ways * np.arctan2(sines, cosines) / np.where(sines > 0.0, sines, 1.0))
+
+
+def turn_about(normal: Array, R: Array) -> tuple[float, Array]:
+    """The turn of a rotation about ``normal`` (its twist, the swing left out), in (−π, π], and the row (3,) that makes
+    its rate of the angular velocity; not a number where the swing is half a turn, which leaves no twist."""
+    w, *vector = _quaternion(R)
+    v = np.array(vector)
+    along, size = float(normal @ v), math.sqrt(w * w + v @ v)
+    w, v, along = w / size, v / size, along / size
+    both = w * w + along * along
+    if both == 0.0:
+        return math.nan, np.zeros(3)
+    return wrapped(2 * math.atan2(along, w)), (w * w * normal + w * np.cross(v, normal) + along * v) / both
+
+
+def wrapped(angle: float) -> float:
+    """An angle modulo 2π, in (−π, π]."""
+    return float(-((np.pi - angle) % (2 * np.pi)) + np.pi)
+
+
+def quaternions(R: Array) -> Array:
+    """Unit quaternions (..., 4) as (w, x, y, z) of rotations (..., 3, 3), w not negative."""
+    trace = np.trace(R, axis1=-2, axis2=-1)
+    products = np.empty((*R.shape[:-2], 4, 4))
+    products[..., 0, 0] = 1 + trace
+    skew = np.stack([R[..., 2, 1] - R[..., 1, 2], R[..., 0, 2] - R[..., 2, 0], R[..., 1, 0] - R[..., 0, 1]], -1)
+    products[..., 0, 1:] = products[..., 1:, 0] = skew
+    products[..., 1:, 1:] = R + np.swapaxes(R, -1, -2) + (1 - trace)[..., None, None] * np.eye(3)
+    best = np.argmax(np.diagonal(products, axis1=-2, axis2=-1), axis=-1)
+    found = np.take_along_axis(products, best[..., None, None], axis=-2)[..., 0, :]
+    found /= np.linalg.norm(found, axis=-1, keepdims=True)
+    return np.asarray(found * np.where(found[..., :1] < 0, -1.0, 1.0))
+
+
+def _quaternion(R: Array) -> tuple[float, float, float, float]:
+    """A quaternion (w, x, y, z) of one rotation, of any length: faster than :func:`quaternions`."""
+    (a, b, c), (d, e, f), (g, h, i) = R.tolist()
+    forms = ((1 + a + e + i, h - f, c - g, d - b), (h - f, 1 + a - e - i, b + d, c + g),
+             (c - g, b + d, 1 - a + e - i, f + h), (d - b, c + g, f + h, 1 - a - e + i))
+    return forms[max(range(4), key=lambda k: forms[k][k])]
