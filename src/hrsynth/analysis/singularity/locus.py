@@ -16,6 +16,7 @@ from ...kinematics.parts import PlatformMotion
 from ...kinematics.reach import reach, sweep
 from ...kinematics.relation import Question
 from ...mechanism.pose import Grid, Pose
+from ...mechanism.so3 import turn_about
 from ...mechanism.vectors import Array
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from .agreement import descend, spectrum, weakest
@@ -118,6 +119,7 @@ def framed(start: ClosedConfiguration, question: Question, motion: PlatformMotio
         name = start.twin.mechanism.name
         raise PlaneNotMet(name, f"the plane {plane}", str(error).removeprefix(f"{name}: ")) from None
     centre = _coordinates(motion, first, names)
+    centre = [0.0 if name == "phi" else c for name, c in zip(names, centre, strict=True)]
     for wide in WIDE:
         half = [np.pi if name == "phi" else wide * start.twin.length for name in names]
         axes = [(name, np.linspace(c - h, c + h, COARSE)) for name, c, h in zip(names, centre, half, strict=True)]
@@ -163,8 +165,10 @@ def _spread(motion: PlatformMotion, pair: tuple[str, str]) -> float:
 
 
 def _coordinates(motion: PlatformMotion, at: ClosedConfiguration, names: Sequence[str]) -> list[float]:
-    position = motion.position(at.pose(motion.link))
-    return [0.0 if name == "phi" else float(position["xyz".index(name)]) for name in names]
+    X = at.pose(motion.link)
+    position, turn = motion.position(X), X[:3, :3] @ motion.home[:3, :3].T
+    return [turn_about(motion.normal, turn)[0] if name == "phi" else float(position["xyz".index(name)])
+            for name in names]
 
 
 def _valleys(table: Array) -> list[int]:

@@ -1,0 +1,229 @@
+"""Poses turned by exactly half a turn: each answer is about that pose, or says that it is not reached.
+
+The sines of all small-angle formulas vanish there as they do where nothing is turned.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache, cached_property, partial
+
+import numpy as np
+import pytest
+
+from hrsynth.analysis import check as checks
+from hrsynth.analysis.accuracy import accuracy as accuracies
+from hrsynth.analysis.aspects.path import Aspects
+from hrsynth.analysis.modes.modes import modes_with
+from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.description import load
+from hrsynth.errors import BadRequest, PlaneNotMet, PoseNotReached
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.reach import reach
+from hrsynth.kinematics.steps import led
+from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.pose import Grid, Pose
+from hrsynth.mechanism.vectors import Array, rotation_from_rpy
+from hrsynth.selection import select as selections
+from hrsynth.servo import scene as scenes
+from hrsynth.servo.desired import whole
+from hrsynth.servo.servo import servo
+from kinematics.robots import state_of
+from oracle import Oracle
+from strategies import planar, pods, random_direction, random_rotation, transformed
+
+NEAR = 1e-8
+
+
+def tilted(name: str) -> Mechanism:
+    rng = np.random.default_rng(3)
+    return transformed(load(name), random_rotation(rng), rng.normal(scale=0.3, size=3))
+
+
+ROBOTS: dict[str, tuple[Callable[[], Mechanism], str | None, int]] = {
+    "gough_stewart": (partial(load, "gough_stewart"), "1,3,5", 250),
+    "gough_stewart, tilted": (partial(tilted, "gough_stewart"), "1,3,5", 200),
+    "pod": (lambda: pods(["SPS"] * 6, np.random.default_rng(0)), "1,3,5", 100),
+    "hexaglide": (partial(load, "hexaglide"), "1,3,5", 100),
+    "quattro": (partial(load, "quattro"), "1,4", 100),
+    "3rpr_m1": (partial(load, "3rpr_m1"), None, 100),
+    "3rpr_m1, tilted": (partial(tilted, "3rpr_m1"), None, 50),
+    "planar": (lambda: planar(["RPR"] * 3, np.random.default_rng(1), [{1}] * 3), None, 50),
+    "3rrr_m1": (partial(load, "3rrr_m1"), None, 50),
+}
+"""Robots, what is watched, and how many of the thousand poses each has."""
+sampled = cache(partial(prepare, samples=3))
+"""Robots are sampled once, not again at each question."""
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """A robot, what is watched, and its setting."""
+
+    robot: Mechanism
+    observe: str | None
+
+    @property
+    def setting(self) -> Setting:
+        return sampled(self.robot, self.observe)
+
+    @cached_property
+    def aspects(self) -> Aspects:
+        return Aspects.about(self.setting)
+
+
+@cache
+def case_of(name: str) -> Case:
+    return Case(ROBOTS[name][0](), ROBOTS[name][1])
+
+
+def half_turn(axis: Array) -> Array:
+    """The rotation by exactly π about a unit vector."""
+    return 2 * np.outer(axis, axis) - np.eye(3)
+
+
+def wanted_poses(setting: Setting, count: int, seed: int) -> Iterator[tuple[Array, Pose]]:
+    """Poses (4, 4) near home turned by half a turn about random axes, at first the coordinate axes; as matrices and
+    as a user writes them."""
+    rng, motion = np.random.default_rng(seed), setting.motion
+    for number in range(count):
+        axis = np.eye(3)[number] if number < 3 and not seed else random_direction(rng)
+        if motion.spins.shape[1] == 1:
+            axis = motion.spins[:, 0]
+        shift = 0.1 * setting.everything.twin.length * motion.shifts @ rng.uniform(-1, 1, motion.shifts.shape[1])
+        X = motion.home.copy()
+        X[:3, :3] = half_turn(axis) @ X[:3, :3]
+        X[:3, 3] = motion.position(motion.home) + shift - X[:3, :3] @ motion.point
+        pose = motion.pose(X)
+        assert rotation(pose) == pytest.approx(X[:3, :3], abs=1e-12)
+        yield X, pose
+
+
+def rotation(pose: Pose) -> Array:
+    assert pose.rpy is not None
+    return rotation_from_rpy(*pose.rpy)
+
+
+def assert_there(setting: Setting, at: ClosedConfiguration, X: Array) -> None:
+    """By the poses of all links: the platform is at X, all loops are closed."""
+    assert np.abs(at.pose(setting.motion.link) - X).max() < NEAR
+    assert Oracle(at.twin.mechanism).error(state_of(at.twin, at.q)) < NEAR
+
+
+Answer = Sequence[ClosedConfiguration]
+
+
+def reached(case: Case, pose: Pose) -> Answer:
+    everything = case.setting.everything
+    return [reach(everything.start, everything.question, pose, case.setting.motion)]
+
+
+def led_whole(case: Case, pose: Pose) -> Answer:
+    """Led to the whole pose, as trajectories are."""
+    X = np.eye(4)
+    X[:3, :3], X[:3, 3] = pose.rotation, [pose.x, pose.y, pose.z]
+    at, came = led(case.setting.everything.start, case.setting.motion, whole(case.setting.motion, X))
+    if came < 1:
+        raise PoseNotReached(case.robot.name, str(pose), came, "")
+    return [at]
+
+
+def checked(case: Case, pose: Pose) -> Answer:
+    return [posture.configuration for posture in checks.check(case.robot, case.observe, at=[pose]).postures]
+
+
+def swept(case: Case, pose: Pose) -> Answer:
+    """A grid of two poses, the first the wanted one."""
+    part = case.setting.motion.parts[0]
+    start = getattr(pose, part)
+    ends = np.array([start, start + 0.01 * case.setting.everything.twin.length])
+    grid = Grid(((part, ends),), replace(pose, **{part: None}))
+    cells = checks.check(case.robot, case.observe, grid=grid).grid
+    assert cells is not None
+    if cells.postures[0] is None:
+        raise PlaneNotMet(case.robot.name, str(grid), "")
+    return [cells.postures[0].configuration]
+
+
+def moded(case: Case, pose: Pose) -> Answer:
+    found = modes_with(case.setting, pose)
+    assert sum(mode.goal for mode in found.modes) == 1
+    return [found.goal, *(mode.configuration for mode in found.modes if mode.goal and mode.configuration is not None)]
+
+
+def pathed(case: Case, pose: Pose) -> Answer:
+    (at,) = reached(case, pose)
+    answer = case.aspects.join(case.setting.everything.start, at, budget=20)
+    assert answer.poses[-1] == answer.goal.pose
+    return [answer.goal.configuration]
+
+
+def exact(case: Case, pose: Pose) -> Answer:
+    (error,) = accuracies.accuracy(case.robot, case.observe, cones=1e-3, at=[pose]).poses
+    assert rotation(error.pose) == pytest.approx(rotation(pose), abs=NEAR)
+    return reached(case, pose)
+
+
+def served(case: Case, pose: Pose) -> Answer:
+    """A run is told to have ended at the goal only at the goal."""
+    found = servo(case.robot, case.observe, start=Pose(), goal=pose, time=0.3)
+    if found.ended == "goal":
+        assert_there(case.setting, found.settled, found.target.pose(case.setting.motion.link))
+    else:
+        assert found.from_goal[1] > 1e-6
+    return [found.target]
+
+
+def selected(case: Case, pose: Pose) -> Answer:
+    found = selections.select(case.robot, start=Pose(), goal=pose, size=1, runs=0)
+    assert rotation(found.goal) == pytest.approx(rotation(pose), abs=NEAR)
+    return reached(case, pose)
+
+
+COMMANDS = {each.__name__: each
+            for each in (reached, led_whole, checked, swept, moded, pathed, exact, served, selected)}
+
+
+def answers(robot: str, command: str, count: int, seed: int) -> Counter[str]:
+    """How many poses were answered and how many refused; each answer is about the pose that was wanted."""
+    case, told = case_of(robot), Counter[str]()
+    for X, pose in wanted_poses(case.setting, count, seed):
+        try:
+            found = COMMANDS[command](case, pose)
+        except (PoseNotReached, PlaneNotMet, BadRequest) as error:
+            told[type(error).__name__] += len(error.lines())
+            continue
+        for at in found:
+            assert_there(case.setting, at, X)
+        told["answered"] += 1
+    return told
+
+
+@pytest.fixture(autouse=True)
+def prepared_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    def prepared(robot: Mechanism, observe: str | None = None, *_: object, **__: object) -> Setting:
+        return sampled(robot, observe)
+
+    for module in (checks, accuracies, scenes, selections):
+        monkeypatch.setattr(module, "prepare", prepared)
+
+
+@pytest.mark.parametrize("robot", ["gough_stewart", "3rpr_m1, tilted"])
+@pytest.mark.parametrize("command", COMMANDS)
+def test_an_answer_is_about_the_pose_that_was_wanted(robot: str, command: str) -> None:
+    assert answers(robot, command, 3, 0)["answered"] == 3
+
+
+def test_a_pose_out_of_reach_is_refused() -> None:
+    assert answers("3rrr_m1", "reached", 3, 0) == {"PoseNotReached": 3}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("command", COMMANDS)
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_thousand_poses(robot: str, command: str) -> None:
+    told = answers(robot, command, ROBOTS[robot][2], 1)
+    print(robot, command, dict(told))
+    assert sum(told.values()) == ROBOTS[robot][2]
