@@ -64,9 +64,10 @@ def attacked(kind: str, seed: int, folder: Path | None = None, only: Sequence[st
 
 def code() -> str:
     """What tells one state of the engine and of its adversary from another."""
-    here = Path(__file__).resolve().parent
+    import hrsynth
+
     found = hashlib.sha256()
-    for path in sorted([*(here.parents[1] / "src").rglob("*.py"), *here.rglob("*.py")]):
+    for path in sorted([*Path(hrsynth.__file__).parent.rglob("*.py"), *Path(__file__).parent.rglob("*.py")]):
         found.update(path.read_bytes())
     return found.hexdigest()[:12]
 

@@ -1,0 +1,106 @@
+"""Enclosures: modes of the file's decimals in eleven more bits, against the radius that is told."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from adversary.case import HELD, UNCLEAR, WRONG, Case, apart, matrix_of
+from adversary.robot import Array, Robot, State, things
+
+ROUNDING = 4e-16
+"""What the doubles of a told pose may be off by themselves (characteristic lengths, rotation matrices)."""
+
+
+def enclosures(case: Case) -> None:
+    """The proved modes of the hidden robot at the zero configuration, or at a whole pose of six freedoms."""
+    import hrsynth
+
+    at = None
+    walked, _ = case.walked
+    if len(walked) and case.rng.random() < 0.5 and case.study.locals(walked[:1])[0].T.any():
+        dof = int(np.sum(np.linalg.svd(case.study.locals(walked[:1])[0].T, compute_uv=False) > 1e-6))
+        if dof == 6:
+            at = case.text_of(walked[[0]])
+    told = case.asked("enclosure", lambda: hrsynth.modes(case.engine, at=at))
+    if told is not None and told.found.continuum is None:
+        judge(case, told, at)
+
+
+def judge(case: Case, told: Any, asked: str | None) -> None:
+    """Hold the radii of the modes that can be assembled against long doubles."""
+    exact = Robot.read(case.path, np.longdouble)
+    items = case.directions(told.setting.observed, exact)
+    goal = exact.zero() if asked is None else asked_exactly(case, exact, told, asked)
+    if items is None or goal is None:
+        case.say("enclosure", UNCLEAR, "the goal is not known in long doubles")
+        return
+    rows = exact.held(items, exact.items(items, exact.frames(goal))[0][0])
+    for mode in told.modes:
+        if not (mode.proved and np.isfinite(mode.radius)) or mode.configuration is None:
+            continue
+        near = case.fitted(mode.configuration)
+        if near is None or apart(case, mode.pose, near) > 1e-5:
+            continue  # told under another claim
+        found = refined(exact, rows, lifted(exact, near))
+        if found is None:
+            case.say("enclosure", UNCLEAR, "more equations than unknowns, closed to rounding only")
+            continue
+        at, sharp = found
+        off, length = distance(case, exact, mode, at), float(told.setting.mechanism.length)
+        allowed = mode.radius + ROUNDING * max(1.0, float(np.max(np.abs(matrix_of(mode.pose)[0]))) / length) + sharp
+        case.say("enclosure", HELD if off <= allowed else WRONG,
+                 "" if off <= allowed else f"{mode.pose}: radius {mode.radius:.2e}, the mode is {off:.2e} away")
+
+
+def asked_exactly(case: Case, exact: Robot, told: Any, asked: str) -> State | None:
+    """The configuration with the platform exactly at the decimals asked for."""
+    near = case.fitted(told.goal)
+    if near is None:
+        return None
+    fields = dict(part.split("=") for part in asked.split(","))
+    x = np.array([np.longdouble(fields[n]) for n in "xyz"])
+    R = _matrix(np.array([np.longdouble(a) for a in fields["rpy"].split("/")]))
+    frame = things(exact, [(exact.platform, np.zeros(3), True), *((exact.platform, e, False) for e in np.eye(3))])
+    found = refined(exact, exact.held(frame, np.array([x, *R.T])), lifted(exact, near))
+    return None if found is None else found[0]
+
+
+def lifted(exact: Robot, at: State) -> State:
+    """The same configuration in long doubles."""
+    return State(at.theta.astype(np.longdouble), at.quats.astype(np.longdouble))
+
+
+def refined(exact: Robot, rows: Any, at: State) -> tuple[State, float] | None:
+    """Newton's steps with residuals in long doubles; with how far the solution may be from it; None where the
+    equations do not vanish."""
+    worth = 0.0
+    for _ in range(8):
+        F, J = exact.rows(rows, exact.frames(at))
+        assert J is not None
+        inverse = np.linalg.pinv(np.asarray(J[0], dtype=float), rcond=1e-9)
+        worth = float(np.linalg.norm(inverse, 2))
+        at = exact.moved(at, (-(inverse.astype(np.longdouble) @ F[0]))[None])
+    F, _ = exact.rows(rows, exact.frames(at))
+    size = float(np.linalg.norm(F[0].astype(float)))
+    return (at, 4 * worth * max(size, 1e-19)) if worth * size < 1e-14 else None
+
+
+def distance(case: Case, exact: Robot, mode: Any, at: State) -> float:
+    """How far the platform of a configuration is from the told pose (characteristic lengths, radians)."""
+    frames = exact.frames(at)
+    k = exact.number(exact.platform)
+    R, p = frames[0][0, k], frames[1][0, k]
+    point = case.robot.point
+    if point is not None:
+        p = p + R @ point
+    x, told = matrix_of(mode.pose)
+    away = float(np.linalg.norm((p - x).astype(float))) / case.robot.length
+    return away if told is None or point is not None else max(away, float(np.linalg.norm((R - told).astype(float), 2)))
+
+
+def _matrix(rpy: Array) -> Array:
+    (cr, cp, cy), (sr, sp, sy) = np.cos(rpy), np.sin(rpy)
+    return np.array([[cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+                     [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr], [-sp, cp * sr, cp * cr]])
