@@ -10,7 +10,7 @@ import pytest
 
 import hrsynth
 from adversary.case import HELD, WRONG, Case
-from adversary.claims import lists, verdicts
+from adversary.claims import enclosures, endings, errors, lists, loci, poses, rewritten, verdicts, ways
 from adversary.run import ALL, made
 
 ROBOTS = Path(__file__).resolve().parents[2] / "robots"
@@ -99,3 +99,106 @@ def test_a_cure_that_does_not_cure_is_found():
     verdicts.judge_cures(case, told, [none])
     assert outcomes(case, "cure") == {WRONG}
 
+
+
+def test_a_false_error_bound_is_found():
+    case = shipped("3rrr_m1")
+    told = hrsynth.accuracy(case.engine, cones=errors.PSI)
+    errors.judge(case, told)
+    assert outcomes(case, "error bound") == {HELD}
+    for factor in (0.99, 1.01):
+        case.found.clear()
+        there = told.poses[0]
+        changed = replace(there.position, largest=factor * there.position.largest, gap=0.0)
+        errors.judge(case, replace(told, poses=(replace(there, position=changed),)))
+        assert WRONG in outcomes(case, "error bound"), factor
+
+
+def test_an_enclosure_that_misses_is_found():
+    case = shipped("gough_stewart")
+    asked = "x=-0.0123,y=0.0456,z=0.3789,rpy=0.11/-0.07/0.2"
+    for at in (None, asked):
+        told = hrsynth.modes(case.engine, ["1", "3", "5"], at=at)
+        case.found.clear()
+        for radius, outcome in ((1e-9, HELD), (0.0, WRONG)):
+            moved = [replace(mode, radius=radius, proved=True, pose=replace(
+                mode.pose, x=mode.pose.x + (0.0 if radius else 1e-13))) for mode in told.modes]
+            case.found.clear()
+            enclosures.judge(case, replace(told, modes=tuple(moved)), at)
+            assert outcomes(case, "enclosure") == {outcome}, (at, radius)
+
+
+@pytest.mark.slow
+def test_a_hidden_robot_of_another_set_of_legs_is_found(tmp_path):
+    case = shipped("quattro")
+    told = hrsynth.derive(case.engine, ["1", "4"])
+    for hidden, outcome in ((told.hidden, HELD), (hrsynth.derive(hrsynth.load("quattro"), ["1", "2"]).hidden, WRONG)):
+        case.found.clear()
+        hrsynth.save(hidden, tmp_path / "hidden.urdf")
+        text = (tmp_path / "hidden.urdf").read_text(encoding="utf-8")
+        (tmp_path / "hidden.urdf").write_text(text.replace("rod_2a", "rod_4a"), encoding="utf-8")
+        rewritten.judge(case, told, tmp_path / "hidden.urdf")
+        assert outcome in outcomes(case, "hidden robot")
+
+
+def test_wrong_ranks_at_a_pose_are_found():
+    case = shipped("3rrr_m1")
+    asked = "x=0.02,y=0.01,z=0,rpy=0/0/0.1"
+    told = hrsynth.check(case.engine, at=[asked])
+    poses.judge(case, told, asked)
+    assert {said.outcome for said in case.found} == {HELD}
+    case.found.clear()
+    there = told.postures[0]
+    poses.judge(case, replace(told, postures=(replace(there, hidden=replace(there.hidden, rank=2)),)), asked)
+    assert outcomes(case, "ranks there") == {WRONG}
+
+
+@pytest.mark.slow
+def test_a_path_through_a_singularity_is_found():
+    case = shipped("3rpr_m1")
+    told = hrsynth.path(case.engine, start="x=0,y=0,phi=0", goal="x=0.05,y=0.02,phi=0.1")
+    assert told.verdict == "same aspect"
+    ways.judge(case, told)
+    assert outcomes(case, "path") == {HELD}
+    case.found.clear()
+    end = replace(told, ways=told.ways[:-1] if len(told.ways) > 1 else (replace(
+        told.ways[0], shift=0.5 * told.ways[0].shift),))
+    ways.judge(case, end)
+    assert outcomes(case, "path") == {WRONG}
+    # a platform turned until the legs' lines meet in a point, told as one way without singularity
+    case.found.clear()
+    across = replace(told.ways[0], shift=0 * told.ways[0].shift, turn=np.array([0.0, 0.0, 3.0]))
+    ways.same(case, replace(told, ways=(across,)), case.fitted(told.start.configuration),
+              case.fitted(told.start.configuration), case.directions(told.setting.observed))
+    assert outcomes(case, "path") == {WRONG}
+
+
+def test_poses_falsely_called_separated_are_found():
+    case = shipped("3rpr_m1")
+    told = hrsynth.path(case.engine, start="x=0,y=0,phi=0", goal="x=0.05,y=0.02,phi=0.1")
+    ways.judge(case, replace(told, verdict="separated"))
+    assert outcomes(case, "separated") == {WRONG}
+
+
+@pytest.mark.slow
+def test_a_false_ending_is_found():
+    case = shipped("3rpr_m1")
+    told = hrsynth.servo(case.engine, start="x=0,y=0,phi=0", goal="x=0.03,y=0.02,phi=0.1")
+    endings.judge(case, told)
+    assert outcomes(case, "ending") == {HELD}
+    case.found.clear()
+    endings.judge(case, replace(told, settled=told.run.configurations[0]))
+    assert outcomes(case, "ending") == {WRONG}
+
+
+def test_a_singular_pose_that_is_none_is_found():
+    case = shipped("3rps")
+    told = hrsynth.singular(case.engine, points=20)
+    loci.judge(case, told)
+    assert outcomes(case, "singular pose") == {HELD}
+    case.found.clear()
+    off = replace(told.examples[0], configuration=told.setting.everything.start)
+    loci.judge(case, replace(told, examples=(off,)))
+    assert outcomes(case, "singular pose") == {WRONG}
+    loci.judge(case, replace(told, condition=None, examples=()))
+    assert outcomes(case, "always singular") == {WRONG}

@@ -22,7 +22,6 @@ Place = Callable[[float], tuple[Array, Array]]
 def ways(case: Case) -> None:
     """``path`` from zero to a pose to which small steps lead, or to half a turn."""
     import hrsynth
-
     from adversary.claims.poses import half_turned
 
     at, _ = case.walked
