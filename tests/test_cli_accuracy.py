@@ -50,6 +50,7 @@ def test_files_and_text(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> N
 
 @pytest.mark.parametrize(("arguments", "status", "word"), [
     (("--cone", "90deg"), 2, "less than 90deg"), (("--cone", "0"), 2, "more than 0"),
+    (("--cone", "1e-300deg"), 2, "at least 1e-15"),
     (("--observe", "1"), 2, "do not see"), (("--observe", "7"), 2, "no leg or link"),
     (("--at", "x=5"), 3, "is not reached"), (("--plane", "z=5"), 3, "no pose of the plane"),
     (("--grid", "x=0:1:4000,y=0:1:4000,z=-0.7"), 2, "at most 10000000"),

@@ -37,6 +37,7 @@ def test_what_may_be_written(text: str, wanted: Pose) -> None:
     ("x=1deg", "not a number"), ("phi=deg", "not a number"), ("phi=1e999", "not finite"), ("rpy=0/0", "rpy"),
     ("rpy=0/nan/0", "not finite"), ("rpy=0/0/0deg deg", "not a number"), ("phi=0,rpy=0/0/0", "both phi and rpy"),
     ("x=0:1:3", "not a number"), ("x=1,,y=2", "name=value"), ("X=1", "unknown part"),
+    ("x=1e300", "too large"), ("z=-1e10", "too large"), ("phi=1e155", "too large"), ("rpy=0/1e300/0", "too large"),
 ])
 def test_what_is_refused(text: str, what: str) -> None:
     with pytest.raises(BadRequest) as caught:
