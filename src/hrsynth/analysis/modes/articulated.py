@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -17,7 +17,7 @@ from .conics import Conic, Numbers, direction, spatial_frame, spokes
 from .curves import Circle, Curve, Line, Point, Surface, cross, extent, length, shifted
 from .quadrics import Chart, Moving, normals, on_circle, shifting
 from .squares import Square, on_plane, single, sum_on_plane, sum_on_sphere
-from .systems import Shifting
+from .systems import ROUNDING, Shifting
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,6 +52,16 @@ class Articulated(Shifting):
         """Where the tips are at a pose; shape (legs, 3), metres."""
         origins = np.array([q[:3], q[:3] + self.slide.at(float(q[3]))])
         return np.asarray(origins[list(self.bodies)] + self.tips)
+
+    def apart(self, q: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, float]:
+        """As for any system; the points are a place of one body and one of the second relative to the first."""
+        error = self.error + ROUNDING * self.size
+        return dict.fromkeys(legs, sum(miss for _, miss in points) + error)
+
+    def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
+        """How far the bodies can be from their places at q (m); they do not turn."""
+        sides = [[each for k, each in apart.items() if self.bodies[k] == body] for body in (0, 1)]
+        return max(min(side, default=math.inf) for side in sides), 0.0
 
     def chart(self, number: int) -> Chart:
         """p, cos θ and sin θ."""

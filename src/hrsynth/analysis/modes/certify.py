@@ -65,14 +65,16 @@ class Quadric(NamedTuple):
 
 
 def krawczyk(equations: Sequence[Polynomial], start: Sequence[Any]) -> list[Any] | None:
-    """A box about the balls ``start`` that is proved to hold exactly one solution, for all coefficients in their balls.
+    """A box about the balls ``start``, all real or all complex, that is proved to hold exactly one solution, for all
+    coefficients in their balls.
 
     None where the proof fails, as it does at a double solution.
     """
-    from flint import arb
+    from flint import acb, arb
 
+    real = isinstance(start[0], arb)
     middle = [x.mid() for x in start]
-    slope = np.array(_jacobian(equations, middle), dtype=float)
+    slope = np.array(_jacobian(equations, middle), dtype=float if real else complex)
     scale = np.abs(slope).max(axis=1, initial=0.0)
     if not np.all(scale > 0) or not np.all(np.isfinite(slope)):
         return None
@@ -80,12 +82,12 @@ def krawczyk(equations: Sequence[Polynomial], start: Sequence[Any]) -> list[Any]
         inverse = np.linalg.inv(slope / scale[:, None]) / scale
     except np.linalg.LinAlgError:
         return None
-    Y = np.array([[arb(float(v)) for v in row] for row in inverse], dtype=object)
+    Y = np.array([[(arb if real else acb)(v) for v in row] for row in inverse.tolist()], dtype=object)
     step = Y @ np.array([equation.value(middle) for equation in equations], dtype=object)
-    least = [FINEST * (1.0 + abs(float(m))) for m in middle]
+    least = [FINEST * (1.0 + float(abs(m))) for m in middle]
     radii = [4.0 * float(s.abs_upper()) + tiny for s, tiny in zip(step, least, strict=True)]
     for _ in range(ATTEMPTS):
-        offsets = np.array([arb(0, r) for r in radii], dtype=object)
+        offsets = np.array([arb(0, r) if real else acb(arb(0, r), arb(0, r)) for r in radii], dtype=object)
         slopes = np.array(_jacobian(equations, [m + d for m, d in zip(middle, offsets, strict=True)]), dtype=object)
         image = -step + (np.eye(len(middle), dtype=int) - Y @ slopes) @ offsets
         if all(d.contains_interior(k) for d, k in zip(offsets, image, strict=True)):

@@ -85,23 +85,29 @@ class Rounded:
     """Numbers of a conic as integers: what the count of solutions is proved for."""
 
     @staticmethod
-    def vector(x: Array, slack: float = SLACK) -> Any:
+    def vector(x: Array, more: float = 0.0) -> Any:
         """Coordinates in units of size, shape (d,), as numbers."""
         return np.array([round(float(value) * UNIT) for value in x], dtype=object)
 
 
-class Balls:
+@dataclass(frozen=True)
+class Within:
     """Numbers of a conic as arb balls that hold the exact input: what enclosures are proved for."""
 
-    @staticmethod
-    def vector(x: Array, slack: float = SLACK) -> Any:
-        """Coordinates in units of size, shape (d,), as balls of radius ``slack`` units."""
+    slack: float
+    """Radius of the balls in units."""
+
+    def vector(self, x: Array, more: float = 0.0) -> Any:
+        """Coordinates in units of size, shape (d,), as balls with the radius ``slack + more`` units."""
         from flint import arb
 
-        return np.array([arb(round(float(value) * UNIT), slack) for value in x], dtype=object)
+        return np.array([arb(round(float(value) * UNIT), self.slack + more) for value in x], dtype=object)
 
 
-Numbers = type[Rounded] | type[Balls]
+Balls = Within(SLACK)
+"""The balls of input that is known as exactly as floats allow."""
+
+Numbers = type[Rounded] | Within
 
 
 def conic(curve: Curve, frame: Frame, turn: float, numbers: Numbers = Rounded) -> Conic:
@@ -124,9 +130,9 @@ def direction(along: Array, frame: Frame, numbers: Numbers) -> Any:
     """A unit direction as numbers, made exact where it nearly is the frame's own or normal to that."""
     d = frame.R @ along
     if _parallel(along, frame.special):
-        return numbers.vector(np.round(d), SLACK + PARALLEL * UNIT * (not _same(along, frame.special)))
+        return numbers.vector(np.round(d), PARALLEL * UNIT * (not _same(along, frame.special)))
     if abs(float(along @ frame.special)) < PARALLEL:
-        return numbers.vector(np.where(np.abs(d) < PARALLEL, 0.0, d), SLACK + PARALLEL * UNIT)
+        return numbers.vector(np.where(np.abs(d) < PARALLEL, 0.0, d), PARALLEL * UNIT)
     return numbers.vector(d)
 
 
@@ -145,9 +151,9 @@ def spokes(circle: Circle, frame: Frame, turn: float, numbers: Numbers) -> tuple
     first, second = cos * circle.start + sin * circle.across, cos * circle.across - sin * circle.start
     a, b = frame.vector(first), frame.vector(second)
     if len(a) == 2 or _parallel(circle.axis, frame.special):
-        slack = SLACK + PARALLEL * UNIT * (len(a) == 3 and not _same(circle.axis, frame.special))
+        more = PARALLEL * UNIT * (len(a) == 3 and not _same(circle.axis, frame.special))
         sign = 1 if a[0] * b[1] - a[1] * b[0] > 0 else -1
-        a = numbers.vector(np.where(np.arange(len(a)) < 2, a, 0.0), slack)
+        a = numbers.vector(np.where(np.arange(len(a)) < 2, a, 0.0), more)
         a[2:] = a[2:] * 0
         b = a * 0
         b[0], b[1] = -sign * a[1], sign * a[0]

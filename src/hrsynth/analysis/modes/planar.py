@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import cmath
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 from typing import Any
@@ -19,7 +19,7 @@ from .conics import Conic, Frame, Numbers, direction, planar_frame
 from .curves import Circle, Curve, Line, Point, Surface, cross, extent, length
 from .quadrics import Chart, Moving, on_circle, shifting
 from .squares import Square, distance, on_sphere, resting, single
-from .systems import System
+from .systems import System, registered
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,6 +62,10 @@ class Planar(System):
             at = X[:3, 3] + X[:3, :2] @ tip
             found.append(at - n * float(n @ (at - curve.centre)))
         return np.array(found)
+
+    def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
+        """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
+        return registered(self.tips, apart)
 
     def chart(self, number: int) -> Chart:
         """x, y, cos and sin of the turn from the working frame to the platform's."""

@@ -6,9 +6,11 @@ other unknowns are rational functions of it carries exactly one. Where a denomin
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -16,7 +18,8 @@ import numpy as np
 from ...tolerances import NEARLY_DOUBLE
 from .algebra import Eliminant, cycle, height, pair, primitive, univariate, without
 from .certify import Equation, Polynomial, krawczyk
-from .conics import Balls, parameter
+from .conics import UNIT, Balls, Conic, Within, parameter
+from .curves import Circle, Curve
 from .squares import Square
 
 if TYPE_CHECKING:
@@ -34,20 +37,24 @@ STARTS = (0.0, 1.1, -0.9)
 Solution = tuple[list[Any], int]
 """Balls of all unknowns, and the multiplicity."""
 
+SHARP = 2.0 ** -60
+"""Radius of a ball, relative to 1 plus its middle, above which a solution is sought with more digits."""
+
 LOUD = 1 << 16
 """A resultant counts as zero if changes of the input in the last bit change it by more than this part of its size."""
 
 
 @dataclass(frozen=True, eq=False)
 class Root:
-    """A real solution: balls of the curves' parameters (m, rad), the largest radius (sizes, rad), its multiplicity.
+    """A real solution: balls of the curves' parameters (m, rad), how far each curve's point, of the exact input, can be
+    from that at the middle of the parameter (m), its multiplicity.
 
     ``unique``: its enclosure is proved to hold exactly one; ``thick``: for the exact input, not only the rounded one;
     not ``real``: the middle of two complex ones so close to each other that rounding decides which they are.
     """
 
     parameters: tuple[Any, ...]
-    radius: float
+    misses: tuple[float, ...]
     multiplicity: int
     unique: bool
     thick: bool
@@ -72,24 +79,24 @@ class Roots:
     method: str = "exact resultant"
 
 
-def solve_square(square: Square) -> Roots:
-    """All solutions of a square system."""
+def solve_square(square: Square, balls: Within = Balls) -> Roots:
+    """All solutions of a square system, those of the rounded input counted, those of all input in the balls enclosed."""
     from flint import ctx
 
     if not square.unknowns:
-        return Roots(1, (Root((), 0.0, 1, True, True),))
+        return Roots(1, (Root((), (), 1, True, True),))
     fallback = Roots(complete=False)
     for turn in STARTS:
         equations = square.equations(turn)
         with ctx.workprec(PRECISION):
-            thick = square.equations(turn, Balls)
+            thick = square.equations(turn, balls)
         noisy = _perturbed(equations, thick)
         zeros = 0
         for (order, eliminant), (_, other) in zip(_eliminants(equations), _eliminants(noisy), strict=True):
             if _vanishes(eliminant.polynomial, other.polynomial):
                 zeros += 1
                 continue
-            found = _roots(square, turn, order, eliminant, equations, thick)
+            found = _roots(_Enclosing(square, turn, balls, equations, thick), order, eliminant)
             if found.complete:
                 return found
             fallback = max(fallback, found, key=lambda each: each.complex)
@@ -135,11 +142,11 @@ def _vanishes(polynomial: fmpz_poly, noisy: fmpz_poly) -> bool:
     return not polynomial or height(polynomial - noisy) * LOUD > height(polynomial)
 
 
-def _roots(square: Square, turn: float, order: tuple[int, ...], eliminant: Eliminant, equations: Sequence[Equation],
-           thick: Sequence[Equation]) -> Roots:
+def _roots(enclosing: _Enclosing, order: tuple[int, ...], eliminant: Eliminant) -> Roots:
     """The solutions over the roots of an eliminant."""
     from flint import ctx, fmpz_poly
 
+    square = enclosing.square
     kept_round = square.round[order[0]]
     polynomial, extraneous = primitive(eliminant.polynomial), 0
     at_infinity = kept_round and polynomial.degree() < eliminant.bound
@@ -148,9 +155,8 @@ def _roots(square: Square, turn: float, order: tuple[int, ...], eliminant: Elimi
         extraneous = 2 * pairs
     resolved = all_solutions(polynomial, lambda x, m: _over(x, m, order, eliminant, square.round))
     with ctx.workprec(PRECISION):
-        real = tuple(_enclosed(square, turn, equations, thick, [v.real for v in values], m)
-                     for values, m in resolved if is_real(values))
-        real += tuple(_middle(square, turn, values) for values, m in resolved if almost_real(values))
+        real = tuple(enclosing.enclosed([v.real for v in values], m) for values, m in resolved if is_real(values))
+        real += tuple(enclosing.middle(values) for values, m in resolved if almost_real(values))
     found = gathered(polynomial.degree(), resolved, real)
     return replace(found, extraneous=extraneous, complete=found.complete and not at_infinity)
 
@@ -159,6 +165,7 @@ def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solutio
     """The solutions ``over`` each complex root and its multiplicity, as precise as it takes to have them all."""
     from flint import ctx
 
+    resolved: list[Solution] = []
     precision = PRECISION
     for _ in range(PRECISIONS):
         with ctx.workprec(precision):
@@ -205,9 +212,13 @@ def _restored(order: tuple[int, ...], values: Sequence[Any]) -> list[Any]:
 
 
 def _finite(values: Sequence[Any], half_angles: Sequence[bool]) -> bool:
-    """Whether all values are finite, and none a half-angle tangent at which a circle is at infinity."""
-    return all(v.is_finite() and not (half and (1 + v * v).contains(0))
-               for v, half in zip(values, half_angles, strict=True))
+    """Whether all values are finite and known well, and none a half-angle tangent at which a circle is at infinity."""
+    return all(sharp(v) and not (half and (1 + v * v).contains(0)) for v, half in zip(values, half_angles, strict=True))
+
+
+def sharp(value: Any) -> bool:
+    """Whether a ball is so small that solutions on both sides of a denominator's zero are told apart."""
+    return bool(value.is_finite()) and float(value.rad()) <= SHARP * (1.0 + float(abs(value.mid())))
 
 
 def is_real(values: Sequence[Any]) -> bool:
@@ -221,24 +232,62 @@ def almost_real(values: Sequence[Any]) -> bool:
     return 0.0 < size < NEARLY_DOUBLE / 2 and next(float(v.imag) for v in values if not v.imag.is_zero()) > 0
 
 
-def _middle(square: Square, turn: float, values: Sequence[Any]) -> Root:
-    """The real part of a conjugate pair, with its imaginary part for a radius."""
-    assert square.frame is not None
-    own = tuple(parameter(curve, square.frame, origin, v.real.mid())
-                for curve, origin, v in zip(square.unknowns, square.turns(turn), values, strict=True))
-    return Root(own, max(2.0 * abs(float(v.imag)) for v in values), 2, False, False, False)
+@dataclass(frozen=True, eq=False)
+class _Enclosing:
+    """A square system with circles counted from ``turn``: its equations, of the rounded input and of the exact one."""
 
+    square: Square
+    turn: float
+    balls: Within
+    equations: Sequence[Equation]
+    thick: Sequence[Equation]
 
-def _enclosed(square: Square, turn: float, equations: Sequence[Equation], thick: Sequence[Equation],
-              start: Sequence[Any], multiplicity: int) -> Root:
-    """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
-    assert square.frame is not None
-    values, unique, wide = boxed(equations, thick, start, multiplicity)
-    own = tuple(parameter(curve, square.frame, origin, t)
-                for curve, origin, t in zip(square.unknowns, square.turns(turn), values, strict=True))
-    radius = max(float(each.rad()) / (1.0 if half else square.frame.size)
-                 for each, half in zip(own, square.round, strict=True))
-    return Root(own, radius, multiplicity, unique, wide)
+    def enclosed(self, start: Sequence[Any], multiplicity: int) -> Root:
+        """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
+        values, unique, wide = boxed(self.equations, self.thick, start, multiplicity)
+        own = self._parameters(values)
+        return Root(own, self._misses(own, values), multiplicity, unique, wide)
+
+    def middle(self, values: Sequence[Any]) -> Root:
+        """The real part of a conjugate pair, and how far its curves' points are from it at most."""
+        own = self._parameters([v.real.mid() for v in values])
+        wide = [v.real + v.imag.union(-v.imag) for v in values]
+        return Root(own, self._misses(own, wide), 2, False, False, False)
+
+    @cached_property
+    def _radii(self) -> list[list[float]]:
+        """Of each unknown's curve how far the exact coefficients of t⁰, t¹, t² can be from the rounded ones (m)."""
+        frame = self.square.frame
+        assert frame is not None
+        return [[math.hypot(*(float(each.rad()) for each in row if not isinstance(each, int))) * frame.size / UNIT
+                 for row in path.N] for path in self.square.conics(self.turn, self.balls)]
+
+    def _parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
+        square = self.square
+        assert square.frame is not None
+        return tuple(parameter(curve, square.frame, origin, t)
+                     for curve, origin, t in zip(square.unknowns, square.turns(self.turn), values, strict=True))
+
+    def _misses(self, own: Sequence[Any], values: Sequence[Any]) -> tuple[float, ...]:
+        """How far the points at balls of the parameters ``own`` and of t are from those at the middle (m)."""
+        if self.square.exact is not None:
+            return tuple(self._miss(*each) for each in zip(self.square.unknowns, own, values,
+                                                           self.square.exact(self.balls), strict=True))
+        found = []
+        for curve, s, t, (r0, r1, r2) in zip(self.square.unknowns, own, values, self._radii, strict=True):
+            ball, size = float(s.rad()), abs(float(t.mid())) + float(t.rad())
+            moved, w = (ball * curve.radius, 1.0 + size * size) if isinstance(curve, Circle) else (ball, 1.0)
+            found.append(moved + (r0 + size * (r1 + size * r2)) / w)
+        return tuple(found)
+
+    def _miss(self, curve: Curve, s: Any, t: Any, path: Conic) -> float:
+        """As above, for a point that is none of the curve's own."""
+        frame = self.square.frame
+        assert frame is not None
+        centre, powers = frame.point(curve.at(float(s.mid()))), np.array([1, t, t * t], dtype=object)
+        w = (powers @ path.w) * UNIT
+        return frame.size * math.hypot(*(float((x / w - c).abs_upper())
+                                         for x, c in zip(powers @ path.N, centre.tolist(), strict=True)))
 
 
 def boxed(equations: Sequence[Polynomial], thick: Sequence[Polynomial], start: Sequence[Any], multiplicity: int

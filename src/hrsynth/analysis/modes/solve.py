@@ -15,7 +15,7 @@ from .near import dimension, residual, stationary
 from .quadrics import Whole
 from .roots import Root, Roots, nearly_double, solve_square
 from .squares import Square
-from .systems import System
+from .systems import ROUNDING, System
 from .translating import Translating
 from .whole import solve_whole, wholes
 
@@ -30,21 +30,26 @@ Part = Square | Whole
 class Mode:
     """A pose with the directions that are held.
 
-    ``parameters`` of the curves that were solved for (m, rad), each within ``radius`` (sizes, rad); none where the pose
-    itself was solved for, then each tip's coordinates are within ``radius``; ``legs`` the places of the curves in the
-    square part; ``residual`` the largest distance of a tip from its curve (sizes); ``q`` the
-    system's own coordinates; ``pose`` (4, 4) the platform's frame in the base frame. A size is that of the mechanism.
+    The exact pose is within ``shift`` (m, the origins of all bodies) and ``turn`` (rad) of ``pose`` (4, 4), the
+    platform's frame in the base frame; ``radius`` is the larger of the two, lengths in sizes. ``parameters`` are those
+    of the curves that were solved for (m, rad), none where the pose itself was solved for; ``legs`` the places of the
+    curves in the square part; ``residual`` the largest distance of a tip from its curve (sizes); ``q`` the system's own
+    coordinates. A size is that of the mechanism.
     """
 
     parameters: tuple[float, ...]
     radius: float
+    shift: float
+    turn: float
     residual: float
     pose: Array
     q: Array
     legs: tuple[int, ...] = ()
     multiplicity: int = 1
     proved: bool = False
-    """Whether there is exactly one mode within the radius."""
+    """Whether there is exactly one mode within the radius, for all input within its error."""
+    rounded: bool = False
+    """Whether that is proved for the rounded input alone; then the radius is for it alone too."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers."""
@@ -90,7 +95,7 @@ def solve(system: System, *, near: bool = True) -> Modes:
         return _too_few(system)
     square = None
     for square in system.squares():
-        roots = solve_square(square)
+        roots = solve_square(square, system.balls(square.frame))
         if not roots.continuum:
             if not near:
                 return _judged(system, square, roots, None)
@@ -111,7 +116,7 @@ def solve_by_msolve(system: System, *, near: bool = True) -> Modes:
         return _too_few(system)
     part = None
     for part in islice(wholes(system), CHOICES):
-        roots = solve_whole(part)
+        roots = solve_whole(part, system.balls(part.chart.frame))
         if not roots.continuum:
             return _judged(system, part, roots, () if near else None)
     return _undecided(system, part is not None)
@@ -141,7 +146,7 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
     """The modes among the solutions of a square part; near ones are looked for from those of others too (not at all
     where these are None)."""
     found = [_mode(system, square, root) for root in roots.real]
-    complete = roots.complete and not (nearly_double(roots) and any(not root.thick for root in roots.real))
+    complete = roots.complete and all(mode.proved for mode in found)
     if square.whole:
         return Modes(roots.complex, tuple(found), complete, _proof(roots), degenerate=_special(roots))
     modes = tuple(mode for mode in found if mode.residual <= VANISHES)
@@ -163,13 +168,20 @@ def _near(system: System, found: Sequence[Mode], modes: Sequence[Mode], others: 
 def _mode(system: System, square: Part, root: Root) -> Mode:
     parameters = tuple(float(each.mid()) for each in root.parameters)
     q = square.place(parameters)
-    own = parameters if isinstance(square, Square) else ()
-    return Mode(own, root.radius, residual(system, q), frozen(system.pose(q)), frozen(q), square.legs,
-                root.multiplicity, root.unique)
+    if isinstance(square, Square):
+        own = parameters
+        points = [curve.at(s) for curve, s in zip(square.unknowns, own, strict=True)]
+        apart = system.apart(q, square.legs, list(zip(points, root.misses, strict=True)))
+    else:
+        own, apart = (), {k: miss + ROUNDING * system.size for k, miss in enumerate(root.misses)}
+    shift, turn = system.spread(q, apart)
+    sure = bool(np.isfinite(system.error)) and root.unique and root.thick and np.isfinite(shift)
+    return Mode(own, max(shift / system.size, turn), shift, turn, residual(system, q), frozen(system.pose(q)),
+                frozen(q), square.legs, root.multiplicity, sure, root.unique and not sure)
 
 
 def _nearly(system: System, q: Array) -> Mode:
-    return Mode((), np.inf, residual(system, q), frozen(system.pose(q)), frozen(q))
+    return Mode((), np.inf, np.inf, np.pi, residual(system, q), frozen(system.pose(q)), frozen(q))
 
 
 def _proof(roots: Roots) -> str:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -17,7 +17,7 @@ from .curves import Point, Surface, cross, curves_of, extent, length
 from .quadrics import Chart
 from .squares import Square, distance, on_sphere, single
 from .study import study
-from .systems import System
+from .systems import System, registered
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,6 +34,10 @@ class Spatial(System):
         """Where the tips are at a pose; shape (legs, 3), metres."""
         X = self.pose(q)
         return np.asarray(X[:3, 3] + self.tips @ X[:3, :3].T)
+
+    def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
+        """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
+        return registered(self.tips, apart)
 
     def chart(self, number: int) -> Chart:
         """Study's coordinates, with a linear form of the quaternion that depends on the number made 1."""

@@ -23,7 +23,7 @@ class Square:
 
     ``unknowns`` are the curves whose parameters are solved for; ``build`` gives the equations from their conics;
     ``place`` turns parameters (n,) into the coordinates of the system's pose; ``whole`` says that no other equation is
-    left.
+    left; ``exact`` gives the points that the unknowns stand for, where these are not those of the curves.
     """
 
     legs: tuple[int, ...]
@@ -32,14 +32,16 @@ class Square:
     build: Callable[[Sequence[Conic], Numbers], list[Equation]]
     place: Callable[[Sequence[float]], Array]
     whole: bool
+    exact: Callable[[Numbers], list[Conic]] | None = None
+
+    def conics(self, turn: float = 0.0, numbers: Numbers = Rounded) -> list[Conic]:
+        """The unknowns' curves, circles counted from ``turn`` on."""
+        assert self.frame is not None
+        return [conic(curve, self.frame, t, numbers) for curve, t in zip(self.unknowns, self.turns(turn), strict=True)]
 
     def equations(self, turn: float = 0.0, numbers: Numbers = Rounded) -> list[Equation]:
         """The equations with circles counted from ``turn`` on."""
-        if self.frame is None:
-            return []
-        conics = [conic(curve, self.frame, t, numbers)
-                  for curve, t in zip(self.unknowns, self.turns(turn), strict=True)]
-        return self.build(conics, numbers)
+        return [] if self.frame is None else self.build(self.conics(turn, numbers), numbers)
 
     def turns(self, turn: float) -> list[float]:
         """Where each unknown's circle is counted from (rad)."""

@@ -31,21 +31,24 @@ def three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tuple[fl
     offset = frame.origin
     line = Line(_foot((one, two), [_offset(surface, last, offset) for surface in (first, second)], d) + offset, d)
 
-    def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
+    def point(numbers: Numbers) -> Conic:
         exact = Rounded.vector(frame.R @ d)
         start = Rounded.vector(np.array([float(d @ (line.centre - frame.origin)) / frame.size]))[0] * UNIT
         (n, h), (m, k) = (_plane(surface, last, frame, numbers) for surface in (first, second))
         across = np.cross(n, m)
         at, slope = h * np.cross(m, exact) + k * np.cross(exact, n) + start * across, UNIT * UNIT * across
-        point = _affine(at, slope, exact @ across)
+        return _affine(at, slope, exact @ across)
+
+    def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
         centre = numbers.vector(frame.point(last.centre))
         if isinstance(last, Plane):
             normal = direction(last.normal, frame, numbers)
-            return [single(on_plane(point, normal, normal @ centre))]
+            return [single(on_plane(point(numbers), normal, normal @ centre))]
         rho = numbers.vector(np.array([last.radius / frame.size]))[0]
-        return [single(on_sphere(point, centre, rho * rho))]
+        return [single(on_sphere(point(numbers), centre, rho * rho))]
 
-    return sine, Square(tuple(k for k, _ in legs), (line,), frame, build, lambda s: line.at(s[0]), whole)
+    return sine, Square(tuple(k for k, _ in legs), (line,), frame, build, lambda s: line.at(s[0]), whole,
+                        lambda numbers: [point(numbers)])
 
 
 def _ordered(surfaces: Sequence[Surface]) -> list[Surface]:

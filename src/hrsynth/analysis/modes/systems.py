@@ -7,8 +7,9 @@ degree two. All curves and surfaces are in one frame, the base frame; ``tips`` a
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import ClassVar
 
@@ -16,9 +17,13 @@ import numpy as np
 
 from ...errors import BadRequest
 from ...mechanism.vectors import Array, frozen, pose
-from .curves import Reach, curves_of, extent, shifted
+from .conics import SLACK, UNIT, Balls, Frame, Within
+from .curves import Point, Reach, curves_of, extent, length, shifted
 from .quadrics import Chart
 from .squares import Square
+
+ROUNDING = 2.0 ** -46
+"""What sixty-four roundings make of a length, relative to the size: poses and tips computed in floats."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,6 +32,8 @@ class System:
 
     curves: tuple[Reach, ...]
     tips: Array
+    error: float = field(default=0.0, kw_only=True)
+    """How far a point that the numbers give can be from that of the exact input (m), besides rounding: closed loops."""
 
     freedoms: ClassVar[int]
     """How many coordinates a pose has; the first d are lengths (m), the others angles (rad)."""
@@ -64,6 +71,28 @@ class System:
         """Whether a tip is confined to a surface only."""
         return len(curves_of(self.curves)) < len(self.curves)
 
+    def balls(self, frame: Frame | None) -> Within:
+        """Balls that hold the exact input in a working frame; the finest where it is not known how far it is."""
+        if frame is None or not np.isfinite(self.error):
+            return Balls
+        return Within(SLACK + UNIT * self.error / min(frame.size, self.size))
+
+    def apart(self, q: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, float]:
+        """How far the tips of some legs can be from those at q (m), with the point on each leg's curve and how far the
+        exact one is from it (m); a tip at rest has no such point."""
+        given, at = iter(points), self.reached(q)
+        found = {}
+        for k in legs:
+            point, miss = (curve.centre, 0.0) if isinstance(curve := self.curves[k], Point) else next(given, (None, 0.0))
+            if point is not None:
+                found[k] = miss + length(point - at[k]) + self.error + ROUNDING * self.size
+        return found
+
+    def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
+        """How far the platform's frame (m) and turn (rad) can be from those at q, with tips within the distances
+        ``apart`` from theirs (m)."""
+        raise NotImplementedError
+
     def misses(self, q: Array) -> Array:
         """What separates each tip from what it can reach at a pose; shape (legs, 3), metres."""
         return np.array([curve.miss(tip) for curve, tip in zip(self.curves, self.reached(q), strict=True)])
@@ -93,6 +122,23 @@ class System:
     def chart(self, number: int) -> Chart:
         """Coordinates of the pose; where there are many charts, that of a number."""
         raise NotImplementedError
+
+
+def registered(tips: Array, apart: Mapping[int, float]) -> tuple[float, float]:
+    """How far the origin of a rigid body (m) can be moved and how far the body turned (rad), at most, where its points
+    ``tips`` (n, d) are moved by at most the distances ``apart`` (m).
+
+    With the tips' mean c, a turn φ about a unit n moves b − c by 2 sin(φ/2) |n × (b − c)| against the mean, and the sum
+    of |n × (b − c)|² is at least that of |b − c|² less the largest eigenvalue of Σ (b − c)(b − c)ᵀ (in the plane: all).
+    """
+    b, e = tips[list(apart)], list(apart.values())
+    mean = b.mean(axis=0)
+    C = b - mean
+    seen = float(np.sum(C * C)) - (float(np.linalg.eigvalsh(C.T @ C)[-1]) if C.shape[1] == 3 else 0.0)
+    moved = math.hypot(*e) / math.sqrt(seen) if seen > 0 else math.inf
+    if not moved < 2.0:
+        return math.inf, math.pi
+    return sum(e) / len(e) + moved * length(mean), 2.0 * math.asin(moved / 2.0)
 
 
 @dataclass(frozen=True, eq=False)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -16,7 +16,7 @@ from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, c
 from .quadrics import Chart, Moving, shifting
 from .squares import Square, on_plane, on_sphere, resting, single
 from .surfaces import three_surfaces
-from .systems import Shifting
+from .systems import ROUNDING, Shifting
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,6 +33,15 @@ class Translating(Shifting):
     def reached(self, q: Array) -> Array:
         """Where the tips are at a pose; shape (legs, 3), metres."""
         return np.asarray(q + self.tips)
+
+    def apart(self, q: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, float]:
+        """As for any system; the points are places of p."""
+        error = self.error + ROUNDING * self.size
+        return dict.fromkeys(legs, max((miss + length(point - q) for point, miss in points), default=0.0) + error)
+
+    def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
+        """How far the platform can be from its place at q (m); it does not turn."""
+        return min(apart.values()), 0.0
 
     def chart(self, number: int) -> Chart:
         """The position."""

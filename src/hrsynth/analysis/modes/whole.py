@@ -6,6 +6,7 @@ solution enclosed, with existence and uniqueness proved, from the equations them
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
@@ -14,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from .certify import Quadric
-from .conics import Balls
+from .conics import UNIT, Balls, Within
 from .msolve import Parametrisation, parametrised
 from .quadrics import Chart, Whole
-from .roots import PRECISION, PRECISIONS, Root, Roots, Solution, all_solutions, almost_real, boxed, gathered, is_real
+from .roots import (PRECISION, PRECISIONS, Root, Roots, Solution, all_solutions, almost_real, boxed, gathered, is_real,
+                    sharp)
 from .systems import System
 
 METHOD = "msolve's parametrisation (Gröbner basis, lifted from many primes, for the rounded geometry: trusted)"
@@ -40,7 +42,7 @@ def wholes(system: System, number: int = 0) -> Iterator[Whole]:
                 yield Whole(legs, chart, False)
 
 
-def solve_whole(part: Whole) -> Roots:
+def solve_whole(part: Whole, balls: Within = Balls) -> Roots:
     """All solutions of a choice of legs, distinct ones once. Raises ``MissingExtra``, ``Unsolved``."""
     from flint import ctx
 
@@ -53,9 +55,10 @@ def solve_whole(part: Whole) -> Roots:
     found = all_solutions(answer.polynomial, lambda t, m: _over(answer, nonzero, t, m))
     resolved = [each for each in found if not _no_pose(nonzero, each[0])]
     with ctx.workprec(PRECISION):
-        thick = part.equations(Balls)
-        real = tuple(_enclosed(part.chart, equations, thick, values, m) for values, m in resolved if is_real(values))
-        real += tuple(_middle(values) for values, _ in resolved if almost_real(values))
+        thick = part.equations(balls)
+        real = tuple(_enclosed(part.chart, balls, equations, thick, values, m)
+                     for values, m in resolved if is_real(values))
+        real += tuple(_middle(part.chart, balls, values) for values, _ in resolved if almost_real(values))
     extraneous = len(found) - len(resolved)
     roots = gathered(answer.polynomial.degree() - extraneous, resolved, real, METHOD)
     return replace(roots, extraneous=extraneous)
@@ -64,7 +67,7 @@ def solve_whole(part: Whole) -> Roots:
 def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
     """The solution over a root; none where it is not finite or it cannot be told whether it is a pose."""
     values = answer.others(t)
-    if not all(v.is_finite() for v in values):
+    if not all(sharp(v) for v in values):
         return []
     told = nonzero is None or float(nonzero.value(values).rad()) < FINE
     return [(values, multiplicity)] if told else []
@@ -78,20 +81,24 @@ def _no_pose(nonzero: Quadric | None, values: Sequence[Any]) -> bool:
         return nonzero is not None and bool(nonzero.value(values).contains(0))
 
 
-def _enclosed(chart: Chart, equations: Sequence[Any], thick: Sequence[Any], values: Sequence[Any], multiplicity: int
-              ) -> Root:
+def _enclosed(chart: Chart, balls: Within, equations: Sequence[Any], thick: Sequence[Any], values: Sequence[Any],
+              multiplicity: int) -> Root:
     box, unique, wide = boxed(equations, thick, [v.real for v in values], multiplicity)
-    return Root(tuple(box), _spread(chart, box), multiplicity, unique, wide)
+    return Root(tuple(box), _misses(chart, balls, box), multiplicity, unique, wide)
 
 
-def _middle(values: Sequence[Any]) -> Root:
-    """The real part of a conjugate pair, with its imaginary part for a radius."""
-    middle = tuple(v.real.mid() for v in values)
-    return Root(middle, max(2.0 * abs(float(v.imag)) for v in values), 2, False, False, False)
+def _middle(chart: Chart, balls: Within, values: Sequence[Any]) -> Root:
+    """The real part of a conjugate pair, and how far its tips are from there at most."""
+    wide = [v.real + v.imag.union(-v.imag) for v in values]
+    return Root(tuple(v.real.mid() for v in values), _misses(chart, balls, wide), 2, False, False, False)
 
 
-def _spread(chart: Chart, box: Sequence[Any]) -> float:
-    """The largest radius of a tip's coordinate in a box (sizes)."""
+def _misses(chart: Chart, balls: Within, box: Sequence[Any]) -> tuple[float, ...]:
+    """How far each leg's tip, in a box, is from that in its middle (m)."""
     x = np.array([1, *box], dtype=object)
-    found = [(x @ tip.N[:, :, k] @ x) / (x @ tip.w @ x) for tip in chart.tips(Balls) for k in range(tip.N.shape[2])]
-    return max(float(each.rad()) for each in found) / 2.0 ** 52
+    found = []
+    for tip in chart.tips(balls):
+        w = (x @ tip.w @ x) * UNIT
+        radii = [float(((x @ tip.N[:, :, k] @ x) / w).rad()) for k in range(tip.N.shape[2])]
+        found.append(2.0 * chart.frame.size * math.hypot(*radii))
+    return tuple(found)
