@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -29,8 +29,9 @@ class Model:
 
 def model(confined: Confinement) -> Model:
     """The system for the way in which the platform moves."""
-    return {"translations": _translating, "planar": _planar, "spatial": _spatial,
+    made = {"translations": _translating, "planar": _planar, "spatial": _spatial,
             "bodies": _articulated}[confined.motion](confined)
+    return replace(made, system=replace(made.system, error=confined.error))
 
 
 def _translating(confined: Confinement) -> Model:

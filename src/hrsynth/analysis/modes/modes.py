@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ...errors import BadRequest
 from ...kinematics.assembly import Assembler, Assembly
-from ...kinematics.configuration import ClosedConfiguration, measure
+from ...kinematics.configuration import ClosedConfiguration, Wanted, measure
 from ...kinematics.reach import reach
 from ...kinematics.relation import Question
 from ...mechanism import Mechanism
@@ -23,6 +23,7 @@ from ..singularity.agreement import weakest
 from ..singularity.measured import Measured
 from .branches import solve_all
 from .build import Model
+from .goal import drift
 from .solve import Mode, Modes, continuum
 from .tips import Confinement, confinement
 
@@ -35,16 +36,18 @@ WITHIN = {"translations": "poses turned as this one", "bodies": "poses whose bod
 class AssemblyMode:
     """A pose of the platform with the measurements of the goal.
 
-    ``radius``: each parameter of the proof's box is within it (characteristic lengths, radians), infinite where nothing
-    was proved; ``residual``: the largest distance of a tip from its curve (characteristic lengths). ``goal``: whether
-    it is the pose itself from which the measurements were taken. ``reachable``: whether the whole real robot, legs that
+    The exact pose, of the file's decimals, is within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite where
+    nothing was proved: its position and its turn, or those of the bodies on which legs end where ``enclosed`` names
+    them; ``residual``: the largest distance of a tip from its curve (characteristic lengths). ``goal``: whether it is
+    the pose itself from which the measurements were taken. ``reachable``: whether the whole real robot, legs that
     are not watched included, closes there within its joints' limits; ``open`` names the legs that do not close,
     ``beyond`` the joints. ``type2_distance``: the smallest singular value of Mᵀ there, as ``check`` gives it; None
     where the robot does not close.
     """
 
     pose: Pose
-    radius: float
+    shift: float
+    turn: float
     residual: float
     goal: bool
     reachable: bool
@@ -54,7 +57,12 @@ class AssemblyMode:
     configuration: ClosedConfiguration | None = None
     multiplicity: int = 1
     proved: bool = False
-    """Whether there is exactly one mode within the radius."""
+    """Whether there is exactly one mode within the radius, for all that the file's decimals and closed loops allow."""
+    rounded: bool = False
+    """Whether that is proved for the rounded geometry alone, of which the radius then speaks."""
+    enclosed: tuple[str, ...] = ()
+    length: float = 1.0
+    """The robot's characteristic length (m)."""
     bodies: dict[str, Array] | None = None
     """Poses (4, 4) of the bodies on which legs end."""
 
@@ -62,12 +70,19 @@ class AssemblyMode:
         said = "the pose itself" if self.goal else "reachable" if self.reachable else "out of the real robot's reach"
         return f"<{type(self).__name__}: {self.pose}, {said}>"
 
+    @property
+    def radius(self) -> float:
+        """The larger of the shift (characteristic lengths) and the turn (rad)."""
+        return max(self.shift / self.length, self.turn)
+
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"pose": self.pose.to_dict(), "radius": self.radius if np.isfinite(self.radius) else None,
-                "residual": self.residual, "goal": self.goal, "reachable": self.reachable,
+        known = bool(np.isfinite(self.radius))
+        return {"pose": self.pose.to_dict(), "radius": self.radius if known else None,
+                "radius_m": self.shift if known else None, "radius_rad": self.turn if known else None,
+                "enclosed": list(self.enclosed), "residual": self.residual, "goal": self.goal, "reachable": self.reachable,
                 "type2_distance": self.type2_distance, "open": list(self.open), "beyond": list(self.beyond),
-                "multiplicity": self.multiplicity, "proved": self.proved}
+                "multiplicity": self.multiplicity, "proved": self.proved, "rounded": self.rounded}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -130,16 +145,18 @@ def modes(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
 def modes_with(setting: Setting, at: Pose | str | None = None, *, real: bool = False,
                progress: Callable[[str], None] = silent) -> AssemblyModes:
     """All assembly modes with the measurements at a pose of a setting, as :func:`modes`."""
-    goal = setting.everything.start
+    goal, wanted = setting.everything.start, None
     if at is not None:
         pose = Pose.parse(at) if isinstance(at, str) else at
+        wanted = setting.motion.goal(pose, setting.robot.name)
         goal = reach(goal, setting.everything.question, pose, setting.motion)
-    return modes_at(setting, goal, real=real, progress=progress)
+    return modes_at(setting, goal, wanted, real=real, progress=progress)
 
 
-def modes_at(setting: Setting, goal: ClosedConfiguration, *, real: bool = False,
+def modes_at(setting: Setting, goal: ClosedConfiguration, wanted: Wanted | None = None, *, real: bool = False,
              progress: Callable[[str], None] = silent) -> AssemblyModes:
-    """All assembly modes with the measurements of a configuration of a setting, as :func:`modes`."""
+    """All assembly modes with the measurements of a configuration of a setting, as :func:`modes`; ``wanted`` is the
+    pose that the configuration was asked for."""
     measured = Measured.driven(setting) if real else Measured.watched(setting)
     motion = setting.motion
     pose = motion.pose(goal.pose(motion.link))
@@ -151,6 +168,7 @@ def modes_at(setting: Setting, goal: ClosedConfiguration, *, real: bool = False,
                              (), ())
     progress("modes")
     confined = confinement(setting.anatomy, measured.question, measured.structure, goal)
+    confined = replace(confined, error=drift(goal, wanted))
     made, found = solve_all(confined)
     reader = _Reader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
@@ -185,16 +203,29 @@ class _Reader:
         """What a mode is for the robot; of all modes the ``nearest`` to the goal can be it."""
         bodies, size = self.made.bodies(mode.q), self.goal.twin.length
         at_goal = nearest and self.away(mode) <= SAME_RELATION
-        near = not np.isfinite(mode.radius)
+        near = mode.near
         held = () if near else self.measured
         found = Assembly(self.goal) if at_goal and not near else self.assembler.at(bodies, held)
         scale = self.made.system.size / size
         X = self.goal.pose(self.motion.link) if found.platform is None else found.platform[self.motion.link]
+        shift, turn = self.radius(mode, bodies, X)
         return AssemblyMode(
-            self.motion.pose(X), mode.radius * scale,
-            mode.residual * scale, at_goal, found.reachable,
+            self.motion.pose(X), shift, turn, mode.residual * scale, at_goal, found.reachable,
             None if found.configuration is None else weakest(found.configuration, self.question),
-            found.open, found.beyond, found.configuration, mode.multiplicity, mode.proved, bodies)
+            found.open, found.beyond, found.configuration, mode.multiplicity, mode.proved, mode.rounded,
+            () if self.motion.link in bodies else tuple(bodies), size, bodies)
+
+    def radius(self, mode: Mode, bodies: dict[str, Array], X: Array) -> tuple[float, float]:
+        """How far the exact pose can be from the pose X (4, 4) that is told (m, rad): the system's, with what its frame
+        at the goal may be off, and what the told pose is from the system's; of the bodies where X is none of theirs."""
+        first, error = next(iter(bodies.values())), self.made.system.error
+        shift, turn = mode.shift + error, mode.turn + error / self.goal.twin.length
+        told = bodies.get(self.motion.link)
+        if told is None:
+            return shift, turn
+        lever = float(np.linalg.norm(told[:3, 3] - first[:3, 3]))
+        return (shift + turn * lever + float(np.linalg.norm(X[:3, 3] - told[:3, 3])),
+                turn + float(np.linalg.norm(X[:3, :3] - told[:3, :3])))
 
 
 def _difference(X: Array, other: Array, length: float) -> float:

@@ -50,6 +50,8 @@ class Mode:
     """Whether there is exactly one mode within the radius, for all input within its error."""
     rounded: bool = False
     """Whether that is proved for the rounded input alone; then the radius is for it alone too."""
+    near: bool = False
+    """Whether it matches almost only."""
 
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers."""
@@ -181,7 +183,7 @@ def _mode(system: System, square: Part, root: Root) -> Mode:
 
 
 def _nearly(system: System, q: Array) -> Mode:
-    return Mode((), np.inf, np.inf, np.pi, residual(system, q), frozen(system.pose(q)), frozen(q))
+    return Mode((), np.inf, np.inf, np.pi, residual(system, q), frozen(system.pose(q)), frozen(q), near=True)
 
 
 def _proof(roots: Roots) -> str:

@@ -68,6 +68,8 @@ class Confinement:
     bodies: tuple[str, ...]
     plane: Array | None = None
     slide: Circle | None = None
+    error: float = 0.0
+    """How far a point of the robot can be from where it is at the exact goal (m)."""
 
 
 def confinement(anatomy: Anatomy, question: Question, structure: Structure, goal: ClosedConfiguration) -> Confinement:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...analysis.modes.modes import AssemblyMode, AssemblyModes
 from .tables import listing
 
@@ -35,9 +37,13 @@ def modes(found: AssemblyModes, file: str | None = None) -> str:
 
 def proved(mode: AssemblyMode) -> str:
     """What is proved of a mode's place."""
+    within = "" if not np.isfinite(mode.radius) else f"to {mode.shift:.1e} m" + (f", {mode.turn:.1e} rad" if mode.turn
+                                                                                 else "")
     if mode.proved:
-        return f"enclosed to {mode.radius:.1e}"
-    return f"not proved, {'a multiple one' if mode.multiplicity > 1 else 'known'} to {mode.radius:.1e}"
+        return f"{', '.join(mode.enclosed)}{' ' if mode.enclosed else ''}enclosed {within}"
+    if mode.rounded:
+        return f"not proved: enclosed {within} for the rounded geometry, not for the file's".replace("  ", " ")
+    return f"not proved, {'a multiple one' if mode.multiplicity > 1 else 'known'} {within}".rstrip()
 
 
 def at_mode(mode: AssemblyMode, kind: str) -> list[tuple[str, str]]:

@@ -1,0 +1,50 @@
+"""How far the goal, a configuration in floats, is from the exactly closed one of the file's numbers at the exact pose."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...kinematics.configuration import ClosedConfiguration, Wanted, system
+from ...kinematics.ranks import range_basis
+from ...mechanism.vectors import Array
+
+ROUNDINGS = 16 * 2.0 ** -52
+"""What thirty-two roundings, those of a chain of joints from the file's decimals on, make of lengths (extents), angles."""
+
+LEVER = 2.0
+"""Least lever (characteristic lengths) with which turns count: directions are divided by the size of the tips' curves."""
+
+
+def drift(goal: ClosedConfiguration, pose: Wanted | None = None) -> float:
+    """How far a point of a link can be from where it is at the exact goal (m), within the robot's extent; infinite
+    where that is not proved.
+
+    Newton and Kantorovich: with σ the smallest singular value of the rows J that count and L a Lipschitz constant of J,
+    L ‖F‖ ≤ σ²/2 gives an exact goal within 2 ‖J⁺ F‖. Rows that depend on the others are taken as consistent.
+    """
+    twin = goal.twin
+    F, J = system(twin, goal.q, pose)
+    links = tuple(twin.mechanism.links)
+    mechanism, V = twin.mechanism, twin.frames(goal.q, links)[1]
+    points = [*(mechanism.links[link].pose[:3, 3] for link in links), *(j.point for j in mechanism.joints.values())]
+    extent = 1.0 + float(np.ptp(np.array(points), axis=0).max()) / twin.length
+    miss = float(np.linalg.norm(F)) + ROUNDINGS * extent
+    if not len(J):
+        return twin.length * miss
+    rank = range_basis(J, 1.0)[1].value
+    left, values, right = np.linalg.svd(J, full_matrices=False)
+    sigma, bends = float(values[rank - 1]) if rank else np.inf, twin.nv * extent
+    if bends * miss > sigma ** 2 / 2:
+        return float("inf")
+    inverse: Array = right[:rank].T / values[:rank] @ left[:, :rank].T
+    return 2.0 * twin.length * miss * max(
+        float(np.linalg.norm(moved[:3], 2) + _lever(goal, link) * np.linalg.norm(moved[3:], 2))
+        for link, moved in zip(links, V @ inverse, strict=True))
+
+
+def _lever(goal: ClosedConfiguration, link: str) -> float:
+    """How far a link's joint centres are from its origin (characteristic lengths)."""
+    mechanism = goal.twin.mechanism
+    origin = mechanism.links[link].pose[:3, 3]
+    return max([LEVER, *(float(np.linalg.norm(joint.point - origin)) / goal.twin.length
+                         for joint in mechanism.joints.values() if link in joint.links)])
