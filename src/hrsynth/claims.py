@@ -80,8 +80,8 @@ CLAIMS = (
           (r"proved to be all", r"exact resultant", r" isolated", r"nothing proved", r"not complete", r"^<p>Proof: ",
            r"the controller cannot$")),
     Claim("enclosed to … m, … rad", "modes",
-          "exactly one mode lies within the shift and the turn that are told, and it is the pose of the file's decimals "
-          "at the exact goal; where bodies are named, theirs",
+          "exactly one mode lies within the shift and the turn that are told, and it is the pose of the file's "
+          "decimals at the exact goal; where bodies are named, theirs",
           "Krawczyk's operator in ball arithmetic, with balls that hold the exact input: rounding, and the distance of "
           "the exactly closed goal by Newton and Kantorovich; the radius of the pose from those of the tips",
           EXACT_GEOMETRY + "; loops that repeat others are consistent; sixteen ulps a chain of joints",

@@ -13,7 +13,7 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 from scipy.optimize import least_squares
 
-from hrsynth.mechanism.vectors import Array, inverse, pose, rotation_about
+from hrsynth.mechanism.vectors import Array, pose, rotation_about
 
 BITS = 220
 STEP = 1e-25
@@ -118,7 +118,8 @@ class File:
                 step = back @ scaled
                 if size == 0 or np.abs(step).max() * size < 1e-45:
                     break
-                at = {name: (at[name] - arb(float(s)) * arb(size)).mid() for name, s in zip(self.moving, step, strict=True)}
+                at = {name: (at[name] - arb(float(s)) * arb(size)).mid()
+                      for name, s in zip(self.moving, step, strict=True)}
                 F = rows(at)
             return at, max(float(abs(f)) for f in F)
 

@@ -21,7 +21,8 @@ from hrsynth.mechanism.pose import Pose
 from hrsynth.mechanism.vectors import pose
 
 OUTSIDE_BEFORE = "x=-0.058,y=0.031,z=0.301,rpy=0/0/0"
-QUICK = [("gough_stewart", ("1", "4", "6"), OUTSIDE_BEFORE), pytest.param("quattro", ("1", "4"), "x=0.03,y=-0.02,z=-0.65", marks=pytest.mark.slow),
+QUICK = [("gough_stewart", ("1", "4", "6"), OUTSIDE_BEFORE),
+         pytest.param("quattro", ("1", "4"), "x=0.03,y=-0.02,z=-0.65", marks=pytest.mark.slow),
          ("3rrr_m1", None, "x=0.012,y=0.008,phi=0.1")]
 MANY = [("gough_stewart", ("1", "4", "6"), 40), ("quattro", ("1", "4"), 8), ("quattro_rigid", ("1", "3"), 8),
         ("hexa", ("1", "3", "5"), 6), ("3rps", None, 6), ("delta", None, 8), ("3rrr_m1", None, 12),

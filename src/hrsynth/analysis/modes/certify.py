@@ -13,7 +13,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 ATTEMPTS = 3
-"""Boxes that are tried, each wider than the one before."""
+"""Boxes that are tried, each wider than the one before where that one was too narrow."""
 
 FINEST = 2.0 ** -100
 """Radius of the smallest box that is tried, relative to 1 plus the unknown."""
@@ -92,7 +92,7 @@ def krawczyk(equations: Sequence[Polynomial], start: Sequence[Any]) -> list[Any]
         image = -step + (np.eye(len(middle), dtype=int) - Y @ slopes) @ offsets
         if all(d.contains_interior(k) for d, k in zip(offsets, image, strict=True)):
             return [m + k for m, k in zip(middle, image, strict=True)]
-        radii = [4.0 * max(r, float(k.abs_upper())) for r, k in zip(radii, image, strict=True)]
+        radii = [max(r, 4.0 * float(k.abs_upper())) for r, k in zip(radii, image, strict=True)]
     return None
 
 

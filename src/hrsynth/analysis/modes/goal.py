@@ -1,4 +1,4 @@
-"""How far the goal, a configuration in floats, is from the exactly closed one of the file's numbers at the exact pose."""
+"""How far the goal, in floats, is from the exactly closed configuration of the file's numbers at the exact pose."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from ...kinematics.ranks import range_basis
 from ...mechanism.vectors import Array
 
 ROUNDINGS = 16 * 2.0 ** -52
-"""What thirty-two roundings, those of a chain of joints from the file's decimals on, make of lengths (extents), angles."""
+"""What thirty-two roundings, those of a chain of joints from the file's decimals on, make of lengths and angles."""
 
 LEVER = 2.0
-"""Least lever (characteristic lengths) with which turns count: directions are divided by the size of the tips' curves."""
+"""Least lever (characteristic lengths) of a turn: directions are compared with the size of the tips' curves."""
 
 
 def drift(goal: ClosedConfiguration, pose: Wanted | None = None) -> float:

@@ -80,7 +80,8 @@ class AssemblyMode:
         known = bool(np.isfinite(self.radius))
         return {"pose": self.pose.to_dict(), "radius": self.radius if known else None,
                 "radius_m": self.shift if known else None, "radius_rad": self.turn if known else None,
-                "enclosed": list(self.enclosed), "residual": self.residual, "goal": self.goal, "reachable": self.reachable,
+                "bodies": list(self.enclosed),
+                "residual": self.residual, "goal": self.goal, "reachable": self.reachable,
                 "type2_distance": self.type2_distance, "open": list(self.open), "beyond": list(self.beyond),
                 "multiplicity": self.multiplicity, "proved": self.proved, "rounded": self.rounded}
 

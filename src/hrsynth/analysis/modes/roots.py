@@ -80,7 +80,7 @@ class Roots:
 
 
 def solve_square(square: Square, balls: Within = Balls) -> Roots:
-    """All solutions of a square system, those of the rounded input counted, those of all input in the balls enclosed."""
+    """All solutions of a square system: those of the rounded input counted, those of all in the balls enclosed."""
     from flint import ctx
 
     if not square.unknowns:

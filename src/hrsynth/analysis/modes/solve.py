@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...mechanism.vectors import Array, frozen
-from ...tolerances import NEARLY_DOUBLE, VANISHES
+from ...tolerances import NEAR_MODE, NEARLY_DOUBLE, VANISHES
 from .near import dimension, residual, stationary
 from .quadrics import Whole
 from .roots import Root, Roots, nearly_double, solve_square
@@ -148,7 +148,7 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
     """The modes among the solutions of a square part; near ones are looked for from those of others too (not at all
     where these are None)."""
     found = [_mode(system, square, root) for root in roots.real]
-    complete = roots.complete and all(mode.proved for mode in found)
+    complete = roots.complete and all(mode.proved or (not square.whole and mode.residual > NEAR_MODE) for mode in found)
     if square.whole:
         return Modes(roots.complex, tuple(found), complete, _proof(roots), degenerate=_special(roots))
     modes = tuple(mode for mode in found if mode.residual <= VANISHES)
@@ -177,7 +177,7 @@ def _mode(system: System, square: Part, root: Root) -> Mode:
     else:
         own, apart = (), {k: miss + ROUNDING * system.size for k, miss in enumerate(root.misses)}
     shift, turn = system.spread(q, apart)
-    sure = bool(np.isfinite(system.error)) and root.unique and root.thick and np.isfinite(shift)
+    sure = bool(np.isfinite(system.error) and root.unique and root.thick and np.isfinite(shift))
     return Mode(own, max(shift / system.size, turn), shift, turn, residual(system, q), frozen(system.pose(q)),
                 frozen(q), square.legs, root.multiplicity, sure, root.unique and not sure)
 

@@ -80,13 +80,11 @@ class System:
     def apart(self, q: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, float]:
         """How far the tips of some legs can be from those at q (m), with the point on each leg's curve and how far the
         exact one is from it (m); a tip at rest has no such point."""
-        given, at = iter(points), self.reached(q)
-        found = {}
-        for k in legs:
-            point, miss = (curve.centre, 0.0) if isinstance(curve := self.curves[k], Point) else next(given, (None, 0.0))
-            if point is not None:
-                found[k] = miss + length(point - at[k]) + self.error + ROUNDING * self.size
-        return found
+        resting = [k for k in legs if isinstance(self.curves[k], Point)]
+        known = {k: (self.curves[k].centre, 0.0) for k in resting}
+        known |= dict(zip((k for k in legs if k not in resting), points, strict=False))
+        at, error = self.reached(q), self.error + ROUNDING * self.size
+        return {k: miss + length(point - at[k]) + error for k, (point, miss) in known.items()}
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """How far the platform's frame (m) and turn (rad) can be from those at q, with tips within the distances

@@ -18,8 +18,19 @@ from .certify import Quadric
 from .conics import UNIT, Balls, Within
 from .msolve import Parametrisation, parametrised
 from .quadrics import Chart, Whole
-from .roots import (PRECISION, PRECISIONS, Root, Roots, Solution, all_solutions, almost_real, boxed, gathered, is_real,
-                    sharp)
+from .roots import (
+    PRECISION,
+    PRECISIONS,
+    Root,
+    Roots,
+    Solution,
+    all_solutions,
+    almost_real,
+    boxed,
+    gathered,
+    is_real,
+    sharp,
+)
 from .systems import System
 
 METHOD = "msolve's parametrisation (Gröbner basis, lifted from many primes, for the rounded geometry: trusted)"
