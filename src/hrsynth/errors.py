@@ -102,6 +102,18 @@ class NotSampled(HrsynthError):
                          f"needed: {wanted}; is the zero configuration singular?")
 
 
+class BranchPoint(HrsynthError):
+    """A zero configuration at which several operation modes meet, or samples of several: what was found of each, and
+    a pose in it."""
+
+    exit_status = 3
+
+    def __init__(self, robot: str, what: str, modes: Iterable[str]) -> None:
+        self.robot, self.what, self.modes = robot, what, tuple(modes)
+        super().__init__(f"{robot}: {what}: " + "; ".join(f"({i}) {mode}" for i, mode in enumerate(self.modes, 1))
+                         + "; no verdict is given; start in one of them")
+
+
 class PoseNotReached(HrsynthError):
     """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much
     (mm, degrees), or None where each leg alone reaches it; how far the robot came (0 to 1), and to which pose."""

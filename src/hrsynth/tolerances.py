@@ -38,6 +38,12 @@ RANK_GAP = 1e3
 RANK_CUTOFF = 1e-7
 """Singular values below this fraction of the largest are candidates for zero; the gap around it is what decides."""
 
+SURELY_SOMETHING = 1e-5
+"""Singular values of a relation above this count, whatever rounding did."""
+
+SURELY_ZERO = 1e-9
+"""Singular values of a relation below this are zero, whatever rounding did; between the two lies the cutoff."""
+
 SAME_POINT = 1e-7
 """Distance (characteristic lengths) below which two points are one: joint centres that meet, axes that intersect."""
 

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import RankUndecided
-from ..kinematics.ranks import kernel_basis, largest_angle, range_basis
+from ..kinematics.ranks import kernel_basis, largest_angle, range_basis, singular_values
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.vectors import Array
@@ -218,8 +218,4 @@ def _padded(block: Array) -> Array:
 
 def _ranks(matrices: Array) -> Array:
     """The rank of each matrix (k, rows, columns), zero relative to one or to its largest singular value; shape (k,)."""
-    values = np.linalg.svd(matrices, compute_uv=False)
-    if not values.shape[1]:
-        return np.zeros(len(values), dtype=int)
-    scale = np.maximum(values[:, :1], 1.0)
-    return np.asarray(np.sum(values > RANK_CUTOFF * scale, axis=1))
+    return np.asarray(np.sum(singular_values(matrices) > RANK_CUTOFF, axis=1))

@@ -7,13 +7,14 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Any
 
+from ..errors import RankUndecided
 from ..kinematics.ranks import Rank
 from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.observation import labels_of
 from ..results import Result
-from ..tolerances import RANK_GAP
+from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
 from .exact import ExactVerdict, architecture
 from .freedoms import Freedom, name_freedoms, point_text
 from .setting import Setting, prepare, restricted
@@ -38,6 +39,15 @@ class Verdict(Result):
     gap: float
     graph: bool = True
     """Whether Mᵀ exists: no observed direction moves while the platform rests."""
+    counted: float = 1.0
+    """The smallest singular value of the measured rates on ρ that counts as seen, over all samples."""
+    dropped: float = 0.0
+    """The largest that does not."""
+
+    @property
+    def near(self) -> bool:
+        """Whether a singular value lies so near to the cutoff that slightly other geometry has another verdict."""
+        return (self.rank > 0 and self.counted < SURELY_SOMETHING) or self.dropped > SURELY_ZERO
 
     def headline(self) -> str:
         """The legs, the verdict and the rank."""
@@ -46,7 +56,13 @@ class Verdict(Result):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"legs": list(self.legs), "verdict": self.verdict, "rank": self.rank,
-                "lost": [freedom.to_dict() for freedom in self.lost], "gap": self.gap, "interaction_matrix": self.graph}
+                "lost": [freedom.to_dict() for freedom in self.lost], "gap": self.gap, "interaction_matrix": self.graph,
+                "margin": self.margin}
+
+    @property
+    def margin(self) -> dict[str, float]:
+        """How far the verdict is from another, as the record of the command line has it."""
+        return {"counted": self.counted, "dropped": self.dropped, "cutoff": RANK_CUTOFF}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -83,18 +99,23 @@ class Legs(Result):
 def verdict_of(setting: Setting, legs: Sequence[str], samples: Samples) -> Verdict:
     """The verdict for ``samples``, whose observations are those of ``legs``.
 
-    The generic rank is the largest over the samples; raises ``RankUndecided`` where its gap is too small.
+    All samples are of one operation mode and must show one rank. Raises ``RankUndecided`` where its gap is too small at
+    a sample, or between what counts at one sample and what does not at another.
     """
     found = [member.relation for member in samples.members]
     rank = max(each.rank for each in found)
-    gap = min(min(each.gap, each.lost_rank.gap) for each in found if each.rank == rank)
-    Rank(rank, gap).decided(f"what legs {', '.join(legs)} see")
+    what = f"what legs {', '.join(legs)} see"
+    counted, dropped = min(each.seen.weakest for each in found), max(each.seen.dropped for each in found)
+    if any(each.rank != rank for each in found):
+        raise RankUndecided(f"{what} is not the same at all configurations", counted / dropped, RANK_GAP)
+    gap = min(min(each.gap, each.lost_rank.gap) for each in found)
+    Rank(rank, gap).decided(what)
     dof = setting.dof
     lost: tuple[Freedom, ...] = ()
     if rank < dof:
         lost = _lost(setting, samples, tuple(legs), dof - rank)
-    graph = min(each.unexplained for each in found) == 0
-    return Verdict(tuple(legs), word(rank, dof), dof, rank, lost, gap, graph)
+    graph = not any(each.unexplained for each in found)
+    return Verdict(tuple(legs), word(rank, dof), dof, rank, lost, gap, graph, counted, dropped)
 
 
 def _lost(setting: Setting, samples: Samples, legs: tuple[str, ...], count: int) -> tuple[Freedom, ...]:

@@ -131,7 +131,7 @@ class Setting:
         drawn = self.everything
         question = replace(drawn.question, observations=observations)
         members = tuple(Sample(at, (), relation(at, question)) for at in self.configurations)
-        return Samples(question, drawn.twin, drawn.start, members, drawn.discarded)
+        return replace(drawn, question=question, members=members)
 
     def to_dict(self) -> dict[str, Any]:
         """What is observed, and from which link, as the records of the command line begin."""
@@ -244,7 +244,7 @@ def restricted(samples: Samples, observations: Iterable[Observation]) -> Samples
                tuple(replace(t, measured=tuple(t.measured[i] for i in places)) for t in m.way),
                selected(m.relation, places))
         for m in samples.members)
-    return Samples(question, samples.twin, samples.start, members, samples.discarded)
+    return replace(samples, question=question, members=members)
 
 
 def selected(relation: Relation, places: Sequence[int]) -> Relation:

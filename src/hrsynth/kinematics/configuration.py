@@ -19,7 +19,7 @@ from ..mechanism.observation import Observation
 from ..mechanism.so3 import logarithm
 from ..mechanism.vectors import Array, frozen, hat
 from ..tolerances import CLOSED
-from .ranks import Rank, kernel_basis
+from .ranks import Rank, kernel_and_values
 from .twin import Twin
 
 
@@ -49,12 +49,17 @@ class ClosedConfiguration:
         return self.twin.velocity(self.q, link)
 
     @cached_property
-    def _kernel(self) -> tuple[Array, Rank]:
-        return kernel_basis(self.twin.jacobian(self.q))
+    def _kernel(self) -> tuple[Array, Rank, Array]:
+        return kernel_and_values(self.twin.jacobian(self.q))
 
     def kernel(self) -> tuple[Array, Rank]:
         """A basis of T_qC, shape (nv, mobility), and the constraints' rank."""
-        return self._kernel
+        return self._kernel[:2]
+
+    @property
+    def strengths(self) -> Array:
+        """The singular values of the constraints that count, descending, (rank,)."""
+        return self._kernel[2]
 
 
 class Wanted(Protocol):

@@ -23,6 +23,11 @@ class Rank:
     gap: float
     weakest: float = 1.0
 
+    @property
+    def dropped(self) -> float:
+        """The first dropped singular value, at least ε, as a fraction of the largest."""
+        return self.weakest / self.gap
+
     def decided(self, what: str) -> int:
         """The rank, if the gap is large enough for a verdict; raises ``RankUndecided`` otherwise."""
         if self.gap < RANK_GAP:
@@ -56,12 +61,23 @@ def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]
 
 def kernel_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
     """An orthonormal basis of the kernel, shape (columns, nullity), with the rank of the matrix."""
+    return kernel_and_values(matrix, scale)[:2]
+
+
+def kernel_and_values(matrix: Array, scale: float | None = None) -> tuple[Array, Rank, Array]:
+    """As :func:`kernel_basis`, with the singular values that count, descending."""
     columns = matrix.shape[1]
     if 0 in matrix.shape:
-        return np.eye(columns), Rank(0, CLEAN)
+        return np.eye(columns), Rank(0, CLEAN), np.zeros(0)
     _, s, Vt = np.linalg.svd(matrix, full_matrices=matrix.shape[0] < columns)
     rank = rank_of(s, scale)
-    return Vt[rank.value :].T, rank
+    return Vt[rank.value :].T, rank, s[: rank.value]
+
+
+def singular_values(matrices: Array) -> Array:
+    """The singular values of each matrix (k, rows, columns), divided by the largest where that is above one; (k, n)."""
+    values = np.linalg.svd(matrices, compute_uv=False)
+    return np.asarray(values / np.maximum(values.max(axis=1, initial=1.0), 1.0)[:, None])
 
 
 def largest_angle(A: Array, B: Array) -> float:

@@ -97,10 +97,15 @@ class Relation:
         return range_basis(self.twist_part, 1.0)[0]
 
     @cached_property
-    def _unseen(self) -> tuple[Array, Rank]:
-        kernel, evidence = kernel_basis(self.rates, 1.0)
+    def _unseen(self) -> tuple[Array, Rank, Rank]:
+        kernel, seen = kernel_basis(self.rates, 1.0)
         basis, rank = range_basis(self.twist_part @ kernel, 1.0)
-        return basis, Rank(rank.value, min(rank.gap, evidence.gap))
+        return basis, Rank(rank.value, min(rank.gap, seen.gap)), seen
+
+    @property
+    def seen(self) -> Rank:
+        """The rank of the measured rates on ρ: what decides which twists are lost."""
+        return self._unseen[2]
 
     @property
     def lost(self) -> Array:

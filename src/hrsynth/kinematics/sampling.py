@@ -1,31 +1,41 @@
-"""Random closed configurations on the component of the zero configuration (theory 3.1).
+"""Random closed configurations on the component of the zero configuration (theory 3.1 and 9).
 
-Each sample is reached from the zero configuration by small steps; every step is checked: it closes, it does not jump,
-it keeps away from singularities of the loops, and the mobility stays the generic one; and the robot, led again along
-the poses and directions of the way, arrives at the same configuration. What fails is discarded and counted.
+Each sample is reached from the zero configuration by steps that follow the branch (:mod:`.branch`), halved until they
+do, away from singularities of the loops; and the robot, led again along the poses and directions of the way, arrives.
+What fails is discarded and counted. All samples must agree in what tells operation modes apart (:mod:`.operation`).
 """
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
-from ..errors import BadMechanism, NotSampled
+from ..errors import BadMechanism, BranchPoint, NotSampled
 from ..mechanism.observation import Observation
 from ..mechanism.vectors import Array
-from ..tolerances import CLOSED, FOLLOWED, INVERTED, PASSED_BY, RANK_GAP, SOLVED
+from ..tolerances import CLOSED, FOLLOWED, INVERTED, PASSED_BY, RANK_GAP, SHARP, SOLVED
+from .branch import CORRECTED, follows
 from .configuration import ClosedConfiguration, Target, closed, limited
+from .operation import OperationMode, Signature, grouped
 from .ranks import range_basis
 from .relation import Question, Relation, relation
 from .twin import Twin
 
 STEP = 0.11
 """Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
-SHRINK = (1.0, 0.4, 0.15)
-"""What a step is shortened to where it does not close near its prediction."""
+HALVED = tuple(2.0**-k for k in range(10))
+"""Parts of a step that are tried; where the last does not follow the branch, a singularity of the loops lies ahead."""
+TURNS = 3
+"""Directions that a walk tries before a singularity before it is given up."""
+STEADY = 1e-7
+"""Turn (radians) of the tangent space that the residual may cause: residual / (weakest singular value)²."""
+LEAVING = 24
+"""Steps in random directions by which the branches at a singular zero configuration are sought."""
+MET = 24
+"""Configurations beyond a singularity that are asked whether they belong to another operation mode."""
 STEPS = 4
 """Steps from the zero configuration to a sample."""
 EASY = 10
@@ -46,74 +56,105 @@ class Sample:
 @dataclass(frozen=True, eq=False)
 class Samples:
     """Samples of one mechanism for one question; ``discarded`` draws did not stay on the branch or came too near to a
-    singularity."""
+    singularity. ``met`` are other operation modes that steps too long would have led to."""
 
     question: Question
     twin: Twin
     start: ClosedConfiguration
     members: tuple[Sample, ...]
     discarded: int
+    met: tuple[OperationMode, ...] = ()
 
     @property
     def mobility(self) -> int:
         """The generic mobility, idle motions included."""
         return self.members[0].relation.mobility
 
+    @cached_property
+    def signature(self) -> Signature:
+        """What tells the samples' operation mode from others."""
+        return Signature.of(self.members[0].relation)
+
 
 def draw(twin: Twin, question: Question, count: int, seed: int = 0, *, led_by: Sequence[Observation] | None = None,
          progress: Callable[[], None] | None = None) -> Samples:
-    """``count`` random samples; raises ``NotSampled`` where too few can be reached.
+    """``count`` random samples of one operation mode; raises ``NotSampled`` where too few can be reached,
+    ``BranchPoint`` where the zero configuration belongs to several.
 
     The robot must find its way again led by the platform's pose and the observations ``led_by`` (default: all).
     """
     leading = {o.key for o in (question.observations if led_by is None else led_by)}
-    rng = np.random.default_rng(seed)
     start = ClosedConfiguration.of(twin, twin.q0)
     if relation(start, question).dimension == 0:
         raise BadMechanism(f"{twin.mechanism.name}: neither the platform nor a segment of a leg can move", None,
                            "a mechanism with at least one freedom")
+    walks = _Walks(question, leading, np.random.default_rng(seed))
+    roots = [start] if _regular(start, question, np.random.default_rng(seed)) else _ways_out(start, question, seed)
     members: list[Sample] = []
     discarded = 0
-    for _ in range(4 * count):
-        sample = _walk(start, question, leading, rng)
+    for number in range(4 * count):
+        sample = walks.walk(roots[number % len(roots)])
         if sample is None:
             discarded += 1
             continue
         members.append(sample)
         if progress is not None:
             progress()
-        if len(members) >= count:
-            usual, dropped = _usual(members)
-            discarded += dropped
-            members = usual
-            if len(members) >= count:
-                break
-    if len(members) < count:
+        if len(members) == count:
+            break
+    else:
         raise NotSampled(twin.mechanism.name, len(members), count)
-    return Samples(question, twin, start, tuple(members), discarded)
+    groups = grouped([OperationMode(Signature.of(m.relation), m.configuration) for m in members])
+    _require_one(groups, question, "the configurations reached differ as only those of several operation modes do")
+    own = groups[0][0].signature
+    beyond = grouped([each for at in walks.beyond[:MET] if (each := _mode(at, question))])
+    met = tuple(group[0] for group in beyond if not group[0].signature.agrees(own))
+    return Samples(question, twin, start, tuple(members), discarded, met)
 
 
-def _usual(members: list[Sample]) -> tuple[list[Sample], int]:
-    """The members whose mobility and dimensions are the generic ones: the smallest mobility, the most frequent rest."""
-    smallest = min(member.relation.mobility for member in members)
-    kept = [m for m in members if m.relation.mobility == smallest]
-    signature = Counter((m.relation.dimension, m.relation.dof.value, m.relation.lost.shape[1]) for m in kept)
-    best = max(signature, key=lambda key: (signature[key], key[0]))
-    kept = [m for m in kept
-            if (m.relation.dimension, m.relation.dof.value, m.relation.lost.shape[1]) == best]
-    return kept, len(members) - len(kept)
+def _mode(at: ClosedConfiguration, question: Question) -> OperationMode | None:
+    """The operation mode that a configuration shows; None where its ranks are not clear."""
+    found = relation(at, question)
+    return OperationMode(Signature.of(found), at) if found.gap >= RANK_GAP else None
 
 
-def _velocity(at: ClosedConfiguration, question: Question, wish: Array | None,
-              rng: np.random.Generator) -> tuple[Array, Array] | None:
-    """A joint velocity without idle motion whose (t, u̇) is a unit vector: near ``wish``, or random."""
+def _ways_out(start: ClosedConfiguration, question: Question, seed: int) -> list[ClosedConfiguration]:
+    """Configurations beside a singular zero configuration; raises ``BranchPoint`` where they are not of one mode."""
+    rng = np.random.default_rng(seed)
+    found = [each for _ in range(LEAVING) if (moving := _velocity(start, question, None, rng)) is not None
+             and (beside := _moved(start, moving[0], leaving=True)) is not None
+             and (each := _mode(beside, question)) is not None]
+    if not found:
+        raise NotSampled(start.twin.mechanism.name, 0, 1)
+    groups = grouped(found)
+    _require_one(groups, question, "several operation modes meet at the zero configuration (its loops have mobility "
+                                   f"{start.kernel()[0].shape[1]} there)")
+    return [each.at for each in found]
+
+
+def _require_one(groups: Sequence[Sequence[OperationMode]], question: Question, what: str) -> None:
+    if len(groups) > 1:
+        first, at = groups[0][0].signature, groups[0][0].at
+        others = [groups[1][0].signature, *[first] * (len(groups) - 1)]
+        raise BranchPoint(at.twin.mechanism.name, what, [
+            group[0].beside(other, [o.leg for o in question.observations]) for group, other in zip(groups, others,
+                                                                                           strict=True)])
+
+
+def _velocity(at: ClosedConfiguration, question: Question, wish: Array | None, rng: np.random.Generator | None
+              ) -> tuple[Array, Array] | None:
+    """A joint velocity without idle motion whose (t, u̇) is a unit vector: near ``wish``, or random; without ``rng``
+    as ``wish`` as can be."""
     kernel, _ = at.kernel()
     image = question.rows(at) @ kernel
     basis, rank = range_basis(image, 1.0)
     if rank.value == 0:
         return None
-    wanted = basis @ (rng.normal(size=rank.value) if wish is None else basis.T @ wish
-                      + 0.2 * rng.normal(size=rank.value) / np.sqrt(rank.value))
+    wanted = np.zeros(rank.value) if wish is None else basis.T @ wish
+    if rng is not None:
+        wanted = rng.normal(size=rank.value) if wish is None else wanted
+        wanted = wanted + 0.2 * rng.normal(size=rank.value) / np.sqrt(rank.value)
+    wanted = basis @ wanted
     norm = float(np.linalg.norm(wanted))
     if norm < 1e-6:
         return None
@@ -121,49 +162,96 @@ def _velocity(at: ClosedConfiguration, question: Question, wish: Array | None,
     return kernel @ np.linalg.lstsq(image, wanted, rcond=INVERTED)[0], wanted
 
 
-def _walk(start: ClosedConfiguration, question: Question, leading: set[tuple[str, ...]],
-          rng: np.random.Generator) -> Sample | None:
-    twin = start.twin
-    here, wish = start, None
-    way: list[Target] = []
-    weakest = WEAKEST * start.kernel()[1].weakest
-    for _ in range(STEPS):
-        moved = _step(here, question, wish, weakest, rng)
-        if moved is None:
+class _Walks:
+    """Random walks of one seed; ``beyond`` collects closed configurations that too long steps came to."""
+
+    def __init__(self, question: Question, leading: set[tuple[str, ...]], rng: np.random.Generator) -> None:
+        self.question, self.leading, self.rng = question, leading, rng
+        self.beyond: list[ClosedConfiguration] = []
+
+    def walk(self, start: ClosedConfiguration) -> Sample | None:
+        """The sample at the end of a random walk; None where it is blocked, or the robot does not find its way."""
+        question = self.question
+        here, wish = start, None
+        way: list[Target] = []
+        weakest = WEAKEST * start.kernel()[1].weakest
+        for _ in range(STEPS):
+            moved = None
+            for attempt in range(TURNS):
+                moving = _velocity(here, question, None if attempt else wish, self.rng)
+                moved = None if moving is None else self._stride(here, *moving, weakest)
+                if moved is not None:
+                    break
+            if moved is None:
+                return None
+            here, wish = moved
+            way.append(question.target(here))
+        here = _sharpened(here)
+        if here.residual > STEADY * here.kernel()[1].weakest ** 2:
             return None
-        here, wish = moved
-        way.append(question.target(here))
-    found = relation(here, question)
-    led = [replace(t, measured=tuple(pair for pair in t.measured if pair[0].key in leading))
-           for t in way]
-    if found.gap < RANK_GAP or followed(twin, led, iterations=EASY)[1] > FOLLOWED:
-        return None
-    return Sample(here, tuple(way), found)
-
-
-def _step(here: ClosedConfiguration, question: Question, wish: Array | None, weakest: float,
-          rng: np.random.Generator) -> tuple[ClosedConfiguration, Array] | None:
-    """The next configuration of a walk and the direction of the step in (t, u̇); None where it jumps or comes too near
-    to a singularity of the loops."""
-    for shrink in SHRINK:
-        moving = _velocity(here, question, wish, rng)
-        if moving is None:
+        found = relation(here, question)
+        led = [replace(t, measured=tuple(pair for pair in t.measured if pair[0].key in self.leading)) for t in way]
+        if found.gap < RANK_GAP or followed(here.twin, led, iterations=EASY)[1] > FOLLOWED:
             return None
-        velocity, direction = moving
-        there = _moved(here, shrink * velocity)
-        if there is not None:
-            return None if there.kernel()[1].weakest < weakest else (there, direction)
-    return None
+        return Sample(here, tuple(way), found)
+
+    def _stride(self, here: ClosedConfiguration, velocity: Array, direction: Array, weakest: float
+                ) -> tuple[ClosedConfiguration, Array] | None:
+        """The configuration a step along ``direction`` in (t, u̇) leads to, in parts that follow the branch; None where
+        it comes too near to a singularity of the loops."""
+        came, part = 0.0, 1.0
+        while came < 1:
+            part = min(part, 1 - came)
+            there = _moved(here, part * velocity, self.beyond)
+            if there is None:
+                part /= 2
+                if part < HALVED[-1]:
+                    return None
+                continue
+            if there.kernel()[1].weakest < weakest:
+                return None
+            here, came, part = there, came + part, 2 * part
+            if came < 1:
+                moving = _velocity(here, self.question, direction, None)
+                if moving is None:
+                    return None
+                velocity, direction = moving
+        return here, direction
 
 
-def _moved(here: ClosedConfiguration, velocity: Array) -> ClosedConfiguration | None:
-    """The configuration a step along ``velocity`` leads to; None where it does not close near its prediction."""
+def _sharpened(here: ClosedConfiguration) -> ClosedConfiguration:
+    """The same configuration, its loops closed as well as numbers allow where it is near a singularity."""
+    if here.residual <= STEADY * here.kernel()[1].weakest ** 2:
+        return here
+    return ClosedConfiguration.of(here.twin, closed(here.twin, here.q, tolerance=SHARP, iterations=5)[0])
+
+
+def _moved(here: ClosedConfiguration, velocity: Array, beyond: list[ClosedConfiguration] | None = None, *,
+           leaving: bool = False) -> ClosedConfiguration | None:
+    """The configuration a step along ``velocity`` leads to; None where it does not close near its prediction, or does
+    not follow the branch: what it closes to goes to ``beyond`` then. ``leaving`` a singular configuration, any branch
+    will do."""
     step = limited(STEP * velocity, 3 * STEP)
     predicted = here.twin.moved(here.q, step)
     q, residual = closed(here.twin, predicted, tolerance=SOLVED)
-    if residual <= CLOSED and np.linalg.norm(q - predicted) <= 0.5 * np.linalg.norm(step) + 1e-9:
-        return ClosedConfiguration.of(here.twin, q)
+    if not residual <= CLOSED:
+        return None
+    there, length = ClosedConfiguration.of(here.twin, q), float(np.linalg.norm(step))
+    apart = float(np.linalg.norm(here.twin.difference(predicted, q)))
+    if leaving:
+        return there if apart <= length / 2 else None
+    if apart <= CORRECTED * length + 1e-9 and follows(here, step, there):
+        return there
+    if beyond is not None:
+        beyond.append(there)
     return None
+
+
+def _regular(start: ClosedConfiguration, question: Question, rng: np.random.Generator) -> bool:
+    """Whether some step from a configuration, however short, follows its branch: not so where branches meet."""
+    moving = _velocity(start, question, None, rng)
+    parts = (*HALVED[::3], 1e-4, 1e-5)
+    return moving is not None and any(_moved(start, part * moving[0]) is not None for part in parts)
 
 
 def wander(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40) -> Iterator[ClosedConfiguration]:
@@ -178,7 +266,7 @@ def wander(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 4
             kernel, _ = here.kernel()
             velocity = kernel @ (kernel.T @ velocity + rng.normal(size=kernel.shape[1]) / 2)
             velocity /= np.linalg.norm(velocity)
-            moved = next((m for shrink in SHRINK if (m := _moved(here, 2 * shrink * velocity)) is not None), None)
+            moved = next((m for part in HALVED if (m := _moved(here, 2 * part * velocity)) is not None), None)
             if moved is None or moved.kernel()[1].weakest < weakest:
                 failed += 1
                 break

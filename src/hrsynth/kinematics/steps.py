@@ -8,6 +8,7 @@ import numpy as np
 
 from ..mechanism.vectors import Array
 from ..tolerances import AS_PRINTED, CLOSED, FOLLOWED, NEAREST, PASSED_BY, RANK_CUTOFF, SOLVED
+from .branch import follows, nears
 from .configuration import Aim, ClosedConfiguration, closed, limited, system
 from .parts import Goal, PlatformMotion
 from .ranks import kernel_basis, range_basis
@@ -70,7 +71,7 @@ def _eased(here: ClosedConfiguration, goal: Aim, X: Array, stride: float) -> Clo
         if fraction == 1 and np.linalg.norm(error) <= SOLVED:
             break
         step = kernel @ np.linalg.lstsq(rows @ kernel, -error, rcond=EASY_RANK)[0]
-        there = _corrected(here, limited(step, 3 * STRIDE), None)
+        there = next(_shrinking(here, limited(step, 3 * STRIDE), None), None)
         if there is None:
             break
         here = there
@@ -101,14 +102,16 @@ def _beyond(before: Array, after: Array) -> bool:
 
 
 def _corrected(here: ClosedConfiguration, step: Array, goal: Aim | None) -> ClosedConfiguration | None:
-    """The closed configuration at the goal after a step; None where there is none or the correction is a jump."""
+    """The closed configuration at the goal after a step; None where there is none, the correction is a jump, or the
+    step does not follow the branch."""
     twin = here.twin
     predicted = twin.moved(here.q, step)
     q, residual = closed(twin, predicted, goal, tolerance=SOLVED, iterations=15)
     allowed = max(0.5 * float(np.linalg.norm(step)), JUMP)
     if not residual <= CLOSED or np.linalg.norm(q - predicted) > allowed:
         return None
-    return ClosedConfiguration.of(twin, q)
+    there = ClosedConfiguration.of(twin, q)
+    return there if follows(here, step, there) or nears(here, step, there) else None
 
 
 def nearest(here: ClosedConfiguration, goal: Aim, home: Goal) -> ClosedConfiguration:
@@ -138,7 +141,7 @@ def _drawn_home(here: ClosedConfiguration, goal: Aim, home: Goal, iterations: in
     return here
 
 
-def _shrinking(here: ClosedConfiguration, step: Array, goal: Aim) -> Iterator[ClosedConfiguration]:
+def _shrinking(here: ClosedConfiguration, step: Array, goal: Aim | None) -> Iterator[ClosedConfiguration]:
     for shrink in (1.0, 0.5, 0.25, 0.1, 0.02):
         there = _corrected(here, shrink * step, goal)
         if there is not None:
