@@ -77,6 +77,12 @@ def _normed(v: Array) -> Array:
     return v / np.sqrt(np.sum(v * v, axis=-1, keepdims=True))
 
 
+def cross(a: Array, b: Array) -> Array:
+    """a × b along the last axis (NumPy's own takes ten times as long for small arrays)."""
+    a0, a1, a2, b0, b1, b2 = a[..., 0], a[..., 1], a[..., 2], b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], -1)
+
+
 def _vector(element: ElementTree.Element | None, key: str, default: str, kind: type) -> Array:
     text = default if element is None else element.get(key, default)
     return np.array([kind(word) for word in text.split()])
@@ -97,8 +103,8 @@ def normals(axis: Array) -> tuple[Array, Array]:
     """Two unit vectors normal to an axis and to each other."""
     other = np.zeros(3, dtype=axis.dtype)
     other[int(np.argmin(np.abs(axis)))] = 1
-    first = _normed(np.cross(axis, other))
-    return first, np.cross(axis, first)
+    first = _normed(cross(axis, other))
+    return first, cross(axis, first)
 
 
 @dataclass(frozen=True)
@@ -222,7 +228,7 @@ class Robot:
             return None
         _, first, axis = ends[0]
         for _, at, other in ends[1:]:
-            if np.linalg.norm(np.cross(axis, other)) > 1e-9 or np.linalg.norm(np.cross(at - first, axis)) > 1e-9:
+            if np.linalg.norm(cross(axis, other)) > 1e-9 or np.linalg.norm(cross(at - first, axis)) > 1e-9:
                 return None
         return np.asarray(R0[k].T @ (first - p0[k]))
 
@@ -244,7 +250,7 @@ class Robot:
         sinc = np.where(angle > 1e-9, np.sin(angle) / np.where(angle > 1e-9, angle, 1), 1 - angle**2 / 6)
         w, v = np.cos(angle), half * sinc
         w0, v0 = at.quats[..., :1], at.quats[..., 1:]
-        quats = np.concatenate([w0 * w - np.sum(v0 * v, -1, keepdims=True), w0 * v + w * v0 + np.cross(v0, v)], -1)
+        quats = np.concatenate([w0 * w - np.sum(v0 * v, -1, keepdims=True), w0 * v + w * v0 + cross(v0, v)], -1)
         return State(theta, _normed(quats) if self.balls else quats)
 
     def frames(self, at: State) -> tuple[Array, Array, Array]:
@@ -264,7 +270,7 @@ class Robot:
             if joint.kind == "R":
                 R[:, k] = Ri @ _about(joint.axis, at.theta[:, joint.place])
                 w = Ri @ joint.axis
-                screws[:, joint.place, :3], screws[:, joint.place, 3:] = w, np.cross(pi, w)
+                screws[:, joint.place, :3], screws[:, joint.place, 3:] = w, cross(pi, w)
             elif joint.kind == "P":
                 a = Ri @ joint.axis
                 screws[:, joint.place, 3:] = a
@@ -274,7 +280,7 @@ class Robot:
                 ball += 1
                 for c in range(3):
                     w = R[:, k, :, c]
-                    screws[:, joint.place + c, :3], screws[:, joint.place + c, 3:] = w, np.cross(pi, w)
+                    screws[:, joint.place + c, :3], screws[:, joint.place + c, 3:] = w, cross(pi, w)
         return R, p, screws
 
     @cached_property
@@ -296,9 +302,7 @@ class Robot:
         R, p, screws = frames
         arm = np.einsum("nkij,kj->nki", R[:, items.links], items.local) + items.point[:, None] * p[:, items.links]
         w, v = screws[:, None, :, :3], screws[:, None, :, 3:]
-        a = arm[:, :, None]
-        J = np.stack([w[..., 1] * a[..., 2] - w[..., 2] * a[..., 1], w[..., 2] * a[..., 0] - w[..., 0] * a[..., 2],
-                      w[..., 0] * a[..., 1] - w[..., 1] * a[..., 0]], -1)
+        J = cross(w, arm[:, :, None])
         J += items.point[:, None, None] * v
         J *= self.carried[items.links][None, :, :, None]
         return arm, J

@@ -10,7 +10,7 @@ from adversary.case import HELD, SILENT, UNCLEAR, WRONG, Case, apart, matrix_of
 from adversary.robot import Array, Items, State, things
 from adversary.search import distinct, polished, scattered, solve, split
 
-STARTS = 150
+STARTS = 120
 PLACES = {"poses turned as this one": "turned", "poses whose bodies are turned as at this one": "bodies"}
 
 
@@ -20,8 +20,10 @@ def hidden(case: Case) -> None:
 
 
 def real(case: Case) -> None:
-    """The modes of the real robot, at zero."""
-    lists(case, real=True)
+    """The modes of the real robot; of four in five robots with six freedoms they take too long."""
+    six = int(np.sum(np.linalg.svd(case.study.locals(case.robot.zero())[0].T, compute_uv=False) > 1e-6)) == 6
+    if not six or case.rng.random() < 0.2:
+        lists(case, real=True)
 
 
 def lists(case: Case, real: bool) -> None:

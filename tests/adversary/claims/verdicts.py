@@ -11,6 +11,10 @@ from adversary.robot import Items
 from adversary.search import Local
 
 
+MOST = 24
+"""Sets of legs of one robot that are looked at."""
+
+
 def generic(case: Case, items: Items | None) -> tuple[int, int] | str:
     """Freedoms of the platform and how many are seen, the same at all configurations of the walk; else why not."""
     at, _ = case.walked
@@ -50,7 +54,8 @@ def verdicts(case: Case) -> None:
 
 def judge(case: Case, told: object, segments: dict[str, object]) -> None:
     """Hold the verdicts of a table of legs against the walk."""
-    for each in told.sets:  # type: ignore[attr-defined]
+    sets = told.sets  # type: ignore[attr-defined]
+    for each in [sets[i] for i in sorted(case.rng.permutation(len(sets))[:MOST])]:
         items = case.directions([segments[leg] for leg in each.legs])
         own = generic(case, items)
         named = f"legs {', '.join(each.legs)}: rank {each.rank} of {each.dof}"
