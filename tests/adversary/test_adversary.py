@@ -121,7 +121,7 @@ def test_an_enclosure_that_misses_is_found():
         told = hrsynth.modes(case.engine, ["1", "3", "5"], at=at)
         case.found.clear()
         for radius, outcome in ((1e-9, HELD), (0.0, WRONG)):
-            moved = [replace(mode, radius=radius, proved=True, pose=replace(
+            moved = [replace(mode, shift=radius, turn=radius, proved=True, rounded=False, pose=replace(
                 mode.pose, x=mode.pose.x + (0.0 if radius else 1e-13))) for mode in told.modes]
             case.found.clear()
             enclosures.judge(case, replace(told, modes=tuple(moved)), at)

@@ -38,7 +38,7 @@ def judge(case: Case, told: Any, asked: str | None) -> None:
         return
     rows = exact.held(items, exact.items(items, exact.frames(goal))[0][0])
     for mode in told.modes:
-        if not (mode.proved and np.isfinite(mode.radius)) or mode.configuration is None:
+        if not (mode.proved and np.isfinite(mode.radius)) or mode.rounded or mode.configuration is None:
             continue
         near = case.fitted(mode.configuration)
         if near is None or apart(case, mode.pose, near) > 1e-5:
@@ -48,10 +48,13 @@ def judge(case: Case, told: Any, asked: str | None) -> None:
             case.say("enclosure", UNCLEAR, "more equations than unknowns, closed to rounding only")
             continue
         at, sharp = found
-        off, length = distance(case, exact, mode, at), float(told.setting.mechanism.length)
-        allowed = mode.radius + ROUNDING * max(1.0, float(np.max(np.abs(matrix_of(mode.pose)[0]))) / length) + sharp
-        case.say("enclosure", HELD if off <= allowed else WRONG,
-                 "" if off <= allowed else f"{mode.pose}: radius {mode.radius:.2e}, the mode is {off:.2e} away")
+        slack = ROUNDING + sharp
+        for name, (shift, turn) in distances(case, exact, mode, at).items():
+            good = (shift <= mode.shift + slack * max(case.robot.length, float(np.max(np.abs(matrix_of(mode.pose)[0]))))
+                    and turn <= mode.turn + slack)
+            case.say("enclosure", HELD if good else WRONG, "" if good else (
+                f"{name} at {mode.pose}: within {mode.shift:.2e} m, {mode.turn:.2e} rad told, "
+                f"the mode is {shift:.2e} m, {turn:.2e} rad away"))
 
 
 def asked_exactly(case: Case, exact: Robot, told: Any, asked: str) -> State | None:
@@ -87,17 +90,24 @@ def refined(exact: Robot, rows: Any, at: State) -> tuple[State, float] | None:
     return (at, 4 * worth * max(size, 1e-19)) if worth * size < 1e-14 else None
 
 
-def distance(case: Case, exact: Robot, mode: Any, at: State) -> float:
-    """How far the platform of a configuration is from the told pose (characteristic lengths, radians)."""
-    frames = exact.frames(at)
-    k = exact.number(exact.platform)
-    R, p = frames[0][0, k], frames[1][0, k]
-    point = case.robot.point
-    if point is not None:
-        p = p + R @ point
+def distances(case: Case, exact: Robot, mode: Any, at: State) -> dict[str, tuple[float, float]]:
+    """How far the platform, or each body of which the radius speaks, is from where it is told to be (m, rad)."""
+    R, p, _ = (each[0] for each in exact.frames(at))
+    found = {}
+    if mode.enclosed:
+        for name in set(mode.enclosed) & set(exact.links) & set(mode.bodies or {}):
+            k, X = exact.number(name), mode.bodies[name]
+            found[name] = _off(p[k] - X[:3, 3], R[k] - X[:3, :3])
+        return found
+    k, point = exact.number(exact.platform), case.robot.point
     x, told = matrix_of(mode.pose)
-    away = float(np.linalg.norm((p - x).astype(float))) / case.robot.length
-    return away if told is None or point is not None else max(away, float(np.linalg.norm((R - told).astype(float), 2)))
+    if told is None or point is not None:
+        return {"the point": (_off(p[k] + R[k] @ (np.zeros(3) if point is None else point) - x, 0 * R[k])[0], 0.0)}
+    return {"the platform": _off(p[k] - x, R[k] - told)}
+
+
+def _off(shift: Array, turned: Array) -> tuple[float, float]:
+    return float(np.linalg.norm(shift.astype(float))), float(np.linalg.norm(turned.astype(float), 2))
 
 
 def _matrix(rpy: Array) -> Array:

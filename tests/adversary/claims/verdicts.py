@@ -10,7 +10,6 @@ from adversary.case import HELD, REFUSED, UNCLEAR, WRONG, Case
 from adversary.robot import Items
 from adversary.search import Local
 
-
 MOST = 24
 """Sets of legs of one robot that are looked at."""
 
