@@ -1,35 +1,70 @@
 """Exact verdicts of an architecture: ranks over the rationals at random instances of its geometry (theory 3.4).
 
 Instantaneous kinematics depends on joint centres, joint axes and observed directions alone, and any choice of them *is*
-an assembled mechanism; link lengths do not matter. With A the constraints, X the platform's twist and Y the rates of
-the directions, an instance (:mod:`.instances`) is believed only if dim ker A, rank X and rank [X; Y] on ker A are the
-robot's own mobility, dof and dim ρ. The legs see rank X − rank [X; Y] + rank Y of the platform's freedoms.
+an assembled mechanism; link lengths do not matter. F is the irreducible family of geometries with all relations that
+persist in the robot's motion; an instance is one of its rational members. With A the constraints, X the platform's
+twist and Y the rates of the directions, the legs see rank X − rank [X; Y] + rank Y of the platform's freedoms, ranks
+on ker A.
 
-*Controllable* at one instance is proved for the architecture: T_qC ⊂ ker A, over-constrained mechanisms included, and
-rank Y can only grow from there. A *deficient* verdict holds the largest rank of several instances: it is probabilistic,
-wrong only if all of them are special by chance. What a single link's dimensions make special (three centres on a line)
-belongs to a robot, not to its architecture; it may see less than its architecture, never more.
+*Proved*: almost all members of F are controllable, over-constrained mechanisms included (T_qC ⊂ ker A). Premises, and
+what each rests on:
+
+1. every relation of F holds on the robot's branch: *carried* by links and joints, from the file
+   (:mod:`hrsynth.mechanism.carried`), or *kept* by all motions where all relations hold (:mod:`.kept`), which asks for
+   a regular zero configuration (4) and an identity that is tested at random instances, with a chance of error;
+2. rank [A; Y] = rank [A; Y; X] at one instance: exact;
+3. rank [A; Y; X] there is the largest on F: exact where only the spins of rods between two S joints are left out, which
+   every member has; else as likely as at several random instances it is the same and yet not the largest;
+4. the robot is a regular member of F: the conditions on each direction and on all centres have the rank of the
+   instance's (with 1: so has A). Numerical, at the zero configuration, else at a sample.
+
+That the robot's own mobility, dof and dim ρ, at samples, are those of the instances is compared besides, and numerical:
+it says that F has all relations that matter. Relations that are neither carried nor kept are *observed*, at samples:
+then the word is not *proved*, and they are named. A *deficient* verdict holds the largest rank of several instances: it
+is probabilistic, wrong only if all of them are special by chance. What a single link's dimensions make special (three
+centres on a line) belongs to a robot, not to its architecture; it may see less than its architecture, never more.
 """
 
 from __future__ import annotations
 
+import math
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from ..kinematics.batch.stage import frames_at
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Question, Relation
 from ..mechanism import Mechanism, Observation
+from ..mechanism.carried import Tie, carried, ties
+from ..mechanism.model import JointType
 from ..mechanism.observation import Direction, labels_of
 from ..mechanism.relations import Relations, recognise
-from .instances import Instance, NotRecognised, draw, instance
+from .instances import LARGEST, Instance, NotRecognised, draw, instance, ranks_at
+from .kept import degree, kept
 from .setting import Setting, selected
 from .verdict import word
 
 INSTANCES = 5
 """Random instances at which a deficient rank is confirmed."""
+TESTS = 3
+"""Random instances at which identities are tested."""
+
+
+@dataclass(frozen=True)
+class Basis:
+    """What the relations of an architecture rest on: how many are ``carried`` by links and joints, how many closed
+    loops keep besides, and those merely ``observed``, in words."""
+
+    carried: int
+    kept: int
+    observed: tuple[str, ...]
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"carried": self.carried, "kept": self.kept, "observed": list(self.observed)}
 
 
 @dataclass(frozen=True)
@@ -37,7 +72,8 @@ class ExactVerdict:
     """What an architecture's generic geometry sees with some legs observed.
 
     ``verdict`` and ``rank`` are None where it is not ``exact``; ``reason`` says why. ``instances`` counts the random
-    instances that carry the verdict: one where it is proved.
+    instances that carry the verdict: one where it is controllable. ``chance`` bounds that of an error where it is
+    ``proved`` by identities that were tested at random instances.
     """
 
     legs: tuple[str, ...]
@@ -47,27 +83,33 @@ class ExactVerdict:
     exact: bool
     instances: int
     reason: str
+    proved: bool = False
+    chance: float = 0.0
+    basis: Basis | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"verdict": self.verdict, "exact": self.exact, "rank": self.rank, "instances": self.instances,
-                "reason": self.reason}
+                "reason": self.reason, "proved": self.proved, "chance": self.chance,
+                "relations": self.basis and self.basis.to_dict()}
 
 
 class ExactArchitecture:
     """The architecture of a mechanism: answers for any set of its observed directions.
 
-    ``relation`` is ρ at a generic configuration for all ``observations``: what an instance must reproduce.
+    ``relation`` is ρ at a generic configuration for all ``observations``: what an instance must reproduce; ``start``
+    is the mobility at the first configuration of the relations, the zero configuration.
     """
 
     def __init__(self, mechanism: Mechanism, relations: Relations, observations: Sequence[Direction],
-                 relation: Relation) -> None:
+                 relation: Relation, start: int | None = None) -> None:
         self.mechanism = mechanism
         self.relations = relations
         self.observations = tuple(observations)
         self.relation = relation
+        self.start = relation.mobility if start is None else start
         self.dof = relation.dof.value
-        self.obstacle = "gears are not part of exact geometry" if mechanism.couplings else ""
+        self.obstacle = "gears are not part of exact geometry" if mechanism.couplings else relations.doubt
         """Why there are no instances; empty as long as there are."""
         self._places = {o.key: i for i, o in enumerate(self.observations)}
         self._instances: list[Instance] = []
@@ -98,11 +140,64 @@ class ExactArchitecture:
         legs = labels_of(observed)
         try:
             rank, instances = self._rank(observed)
+            basis = self.basis
+            chance = self._chance(observed) if rank == self.dof and not basis.observed else 0.0
         except NotRecognised as error:
             return ExactVerdict(legs, None, None, self.dof, False, 0, str(error))
-        reason = ("proved in exact arithmetic" if rank == self.dof else
-                  f"exact at {instances} random instances")
-        return ExactVerdict(legs, word(rank, self.dof), rank, self.dof, True, instances, reason)
+        proved = rank == self.dof and not basis.observed
+        reason = "proved in exact arithmetic" if proved else f"exact at {instances} random instance{'s'[:instances - 1]}"
+        if chance:
+            reason += f", but for a chance below 1e{math.ceil(math.log10(chance))}"
+        if basis.observed:
+            reason += f" of geometry with {len(basis.observed)} relations observed at samples ({basis.observed[0]})"
+        return ExactVerdict(legs, word(rank, self.dof), rank, self.dof, True, instances, reason, proved, chance, basis)
+
+    @cached_property
+    def basis(self) -> Basis:
+        """What the relations rest on; raises ``NotRecognised`` where the robot is no regular member of its family."""
+        every = ties(self.relations)
+        known = carried(self.mechanism, self.relations, every)
+        left = [tie for tie, holds in zip(every, known, strict=True) if not holds]
+        regular = self._regular()
+        if left and not (regular and self.start == self.instance(0).mobility and self._all_kept(every)):
+            return Basis(len(every) - len(left), 0, tuple(tie.words(self.relations) for tie in left))
+        return Basis(len(every) - len(left), len(left), ())
+
+    def _regular(self) -> bool:
+        """Whether the zero configuration is a regular member of the family, as the instance is; a sample must be."""
+        ranks = self.instance(0).geometry.ranks
+        if ranks_at(self.relations, 0) == ranks:
+            return True
+        if ranks_at(self.relations, -1) != ranks:
+            raise NotRecognised("its geometry is not recognised: it is more special than its relations say")
+        return False
+
+    def _all_kept(self, every: Sequence[Tie]) -> bool:
+        """Whether the motions of each of some instances keep all relations."""
+        return all(all(kept(every, self.relations, self.instance(i))) for i in range(TESTS))
+
+    def _chance(self, observed: Sequence[Observation]) -> float:
+        """A bound of the chance that an identity on which *proved* rests is none (0: there are none to test)."""
+        places = [self._places[o.key] for o in observed]
+        found = [self.instance(0)]
+        spins = sum(self._spins(link, places) for link in self.mechanism.links)
+        tested = self.basis.kept
+        if found[0].mobility - found[0].ranks(places)[0] != spins:
+            tested += 1
+            found += [self.instance(i) for i in range(1, TESTS)]
+            for each in found:
+                _same("dim ρ of these legs", each.ranks(places)[0], found[0].ranks(places)[0])
+        return tested * (degree(self.relations, len(found[0].free)) / (2 * LARGEST)) ** TESTS
+
+    def _spins(self, link: str, places: Sequence[int]) -> bool:
+        """Whether a link is a rod between two S joints that can spin unseen."""
+        joints = self.mechanism.joints_of(link)
+        if (len(joints) != 2 or {joint.type for joint in joints} != {JointType.SPHERICAL}
+                or link in (self.mechanism.base, self.mechanism.platform, self.mechanism.reference)):
+            return False
+        ends = {self.relations.centres[joint.name] for joint in joints}
+        return all(self.relations.sights[i].kind == "between" and set(self.relations.sights[i].points) == ends
+                   for i in places if self.observations[i].link == link)
 
     def _rank(self, observed: Sequence[Observation]) -> tuple[int, int]:
         """The largest rank seen, and the instances looked at: one that sees everything is enough."""
@@ -134,7 +229,7 @@ def architecture_of(mechanism: Mechanism, question: Question, at: Sequence[Close
     places = [i for i, o in enumerate(question.observations) if type(o) is Direction]
     directions = [o for o in question.observations if type(o) is Direction]
     relations = recognise(mechanism, frames_at(at), directions, question.point)
-    return ExactArchitecture(mechanism, relations, directions, selected(relation, places))
+    return ExactArchitecture(mechanism, relations, directions, selected(relation, places), at[0].kernel()[0].shape[1])
 
 
 def _same(what: str, here: int, there: int) -> None:

@@ -16,17 +16,19 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..kinematics.ranks import rank_of
 from ..mechanism import Joint, Mechanism, graphs
 from ..mechanism.incidences import Incidence
 from ..mechanism.observation import Direction
 from ..mechanism.relations import Relations, Sight
 from ..mechanism.screws import Numbers, allowed, cross, normals
+from ..tolerances import RANK_CUTOFF, RANK_GAP
 
 if TYPE_CHECKING:
     from flint import fmpz_mat
 
-LARGEST = 10**6
-"""Range of the random whole numbers: two that should differ are equal once in a million draws."""
+LARGEST = 10**9
+"""Range of the random whole numbers, of either sign: the larger, the smaller the chance of an accident."""
 
 
 class NotRecognised(Exception):
@@ -39,6 +41,8 @@ class Geometry:
 
     directions: tuple[Numbers, ...]
     centres: Numbers
+    ranks: tuple[int, ...] = ()
+    """Ranks of the conditions on each direction, and of those on all centres."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,8 +50,23 @@ class Instance:
     """Exact maps on a basis of ker A, the velocities that all joints allow: the platform's twist (twist rows,
     mobility), and u × (ω − ω of the reference) for each observed direction (3, mobility)."""
 
+    geometry: Geometry
     twist: Numbers
     rates: tuple[Numbers, ...]
+    links: Mapping[str, Numbers]
+    """The twists of all links for each joint's rates (6, rates)."""
+    free: Numbers
+    """The basis of ker A (rates, mobility)."""
+
+    @property
+    def idle(self) -> int:
+        """Dimension of the motions that neither move the platform nor change an observed direction."""
+        return self.mobility - self.ranks(range(len(self.rates)))[0]
+
+    def twists(self) -> dict[str, Numbers]:
+        """The twists of all links on the basis of ker A (6, mobility)."""
+        rows = np.vstack(list(self.links.values()))
+        return dict(zip(self.links, _times(rows, self.free).reshape(-1, 6, self.mobility), strict=True))
 
     @property
     def mobility(self) -> int:
@@ -69,9 +88,27 @@ def draw(relations: Relations, rng: random.Random) -> Geometry:
     """A random geometry; raises ``NotRecognised`` where the relations leave no direction to choose."""
     from flint import fmpq
 
-    directions = _directions(relations, rng)
-    centres = _centres(relations, directions, rng)
-    return Geometry(tuple(np.array([fmpq(x) for x in each], dtype=object) for each in directions), centres)
+    directions, ranks = _directions(relations, rng)
+    n = relations.count
+    basis = kernel(_centre_rows(relations, directions))
+    centres = np.asarray((basis @ _numbers(basis.shape[1], rng)).reshape(n, 3))
+    return Geometry(tuple(np.array([fmpq(x) for x in each], dtype=object) for each in directions), centres,
+                    (*ranks, 3 * n - basis.shape[1]))
+
+
+def ranks_at(relations: Relations, place: int) -> tuple[int, ...]:
+    """The same ranks as those of ``Geometry``, in floating point, at one of the configurations of the relations; -1
+    where the singular values leave no gap."""
+    directions = list(relations.directions[:, place])
+    rows = [*(_direction_rows(conditions, directions) for conditions in relations.tower),
+            _centre_rows(relations, directions)]
+    found = []
+    for each in rows:
+        matrix = each.astype(float)
+        sizes = np.maximum(np.linalg.norm(matrix, axis=1, keepdims=True), RANK_CUTOFF)
+        seen = rank_of(np.linalg.svd(matrix / sizes, compute_uv=False))
+        found.append(seen.value if seen.gap >= RANK_GAP else -1)
+    return tuple(found)
 
 
 def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[Direction], drawn: Geometry
@@ -81,16 +118,15 @@ def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[
     velocities, loops = _velocities(mechanism, screws)
     t = velocities[mechanism.platform]
     if relations.point is not None:
-        point, scale = _scaled(drawn.centres[relations.point])
+        point, scale = scaled(drawn.centres[relations.point])
         t = scale * t[:3] + cross(t[3:], point)
     parts = [t]
     for observation, sight in zip(observations, relations.sights, strict=True):
         turn = velocities[observation.link] - velocities[observation.seen_from or mechanism.reference]
-        parts.append(cross(_scaled(seen(sight, drawn))[0], turn[3:]))
+        parts.append(cross(scaled(seen(sight, drawn))[0], turn[3:]))
     rows, (free, _) = np.vstack(parts), _reduced(loops)
-    moved = np.array((_matrix(rows) * _matrix(free)).entries(), dtype=object).reshape(len(rows), free.shape[1])
-    t, *rates = np.split(moved, np.cumsum([len(part) for part in parts[:-1]]))
-    return Instance(t, tuple(rates))
+    t, *rates = np.split(_times(rows, free), np.cumsum([len(part) for part in parts[:-1]]))
+    return Instance(drawn, t, tuple(rates), velocities, free)
 
 
 def _screws(joint: Joint, relations: Relations, drawn: Geometry) -> Numbers:
@@ -99,8 +135,8 @@ def _screws(joint: Joint, relations: Relations, drawn: Geometry) -> Numbers:
 
     number = relations.centres.get(joint.name)
     anywhere = np.array([fmpz(0)] * 3, dtype=object)
-    point, scale = (anywhere, 1) if number is None else _scaled(drawn.centres[number])
-    axes = [_scaled(drawn.directions[c])[0] for c in relations.axes[joint.name]]
+    point, scale = (anywhere, 1) if number is None else scaled(drawn.centres[number])
+    axes = [scaled(drawn.directions[c])[0] for c in relations.axes[joint.name]]
     found = [np.concatenate([screw[:3], scale * screw[3:]]) if screw[3:].any() else screw
              for screw in allowed(joint.type, point, axes)]
     return np.array(found, dtype=object).reshape(-1, 6).T
@@ -127,21 +163,28 @@ def _velocities(mechanism: Mechanism, screws: Mapping[str, Numbers]) -> tuple[di
     return velocities, np.vstack(loops)
 
 
-def _directions(relations: Relations, rng: random.Random) -> tuple[Numbers, ...]:
-    """A direction for each class, one after another, whole numbers."""
+def _directions(relations: Relations, rng: random.Random) -> tuple[tuple[Numbers, ...], list[int]]:
+    """A direction for each class, one after another, whole numbers; the rank of the conditions on each."""
     found: list[Numbers] = []
+    ranks: list[int] = []
     for number, conditions in enumerate(relations.tower):
-        rows = [found[c[0]] if len(c) == 1 else cross(found[c[0]], found[c[1]]) for c in conditions]
-        basis = kernel(np.array(rows, dtype=object).reshape(-1, 3))
+        basis = kernel(_direction_rows(conditions, found))
         if basis.shape[1] == 0:
             raise NotRecognised("no random direction fits all that is parallel, perpendicular or in one plane: "
                                 + relations.members(number))
         found.append(_whole(basis @ _numbers(basis.shape[1], rng)))
-    return tuple(found)
+        ranks.append(3 - basis.shape[1])
+    return tuple(found), ranks
 
 
-def _centres(relations: Relations, directions: Sequence[Numbers], rng: random.Random) -> Numbers:
-    """Centres (n, 3) from the linear system of all incidences."""
+def _direction_rows(conditions: Sequence[tuple[int, ...]], directions: Sequence[Numbers]) -> Numbers:
+    """What a direction is normal to (conditions, 3), of those before it."""
+    rows = [directions[c[0]] if len(c) == 1 else cross(directions[c[0]], directions[c[1]]) for c in conditions]
+    return np.array(rows, dtype=object).reshape(-1, 3)
+
+
+def _centre_rows(relations: Relations, directions: Sequence[Numbers]) -> Numbers:
+    """The linear system of all incidences (rows, 3 centres)."""
     n = relations.count
     rows: dict[tuple[Any, ...], None] = {}
     for each in relations.incidences:
@@ -150,8 +193,7 @@ def _centres(relations: Relations, directions: Sequence[Numbers], rng: random.Ra
             for point, sign in each.terms:
                 row[3 * point : 3 * point + 3] = [sign * x for x in normal]
             rows[tuple(row)] = None
-    basis = kernel(np.array(list(rows), dtype=object).reshape(len(rows), 3 * n))
-    return np.asarray((basis @ _numbers(basis.shape[1], rng)).reshape(n, 3))
+    return np.array(list(rows), dtype=object).reshape(len(rows), 3 * n)
 
 
 def _normals(incidence: Incidence, directions: Sequence[Numbers]) -> Sequence[Iterable[Any]]:
@@ -187,11 +229,11 @@ def _numbers(count: int, rng: random.Random) -> Numbers:
 
 def _whole(vector: Numbers) -> Numbers:
     """The shortest vector of whole numbers along a rational one."""
-    numbers, _ = _scaled(vector)
+    numbers, _ = scaled(vector)
     return numbers // gcd(*numbers)
 
 
-def _scaled(vector: Numbers) -> tuple[Numbers, int]:
+def scaled(vector: Numbers) -> tuple[Numbers, int]:
     """The first multiple of a rational vector that has whole entries, and how many times it is taken."""
     scale = lcm(*(int(x.q) for x in vector))
     return np.array([x.p * (scale // x.q) for x in vector], dtype=object), scale
@@ -218,6 +260,11 @@ def _reduced(rows: Numbers) -> tuple[Numbers, Any]:
     basis[free, range(len(free))] = divisor
     basis[pivots] = -table[:, free]
     return basis, divisor
+
+
+def _times(a: Numbers, b: Numbers) -> Numbers:
+    """The product of matrices of whole numbers."""
+    return np.array((_matrix(a) * _matrix(b)).entries(), dtype=object).reshape(len(a), b.shape[1])
 
 
 def _matrix(rows: Numbers) -> fmpz_mat:

@@ -12,10 +12,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tolerances import SAME_POINT
+from ..tolerances import RANK_GAP, SAME_POINT
 from .vectors import Array, crossed
 
 Indices = NDArray[np.intp]
+OFTEN = 2
+"""Configurations beside the first at which a relation must hold before that is no accident."""
 
 
 @dataclass(frozen=True)
@@ -28,14 +30,36 @@ class Incidence:
     classes: tuple[int, ...] = ()
 
 
-def held(candidates: Indices, value: Callable[[Indices, slice], Array], tolerance: float) -> Indices:
-    """The candidates (m, k) whose ``value`` (m, configurations, …) vanishes at all configurations: first looked at at
-    the last one, then at all."""
-    for where in (slice(-1, None), slice(None)):
-        if len(candidates):
-            sizes = np.abs(value(candidates, where)).reshape(len(candidates), -1).max(axis=1, initial=0.0)
-            candidates = candidates[sizes < tolerance]
-    return candidates
+class Sieve:
+    """Tells relations that hold from those that do not, at the first configuration (zero) and at all others, and
+    remembers how clear that was."""
+
+    def __init__(self) -> None:
+        self.accepted, self.rejected = 0.0, float("inf")
+        """The largest defect of a relation that is taken as held, and the smallest of one that is not."""
+        self.mixed: tuple[int, int] | None = None
+        """Of a relation that holds at the first configuration and at some of the others: at how many, of how many."""
+
+    def held(self, candidates: Indices, value: Callable[[Indices, slice], Array], tolerance: float) -> Indices:
+        """The candidates (m, k) whose ``value`` (m, configurations, …) vanishes at all configurations."""
+        near = candidates[self._sizes(candidates, value, slice(1)).max(axis=1, initial=0.0) < RANK_GAP * tolerance]
+        sizes = self._sizes(near, value, slice(None))
+        defects = sizes.max(axis=1, initial=0.0)
+        kept = defects < tolerance
+        self.accepted = max(self.accepted, float(np.max(defects, where=kept, initial=0.0)))
+        self.rejected = min(self.rejected, float(np.min(defects, where=~kept, initial=np.inf)))
+        here = sizes < tolerance
+        for row in here[here[:, 0] & (here[:, 1:].sum(axis=1) >= OFTEN) & ~kept]:
+            self.mixed = int(row[1:].sum()), len(row) - 1
+        return near[kept]
+
+    @staticmethod
+    def _sizes(candidates: Indices, value: Callable[[Indices, slice], Array], where: slice) -> Array:
+        """The largest entry of each value at each configuration (m, configurations)."""
+        if not len(candidates):
+            return np.zeros((0, 1))
+        found = np.abs(value(candidates, where))
+        return np.asarray(found.reshape(*found.shape[:2], -1).max(axis=2))
 
 
 def choices(n: int, k: int) -> Indices:
@@ -53,7 +77,7 @@ def triple(a: Array, b: Array, c: Array) -> Array:
     return np.asarray(np.sum(a * crossed(b, c), axis=-1))
 
 
-def incidences(classes: Array, points: Array, together: NDArray[np.bool_], owns: Sequence[set[int]],
+def incidences(sieve: Sieve, classes: Array, points: Array, together: NDArray[np.bool_], owns: Sequence[set[int]],
                slides: Sequence[set[int]]) -> list[Incidence]:
     """All incidences of ``points`` (n, configurations, 3) towards ``classes`` of directions (m, configurations, 3).
 
@@ -71,21 +95,21 @@ def incidences(classes: Array, points: Array, together: NDArray[np.bool_], owns:
 
     count = range(len(classes))
     pairs = choices(len(points), 2)
-    same = held(pairs, between, SAME_POINT).tolist()
+    same = sieve.held(pairs, between, SAME_POINT).tolist()
     apart = [(j, k) for j, k in pairs.tolist() if [j, k] not in same]
-    parallel = held(rows(((j, k, c) for j, k in apart for c in count if together[j, k] or c in owns[j] | owns[k]), 3),
-                    along, SAME_POINT).tolist()
+    candidates = rows(((j, k, c) for j, k in apart for c in count if together[j, k] or c in owns[j] | owns[k]), 3)
+    parallel = sieve.held(candidates, along, SAME_POINT).tolist()
     lined = {(j, k) for j, k, _ in parallel}
     rest = [(j, k) for j, k in apart if together[j, k] and (j, k) not in lined]
-    normal = held(rows(((j, k, c) for j, k in rest for c in count), 3), across, SAME_POINT).tolist()
+    normal = sieve.held(rows(((j, k, c) for j, k in rest for c in count), 3), across, SAME_POINT).tolist()
     return [*(Incidence(((k, 1), (j, -1)), "zero") for j, k in same),
             *(Incidence(((k, 1), (j, -1)), "parallel", (c,)) for j, k, c in parallel),
             *(Incidence(((k, 1), (j, -1)), "normal", (c,)) for j, k, c in normal),
-            *_parallelograms(classes, points, together, slides)]
+            *_parallelograms(sieve, classes, points, together, slides)]
 
 
-def _parallelograms(classes: Array, points: Array, together: NDArray[np.bool_], slides: Sequence[set[int]]
-                    ) -> list[Incidence]:
+def _parallelograms(sieve: Sieve, classes: Array, points: Array, together: NDArray[np.bool_],
+                    slides: Sequence[set[int]]) -> list[Incidence]:
     """P_i − P_j = P_k − P_m, where ij, km, ik and jm are sides on links; up to a slide along an axis all four share."""
     def gap(c: Indices, s: slice) -> Array:
         return np.asarray(points[c[:, 0], s] - points[c[:, 1], s] - points[c[:, 2], s] + points[c[:, 3], s])
@@ -96,9 +120,9 @@ def _parallelograms(classes: Array, points: Array, together: NDArray[np.bool_], 
     beside = [set(np.flatnonzero(each).tolist()) - {i} for i, each in enumerate(together)]
     quads = [(i, j, k, m) for i, near in enumerate(beside) for j, k in combinations(sorted(near), 2)
              for m in beside[j] & beside[k] if i < min(j, m) and not (together[i, m] and together[j, k])]
-    closed = held(rows(quads, 4), gap, SAME_POINT).tolist()
+    closed = sieve.held(rows(quads, 4), gap, SAME_POINT).tolist()
     shared = ((*quad, c) for quad in quads for c in set.intersection(*(slides[i] for i in quad)))
-    slid = [each for each in held(rows(shared, 5), gap_across, SAME_POINT).tolist() if each[:4] not in closed]
+    slid = [each for each in sieve.held(rows(shared, 5), gap_across, SAME_POINT).tolist() if each[:4] not in closed]
 
     def terms(quad: list[int]) -> tuple[tuple[int, int], ...]:
         return tuple(zip(quad[:4], (1, -1, -1, 1), strict=True))

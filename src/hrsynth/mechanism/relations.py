@@ -1,7 +1,8 @@
 """The special relations of a mechanism's geometry that persist in motion: what its architecture prescribes.
 
-Instantaneous kinematics depends on joint centres, joint axes and observed directions alone. A relation between them
-counts if it holds at every configuration given (theory 3.4); what holds by accident at one of them does not. All
+Instantaneous kinematics depends on joint centres, joint axes and observed directions alone. A relation between them is
+proposed if it holds at every configuration given (theory 3.4); what holds by accident at one of them does not. Which
+of those proposed follow from the file is another question (:mod:`.carried`, :mod:`hrsynth.analysis.kept`). All
 relations are of two kinds, so that geometry can be drawn anew in linear steps: a direction is normal to earlier ones,
 or in the plane of two earlier ones; a sum of centres ±P_j is zero, parallel to a direction, or normal to one.
 """
@@ -9,16 +10,16 @@ or in the plane of two earlier ones; a sum of centres ±P_j is zero, parallel to
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..tolerances import SAME_DIRECTION, SAME_PLANE, SAME_POINT
+from ..tolerances import RANK_GAP, SAME_DIRECTION, SAME_PLANE, SAME_POINT
 from . import graphs, lines
-from .incidences import Incidence, choices, held, incidences, triple
+from .incidences import Incidence, Sieve, choices, incidences, triple
 from .model import Joint, JointType, Mechanism
 from .observation import Direction
 from .vectors import Array, crossed, inverse, unit
@@ -56,6 +57,16 @@ class Relations:
     incidences: tuple[Incidence, ...]
     sights: tuple[Sight, ...]
     """One for each observation."""
+    hosts: tuple[str, ...]
+    """The link in which each centre is fixed (that of a C: its predecessor)."""
+    fixed: tuple[tuple[str, ...], ...]
+    """For each class the link in which each of its directions is fixed, joint by joint, observed ones last."""
+    watched: tuple[str, ...]
+    """The link of each observation."""
+    directions: Array = field(compare=False)
+    """A direction of each class at each configuration (classes, configurations, 3)."""
+    doubt: str = ""
+    """Why the relations are not to be relied on; empty where they are."""
 
     def members(self, number: int) -> str:
         """The joints with an axis in a class, in words."""
@@ -69,10 +80,14 @@ def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Se
 
     ``point`` is the platform's point in the platform's frame, for a point body.
     """
-    drawn = _Drawing(mechanism, poses, point)
-    classes, members = _parallels(np.array(drawn.directions).reshape(-1, drawn.size, 3))
+    drawn, sieve = _Drawing(mechanism, poses, point), Sieve()
+    classes, members = _parallels(sieve, np.array(drawn.directions).reshape(-1, drawn.size, 3))
     axes = {name: tuple(members[i] for i in numbers) for name, numbers in drawn.axes.items()}
     points = np.array(drawn.points).reshape(len(drawn.points), drawn.size, 3) / mechanism.length
+    fixed: list[list[str]] = [[] for _ in classes]
+    for name, numbers in axes.items():
+        for number, link in zip(numbers, mechanism.joints[name].links, strict=False):
+            fixed[number].append(link)
     sights: list[Sight] = []
     for observation in observations:
         u = drawn.turned(observation)
@@ -82,13 +97,17 @@ def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Se
         if sight is None:
             sight = Sight("class", classes=(len(classes),))
             classes = np.concatenate([classes, u[None]])
+            fixed.append([])
+        if sight.kind == "class":
+            fixed[sight.classes[0]].append(observation.link)
         sights.append(sight)
-    tower, place = _tower(classes)
+    tower, place = _tower(sieve, classes)
     owns = [set(axes[name]) for name in drawn.centres]
     slides = [own if mechanism.joints[name].type in AXIAL else set()
               for name, own in zip(drawn.centres, owns, strict=True)]
     bare = [set[int]()] * (len(points) - len(owns))
-    found = incidences(classes, points, drawn.together(), owns + bare, slides + bare)
+    found = incidences(sieve, classes, points, drawn.together(), owns + bare, slides + bare)
+    order = sorted(place, key=place.__getitem__)
 
     def placed(numbers: Iterable[int]) -> tuple[int, ...]:
         return tuple(place[i] for i in numbers)
@@ -96,7 +115,20 @@ def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Se
     return Relations({name: placed(numbers) for name, numbers in axes.items()}, tower, drawn.centres,
                      None if point is None else len(points) - 1, len(points),
                      tuple(replace(each, classes=placed(each.classes)) for each in found),
-                     tuple(replace(each, classes=placed(each.classes)) for each in sights))
+                     tuple(replace(each, classes=placed(each.classes)) for each in sights),
+                     tuple(drawn.carriers), tuple(tuple(fixed[i]) for i in order),
+                     tuple(o.link for o in observations), classes[order], _doubt(sieve))
+
+
+def _doubt(sieve: Sieve) -> str:
+    """Why what a sieve kept is not to be relied on (theory 9: branches, nearly special geometry)."""
+    if sieve.mixed is not None:
+        return ("the samples are of several operation modes: a relation of its geometry holds at zero and at "
+                "{} of {} of them".format(*sieve.mixed))
+    if sieve.rejected < RANK_GAP * sieve.accepted:
+        return (f"its geometry is nearly special: a relation that counts as held misses by {sieve.accepted:.1e}, one "
+                f"that does not by {sieve.rejected:.1e}, needed: {RANK_GAP:.0e} times as much")
+    return ""
 
 
 class _Drawing:
@@ -113,15 +145,18 @@ class _Drawing:
         self.points: list[Array] = []
         self.centres: dict[str, int] = {}
         self.hosts: list[tuple[str, ...]] = []
+        self.carriers: list[str] = []
         for joint in mechanism.joints.values():
             self._add(joint)
-        for centre in self._meetings():
+        for link, centre in self._meetings():
             self.points.append(centre)
             self.hosts.append(())
+            self.carriers.append(link)
         if point is not None:
             X = mechanism.links[mechanism.platform].pose
             self.points.append(self._at(mechanism.platform, X[:3, :3] @ point + X[:3, 3]))
             self.hosts.append((mechanism.platform,))
+            self.carriers.append(mechanism.platform)
 
     def _add(self, joint: Joint) -> None:
         self.axes[joint.name] = []
@@ -132,9 +167,10 @@ class _Drawing:
             self.centres[joint.name] = len(self.points)
             self.points.append(self._at(joint.predecessor, joint.point))
             self.hosts.append(joint.links)
+            self.carriers.append(joint.predecessor)
 
-    def _meetings(self) -> list[Array]:
-        """Points (configurations, 3) at which the axes of three or more R or C meet, two of them on one link."""
+    def _meetings(self) -> list[tuple[str, Array]]:
+        """Points (configurations, 3) at which the axes of three or more R or C meet, and the link of two of them."""
         mechanism, near = self.mechanism, SAME_POINT * self.mechanism.length
         turning = [joint for joint in mechanism.joints.values() if joint.type in AXIAL]
 
@@ -142,14 +178,14 @@ class _Drawing:
             arm, axis = point - self.points[self.centres[joint.name]], self.directions[self.axes[joint.name][0]]
             return bool(np.max(np.abs(crossed(arm, axis))) < near)
 
-        found: list[Array] = []
+        found: list[tuple[str, Array]] = []
         for a, b in combinations(turning, 2):
             centre = lines.meeting_point([(a.point, a.axis), (b.point, b.axis)], near)
             for link in sorted({*a.links} & {*b.links}) if centre is not None else ():
                 moved = self._at(link, np.asarray(centre))
-                known = any(np.max(np.abs(moved - other)) < near for other in found)
+                known = any(np.max(np.abs(moved - other)) < near for _, other in found)
                 if not known and sum(on_axis(moved, joint) for joint in turning) > 2:
-                    found.append(moved)
+                    found.append((link, moved))
         return found
 
     def turned(self, observation: Direction) -> Array:
@@ -169,9 +205,9 @@ class _Drawing:
         return np.asarray(on @ on.T) if len(on) else np.zeros((0, 0), dtype=bool)
 
 
-def _parallels(D: Array) -> tuple[Array, list[int]]:
+def _parallels(sieve: Sieve, D: Array) -> tuple[Array, list[int]]:
     """One direction of each class of parallels (classes, configurations, 3), and the class of each direction."""
-    pairs = held(choices(len(D), 2), lambda c, s: crossed(D[c[:, 0], s], D[c[:, 1], s]), SAME_DIRECTION)
+    pairs = sieve.held(choices(len(D), 2), lambda c, s: crossed(D[c[:, 0], s], D[c[:, 1], s]), SAME_DIRECTION)
     first = list(range(len(D)))
     for a, b in pairs.tolist():
         first[b] = min(first[b], first[a])
@@ -179,15 +215,16 @@ def _parallels(D: Array) -> tuple[Array, list[int]]:
     return D[leaders], [leaders.index(i) for i in first]
 
 
-def _tower(classes: Array) -> tuple[tuple[tuple[tuple[int, ...], ...], ...], dict[int, int]]:
+def _tower(sieve: Sieve, classes: Array) -> tuple[tuple[tuple[tuple[int, ...], ...], ...], dict[int, int]]:
     """What each class obeys towards those before it, in an order in which each is left a choice; its place in it.
 
     The last is the one that lies in the fewest different planes, and so on with the rest.
     """
     n = len(classes)
-    normal = held(choices(n, 2), lambda c, s: np.sum(classes[c[:, 0], s] * classes[c[:, 1], s], axis=-1),
-                  SAME_DIRECTION)
-    planar = held(choices(n, 3), lambda c, s: triple(*(classes[c[:, i], s] for i in range(3))), SAME_DIRECTION)
+    normal = sieve.held(choices(n, 2), lambda c, s: np.sum(classes[c[:, 0], s] * classes[c[:, 1], s], axis=-1),
+                        SAME_DIRECTION)
+    planar = sieve.held(choices(n, 3), lambda c, s: triple(*(classes[c[:, i], s] for i in range(3))),
+                        SAME_DIRECTION)
     obeyed: list[list[tuple[frozenset[int], int]]] = [[] for _ in range(n)]
     planes: list[list[Array]] = [[] for _ in range(n)]
     for related in (frozenset(each) for each in normal.tolist() + planar.tolist()):
