@@ -145,7 +145,8 @@ class ExactArchitecture:
         except NotRecognised as error:
             return ExactVerdict(legs, None, None, self.dof, False, 0, str(error))
         proved = rank == self.dof and not basis.observed
-        reason = "proved in exact arithmetic" if proved else f"exact at {instances} random instance{'s'[:instances - 1]}"
+        random = f"exact at {instances} random instance" + "s" * (instances > 1)
+        reason = "proved in exact arithmetic" if proved else random
         if chance:
             reason += f", but for a chance below 1e{math.ceil(math.log10(chance))}"
         if basis.observed:

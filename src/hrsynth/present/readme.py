@@ -30,7 +30,7 @@ def row(name: str) -> str:
     lost = "; ".join(freedom.name for freedom in found.verdict.lost)
     smallest = "–" if hidden is None else _smallest(sets.minimal)
     exact = "not decided" if not found.exact.exact else (
-        "proved" if found.exact.instances == 1 else f"{found.exact.instances} instances")
+        "proved" if found.exact.proved else f"{found.exact.instances} instances")
     words = singular(mechanism, points=POINTS).words
     if words.startswith("always"):
         words = "always" + "".join(words.partition(", because")[1:])

@@ -80,7 +80,7 @@ def exact_cell(exact: ExactVerdict, rank: int) -> str:
     """The same in a cell of a table."""
     if exact.rank is None:
         return "not decided"
-    text = "proved" if exact.rank == exact.dof else f"{exact.instances} instances"
+    text = "proved" if exact.proved else f"{exact.instances} instance" + "s" * (exact.instances > 1)
     return text if exact.rank == rank else f"{text}, of generic geometry: {exact.rank} of {exact.dof}"
 
 
