@@ -12,36 +12,15 @@ import pytest
 from hrsynth.description import load, shipped
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.legs import default_observation, dissect
 from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.relations import Incidence, Relations, recognise
+from hrsynth.mechanism.relations import Incidence, Relations
 from hrsynth.mechanism.screws import constraints
 from hrsynth.mechanism.vectors import Array, inverse, unit
+from mechanism.relating import observed, recognised, segments, walked
 from oracle import Oracle
 from strategies import deltas, planar, pods, random_rotation, spherical, transformed
 
 Rng = np.random.Generator
-
-
-def walked(mechanism: Mechanism, n: int, seed: int) -> list[Array]:
-    """The zero configuration and ``n`` others, by the oracle."""
-    oracle = Oracle(mechanism)
-    return [oracle.zero(), *oracle.random_walk(np.random.default_rng(seed), n, 0.15)]
-
-
-def recognised(mechanism: Mechanism, states: list[Array], point: Array | None = None) -> Relations:
-    poses = {name: np.array([state[i] for state in states]) for i, name in enumerate(mechanism.links)}
-    return recognise(mechanism, poses, segments(mechanism), point)
-
-
-def segments(mechanism: Mechanism) -> list[Direction]:
-    return [o for o in mechanism.observations if isinstance(o, Direction)]
-
-
-def observed(mechanism: Mechanism) -> Mechanism:
-    """The normal form with the default segments of its legs."""
-    anatomy = dissect(normal_form(mechanism).mechanism)
-    return anatomy.mechanism.changed(observations=tuple(default_observation(anatomy, leg) for leg in anatomy.legs))
 
 
 class Here:

@@ -91,6 +91,9 @@ class _Carried:
         self.at_axis = [self._reached(groups, set(links))
                         for groups, links in zip(self.groups, relations.fixed, strict=True)]
         """For each class where its directions are fixed."""
+        self.whole = [all(link in groups.get(links[0], links[:1]) for link in links)
+                      for groups, links in zip(self.groups, relations.fixed, strict=True)]
+        """Whether all directions of a class are parallel by the file: else what holds for one may not for another."""
         slides = [[joint.links for joint in self.joints if joint.type is JointType.FIXED
                    or (joint.type is JointType.PRISMATIC and self.axes[joint.name] == (c,))] for c in range(number)]
         self.slides = [self._joined(pairs) for pairs in slides]
@@ -131,7 +134,8 @@ class _Carried:
 
     def _is_square(self, a: int, b: int) -> bool:
         """Whether two classes are perpendicular by the file."""
-        return frozenset((a, b)) in self.square and not self.at_axis[a].isdisjoint(self.at_axis[b])
+        return (frozenset((a, b)) in self.square and self.whole[a] and self.whole[b]
+                and not self.at_axis[a].isdisjoint(self.at_axis[b]))
 
     def _spread(self, relations: Relations) -> None:
         """A point on the axis of an R that is fixed in one of its links is fixed in the other."""
@@ -148,10 +152,12 @@ class _Carried:
 
     def holds(self, tie: Tie) -> bool:
         """Whether a relation holds by the file."""
+        if tie.kind == "same":
+            first, other = tie.links
+            return other in self.groups[tie.classes[0]].get(first, ())
+        if not all(self.whole[c] for c in tie.classes):
+            return False
         match tie.kind:
-            case "same":
-                first, other = tie.links
-                return other in self.groups[tie.classes[0]].get(first, ())
             case "square":
                 return self._is_square(*tie.classes)
             case "plane":
