@@ -42,6 +42,7 @@ from ..mechanism.carried import Tie, carried, ties
 from ..mechanism.model import JointType
 from ..mechanism.observation import Direction, labels_of
 from ..mechanism.relations import Relations, recognise
+from ..tolerances import CLOSED
 from .instances import LARGEST, Instance, NotRecognised, draw, instance, ranks_at
 from .kept import degree, kept
 from .setting import Setting, selected
@@ -61,10 +62,21 @@ class Basis:
     carried: int
     kept: int
     observed: tuple[str, ...]
+    held: float = 0.0
+    """The largest defect (sines, characteristic lengths) of a relation that counts as held."""
+    missed: float | None = None
+    """The smallest one of a relation that nearly holds and does not count."""
+
+    @property
+    def nearly(self) -> str:
+        """What nearly holds, or holds only nearly, in words; empty where nothing does."""
+        text = f"; relations that miss by up to {self.held:.1e} count as held" if self.held > CLOSED else ""
+        return text + ("" if self.missed is None else f"; a relation misses by {self.missed:.1e} and does not count")
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
-        return {"carried": self.carried, "kept": self.kept, "observed": list(self.observed)}
+        return {"carried": self.carried, "kept": self.kept, "observed": list(self.observed),
+                "largest_defect_held": self.held, "smallest_defect_not_held": self.missed}
 
 
 @dataclass(frozen=True)
@@ -151,6 +163,7 @@ class ExactArchitecture:
             reason += f", but for a chance below 1e{math.ceil(math.log10(chance))}"
         if basis.observed:
             reason += f" of geometry with {len(basis.observed)} relations observed at samples ({basis.observed[0]})"
+        reason += basis.nearly
         return ExactVerdict(legs, word(rank, self.dof), rank, self.dof, True, instances, reason, proved, chance, basis)
 
     @cached_property
@@ -161,8 +174,12 @@ class ExactArchitecture:
         left = [tie for tie, holds in zip(every, known, strict=True) if not holds]
         regular = self._regular()
         if left and not (regular and self.start == self.instance(0).mobility and self._all_kept(every)):
-            return Basis(len(every) - len(left), 0, tuple(tie.words(self.relations) for tie in left))
-        return Basis(len(every) - len(left), len(left), ())
+            kept_too, observed = 0, tuple(tie.words(self.relations) for tie in left)
+        else:
+            kept_too, observed = len(left), ()
+        missed = self.relations.missed
+        return Basis(len(every) - len(left), kept_too, observed, self.relations.held,
+                     missed if math.isfinite(missed) else None)
 
     def _regular(self) -> bool:
         """Whether the zero configuration is a regular member of the family, as the instance is; a sample must be."""

@@ -36,7 +36,8 @@ class Sieve:
 
     def __init__(self) -> None:
         self.accepted, self.rejected = 0.0, float("inf")
-        """The largest defect of a relation that is taken as held, and the smallest of one that is not."""
+        """The largest defect of a relation that is taken as held, and the smallest of one that is not, if it is less
+        than ``RANK_GAP`` tolerances."""
         self.mixed: tuple[int, int] | None = None
         """Of a relation that holds at the first configuration and at some of the others: at how many, of how many."""
 
@@ -47,9 +48,10 @@ class Sieve:
         defects = sizes.max(axis=1, initial=0.0)
         kept = defects < tolerance
         self.accepted = max(self.accepted, float(np.max(defects, where=kept, initial=0.0)))
-        self.rejected = min(self.rejected, float(np.min(defects, where=~kept, initial=np.inf)))
+        close, far = ~kept & (defects < RANK_GAP * tolerance), defects >= RANK_GAP * tolerance
+        self.rejected = min(self.rejected, float(np.min(defects, where=close, initial=np.inf)))
         here = sizes < tolerance
-        for row in here[here[:, 0] & (here[:, 1:].sum(axis=1) >= OFTEN) & ~kept]:
+        for row in here[here[:, 0] & (here[:, 1:].sum(axis=1) >= OFTEN) & far]:
             self.mixed = int(row[1:].sum()), len(row) - 1
         return near[kept]
 

@@ -67,6 +67,10 @@ class Relations:
     """A direction of each class at each configuration (classes, configurations, 3)."""
     doubt: str = ""
     """Why the relations are not to be relied on; empty where they are."""
+    held: float = 0.0
+    """The largest defect (sines, characteristic lengths) of a relation that counts as held."""
+    missed: float = float("inf")
+    """The smallest defect of one that does not, where it is at most ``RANK_GAP`` tolerances."""
 
     def members(self, number: int) -> str:
         """The joints with an axis in a class, in words."""
@@ -117,7 +121,7 @@ def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Se
                      tuple(replace(each, classes=placed(each.classes)) for each in found),
                      tuple(replace(each, classes=placed(each.classes)) for each in sights),
                      tuple(drawn.carriers), tuple(tuple(fixed[i]) for i in order),
-                     tuple(o.link for o in observations), classes[order], _doubt(sieve))
+                     tuple(o.link for o in observations), classes[order], _doubt(sieve), sieve.accepted, sieve.rejected)
 
 
 def _doubt(sieve: Sieve) -> str:

@@ -1,0 +1,229 @@
+"""Relations that closed loops keep, what proofs rest on, and what is merely observed."""
+
+from __future__ import annotations
+
+import random
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+from hrsynth.analysis import instances
+from hrsynth.analysis.controllability import CONTROLLABLE, PARTIAL
+from hrsynth.analysis.exact import TESTS, ExactArchitecture, architecture, architecture_of
+from hrsynth.analysis.instances import Instance, draw, instance, ranks_at
+from hrsynth.analysis.kept import degree, kept
+from hrsynth.analysis.setting import Setting, prepare, selected
+from hrsynth.catalog.geometry import mechanism as built
+from hrsynth.catalog.words import parse
+from hrsynth.description import load
+from hrsynth.errors import HrsynthError
+from hrsynth.kinematics.relation import relation
+from hrsynth.mechanism import Direction, Mechanism
+from hrsynth.mechanism.carried import carried, ties
+from hrsynth.mechanism.relations import Relations
+from hrsynth.mechanism.vectors import rotation_about
+from kinematics.robots import ROBOTS, setting_of
+from mechanism.relating import miss, observed, recognised, walked
+from oracle import NotAssembled, Undecided
+from strategies import deltas, parallel_robots, random_rotation, transformed
+
+POD = "(Pk*-Utn-Unt)+(Pz*-2SSt)+(Pz*-Utn-S)+(Rt*-2SSt)"
+"""Its P axes of legs 2 and 3 are parallel: the two never see the translation along them."""
+
+
+def one_of(mechanism: Mechanism, relations: Relations, seed: int = 0) -> Instance:
+    """A random instance of relations."""
+    directions = [o for o in mechanism.observations if isinstance(o, Direction)]
+    return instance(mechanism, relations, directions, draw(relations, random.Random(seed)))
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_all_relations_of_shipped_robots_are_derived(robot: str) -> None:
+    generic = architecture(setting_of(robot))
+    basis = generic.basis
+    assert basis.observed == ()
+    assert basis.carried + basis.kept == len(ties(generic.relations)) > 0
+    assert basis.held < 1e-10
+    assert basis.missed is None
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_what_is_kept_holds_far_away(robot: str) -> None:
+    """Relations are proposed and kept from one small step; they hold at the end of a long walk by the oracle."""
+    mechanism = observed(load(robot))
+    relations = recognised(mechanism, walked(mechanism, 1, seed=1))
+    every = ties(relations)
+    assert all(kept(every, relations, one_of(mechanism, relations)))
+    state = walked(mechanism, 6, seed=2)[-1]
+    assert max(miss(tie, mechanism, relations, state) for tie in every) < 1e-7
+
+
+@given(parallel_robots(), st.integers(0, 2**32 - 1))
+@settings(max_examples=10, deadline=None)
+def test_relations_of_random_robots_are_derived(mechanism: Mechanism, seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    robot = transformed(mechanism, random_rotation(rng), rng.normal(size=3))
+    try:
+        generic = architecture(prepare(robot, samples=3))
+        states = walked(generic.mechanism, 3, seed)
+    except (HrsynthError, NotAssembled, Undecided):
+        assume(False)
+    assert generic.basis.observed == ()
+    for tie in ties(generic.relations):
+        if tie.kind != "seen":
+            assert miss(tie, generic.mechanism, generic.relations, states[-1]) < 1e-7, tie.words(generic.relations)
+
+
+@pytest.mark.parametrize("robot", ["3rps", "3ruu", "6pus", "delta", "i4l", "quattro_rigid"])
+def test_what_holds_at_zero_by_accident_is_not_kept(robot: str) -> None:
+    """These are more special at zero than elsewhere: motion breaks some of it, and a word of proof is not said."""
+    setting = setting_of(robot)
+    everything = setting.everything
+    start, question = everything.start, everything.question
+    here = architecture_of(setting.mechanism, question, [start], relation(start, question))
+    persistent = architecture(setting)
+    assert len(ties(here.relations)) > len(ties(persistent.relations))
+    every = ties(here.relations)
+    answers = kept(every, here.relations, instance(here.mechanism, here.relations, here.observations,
+                                                   draw(here.relations, random.Random(0))))
+    assert not all(answers)
+    known = carried(here.mechanism, here.relations, every)
+    assert all(keeps for keeps, holds in zip(answers, known, strict=True) if holds)
+    verdict = here.verdict(here.observations)
+    assert not verdict.proved
+    assert "proved" not in verdict.reason
+    if verdict.exact:
+        assert "observed at samples" in verdict.reason
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_what_is_carried_is_kept(seed: int) -> None:
+    """Joints carry it, so do all motions: two ways to one answer."""
+    rng = np.random.default_rng(seed)
+    for robot in (deltas(["R"] * 3, ["2-SS", "UU", "2-SS"], rng, True), deltas(["P"] * 3, ["US", "2-SS", "SS"], rng, False)):
+        relations = recognised(robot, walked(robot, 0, seed))
+        every = ties(relations)
+        answers = kept(every, relations, one_of(robot, relations))
+        assert all(keeps for keeps, holds in zip(answers, carried(robot, relations, every), strict=True) if holds)
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_the_degree_of_identities_is_bounded(robot: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Numbers of k more bits make motions of at most degree · k more: the bound is none that is too low."""
+    setting = setting_of(robot)
+    relations = architecture(setting).relations
+    bits = []
+    for power in (20, 100):
+        monkeypatch.setattr(instances, "LARGEST", 2**power)
+        found = instance(setting.mechanism, relations, architecture(setting).observations,
+                         draw(relations, random.Random(0)))
+        bits.append(max(int(x).bit_length() for twist in found.twists().values() for x in twist.ravel()))
+    assert 0 < bits[1] - bits[0] <= 80 * degree(relations, len(found.free))
+
+
+def test_an_instance_is_no_more_special_than_the_robot() -> None:
+    """The conditions on directions and centres have the same rank at an instance and where the robot is."""
+    for robot in ("quattro", "hexaglide", "3upu"):
+        generic = architecture(setting_of(robot))
+        assert generic.instance(0).geometry.ranks == ranks_at(generic.relations, 0) == ranks_at(generic.relations, -1)
+    special = replace(generic.relations, directions=np.ones_like(generic.relations.directions))
+    other = ExactArchitecture(generic.mechanism, special, generic.observations, generic.relation)
+    verdict = other.verdict(other.observations)
+    assert not verdict.exact
+    assert "more special" in verdict.reason
+
+
+def test_a_special_zero_configuration_proves_nothing_of_what_loops_keep() -> None:
+    """Where more can move at zero than elsewhere, no relation is known to hold on the branch because it holds there."""
+    generic = architecture(setting_of("delta"))
+    other = ExactArchitecture(generic.mechanism, generic.relations, generic.observations, generic.relation,
+                              generic.relation.mobility + 1)
+    verdict = other.verdict(other.observations)
+    assert (verdict.exact, verdict.proved, verdict.verdict) == (True, False, CONTROLLABLE)
+    assert "relations observed at samples" in verdict.reason
+    planar = architecture(setting_of("3rrr_m1"))
+    other = ExactArchitecture(planar.mechanism, planar.relations, planar.observations, planar.relation, 9)
+    assert other.verdict(other.observations).proved
+
+
+def test_identities_are_tested_at_several_instances() -> None:
+    generic = architecture(setting_of("delta"))
+    verdict = generic.verdict(generic.observations)
+    assert 0 < verdict.chance < 1e-12
+    assert len(generic._instances) == TESTS
+    planar = architecture(setting_of("3rrr_m1"))
+    assert planar.verdict(planar.observations).chance == 0
+    assert len(planar._instances) == 1
+
+
+# --- operation modes ---------------------------------------------------------------------------------------------
+
+@pytest.fixture(scope="module", params=[0, 7, 42])
+def pod(request: pytest.FixtureRequest) -> Setting:
+    """The pod with the catalog's own dimensions and with others, some samples of which may be of another mode."""
+    return prepare(built(parse(POD), request.param))
+
+
+def test_a_mixture_of_operation_modes_proves_nothing(pod: Setting) -> None:
+    generic = architecture(pod)
+    verdict = generic.verdict(pod.segments[1:3])
+    ranks = {selected(m.relation, (1, 2)).rank for m in pod.everything.members}
+    assert verdict.verdict in ((PARTIAL,) if ranks == {2} else (PARTIAL, None))
+    if verdict.verdict is None:
+        assert "operation modes" in verdict.reason
+
+
+def test_one_sample_of_another_mode_is_seen() -> None:
+    """The relations of a translating platform do not hold where it turns: one sample is enough to tell."""
+    robot = observed(load("3upu"))
+    states = walked(robot, 5, seed=3)
+    poses = {name: np.array([state[i] for state in states]) for i, name in enumerate(robot.links)}
+    assert recognised(robot, states).doubt == ""
+    turned = poses["platform"].copy()
+    turned[-1, :3, :3] = rotation_about((1, 2, 3), 0.2) @ turned[-1, :3, :3]
+    index = list(robot.links).index("platform")
+    mixed = [state.copy() for state in states]
+    mixed[-1][index] = turned[-1]
+    assert "operation modes: a relation of its geometry holds at zero and at 4 of 5" in recognised(robot, mixed).doubt
+
+
+# --- nearly special geometry -------------------------------------------------------------------------------------
+
+def nearly(misses: dict[str, float], seed: int) -> Mechanism:
+    """A PRRRP with parallel rails, some turned by an angle, anywhere."""
+    robot = load("prrrp_parallel")
+    normal = robot.joints["elbow_1"].axis
+    rails = [replace(robot.joints[name], axes=(rotation_about(normal, angle) @ robot.joints[name].axis,))
+             for name, angle in misses.items()]
+    rng = np.random.default_rng(seed)
+    return transformed(robot.changed(joints=rails), random_rotation(rng), rng.normal(size=3))
+
+
+@pytest.mark.parametrize("angle", [1e-12, 1e-9, 1e-8, 1e-6, 1e-4])
+def test_rails_that_are_nearly_parallel(angle: float) -> None:
+    """The verdict is that of the numbers, and says how near the other one is."""
+    setting = prepare(nearly({"guide_2": angle}, seed=int(-np.log10(angle))), samples=4)
+    verdict = architecture(setting).verdict(setting.observed)
+    assert {member.relation.rank for member in setting.everything.members} == {verdict.rank}
+    assert verdict.verdict == (PARTIAL if angle < 1e-7 else CONTROLLABLE)
+    told = "count as held" if angle < 1e-7 else "does not count"
+    assert (told in verdict.reason) == (angle > 1e-10)
+    if told in verdict.reason:
+        assert 0.5 * angle < float(re.findall(r"by (?:up to )?(\S+)", verdict.reason)[0]) <= angle
+
+
+def test_no_verdict_where_held_and_missed_are_close() -> None:
+    """Rails that miss by 3e-8 and by 3e-6 leave no gap between what is meant and what is not."""
+    robot = load("hexaglide")
+    rails = [joint for joint in robot.joints.values() if joint.type.value == "P"]
+    angles = (3e-8, 3e-6, 0, 0, 0, 0)
+    bent = robot.changed(joints=[replace(rail, axes=(rotation_about((1, 2, 3), angle) @ rail.axis,))
+                                 for rail, angle in zip(rails, angles, strict=True)])
+    setting = prepare(bent, samples=4)
+    verdict = architecture(setting).verdict(setting.observed)
+    assert not verdict.exact
+    assert "nearly special" in verdict.reason
