@@ -59,10 +59,16 @@ CLAIMS = (
           "not found, rather than proved: the step is refused, which is safe",
           "tests/kinematics/test_certificate.py::test_a_longer_rod_is_caught", (r"cannot follow the real robot",)),
     Claim("proved in exact arithmetic", "derive, legs, catalog",
-          "the architecture is controllable: almost all geometries with its relations are",
-          "the ranks of an instance with rational centres and axes that has all its relations, over the rationals",
-          "the relations named (see the line itself) are the architecture's",
-          "tests/analysis/test_exact.py::test_exact_ranks_are_the_numerical_ones",
+          "the architecture is controllable: almost all geometries with its relations are; *but for a chance below …* "
+          "bounds the chance that one of the identities on which this rests is none; *exact at … random instances* "
+          "claims no more than the ranks of these instances",
+          "the ranks of an instance with rational centres and axes that has all its relations, over the rationals; "
+          "each relation follows from the file, by rigid links and joints, or all motions keep it, an identity tested at "
+          "three random instances (Schwartz and Zippel); one merely observed is told and takes the word *proved* away",
+          "what is held within 1e-7 is meant so, a thousand times smaller than what is not; numerical: mobility, dof "
+          "and dim ρ of the robot are compared with the instance's at samples, and that the zero configuration is "
+          "a regular one",
+          "tests/analysis/test_kept.py::test_what_is_kept_holds_far_away",
           (r"proved in exact arithmetic", r"exact at ", r"not decided in exact arithmetic",
            r"freedoms in exact arithmetic", r"gears are not part of exact geometry", r"^proved$",
            r"Exact in %d instances", r'scope="col">exact<')),

@@ -104,7 +104,8 @@ def test_what_holds_at_zero_by_accident_is_not_kept(robot: str) -> None:
 def test_what_is_carried_is_kept(seed: int) -> None:
     """Joints carry it, so do all motions: two ways to one answer."""
     rng = np.random.default_rng(seed)
-    for robot in (deltas(["R"] * 3, ["2-SS", "UU", "2-SS"], rng, True), deltas(["P"] * 3, ["US", "2-SS", "SS"], rng, False)):
+    for robot in (deltas(["R"] * 3, ["2-SS", "UU", "2-SS"], rng, True),
+                  deltas(["P"] * 3, ["US", "2-SS", "SS"], rng, False)):
         relations = recognised(robot, walked(robot, 0, seed))
         every = ties(relations)
         answers = kept(every, relations, one_of(robot, relations))

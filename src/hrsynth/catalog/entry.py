@@ -34,6 +34,8 @@ ATTEMPTS = 3
 """Choices of dimensions, of which the first that can be studied is taken."""
 INSTANCES = 5
 """Configurations at which assembly modes are listed."""
+CHANCE = 1e-9
+"""Largest chance of an error of a record that is called proved."""
 
 
 def entry(text: str) -> dict[str, Any]:
@@ -127,7 +129,7 @@ def _study(word: Word, attempt: int) -> _Study:
 def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
     """Raise ``NotConfirmed`` unless the exact verdict is that of the closed configurations."""
     generic = exact.verdict(samples.question.observations)
-    if not generic.exact:
+    if not generic.exact or (generic.basis and generic.basis.observed) or generic.chance > CHANCE:
         raise NotConfirmed(exact.mechanism.name, generic.reason)
     if generic.rank != found.rank:
         raise NotConfirmed(exact.mechanism.name, f"legs {', '.join(found.legs)} see {generic.rank} of {found.dof} "
