@@ -63,8 +63,9 @@ CLAIMS = (
           "bounds the chance that one of the identities on which this rests is none; *exact at … random instances* "
           "claims no more than the ranks of these instances",
           "the ranks of an instance with rational centres and axes that has all its relations, over the rationals; "
-          "each relation follows from the file, by rigid links and joints, or all motions keep it, an identity tested at "
-          "three random instances (Schwartz and Zippel); one merely observed is told and takes the word *proved* away",
+          "each relation follows from the file, by rigid links and joints, or all motions keep it, an identity tested "
+          "at three random instances (Schwartz and Zippel); one merely observed is told and is "
+          "not *proved*",
           "what is held within 1e-7 is meant so, a thousand times smaller than what is not; numerical: mobility, dof "
           "and dim ρ of the robot are compared with the instance's at samples, and that the zero configuration is "
           "a regular one",
