@@ -33,6 +33,7 @@ def solve_all(confined: Confinement, *, near: bool = True) -> tuple[Model, Modes
     total = int(np.prod([1 + len(tip.others) for tip in confined.tips]))
     modes = found[0] if len(found) == 1 else _together(found, confined.tips, size)
     doubts = [f"leg {tip.leg}: {tip.doubt}" for tip in confined.tips if tip.doubt is not None]
+    doubts += [] if confined.doubt is None else [confined.doubt]
     if total > len(made):
         doubts.append(f"only {len(made)} of {total} choices of the legs' branches were solved")
     if doubts and modes.continuum is None:
@@ -64,9 +65,9 @@ def _together(found: Sequence[Modes], tips: Sequence[Tip], size: float) -> Modes
                  if mode not in modes)
     twice = sum(len(each.modes) for each in found) - len(modes)
     legs = ", ".join(f"leg {tip.leg}: {1 + len(tip.others)}" for tip in tips if tip.others)
+    counts = [f"{each} complex in {count}" for each, count in Counter(each.complex for each in found).items()]
     proofs = [f"{count} × ({text})" if count > 1 else text for text, count in Counter(e.proof for e in found).items()]
-    proof = (f"{len(found)} choices of the held legs' branches ({legs}), "
-             f"{' + '.join(str(each.complex) for each in found)} complex"
+    proof = (f"{len(found)} choices of the held legs' branches ({legs}), {', '.join(counts)}"
              + (f", {twice} in two of them" if twice else "") + f": {'; '.join(proofs)}")
     special = found[0].degenerate or next((f"on other branches of the legs: {each.degenerate}" for each in found
                                            if each.degenerate is not None), None)

@@ -45,7 +45,7 @@ class Body:
     """A body that turns against the one before about ``axis`` (None: about all, in a ball; the base: not at all).
 
     ``point`` is on that axis; ``shift`` leads from there to the next body's, cranks left out; ``slides`` are directions
-    fixed in it along which it carries what follows.
+    fixed in it along which it carries what follows; ``watched`` those that are held.
     """
 
     axis: Array | None
@@ -54,6 +54,8 @@ class Body:
     slides: tuple[Array, ...] = ()
     cranks: tuple[Crank, ...] = ()
     watched: tuple[Array, ...] = ()
+    angles: tuple[float, ...] = ()
+    """The angles about the axis that a drive leaves to it; none where it is free."""
 
     @property
     def rigid(self) -> bool:
@@ -105,7 +107,9 @@ class _Walk:
         """The bodies, shifts included; every measurement must be met on the way."""
         at = self.anatomy.mechanism.base
         found = [Body(None, np.zeros(3), watched=self._seen(at))]
-        for edge in self.anatomy.path(self.leg):
+        path = self.anatomy.path(self.leg)
+        self.beside = set(self.leg.joints).difference(*(edge.joints for edge in path))
+        for edge in path:
             there = edge.other(at)
             if len(edge.joints) == 1:
                 self._joint(found, self.anatomy.mechanism.joints[edge.joints[0]], at)
@@ -142,6 +146,49 @@ class _Walk:
         slides = axes if joint.type.slides else normals(axes[0]) if joint.type is JointType.PLANAR else ()
         found[-1] = replace(found[-1], slides=(*found[-1].slides, *(unit(s) for s in slides)))
         found.extend(Body(axis, point) for axis in axes if _TURNS[joint.type])
+        if joint.type is JointType.REVOLUTE and self.beside:
+            found[-1] = replace(found[-1], angles=self._driven(joint, at))
+
+    def _driven(self, joint: Joint, at: str) -> tuple[float, ...]:
+        """The two angles of an R that a rod leaves, between points C and D of bodies that are fixed to its links: D is
+        where it is, or its mirror image in the plane of C and the axis (a four-bar with its crank held, a strut of held
+        length)."""
+        near, far = self._fixed_to(at), self._fixed_to(joint.other(at))
+        o, (a, *_) = self._geometry(joint, at)
+        for link in self.leg.links:
+            rod = self._fixed_to(link)
+            ends = [self._centre(rod, end) for end in (near, far)]
+            if rod & (near | far) or ends[0] is None or ends[1] is None:
+                continue
+            c, d = (C - o - a * float(a @ (C - o)) for C in ends if C is not None)
+            if min(np.linalg.norm(c), np.linalg.norm(d)) > SAME_POINT * self.goal.twin.length:
+                for name in [name for name in self.coordinates if name in self.beside]:
+                    if any(part.issuperset(self.anatomy.mechanism.joints[name].links) for part in (rod, near, far)):
+                        del self.coordinates[name]
+                return 0.0, 2 * float(np.arctan2(a @ np.cross(d, c), d @ c))
+        return ()
+
+    def _centre(self, one: set[str], other: set[str]) -> Array | None:
+        """The centre (m) of a joint beside the way that joins two groups of links and is fixed in both, or None."""
+        kinds = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL)
+        for name in sorted(self.beside):
+            joint = self.anatomy.mechanism.joints[name]
+            a, b = joint.links
+            if joint.type in kinds and ((a in one and b in other) or (b in one and a in other)):
+                return self._geometry(joint, a)[0]
+        return None
+
+    def _fixed_to(self, link: str) -> set[str]:
+        """A link with those that held joints beside the way fix to it."""
+        mechanism, found, new = self.anatomy.mechanism, {link}, [link]
+        while new:
+            at = new.pop()
+            for joint in mechanism.joints_of(at):
+                held = joint.name in self.beside and self.coordinates.get(joint.name) == joint.type.freedoms
+                if held and joint.other(at) not in found:
+                    found.add(joint.other(at))
+                    new.append(joint.other(at))
+        return found
 
     def _parallelogram(self, found: list[Body], edge: Edge, at: str) -> None:
         """Both cranks are one: they stay parallel (a parallelogram is not crossed)."""
@@ -187,15 +234,15 @@ def _shifted(bodies: Sequence[Body], tip: Array, small: float) -> tuple[Body, ..
 
 
 def _meeting(body: Body, before: Body | None, after: Body | None, tip: Array | None, small: float) -> Array:
-    """The point of a body's axis that a ball, the tip or a neighbour's axis has as well, else its own."""
+    """The point of a body's axis at which a ball, the tip or a neighbour's axis is, else its own."""
     assert body.axis is not None
     balls = [each.point for each in (before, after) if each is not None and each.axis is None]
     for point in [*balls, *([] if tip is None else [tip])]:
         if lines.distance(point, body.point, body.axis) <= small:
-            return point
+            return lines.foot(point, body.point, body.axis)
     for other in (before, after):
         if other is not None and other.axis is not None:
-            met = lines.meeting_point([(body.point, body.axis), (other.point, other.axis)], small)
-            if met is not None:
-                return met
+            near, far = lines.common_perpendicular(body.point, body.axis, other.point, other.axis)
+            if not lines.parallel(body.axis, other.axis) and np.linalg.norm(near - far) <= small:
+                return near
     return body.point

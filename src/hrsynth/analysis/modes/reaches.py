@@ -43,16 +43,20 @@ class _Sum:
     def turn(self, axis: Array, vector: Array) -> None:
         """A vector that turns about a fixed direction."""
         along = axis * float(axis @ vector)
-        self.centre = self.centre + along
         spoke = vector - along
         if np.linalg.norm(spoke) > self.small:
+            self.centre = self.centre + along
             self.circles.append((axis, spoke))
+        else:
+            self.centre = self.centre + vector
 
     def ball(self, vector: Array) -> None:
         """A vector that turns freely."""
         radius = float(np.linalg.norm(vector))
         if radius > self.small:
             self.spheres.append(radius)
+        else:
+            self.centre = self.centre + vector
 
     def reach(self) -> Reach:
         """Its name. Raises :class:`Underived` where it has none."""

@@ -22,9 +22,10 @@ from ...kinematics.ranks import kernel_basis
 from ...kinematics.relation import Question
 from ...kinematics.twin import Twin
 from ...mechanism import Observation
+from ...mechanism.composites import WordGraph
 from ...mechanism.legs import Anatomy, dissect
 from ...mechanism.vectors import Array
-from ...tolerances import CLOSED, SAME_POINT, SAME_RELATION, SOLVED
+from ...tolerances import CLOSED, FOLLOWED, SAME_POINT, SAME_RELATION, SOLVED
 from ..singularity.features import Carried, Feature, Spot, Tangent, poses_at
 from ..singularity.structure import HeldLeg, Structure
 from .chain import Underived, chain
@@ -59,7 +60,7 @@ class Confinement:
     """The platform at one configuration with its directions held: tips on curves and surfaces.
 
     ``motion`` is that of :class:`Structure`; ``plane`` the normal of planar motion; ``slide`` the circle on which the
-    second body's origin moves relative to the first's; ``bodies`` their names.
+    second body's origin moves relative to the first's, ``doubt`` why it may have other ways; ``bodies`` their names.
     """
 
     goal: ClosedConfiguration
@@ -70,6 +71,7 @@ class Confinement:
     slide: Circle | None = None
     error: float = 0.0
     """How far a point of the robot can be from where it is at the exact goal (m)."""
+    doubt: str | None = None
 
 
 def confinement(anatomy: Anatomy, question: Question, structure: Structure, goal: ClosedConfiguration) -> Confinement:
@@ -85,8 +87,8 @@ def confinement(anatomy: Anatomy, question: Question, structure: Structure, goal
     end = (plane if plane is not None and structure.motion == "planar" else
            "free" if structure.motion == "spatial" or anatomy.point is not None else "kept")
     tips = tuple(_tip(anatomy, question, leg, goal, end) for leg in structure.legs)
-    slide = None if structure.slide is None else _slide(structure, goal)
-    return Confinement(goal, structure.motion, tips, structure.bodies, plane, slide)
+    slide, doubt = (None, None) if structure.slide is None else _slide(anatomy, structure, goal)
+    return Confinement(goal, structure.motion, tips, structure.bodies, plane, slide, doubt=doubt)
 
 
 def _tip(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfiguration, end: Array | str) -> Tip:
@@ -100,7 +102,7 @@ def _tip(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfigu
         return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=str(error)),
                        leg, goal)
     freedoms = 0 if leg.fixed else 1 if leg.line is not None else 2 if leg.normal is not None else 3
-    if found[0].freedoms == freedoms and np.linalg.norm(found[0].miss(B)) <= SAME_RELATION * goal.twin.length:
+    if found[0].freedoms == freedoms and np.linalg.norm(found[0].miss(B)) <= FOLLOWED * goal.twin.length:
         return Tip(leg.label, leg.body, place, found[0], tuple(found[1:]))
     doubt = f"its joints taken one by one leave {found[0].freedoms} freedoms, together {freedoms}"
     return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=doubt), leg, goal)
@@ -170,18 +172,30 @@ def _opposite(circle: Circle, tip: Array) -> Circle:
     return Circle(2 * tip - circle.centre, circle.axis, circle.radius, circle.centre - tip)
 
 
-def _slide(structure: Structure, goal: ClosedConfiguration) -> Circle:
-    """The circle of the second body's origin relative to the first's: of the two with the tangent that the pattern
+def _slide(anatomy: Anatomy, structure: Structure, goal: ClosedConfiguration) -> tuple[Circle, str | None]:
+    """The circle of the second body's origin relative to the first's, and why it may not be all.
+
+    Where a parallelogram joins the bodies it is that of a crank; else of the two with the tangent that the pattern
     names (whichever of the bodies its link turns about) the one that nearby configurations keep to."""
-    assert isinstance(structure.slide, Tangent)
     at, moving = _apart(structure, goal, goal.q)
-    one = _circle(structure.slide, at, goal)
-    other = _opposite(one, at)
+    one, other = structure.bodies
+    graph = WordGraph(anatomy.mechanism, structure.bodies, anatomy.platform).recognise()
+    for _, edge in graph.between(one, other):
+        if len(edge.joints) == 4:
+            joints = [anatomy.mechanism.joints[name] for name in edge.joints[:2]]
+            near, far = joints if edge.tail == one else joints[::-1]
+            (start, axes), (end, _) = moved(goal, near), moved(goal, far)
+            spoke = (end - start - axes[0] * float(axes[0] @ (end - start))) * goal.twin.length
+            return Circle(at - spoke, axes[0], float(np.linalg.norm(spoke)), spoke), None
+    assert isinstance(structure.slide, Tangent)
+    first = _circle(structure.slide, at, goal)
+    second = _opposite(first, at)
     kernel, _ = goal.kernel()
     step = kernel @ np.linalg.svd(moving @ kernel)[2][0]
     nearby, _ = closed(goal.twin, goal.twin.moved(goal.q, MOVES[-1] * step), tolerance=SOLVED)
     there, _ = _apart(structure, goal, nearby)
-    return min((one, other), key=lambda circle: float(np.linalg.norm(circle.miss(there))))
+    circle = min((first, second), key=lambda circle: float(np.linalg.norm(circle.miss(there))))
+    return circle, f"no parallelogram joins {one} and {other}"
 
 
 def _apart(structure: Structure, goal: ClosedConfiguration, q: Array) -> tuple[Array, Array]:

@@ -36,7 +36,7 @@ def orientations(chain: Chain) -> list[Known]:
 
 
 def _settled(chain: Chain, known: Known) -> list[Known]:
-    for step in (_watched_once, _between_two, _watched_twice, _between_three):
+    for step in (_driven, _watched_once, _between_two, _watched_twice, _between_three):
         for found in step(chain, known):
             if any(known[k] is None for k in found.places) or not found.turns:
                 return [each for turn in found.turns for each in _settled(chain, _with(known, found.places, turn))]
@@ -93,6 +93,14 @@ def _held(chain: Chain, known: Known) -> Iterator[tuple[Array, list[Way], Array]
                 yield from ((Q, groups(way), d) for d in body.watched)
             for crank in body.cranks:
                 yield from ((Q, groups([*way, (-1, crank.axis)]), d) for d in crank.watched)
+
+
+def _driven(chain: Chain, known: Known) -> Iterator[_Found]:
+    """A body that a drive turns, on one of known orientation: as many solutions as the drive leaves angles."""
+    for k, body in enumerate(chain.bodies):
+        Q, axis = known[k - 1], body.axis
+        if body.angles and axis is not None and Q is not None:
+            yield _Found((k,), tuple((Q @ rotation_about(axis, angle),) for angle in body.angles))
 
 
 def _watched_once(chain: Chain, known: Known) -> Iterator[_Found]:
