@@ -135,7 +135,7 @@ def _leg(leg: Serial, x: Array) -> tuple[Array, Array, Array, Array]:
         if letter == "P":
             p = p + x[:, k, None] * (R @ axis)
         else:
-            K = np.cross(np.eye(3), -axis)
+            K = np.cross(np.eye(3), axis)
             turn = np.eye(3) + np.sin(x[:, k])[:, None, None] * K + (1 - np.cos(x[:, k]))[:, None, None] * (K @ K)
             p = p + np.einsum("nij,nj->ni", R, point - turn @ point)
             R = R @ turn

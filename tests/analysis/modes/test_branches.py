@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from analysis.modes.drives import closings, driven
 from analysis.modes.pods import displacements, pods
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.catalog.geometry import mechanism
@@ -26,6 +27,7 @@ def check(words: tuple[str, ...], seed: int, complex_count: int | None, starts: 
     assert found.found.complete
     assert complex_count in (None, found.found.complex)
     met = {nearest(found, D) for D in displacements(legs, starts, seed)}
+    assert met
     assert None not in met
     assert found.modes[0].goal
     assert not any(found.modes[k].open for k in met if k is not None)
@@ -65,10 +67,42 @@ def test_a_hexapod_with_offset_joints_has_eight_branches():
     assert found.found.complete
     assert found.found.complex == 64
     assert len(found.modes) == len(set(map(str, found.modes))) > 8
-    assert {nearest(found, D) for D in displacements(legs[:3], 100)} <= set(range(len(found.modes)))
+    met = {nearest(found, D) for D in displacements(legs[:3], 100)}
+    assert set() < met <= set(range(len(found.modes)))
 
 
 def test_legs_that_rest_leave_the_pose_itself():
     """3-RRS with skew axes: with the directions held no tip moves."""
     found = check(("RRS", "RRS", "RRS"), 3, 1)
     assert [mode.goal for mode in found.modes] == [True]
+
+
+@pytest.mark.parametrize(("drive", "seed"), [("four-bar", 0), ("strut", 1), ("ball rod", 2)])
+def test_a_held_drive_leaves_two_angles(drive: str, seed: int):
+    check_driven(drive, seed, 12)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("drive", ["four-bar", "strut", "ball rod"])
+def test_many_held_drives_leave_two_angles(drive: str):
+    for seed in range(10, 20):
+        check_driven(drive, seed, 60)
+
+
+def check_driven(drive: str, seed: int, starts: int) -> None:
+    """3-RRR, one leg driven through a loop, its motors held: two branches of degree 6, and no pose outside the list."""
+    robot = driven(drive, seed)
+    found = modes(robot, real=True)
+    assert (found.found.complex, found.found.complete) == (12, True)
+    met = [min(float(np.abs(X - mode.bodies["platform"]).max()) for mode in found.modes if mode.bodies is not None)
+           for X in closings(robot, starts, seed)]
+    assert met
+    assert max(met) < SAME
+
+
+def test_a_list_is_not_called_all_where_a_leg_is_not_understood():
+    """A coupler that is watched: its leg keeps the curve that its moves show, and the proof says why."""
+    robot = driven("four-bar", 2, watched="coupler")
+    found = modes(robot)
+    assert not found.found.complete
+    assert "coupler" in found.found.proof
