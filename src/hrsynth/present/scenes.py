@@ -142,8 +142,9 @@ def _translating(found: AssemblyModes, confined: Confinement) -> _Plot:
     plot = _platform(found, confined)
     X = found.goal.pose(plot.body)
     p = X[:3, :3] @ plot.place + X[:3, 3]
+    curves = [(tip, curve) for tip in confined.tips for curve in (tip.curve, *(each for each, _ in tip.others))]
     reaches = tuple((shifted(curve, p - _at_goal(found, tip)), f"platform on leg {tip.leg}")
-                    for tip in confined.tips for curve in (tip.curve, *tip.others) if not isinstance(curve, Point))
+                    for tip, curve in curves if not isinstance(curve, Point))
     return _Plot(plot.body, plot.place, (), reaches)
 
 

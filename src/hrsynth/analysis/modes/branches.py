@@ -20,9 +20,10 @@ MOST = 256
 
 def choices(confined: Confinement) -> Iterator[Confinement]:
     """The platform with each tip on one of its reaches, in all combinations, the goal's own first."""
-    for reaches in product(*((tip.curve, *tip.others) for tip in confined.tips)):
-        tips = tuple(replace(tip, curve=reach, others=()) for tip, reach in zip(confined.tips, reaches, strict=True))
-        yield replace(confined, tips=tips)
+    for chosen in product(*(((tip.curve, 1.0), *tip.others) for tip in confined.tips)):
+        tips = tuple(replace(tip, curve=reach, others=())
+                     for tip, (reach, _) in zip(confined.tips, chosen, strict=True))
+        yield replace(confined, tips=tips, error=confined.error * max(gain for _, gain in chosen))
 
 
 def solve_all(confined: Confinement, *, near: bool = True) -> tuple[Model, Modes]:
@@ -44,11 +45,13 @@ def solve_all(confined: Confinement, *, near: bool = True) -> tuple[Model, Modes
 
 def _scaled(modes: Modes, factor: float) -> Modes:
     """Radii and residuals in sizes of another system."""
-    if factor == 1.0:
-        return modes
 
     def scaled(each: Sequence[Mode]) -> tuple[Mode, ...]:
-        return tuple(replace(mode, radius=mode.radius * factor, residual=mode.residual * factor) for mode in each)
+        return tuple(replace(mode, radius=max(mode.radius * factor, mode.turn), residual=mode.residual * factor)
+                     for mode in each)
+
+    if factor == 1.0:
+        return modes
 
     return replace(modes, modes=scaled(modes.modes), near=scaled(modes.near))
 

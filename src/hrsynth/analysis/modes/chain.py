@@ -54,8 +54,8 @@ class Body:
     slides: tuple[Array, ...] = ()
     cranks: tuple[Crank, ...] = ()
     watched: tuple[Array, ...] = ()
-    angles: tuple[float, ...] = ()
-    """The angles about the axis that a drive leaves to it; none where it is free."""
+    angles: tuple[tuple[float, float], ...] = ()
+    """The angles about the axis that a drive leaves to it, each with what it makes of an error; none if it is free."""
 
     @property
     def rigid(self) -> bool:
@@ -149,7 +149,7 @@ class _Walk:
         if joint.type is JointType.REVOLUTE and self.beside:
             found[-1] = replace(found[-1], angles=self._driven(joint, at))
 
-    def _driven(self, joint: Joint, at: str) -> tuple[float, ...]:
+    def _driven(self, joint: Joint, at: str) -> tuple[tuple[float, float], ...]:
         """The two angles of an R that a rod leaves, between points C and D of bodies that are fixed to its links: D is
         where it is, or its mirror image in the plane of C and the axis (a four-bar with its crank held, a strut of held
         length)."""
@@ -161,11 +161,12 @@ class _Walk:
             if rod & (near | far) or ends[0] is None or ends[1] is None:
                 continue
             c, d = (C - o - a * float(a @ (C - o)) for C in ends if C is not None)
-            if min(np.linalg.norm(c), np.linalg.norm(d)) > SAME_POINT * self.goal.twin.length:
+            least = min(np.linalg.norm(c), np.linalg.norm(d)) / self.goal.twin.length
+            if least > SAME_POINT:
                 for name in [name for name in self.coordinates if name in self.beside]:
                     if any(part.issuperset(self.anatomy.mechanism.joints[name].links) for part in (rod, near, far)):
                         del self.coordinates[name]
-                return 0.0, 2 * float(np.arctan2(a @ np.cross(d, c), d @ c))
+                return (0.0, 1.0), (2 * float(np.arctan2(a @ np.cross(d, c), d @ c)), 3.0 + 8.0 / float(least))
         return ()
 
     def _centre(self, one: set[str], other: set[str]) -> Array | None:

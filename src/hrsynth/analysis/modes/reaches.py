@@ -20,13 +20,15 @@ from .curves import Circle, Line, Plane, Point, Reach, Sphere
 from .turns import Known, groups, orientations, ways
 
 
-def reaches(chain: Chain) -> list[Reach]:
-    """All components of the places of the tip, each once, the goal's own first. Raises :class:`Underived`."""
-    found: list[Reach] = []
-    for known in orientations(chain):
+def reaches(chain: Chain) -> list[tuple[Reach, float]]:
+    """All components of the places of the tip, each once, the goal's own first; and by what an error of the goal grows
+    in each (1 in the goal's own). Raises :class:`Underived`."""
+    found: list[tuple[Reach, float]] = []
+    far = sum(float(np.linalg.norm(body.shift)) for body in chain.bodies) / chain.length
+    for known, gain in orientations(chain):
         reach = _sum(chain, known)
-        if not any(same_reach(reach, other, SAME_POINT * chain.length) for other in found):
-            found.append(reach)
+        if not any(same_reach(reach, other, SAME_POINT * chain.length) for other, _ in found):
+            found.append((reach, gain * (1.0 + far) if found else 1.0))
     return found
 
 

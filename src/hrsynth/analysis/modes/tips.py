@@ -44,14 +44,15 @@ class Tip:
     """The tip of a held leg: the body that carries it, where (3,) in the body's frame (m), and the curve or surface in
     the base frame (m) on which it is at the goal.
 
-    ``others`` are those of the leg's other branches; ``doubt`` says why there may be more, None where these are all.
+    ``others`` are those of the leg's other branches, each with what it makes of an error of the goal; ``doubt`` says
+    why there may be more, None where these are all.
     """
 
     leg: str
     body: str
     place: Array
     curve: Reach
-    others: tuple[Reach, ...] = ()
+    others: tuple[tuple[Reach, float], ...] = ()
     doubt: str | None = None
 
 
@@ -102,9 +103,10 @@ def _tip(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfigu
         return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=str(error)),
                        leg, goal)
     freedoms = 0 if leg.fixed else 1 if leg.line is not None else 2 if leg.normal is not None else 3
-    if found[0].freedoms == freedoms and np.linalg.norm(found[0].miss(B)) <= FOLLOWED * goal.twin.length:
-        return Tip(leg.label, leg.body, place, found[0], tuple(found[1:]))
-    doubt = f"its joints taken one by one leave {found[0].freedoms} freedoms, together {freedoms}"
+    here = found[0][0]
+    if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= FOLLOWED * goal.twin.length:
+        return Tip(leg.label, leg.body, place, here, tuple(found[1:]))
+    doubt = f"its joints taken one by one leave {here.freedoms} freedoms, together {freedoms}"
     return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=doubt), leg, goal)
 
 

@@ -3,6 +3,9 @@
 Two cones with one apex meet in two lines, so a direction that is held behind two axes has two solutions; so have three
 axes between two bodies that do not turn. Only necessary conditions are used: what is not found here is left open, never
 excluded, so no branch with real orientations is lost (theory 9, "Locked legs with several branches").
+
+Each solution comes with its *gain*: an error ε of all directions of the chain (rad) makes one of at most gain · ε, to
+first order, in the orientations. That of the goal's own is 1: nothing is computed for it.
 """
 
 from __future__ import annotations
@@ -26,29 +29,31 @@ Way = list[tuple[int, Array]]
 """Bodies met one after another, each with the axis about which it turns against the one before."""
 
 
-def orientations(chain: Chain) -> list[Known]:
-    """All solutions for the bodies whose orientation is discrete; the goal's own is the first."""
+def orientations(chain: Chain) -> list[tuple[Known, float]]:
+    """All solutions for the bodies whose orientation is discrete, with their gains; the goal's own is the first."""
     known: list[Array | None] = [None] * len(chain.bodies)
     known[0] = np.eye(3)
     if chain.kept:
         known[-1] = np.eye(3)
-    return _settled(chain, tuple(known))
+    return _settled(chain, tuple(known), 1.0)
 
 
-def _settled(chain: Chain, known: Known) -> list[Known]:
+def _settled(chain: Chain, known: Known, gain: float) -> list[tuple[Known, float]]:
     for step in (_driven, _watched_once, _between_two, _watched_twice, _between_three):
         for found in step(chain, known):
             if any(known[k] is None for k in found.places) or not found.turns:
-                return [each for turn in found.turns for each in _settled(chain, _with(known, found.places, turn))]
-    return [known]
+                return [each for turns, own in found.turns
+                        for each in _settled(chain, _with(known, found.places, turns), gain * own)]
+    return [(known, gain)]
 
 
 @dataclass(frozen=True, eq=False)
 class _Found:
-    """Bodies that are known now, and what orientations they have, a solution each; none: there is no such branch."""
+    """Bodies that are known now, and for each solution what orientations they have, with its gain; no solution: there
+    is no such branch."""
 
     places: tuple[int, ...]
-    turns: tuple[tuple[Array, ...], ...]
+    turns: tuple[tuple[tuple[Array, ...], float], ...]
 
 
 def _with(known: Known, places: Sequence[int], turns: Sequence[Array]) -> Known:
@@ -100,7 +105,7 @@ def _driven(chain: Chain, known: Known) -> Iterator[_Found]:
     for k, body in enumerate(chain.bodies):
         Q, axis = known[k - 1], body.axis
         if body.angles and axis is not None and Q is not None:
-            yield _Found((k,), tuple((Q @ rotation_about(axis, angle),) for angle in body.angles))
+            yield _Found((k,), tuple(((Q @ rotation_about(axis, angle),), gain) for angle, gain in body.angles))
 
 
 def _watched_once(chain: Chain, known: Known) -> Iterator[_Found]:
@@ -112,7 +117,7 @@ def _watched_once(chain: Chain, known: Known) -> Iterator[_Found]:
             if turn is None:
                 yield _Found((), ())
             elif place >= 0:
-                yield _Found((place,), ((Q @ turn,),))
+                yield _Found((place,), (((Q @ turn[0],), turn[1]),))
 
 
 def _watched_twice(chain: Chain, known: Known) -> Iterator[_Found]:
@@ -123,8 +128,9 @@ def _watched_twice(chain: Chain, known: Known) -> Iterator[_Found]:
             places = [part[-1][0] for part in parts]
             if both is not None:
                 keep = [n for n, place in enumerate(places) if place >= 0]
-                turns = [(Q @ first, Q @ first @ second) for first, second in both]
-                yield _Found(tuple(places[n] for n in keep), tuple(tuple(turn[n] for n in keep) for turn in turns))
+                turns = [((Q @ first, Q @ first @ second), gain) for first, second, gain in both]
+                yield _Found(tuple(places[n] for n in keep),
+                             tuple((tuple(turn[n] for n in keep), gain) for turn, gain in turns))
 
 
 def _gaps(chain: Chain, known: Known) -> Iterator[tuple[Array, Array, list[Way]]]:
@@ -145,7 +151,7 @@ def _between_two(chain: Chain, known: Known) -> Iterator[_Found]:
         elif len(parts) == 2:
             a, b = parts[0][0][1], parts[1][0][1]
             turn = _about(a, b, M @ b)
-            yield _Found((parts[0][-1][0],), () if turn is None else ((Q @ turn,),))
+            yield _Found((parts[0][-1][0],), () if turn is None else (((Q @ turn[0],), turn[1]),))
 
 
 def _between_three(chain: Chain, known: Known) -> Iterator[_Found]:
@@ -156,22 +162,27 @@ def _between_three(chain: Chain, known: Known) -> Iterator[_Found]:
             both = _cones(a, b, c, Q.T @ R @ c)
             if both is not None:
                 yield _Found((parts[0][-1][0], parts[1][-1][0]),
-                             tuple((Q @ first, Q @ first @ second) for first, second in both))
+                             tuple(((Q @ first, Q @ first @ second), gain) for first, second, gain in both))
 
 
-def _about(axis: Array, start: Array, end: Array) -> Array | None:
-    """The turn about an axis that brings a unit vector to another, or None."""
+def _about(axis: Array, start: Array, end: Array) -> tuple[Array, float] | None:
+    """The turn about an axis that brings a unit vector to another, with its gain, or None.
+
+    The angle is that of two vectors of length r normal to the axis, each off by at most 2 ε."""
     if not _same(np.array([axis @ start]), np.array([axis @ end])):
         return None
+    if _same(start, end):
+        return np.eye(3), 1.0
     angle = math.atan2(float(axis @ np.cross(start, end)), float(start @ end - (axis @ start) * (axis @ end)))
-    return np.eye(3) if _same(start, end) else rotation_about(axis, angle)
+    return rotation_about(axis, angle), 3.0 + 4.0 / float(np.linalg.norm(np.cross(axis, start)))
 
 
-def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Array]] | None:
-    """All (R(a, α), R(b, β)) with R(a, α) R(b, β) start = end, the one that turns nothing first; None where α or β is
-    free.
+def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Array, float]] | None:
+    """All (R(a, α), R(b, β)) with R(a, α) R(b, β) start = end, with their gains, the one that turns nothing first; None
+    where α or β is free.
 
-    z = R(b, β) start has b·z = b·start, a·z = a·end and is of length 1: z = p a + q b ± s a × b.
+    z = R(b, β) start has b·z = b·start, a·z = a·end and is of length 1: z = p a + q b ± s a × b. Errors ε of a, b,
+    start and end leave δα (a × end) + δβ (R(a, α) b × end) of at most 6 ε.
     """
     c, alpha, beta = float(a @ b), float(a @ end), float(b @ start)
     sine = 1 - c * c
@@ -187,7 +198,9 @@ def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Ar
             return None
         second, first = _about(b, start, z), _about(a, z, end)
         if first is not None and second is not None:
-            found.append((first, second))
+            slopes = np.column_stack([np.cross(a, end), np.cross(first[0] @ b, end)])
+            still = first[1] == second[1] == 1.0
+            found.append((first[0], second[0], 1.0 if still else 4.0 + 9.0 / float(np.linalg.norm(slopes, -2))))
     return found
 
 
