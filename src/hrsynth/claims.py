@@ -143,7 +143,7 @@ NO_CLAIMS = (
     NoClaim("tells a limit of what was done", (
         r"cannot tell it from a singularity", r"cannot be moved to see where its tip goes",
         r"cannot be enclosed away from",
-        r"follow the command any further", r"are made exact, largest change")),
+        r"are made exact, largest change")),
     NoClaim("names of fields, modules and styles", (
         r"^[\w.]*(certificate|Certificate|complete|proof|proved|always)\w*$",
         r"task\.completed", r"isolated modes$", r"drawings, proof,",

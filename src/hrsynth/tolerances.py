@@ -113,3 +113,9 @@ SERVED = 1e-10
 AT_REST = 1e-8
 """Speed (characteristic lengths, radians) for each unit of error and gain below which a servo loop is at a local
 minimum."""
+
+RESTED = 1e-10
+"""Newton step (characteristic lengths, radians) at which the rest of a servo loop is found."""
+
+ARRIVED = 1e-6
+"""Distance (characteristic lengths, radians) from a stable rest at which a servo loop has ended there."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from dataclasses import replace
@@ -33,7 +34,7 @@ START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 @cache
 def found() -> Selection:
     return select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65",
-                  cones="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1, seconds=1000)
+                  cones="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1)
 
 
 @cache
@@ -101,10 +102,37 @@ def test_a_run_that_ends_elsewhere_discards_its_set() -> None:
     assert "ends in: mode" in str(ran.discarded)
 
 
-def test_nothing_more_is_asked_when_the_time_is_over() -> None:
-    late, begun = replace(work(), until=0.0), first("1,3,4")
-    assert late.decided(begun) is begun
-    assert late.examined([begun], 1) == [begun]
+def told(selection: Selection) -> dict[tuple[str, ...], dict]:
+    return {each.legs: each.to_dict() for each in selection.candidates}
+
+
+def test_what_is_kept_does_not_depend_on_the_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A machine on which an hour passes between two looks at the clock gives the same answer."""
+    ticks = itertools.count(step=3600.0)
+    monkeypatch.setattr("time.monotonic", lambda: next(ticks))
+    slow = select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65",
+                  cones="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1)
+    assert told(slow) == told(found())
+    assert slow.left is None
+
+
+@pytest.mark.parametrize(("examine", "seconds"), [(1, None), (2, None), (20, 1e-9)])
+def test_what_is_not_examined_is_neither_kept_nor_discarded(examine: int, seconds: float | None) -> None:
+    """And nothing else is said of the others than with all examined."""
+    part = select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65", runs=1, size=2,
+                  cones="1=0.2deg,2=0.1deg,3=0.1deg", examine=examine, seconds=seconds)
+    begun = 0 if seconds else examine
+    whole, left = told(found()), {each.legs for each in part.unexamined}
+    assert len(part.kept) == begun
+    assert len(left) == len(found().kept) - begun
+    assert [each.legs for each in part.kept] == [each.legs for each in found().kept][:begun]
+    assert {legs: record for legs, record in told(part).items() if legs not in left} == {
+        legs: record for legs, record in whole.items() if legs not in left}
+    for each in part.unexamined:
+        assert (each.discarded, each.start_modes, each.aspect, each.run) == (None, None, None, None)
+    assert part.to_dict()["not_examined"]["count"] == len(left)
+    assert ("time was over" if seconds else f"the {examine} most accurate") in str(part.left)
+    assert "not examined" in str(part)
 
 
 def test_a_singular_end_discards() -> None:
@@ -168,7 +196,7 @@ def test_a_blind_camera_discards_every_set() -> None:
 @pytest.mark.parametrize(("options", "word"), [
     ({"cones": "90deg"}, "half-angle"), ({"cones": "1=0.1deg"}, "no cone"), ({"size": 0}, "largest sets"),
     ({"runs": -1}, "runs"), ({"sight": "x=0"}, "camera"), ({"sight": "x=0,y=0,z=0,rpy=0/0/0", "focal": 0.0}, "focal"),
-    ({"seconds": 0.0}, "seconds"), ({"start": "w=1"}, "unknown part")])
+    ({"seconds": 0.0}, "seconds"), ({"examine": 0}, "examined"), ({"start": "w=1"}, "unknown part")])
 def test_bad_requests(options: dict, word: str) -> None:
     with pytest.raises(BadRequest) as caught:
         select(load("quattro"), **{"start": START, "goal": GOAL, **options})
@@ -197,6 +225,8 @@ def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     out, err = capsys.readouterr()
     assert "partially controllable" in out
     assert err == ""
+    assert execute([*arguments, "--size", "1", "--seconds", "100"]) == 0
+    assert "deprecated" in capsys.readouterr().err
     assert execute(["select", "quattro", "--from", "x=9", "--to", "x=0"]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
 

@@ -104,7 +104,10 @@ def select(
     = None,
     focal: Annotated[float, typer.Option(metavar="PIXELS", help="Focal length of the camera, of 640 by 480 pixels.")]
     = 800.0,
-    seconds: Annotated[float, typer.Option(help="Time after which nothing more is asked.")] = 45.0,
+    examine: Annotated[int, typer.Option(min=1, help="Sets, the most accurate first, whose modes, aspects and runs are "
+                                         "asked for.")] = 20,
+    seconds: Annotated[float | None, typer.Option(help="Deprecated, as the answer then depends on the machine: time "
+                                                  "after which no further set is examined.")] = None,
     json: Json = False,
     seed: Seed = 0,
     *,
@@ -117,5 +120,8 @@ def select(
 
     with Progress() as progress:
         found = run(robot.load(), camera, start=start, goal=goal, cones=cone, size=size, runs=runs, sight=sight,
-                    focal=focal, seconds=seconds, seed=seed, progress=progress.tell)
+                    focal=focal, examine=examine, seconds=seconds, seed=seed, progress=progress.tell)
+    if seconds is not None:
+        typer.echo("hrsynth: --seconds is deprecated, what it leaves out depends on the machine: try --examine",
+                   err=True)
     typer.echo(records.record("select", found.setting.robot.name, found.to_dict()) if json else written(found))

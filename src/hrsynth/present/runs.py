@@ -73,7 +73,8 @@ def picture(found: Servo) -> bytes:
 
 
 _ENDS = {"goal": "the goal", "mode": "another assembly mode", "antipodal": "an antipodal pose",
-         "local minimum": "a local minimum", "boundary": "a boundary of the workspace", "time": "the end of its time"}
+         "local minimum": "a local minimum", "boundary": "a boundary of the workspace", "time": "the end of its time",
+         "undecided": "a place that is not decided"}
 
 
 def _until(found: Servo) -> float:

@@ -50,8 +50,8 @@ class Decision:
 
 @dataclass(frozen=True, eq=False)
 class Candidate:
-    """What is known of a set of legs; None where it was not asked, because the set was discarded before or the time
-    was over."""
+    """What is known of a set of legs; None where it was not asked, because the set was discarded before or was not
+    ``examined``: then it is neither kept nor discarded."""
 
     legs: tuple[str, ...]
     verdict: str
@@ -63,6 +63,7 @@ class Candidate:
     goal_modes: Modes | None = None
     aspect: Decision | None = None
     run: Decision | None = None
+    examined: bool = True
 
     @property
     def order(self) -> tuple[float, float, int]:
@@ -75,6 +76,7 @@ class Candidate:
         """The record of the command line."""
         errors = self.errors
         return {"legs": list(self.legs), "verdict": self.verdict, "discarded": self.discarded,
+                "examined": self.examined,
                 "position_mm": errors and errors.position.to_dict(1e3)["largest"],
                 "orientation_deg": errors and errors.orientation.to_dict(180 / np.pi)["largest"],
                 "seen": None if self.seen is None else dict(self.seen),

@@ -36,8 +36,8 @@ SIZE = 4
 """Legs of the largest sets."""
 RUNS = 3
 """Sets that a simulated run is to lead to the goal."""
-SECONDS = 45.0
-"""Time after which no further set is examined."""
+EXAMINED = 20
+"""Sets, the most accurate first, that are examined."""
 BUDGET = 2_000
 """Intervals that a path's certificate may take."""
 CONE = "0.1deg"
@@ -48,8 +48,8 @@ AUTO = "auto"
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Selection(Result):
-    """All sets of legs up to a size for one displacement: the kept ones first, the most accurate at the goal before
-    the others, then the discarded ones."""
+    """All sets of legs up to a size for one displacement: the kept ones, those not examined, the most accurate at the
+    goal before the others in both, then the discarded ones."""
 
     setting: Setting
     start: Pose
@@ -58,16 +58,24 @@ class Selection(Result):
     cones: Array
     """Half-angles (rad) of all legs' cones."""
     sight: Sight | None
+    left: str | None
+    """Why sets were not examined, None where all were."""
 
     def headline(self) -> str:
         """The robot, and the set that is best."""
         best = f"best {', '.join(self.kept[0].legs)}" if self.kept else "none is kept"
-        return f"{self.setting.robot.name}: {len(self.candidates)} sets, {len(self.kept)} kept, {best}"
+        more = f", {len(self.unexamined)} not examined" if self.unexamined else ""
+        return f"{self.setting.robot.name}: {len(self.candidates)} sets, {len(self.kept)} kept{more}, {best}"
 
     @property
     def kept(self) -> tuple[Candidate, ...]:
-        """The sets that are not discarded."""
-        return tuple(each for each in self.candidates if each.discarded is None)
+        """The sets that were examined and not discarded."""
+        return tuple(each for each in self.candidates if each.examined and each.discarded is None)
+
+    @property
+    def unexamined(self) -> tuple[Candidate, ...]:
+        """The sets of which it is not known whether they would be kept."""
+        return tuple(each for each in self.candidates if not each.examined)
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
@@ -79,29 +87,34 @@ class Selection(Result):
                 "cones": {o.leg: float(np.degrees(cone))
                           for o, cone in zip(self.setting.observed, self.cones, strict=True)},
                 "sight": camera, "best": None if best is None else list(best.legs),
+                "not_examined": {"count": len(self.unexamined), "reason": self.left},
                 "sets": [each.to_dict() for each in self.candidates]}
 
 
 def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, goal: Pose | str, cones: Cones = CONE,
            size: int = SIZE, runs: int = RUNS, sight: str | None = None, focal: float = FOCAL,
-           seconds: float = SECONDS, seed: int = 0, progress: Callable[[str], None] | None = None) -> Selection:
+           examine: int = EXAMINED, seconds: float | None = None, seed: int = 0,
+           progress: Callable[[str], None] | None = None) -> Selection:
     """All sets of up to ``size`` legs for the displacement from ``start`` to ``goal``, ranked by the largest position
     error at the goal for ``cones`` about the directions (MMT A.2).
 
     A set is discarded where it does not see every freedom, where an end is singular, where a camera (``sight``: its
     pose on the link that carries it, or ``auto`` for one that sees all legs well) sees too little of a leg, where start
-    and goal are proved to lie in different aspects, and where a simulated run ends elsewhere. Runs are made from the
-    best set on, until ``runs`` of them ended at the goal. After ``seconds`` nothing more is asked about any set.
+    and goal are proved to lie in different aspects, and where a simulated run ends elsewhere. Modes and aspects are
+    asked for the ``examine`` most accurate sets, the others are neither kept nor discarded. Runs are made from the best
+    set on, until ``runs`` of them ended at the goal. With ``seconds`` (deprecated: what is examined then depends on the
+    machine) no further set is begun after that time.
 
     Raises ``BadRequest``, ``PoseNotReached`` (exit status 2).
     """
     wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
     if sight is None and focal != FOCAL:
         raise BadRequest("focal length without a camera", focal, "together with --sight")
-    for what, value, least in (("legs of the largest sets", size, 1), ("number of runs", runs, 0)):
+    for what, value, least in (("legs of the largest sets", size, 1), ("number of runs", runs, 0),
+                               ("sets that are examined", examine, 1)):
         if value < least:
             raise BadRequest(what, value, f"at least {least}")
-    if not seconds > 0:
+    if seconds is not None and not seconds > 0:
         raise BadRequest("seconds", seconds, "a positive number")
     tell = progress or silent
     tell("sampling")
@@ -115,14 +128,15 @@ def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, go
     except PoseNotReached as error:
         error.exit_status = 2
         raise
-    work = _Work(setting, ends[0], ends[1], half, _sight(setting, ends, sight, focal), time.monotonic() + seconds, seed,
-                 tell)
+    work = _Work(setting, ends[0], ends[1], half, _sight(setting, ends, sight, focal),
+                 np.inf if seconds is None else time.monotonic() + seconds, seed, tell)
     sets = [legs for count in range(1, min(size, len(directions)) + 1) for legs in combinations(directions, count)]
     found = sorted((work.first(legs) for legs in sets), key=lambda each: each.order)
-    found = work.examined(found, runs)
-    found.sort(key=lambda each: (each.discarded is not None, each.order if each.discarded is None else (0, 0, 0)))
+    found, left = work.examined(found, runs, examine)
+    found.sort(key=lambda each: (each.discarded is not None, not each.examined,
+                                 each.order if each.discarded is None else (0, 0, 0)))
     poses = [setting.motion.pose(at.pose(setting.motion.link)) for at in ends]
-    return Selection(setting, poses[0], poses[1], tuple(found), half, work.sight)
+    return Selection(setting, poses[0], poses[1], tuple(found), half, work.sight, left)
 
 
 def _sight(setting: Setting, ends: Sequence[ClosedConfiguration], text: str | None, focal: float) -> Sight | None:
@@ -137,7 +151,7 @@ def _sight(setting: Setting, ends: Sequence[ClosedConfiguration], text: str | No
 
 @dataclass(frozen=True, eq=False)
 class _Work:
-    """What examines sets of legs between two configurations, until a point in time."""
+    """What examines sets of legs between two configurations; none is begun after a point in time."""
 
     setting: Setting
     start: ClosedConfiguration
@@ -189,7 +203,7 @@ class _Work:
 
     def decided(self, candidate: Candidate) -> Candidate:
         """The candidate with its modes and whether start and goal lie in one aspect."""
-        if candidate.discarded or self.over:
+        if candidate.discarded:
             return candidate
         setting = self.watching(candidate.legs)
         self.tell("modes")
@@ -211,17 +225,30 @@ class _Work:
         except HrsynthError as error:
             return Modes(None, None, False, str(error))
 
-    def examined(self, candidates: Sequence[Candidate], runs: int) -> list[Candidate]:
-        """The candidates, best first, with their modes and aspects, and with simulated runs until ``runs`` of them
-        ended at the goal."""
-        found, arrived = [], 0
-        for candidate in map(self.decided, candidates):
-            if not candidate.discarded and arrived < runs and not self.over:
+    def examined(self, candidates: Sequence[Candidate], runs: int, most: int) -> tuple[list[Candidate], str | None]:
+        """The candidates, best first, the ``most`` first that are not discarded with their modes and aspects, and with
+        simulated runs until ``runs`` of them ended at the goal; why the others were left, None where there are none."""
+        found: list[Candidate] = []
+        arrived = begun = 0
+        left = None
+        for candidate in candidates:
+            if candidate.discarded:
+                found.append(candidate)
+                continue
+            if left is None and (begun == most or self.over):
+                left = f"the {begun} most accurate were" if begun == most else (
+                    f"the time was over after the {begun} most accurate, on a faster machine there would be more")
+            if left is not None:
+                found.append(replace(candidate, examined=False))
+                continue
+            begun += 1
+            candidate = self.decided(candidate)
+            if not candidate.discarded and arrived < runs:
                 self.tell("runs")
                 candidate = self.ran(candidate)
                 arrived += candidate.discarded is None
             found.append(candidate)
-        return found
+        return found, left
 
     def ran(self, candidate: Candidate) -> Candidate:
         """The candidate with where its simulated run ends, and what the camera sees along it."""

@@ -1,9 +1,9 @@
-"""Where a run ended, in the words of the theory (6): goal, mode, antipodal, local minimum, boundary, time."""
+"""Where a run ended, in the words of theory 6: goal, mode, antipodal, local minimum, boundary, time; or undecided."""
 
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,10 +14,11 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.vectors import Array
 from ..tolerances import DAMPED, SAME_RELATION
 from .law import Command
-from .run import AWAY, EFFORT, LIMIT, MOST, OPEN, REST, SERVED_AT, Run, margins
+from .run import AWAY, EFFORT, LIMIT, LOST, MOST, OPEN, POISED, REST, SERVED_AT, Run, margins
 
 GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME = "goal", "mode", "antipodal", "local minimum", "boundary", "time"
-ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME)
+UNDECIDED = "undecided"
+ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME, UNDECIDED)
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,13 +49,17 @@ class Referee:
         last = run.commands[-1]
         if run.stopped == SERVED_AT:
             return self._served(run.last, directions)
-        if run.stopped == REST:
-            return self._rest(run.last, last)
+        if run.stopped in (REST, POISED):
+            ending = self._rest(run.last, last)
+            loose = "" if run.stopped == REST else "; that this rest draws the state to itself was not found"
+            return replace(ending, reason=ending.reason + loose)
         if run.stopped == LIMIT:
             joint, _ = min(margins(run.last).items(), key=lambda item: item[1])
             return Ending(BOUNDARY, f"joint {joint} is at its limit")
         if run.stopped == OPEN:
-            return Ending(BOUNDARY, "the loops cannot follow the command any further")
+            return Ending(BOUNDARY, "the loops lose their rank here, and the integrator found no way on")
+        if run.stopped == LOST:
+            return Ending(UNDECIDED, "the integrator found no way on, which says nothing of the robot")
         if run.stopped == AWAY:
             return Ending(BOUNDARY, "the platform runs away, nothing limits its slides")
         over = f"more than {MOST:,} configurations would be needed" if run.stopped == EFFORT else "the time was over"

@@ -13,11 +13,15 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Question
 from ..mechanism import JointType, Mechanism
 from ..mechanism.vectors import Array
-from ..tolerances import AT_REST, SERVED
+from ..tolerances import ARRIVED, AT_REST, SERVED
 from .law import Command, Desired, Law, Sense
 from .noise import PERIOD
+from .rest import NEUTRAL, Patience, rest_near
 
-SERVED_AT, REST, LIMIT, OPEN, AWAY, TIME, EFFORT = "served", "rest", "limit", "open", "away", "time", "effort"
+State = tuple[ClosedConfiguration, Command]
+
+SERVED_AT, REST, POISED, LIMIT, OPEN = "served", "rest", "poised", "limit", "open"
+AWAY, TIME, EFFORT, LOST = "away", "time", "effort", "lost"
 TOLERANCE = 1e-6
 """Relative tolerance of the integrator, for coordinates of a chart as for errors at the start of a stretch."""
 CLOSER = 1e-2
@@ -26,6 +30,10 @@ FAR = 20.0
 """Characteristic lengths from its start at which a platform has run away."""
 MOST = 20_000
 """Configurations that the integrator may ask for in a run."""
+LOOSE = 1e-3
+"""Part of its value at the start to which the loops' weakest singular value has fallen where a run cannot go on."""
+SHORTEST = 1e-9
+"""Longest step (time constants) with which a run that cannot go on has been tried."""
 HALVINGS = 40
 """Bisections that find the moment at which a joint meets its limit."""
 
@@ -33,9 +41,9 @@ HALVINGS = 40
 @dataclass(frozen=True, eq=False)
 class Run:
     """What happened: times (n,), the configurations and commands at them, and why it stopped: the error vanished
-    (``served``), the command did (``rest``), a joint met its limit (``limit``), the loops could not be closed further
-    (``open``), the platform ran away (``away``), the time was over (``time``), or the integrator's ``MOST``
-    configurations were (``effort``)."""
+    (``served``), a stable rest was reached (``rest``), the command vanished where none was found (``poised``), a joint
+    met its limit (``limit``), the loops' rank falls (``open``), the platform ran away (``away``), the time was over
+    (``time``), the integrator's ``MOST`` configurations were (``effort``), or it could not go on (``lost``)."""
 
     times: Array
     configurations: tuple[ClosedConfiguration, ...]
@@ -64,15 +72,23 @@ class Loop:
     def simulate(self, start: ClosedConfiguration, horizon: float) -> Run:
         """Run until it ends by itself, or ``horizon`` (s)."""
         times, found = [0.0], [(start, self._command(0.0, start))]
-        stopped, left = None, MOST
+        stopped, left, longest = None, MOST, np.inf
+        patience = Patience(1 / self.law.gain, 0.0, found[0][1].size)
         while stopped is None:
-            stretch = _Stretch(self, Chart.around(found[-1][0], self.moving), found[-1][0], left)
-            reached, states, stopped = stretch.integrate(times[-1], horizon)
+            stretch = _Stretch(self, Chart.around(found[-1][0], self.moving), found[-1][0], left, patience)
+            reached, states, stopped = stretch.integrate(times[-1], horizon, longest)
             left = stretch.left
             times += reached
             found += states
-            if stopped is None and self._shift(start, found[-1][0]) > FAR:
-                stopped = AWAY
+            if stopped == LOST and longest * self.law.gain > SHORTEST:
+                # the step was too long for the loops to follow, or for the chart: another chart, shorter steps
+                longest, stopped = min(longest, 1 / self.law.gain) / 8, None
+            elif stopped == LOST and _loose(found[-1][0], start):
+                stopped = OPEN
+            elif stopped is None:
+                longest *= 2
+                if self._shift(start, found[-1][0]) > FAR:
+                    stopped = AWAY
         return Run(np.array(times), tuple(c for c, _ in found), tuple(c for _, c in found), stopped)
 
     def _shift(self, start: ClosedConfiguration, at: ClosedConfiguration) -> float:
@@ -87,12 +103,12 @@ class Loop:
 class _Stretch:
     """One stretch of a run, in one chart; configurations are remembered while the integrator works around them."""
 
-    def __init__(self, loop: Loop, chart: Chart, start: ClosedConfiguration, left: int) -> None:
-        self.loop, self.chart, self.near, self.left = loop, chart, start.q, left
+    def __init__(self, loop: Loop, chart: Chart, start: ClosedConfiguration, left: int, patience: Patience) -> None:
+        self.loop, self.chart, self.near, self.left, self.patience = loop, chart, start.q, left, patience
         self.margin = clearance(start)
-        self._memory: dict[tuple[float, bytes], tuple[ClosedConfiguration, Command]] = {}
+        self._memory: dict[tuple[float, bytes], State] = {}
 
-    def state(self, time: float, y: Array) -> tuple[ClosedConfiguration, Command]:
+    def state(self, time: float, y: Array) -> State:
         """Configuration and command at coordinates y."""
         key = (time, y.tobytes())
         if key not in self._memory:
@@ -106,29 +122,30 @@ class _Stretch:
         at, command = self.state(time, y)
         return self.chart.slope(at.q) @ command.velocity
 
-    def integrate(self, start: float, horizon: float
-                  ) -> tuple[list[float], list[tuple[ClosedConfiguration, Command]], str | None]:
-        """Times and states after ``start``, and why the run stopped (None: only the stretch is at its end)."""
+    def integrate(self, start: float, horizon: float, longest: float
+                  ) -> tuple[list[float], list[State], str | None]:
+        """Times and states after ``start``, in steps of up to ``longest`` (s), and why the run stopped (None: only the
+        stretch is at its end)."""
         from scipy.integrate import LSODA, RK23
 
         loop = self.loop
         first = self.state(start, np.zeros(self.chart.basis.shape[1]))
         settling = loop.sensed is None and start >= loop.steady
         scale = min(1.0, first[1].size) if settling else 1.0
-        if settling and (stopped := self._over(first[1])):
-            return [], [], stopped
+        if settling and (end := self._end(start, np.zeros(self.chart.basis.shape[1]), first)):
+            return ([], [], end[0]) if end[1] is first else ([start], [end[1]], end[0])
         until = horizon if start >= loop.steady else min(horizon, loop.steady)
         tolerances = {"rtol": TOLERANCE, "atol": TOLERANCE * scale}
         times: list[float] = []
-        states: list[tuple[ClosedConfiguration, Command]] = []
+        states: list[State] = []
         try:
             y = np.zeros(self.chart.basis.shape[1])
-            solver = (LSODA(self.rate, start, y, until, **tolerances) if loop.smooth
-                      else RK23(self.rate, start, y, until, max_step=PERIOD, **tolerances))
+            solver = (LSODA(self.rate, start, y, until, max_step=longest, **tolerances) if loop.smooth
+                      else RK23(self.rate, start, y, until, max_step=min(PERIOD, longest), **tolerances))
             while solver.status == "running":
                 solver.step()
                 if solver.status == "failed":
-                    return times, states, OPEN
+                    return times, states, LOST
                 time, state = float(solver.t), self.state(float(solver.t), solver.y)
                 if clearance(state[0]) < min(0.0, self.margin):
                     time, state = self._at_limit(solver)
@@ -136,23 +153,35 @@ class _Stretch:
                 states.append(state)
                 if time < solver.t:
                     return times, states, LIMIT
-                if settling and (stopped := self._over(state[1])):
-                    return times, states, stopped
+                if settling and (end := self._end(time, solver.y, state)):
+                    states[-1] = end[1]
+                    return times, states, end[0]
                 if self.left <= 0:
                     return times, states, EFFORT
                 if np.linalg.norm(solver.y) > WIDE or (settling and state[1].size < CLOSER * scale):
                     return times, states, None
         except LoopsNotClosed:
-            return times, states, OPEN
+            return times, states, LOST
         return times, states, TIME if until == horizon else None
 
-    def _over(self, command: Command) -> str | None:
-        """Why a run with steady, exact directions ends here, if it does."""
+    def _end(self, time: float, y: Array, state: State) -> tuple[str, State] | None:
+        """Why a run with steady, exact directions ends at y (n,), if it does, and the state in which it ends."""
+        command = state[1]
         if command.size <= SERVED:
-            return SERVED_AT
-        return REST if command.speed <= AT_REST * self.loop.law.gain * command.size else None
+            return SERVED_AT, state
+        poised = command.speed <= AT_REST * self.loop.law.gain * command.size
+        if (poised or self.patience.over(time, command.size)) and (rest := self._rest(time, y)):
+            return SERVED_AT if rest[1].size <= SERVED else REST, rest
+        return (POISED, state) if poised else None
 
-    def _at_limit(self, solver: Any) -> tuple[float, tuple[ClosedConfiguration, Command]]:
+    def _rest(self, time: float, y: Array) -> State | None:
+        """The stable rest at which a run has arrived that is at y (n,); None where it is still on its way."""
+        found = rest_near(lambda y: self.rate(time, y), y)
+        if found is None or np.linalg.norm(found.y - y) > ARRIVED or found.growth > NEUTRAL * self.loop.law.gain:
+            return None
+        return self.state(time, found.y)
+
+    def _at_limit(self, solver: Any) -> tuple[float, State]:
         """Time and state in the solver's last step at which a joint meets its limit."""
         inside, outside, curve = float(solver.t_old), float(solver.t), solver.dense_output()
         for _ in range(HALVINGS):
@@ -160,6 +189,11 @@ class _Stretch:
             met = clearance(self.state(middle, curve(middle))[0]) < 0
             inside, outside = (inside, middle) if met else (middle, outside)
         return inside, self.state(inside, curve(inside))
+
+
+def _loose(at: ClosedConfiguration, start: ClosedConfiguration) -> bool:
+    """Whether the loops lose their rank at a configuration."""
+    return at.kernel()[1].weakest < LOOSE * start.kernel()[1].weakest
 
 
 def limited(mechanism: Mechanism) -> list[tuple[str, float, float]]:

@@ -18,6 +18,8 @@ def selection(found: Selection) -> str:
     rows = [("robot", f"{setting.robot.name}   {setting.anatomy.architecture()}"), ("from", str(found.start)),
             ("to", str(found.goal)), ("cones", f"{angle} about each direction"),
             ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}, the most accurate first")]
+    if found.unexamined:
+        rows.append(("", f"not examined: {len(found.unexamined)} ({found.left})"))
     if found.sight is not None:
         rows.append(("camera", f"on {found.sight.reference}"))
     blocks = [listing(rows)]
@@ -26,6 +28,9 @@ def selection(found: Selection) -> str:
         blocks.append(table([_row(each, found.sight is not None) for each in found.kept], heads))
         blocks.append("mm, degrees: largest errors at the goal; modes: those of the start / of the goal, in brackets\n"
                       "those that the robot can take; – not asked")
+    if found.unexamined:
+        blocks.append(table([_row(each, found.sight is not None)[:3] for each in found.unexamined],
+                            ["not examined", "mm", "degrees"]))
     discarded = [each for each in found.candidates if each.discarded is not None]
     if discarded:
         blocks.append(table([(", ".join(each.legs), str(each.discarded)) for each in discarded],
