@@ -23,6 +23,7 @@ from hrsynth.description import load
 from hrsynth.errors import HrsynthError
 from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism import Direction, Mechanism
+from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.carried import carried, ties
 from hrsynth.mechanism.relations import Relations
 from hrsynth.mechanism.vectors import rotation_about
@@ -149,6 +150,42 @@ def test_a_special_zero_configuration_proves_nothing_of_what_loops_keep() -> Non
     planar = architecture(setting_of("3rrr_m1"))
     other = ExactArchitecture(planar.mechanism, planar.relations, planar.observations, planar.relation, 9)
     assert other.verdict(other.observations).proved
+
+
+def test_robots_without_axes_or_without_centres() -> None:
+    """Rods between balls have no axes, slides no centres; what they see is fixed in their links."""
+    rods, slides = Builder("rods"), Builder("slides")
+    rods.link("base")
+    rods.link("platform", at=(0, 0, 1))
+    rng = np.random.default_rng(0)
+    for number in range(4):
+        foot = rng.normal(size=3)
+        tip = foot * [0.5, 0.5, 0] + [0, 0, 1]
+        rods.link(f"rod_{number}", at=foot)
+        rods.joint(f"foot_{number}", "S", "base", f"rod_{number}", foot)
+        rods.joint(f"tip_{number}", "S", f"rod_{number}", "platform", tip, loop=number > 0)
+        rods.observe(str(number + 1), f"rod_{number}", tip - foot)
+    for name in ("base", "one", "platform"):
+        slides.link(name)
+    slides.joint("x", "P", "base", "one", axis=(1, 0, 0))
+    slides.joint("y", "P", "one", "platform", axis=(0, 1, 0))
+    slides.observe("1", "platform", (1, 2, 3))
+    for builder in (rods, slides):
+        robot = builder.build(platform="platform")
+        relations = recognised(robot, walked(robot, 2, seed=0))
+        every = ties(relations)
+        assert every
+        assert all(kept(every, relations, one_of(robot, relations)))
+        assert all(carried(robot, relations, every))
+
+
+@pytest.mark.parametrize("robot", ["3upu", "delta", "quattro", "3rps", "hexaglide"])
+def test_the_seed_of_the_samples_does_not_matter(robot: str) -> None:
+    settings = [prepare(load(robot), samples=4, seed=seed) for seed in (0, 1, 2)]
+    architectures = [architecture(setting) for setting in settings]
+    assert len({frozenset(ties(each.relations)) for each in architectures}) == 1
+    verdicts = [each.verdict(each.observations) for each in architectures]
+    assert len({(verdict.rank, verdict.proved, verdict.reason) for verdict in verdicts}) == 1
 
 
 def test_identities_are_tested_at_several_instances() -> None:

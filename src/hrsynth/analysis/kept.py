@@ -59,8 +59,9 @@ class _Moving:
         drawn = found.geometry
         centres, factor = scaled(drawn.centres.ravel())
         self.twists = found.twists()
-        self.D = np.array([scaled(direction)[0] for direction in drawn.directions])[..., None]
-        self.dD = _cross(np.array([self.twists[links[0]][3:] for links in relations.fixed]), self.D)
+        self.D = np.array([scaled(direction)[0] for direction in drawn.directions]).reshape(-1, 3, 1)
+        turns = np.array([self.twists[links[0]][3:] for links in relations.fixed])
+        self.dD = _cross(turns.reshape(len(self.D), 3, found.mobility), self.D)
         self.P = centres.reshape(-1, 3, 1)
         at = np.array([self.twists[host] for host in relations.hosts]).reshape(len(self.P), 6, found.mobility)
         self.dP = factor * at[:, :3] + _cross(at[:, 3:], self.P)

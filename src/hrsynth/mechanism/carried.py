@@ -17,9 +17,6 @@ from .model import Joint, JointType, Mechanism
 from .relations import Relations, Sight
 
 Kind = Literal["same", "square", "plane", "zero", "parallel", "normal", "seen"]
-WORDS: dict[Kind, str] = {
-    "same": "are parallel", "square": "are perpendicular", "plane": "lie in one plane", "zero": "coincide",
-    "parallel": "lie on a line along", "normal": "lie in a plane normal to", "seen": "go with the observed direction"}
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL, JointType.PLANAR)
 """Joints whose axis is fixed in both links."""
 LEVEL = (JointType.REVOLUTE, JointType.PLANAR)
@@ -43,20 +40,23 @@ class Tie:
         """The relation in words."""
         axes = " and ".join(relations.members(c) for c in self.classes)
         names = {number: name for name, number in relations.centres.items()}
-        points = ", ".join(names.get(number, "a further point") for number, _ in self.terms)
+        points = "centres of " + ", ".join(names.get(number, "a further point") for number, _ in self.terms)
+        pair = len(self.terms) == 2
         match self.kind:
             case "same":
-                return f"{axes} are parallel, those in {' and '.join(self.links)}"
-            case "square" | "plane":
-                return f"{axes} {WORDS[self.kind]}"
-            case "seen":
-                return f"the direction observed in {self.links[0]} follows from centres and axes"
-            case "zero" if len(self.terms) == 2:
-                return f"the centres of {points} coincide"
+                return f"{axes}: parallel in {self.links[0]} and {self.links[1]}"
+            case "square":
+                return f"{axes}: perpendicular"
+            case "plane":
+                return f"{axes}: in one plane"
             case "zero":
-                return f"the centres of {points} are a parallelogram"
-        what = f"the centres of {points}" if len(self.terms) == 2 else f"two differences of the centres of {points}"
-        return f"{what} {WORDS[self.kind]} the {axes}"
+                return f"{points}: {'one point' if pair else 'a parallelogram'}"
+            case "parallel":
+                return f"{points}: {'on a line' if pair else 'a parallelogram but for slides'} along {axes}"
+            case "normal":
+                return f"{points}: in a plane normal to {axes}"
+            case _:
+                return f"observed direction of {self.links[0]}: along its centres or axes"
 
 
 def ties(relations: Relations) -> tuple[Tie, ...]:
@@ -162,7 +162,7 @@ class _Carried:
                 return self._is_square(*tie.classes)
             case "plane":
                 together = set.intersection(*(self.at_axis[c] for c in tie.classes))
-                return bool(together) or any(all(self._is_square(n, c) for c in tie.classes if c != n)
+                return bool(together) or any(all(self._is_square(n, c) for c in tie.classes)
                                              for n in range(len(self.at_axis)) if n not in tie.classes)
             case "seen":
                 return self._seen(tie)
