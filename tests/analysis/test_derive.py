@@ -14,6 +14,8 @@ import yourdfpy
 from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.analysis.setting import SAMPLES
+from hrsynth.catalog.geometry import mechanism as catalog_mechanism
+from hrsynth.catalog.words import parse
 from hrsynth.description import load, native
 from hrsynth.errors import BadRequest, NotCertified
 from hrsynth.kinematics.certificate import Certificate
@@ -334,6 +336,17 @@ def test_other_segments(robot: str, observe: tuple[str, ...]) -> None:
     links = {o.link for o in derivation.setting.observed}
     assert {each for each in observe if not each.isdigit()} <= links
     assert len(links) == len(observe)
+
+
+@pytest.mark.parametrize("observe", ["link_2_1,link_2_2", "link_2_2,link_2_1", "link_1_1,link_1_2,link_2_1,3"])
+@pytest.mark.parametrize("form", ["simplified", "general"])
+def test_two_links_that_a_slide_joins_are_both_watched(observe: str, form: str) -> None:
+    """They have one direction and one joint before them, which is taken over once; the second adds nothing."""
+    robot = catalog_mechanism(parse("3(Ra*-Ph-Ra-Ra)"))
+    found = derive(robot, observe, form=form)
+    certified(found)
+    fewer = [name for name in observe.split(",") if not name.endswith("_2")]
+    assert found.verdict.rank == derive(robot, fewer, form=form).verdict.rank
 
 
 def test_encoders_made_visible() -> None:

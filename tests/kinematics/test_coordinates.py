@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from hrsynth.analysis.setting import prepare
 from hrsynth.description import load
 from hrsynth.kinematics.coordinates import Coordinates
+from hrsynth.kinematics.reach import reach
+from hrsynth.mechanism.vectors import rotation_from_rpy
+from oracle import exponential
+from strategies import planar, transformed
 
 EXPECTED = {
     "rrrrr_m1": ("x", "y"),
@@ -32,7 +38,39 @@ def test_a_platform_has_as_many_coordinates_as_freedoms(name: str):
     assert len(coordinates.names) == setting.dof
 
 
-@pytest.mark.parametrize("name", ["quattro", "gough_stewart", "3rps"])
+@pytest.mark.parametrize("seed", range(4))
+def test_the_turn_of_a_planar_robot_is_its_angle_about_the_normal(seed: int):
+    """Wherever its plane lies: no component of the turn, which is less."""
+    setting = prepare(planar(["RRR", "RPR", "RPR"], np.random.default_rng(seed), [{0}, {1}, {1}]), samples=3)
+    start, motion = setting.everything.start, setting.motion
+    coordinates = Coordinates.of(start, setting.everything.question, motion)
+    assert coordinates.names[2] == "phi"
+    for value, at in coordinates.along(start, 2, (0.3, 0.3), 3):
+        turn = at.pose(motion.link)[:3, :3] @ motion.home[:3, :3].T
+        assert turn == pytest.approx(exponential(value * motion.normal), abs=1e-8)
+        assert reach(start, setting.everything.question, motion.pose(at.pose(motion.link)), motion) is not None
+
+
+def test_the_turn_about_a_tilted_axis_is_its_angle():
+    """A robot that turns about one axis in space, which is not the base's z."""
+    R = rotation_from_rpy(0.5, 0.3, 0.2)
+    setting = prepare(transformed(load("quattro"), R, np.zeros(3)), samples=3)
+    start, motion = setting.everything.start, setting.motion
+    coordinates = Coordinates.of(start, setting.everything.question, motion)
+    assert coordinates.names[3] == "turn about " + " ".join(f"{x:.3g}" for x in R[:, 2])
+    for value, at in coordinates.along(start, 3, (0.3, 0.3), 3):
+        turn = at.pose(motion.link)[:3, :3] @ motion.home[:3, :3].T
+        assert turn == pytest.approx(exponential(value * R[:, 2]), abs=1e-8)
+
+
+def test_an_angle_is_the_same_after_a_whole_turn():
+    coordinates, setting = made("3rrr_m1")
+    X = setting.everything.start.pose(setting.motion.link)
+    turned = replace(coordinates, values=coordinates.values + [0, 0, 2 * np.pi])
+    assert turned.apart(X) == pytest.approx(np.zeros(3), abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["quattro", "gough_stewart", "3rps", "3rrr_m1"])
 def test_the_jacobian_is_that_of_the_error(name: str):
     coordinates, setting = made(name)
     step = 1e-6

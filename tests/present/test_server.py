@@ -13,9 +13,10 @@ import pytest
 
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism import JointType
-from hrsynth.present.view.server import Handler, Server, serve
-from hrsynth.present.view.view import View
+from hrsynth.present.view.server import Handler, Server, Session, serve
+from hrsynth.present.view.view import View, view
 from present.views import miss, moved, seen, serving
+from strategies import planar
 
 pytest.importorskip("meshcat")
 
@@ -63,6 +64,25 @@ def test_several_coordinates_at_once_with_closed_loops(found: View, address: str
     back = ask(address, {"values": home.tolist(), "home": True, "modes": True})
     assert np.array(back["state"]["real"]) == pytest.approx(found.home.places["real"], abs=1e-6)
     assert len(back["ghosts"]) == len(found.ghosts)
+
+
+def test_a_tilted_planar_robot_turns_by_the_angle_that_its_slider_shows():
+    """As the page without a server has it, and as the server answers."""
+    found = view(planar(["RPR"] * 3, np.random.default_rng(1), [{1}] * 3))
+    link = list(found.setting.mechanism.links).index(found.setting.mechanism.platform)
+    slider = found.scene()["sliders"][2]
+    assert (slider["name"], slider["unit"]) == ("phi", "rad")
+    normal = found.setting.motion.normal
+    session, home = Session(found), [each.values[each.home] for each in found.sliders]
+    shown = list(zip(slider["values"], slider["states"], strict=True))
+    for value in (0.4, -0.3, 0.4 - 2 * np.pi):
+        reply = session.answer({"values": [*home[:2], value]})
+        assert not reply["stopped"]
+        shown.append((value, reply["state"]))
+    for value, state in shown:
+        x, y, z, w = state["real"][link][3:]
+        turn = 2 * np.arctan2([x, y, z] @ normal, w) - value
+        assert (turn + np.pi) % (2 * np.pi) - np.pi == pytest.approx(0, abs=1e-5)
 
 
 def test_beyond_the_workspace_it_stops_at_its_edge(found: View, address: str):
