@@ -17,10 +17,13 @@ from hrsynth.analysis import check as checks
 from hrsynth.analysis.accuracy import accuracy as accuracies
 from hrsynth.analysis.aspects.path import Aspects
 from hrsynth.analysis.modes.modes import modes_with
-from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.analysis.setting import Setting, motors, prepare
+from hrsynth.analysis.singularity.agreement import weakest
+from hrsynth.analysis.singularity.singular import locus_of
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet, PoseNotReached
-from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.batch.chain import Chain
+from hrsynth.kinematics.configuration import ClosedConfiguration, Target
 from hrsynth.kinematics.reach import reach
 from hrsynth.kinematics.steps import led
 from hrsynth.mechanism import Mechanism
@@ -134,12 +137,17 @@ def checked(case: Case, pose: Pose) -> Answer:
     return [posture.configuration for posture in checks.check(case.robot, case.observe, at=[pose]).postures]
 
 
-def swept(case: Case, pose: Pose) -> Answer:
-    """A grid of two poses, the first the wanted one."""
+def beside(case: Case, pose: Pose) -> Grid:
+    """The grid of the pose and another beside it."""
     part = case.setting.motion.parts[0]
     start = getattr(pose, part)
     ends = np.array([start, start + 0.01 * case.setting.everything.twin.length])
-    grid = Grid(((part, ends),), replace(pose, **{part: None}))
+    return Grid(((part, ends),), replace(pose, **{part: None}))
+
+
+def swept(case: Case, pose: Pose) -> Answer:
+    """A grid of two poses, the first the wanted one."""
+    grid = beside(case, pose)
     cells = checks.check(case.robot, case.observe, grid=grid).grid
     assert cells is not None
     if cells.postures[0] is None:
@@ -166,6 +174,29 @@ def exact(case: Case, pose: Pose) -> Answer:
     return reached(case, pose)
 
 
+def mapped(case: Case, pose: Pose) -> Answer:
+    """A grid of two poses: the error at the first is that of the single pose."""
+    grid, at = beside(case, pose), reached(case, pose)
+    field = accuracies.accuracy(case.robot, case.observe, cones=1e-3, grid=grid).field
+    assert field is not None
+    if field.reached[0]:
+        single = accuracies.errors_at(case.setting, np.full(len(case.setting.observed), 1e-3), at[0])
+        assert field.position[0] == pytest.approx(single.position.largest, rel=1e-2)
+    return at
+
+
+def located(case: Case, pose: Pose) -> Answer:
+    """Over a plane of poses turned alike: the nearest cell's distance from a singularity is that of its pose."""
+    plane = Pose(z=pose.z if case.setting.motion.shifts.shape[1] == 3 else None, rpy=pose.rpy)
+    locus = locus_of(case.setting, plane=plane, steps=5)
+    cell = np.unravel_index(np.nanargmax(locus.hidden.type2), locus.grid.shape)
+    (there,) = locus.grid.poses_at([tuple(map(int, cell))])
+    assert there.rpy == plane.rpy
+    (at,) = reached(case, there)
+    assert locus.hidden.type2[cell] == pytest.approx(weakest(at, case.setting.samples.question), rel=1e-6)
+    return reached(case, pose)
+
+
 def served(case: Case, pose: Pose) -> Answer:
     """A run is told to have ended at the goal only at the goal."""
     found = servo(case.robot, case.observe, start=Pose(), goal=pose, time=0.3)
@@ -183,7 +214,8 @@ def selected(case: Case, pose: Pose) -> Answer:
 
 
 COMMANDS = {each.__name__: each
-            for each in (reached, led_whole, checked, swept, moded, pathed, exact, served, selected)}
+            for each in (reached, led_whole, checked, swept, moded, pathed, exact, mapped, served, selected)}
+SLOW = {"located": located}
 
 
 def answers(robot: str, command: str, count: int, seed: int) -> Counter[str]:
@@ -191,7 +223,7 @@ def answers(robot: str, command: str, count: int, seed: int) -> Counter[str]:
     case, told = case_of(robot), Counter[str]()
     for X, pose in wanted_poses(case.setting, count, seed):
         try:
-            found = COMMANDS[command](case, pose)
+            found = (COMMANDS | SLOW)[command](case, pose)
         except (PoseNotReached, PlaneNotMet, BadRequest) as error:
             told[type(error).__name__] += len(error.lines())
             continue
@@ -199,6 +231,39 @@ def answers(robot: str, command: str, count: int, seed: int) -> Counter[str]:
             assert_there(case.setting, at, X)
         told["answered"] += 1
     return told
+
+
+def test_a_motor_at_half_a_turn_is_held_from_either_side() -> None:
+    """Its angle is π and −π there; the way to it is as short from both sides."""
+    case = case_of("3rrr_m1")
+    setting, twin = case.setting, case.setting.everything.twin
+    (encoder, *_) = motors(setting).observations
+    bare = Target(setting.motion.link, np.eye(4), np.zeros(3), setting.mechanism.reference, ())
+    (crank,) = twin.coordinates[encoder.joint]
+    for angle in (np.pi, -np.pi):
+        for side in (1e-2, -1e-2):
+            q = twin.q0.copy()
+            q[twin.model.joints[twin.model.getJointId(encoder.joint)].idx_q] = angle + side
+            error, rows = replace(bare, measured=((encoder, np.array([angle])),)).rows(twin, q)
+            assert error[-1] == pytest.approx(side, abs=1e-12)
+            assert rows[-1, crank] == pytest.approx(1)
+
+
+def test_a_link_that_has_turned_over_does_not_close_its_leg() -> None:
+    """Half a turn about the line through its two joints keeps the joints' centres and leaves their axes parallel."""
+    setting = case_of("3rrr_m1").setting
+    leg, seen = setting.anatomy.legs[0], setting.segments[0]
+    chain = Chain.of(setting.mechanism, leg, seen, None)
+    place = chain.links.index(seen.link)
+    one, two = (joint.point / chain.length for joint in setting.mechanism.joints_of(seen.link))
+    state = chain.start(1)
+    ends = state[:, 1].copy()
+    assert chain.led(state, ends, 1)[1] == pytest.approx([0], abs=1e-12)
+    turn = half_turn((two - one) / np.linalg.norm(two - one))
+    state[0, place, :3, 3] = one + turn @ (state[0, place, :3, 3] - one)
+    state[0, place, :3, :3] = turn @ state[0, place, :3, :3]
+    assert np.linalg.norm(chain.ties.evaluate(state)[0]) < 1e-12
+    assert chain.led(state, ends, 1)[1] == [np.inf]
 
 
 @pytest.fixture(autouse=True)
@@ -210,10 +275,20 @@ def prepared_once(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setattr(module, "prepare", prepared)
 
 
-@pytest.mark.parametrize("robot", ["gough_stewart", "3rpr_m1, tilted"])
-@pytest.mark.parametrize("command", COMMANDS)
+QUICK = ("reached", "led_whole", "checked", "swept", "moded")
+
+
+@pytest.mark.parametrize(("robot", "command"), [
+    *(("3rpr_m1, tilted", command) for command in COMMANDS), *(("gough_stewart", command) for command in QUICK),
+    *(pytest.param("gough_stewart", command, marks=pytest.mark.slow) for command in COMMANDS if command not in QUICK)])
 def test_an_answer_is_about_the_pose_that_was_wanted(robot: str, command: str) -> None:
     assert answers(robot, command, 3, 0)["answered"] == 3
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", ["3rpr_m1, tilted", "gough_stewart"])
+def test_a_map_is_of_the_poses_that_were_wanted(robot: str) -> None:
+    assert answers(robot, "located", 2, 0)["answered"] == 2
 
 
 def test_a_pose_out_of_reach_is_refused() -> None:

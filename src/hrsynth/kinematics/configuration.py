@@ -99,7 +99,7 @@ class Target:
         else:
             errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length, logarithm(X[:3, :3] @ self.pose[:3, :3].T)]
             blocks = [V]
-        errors += [value - wanted for value, (_, wanted) in zip(values, self.measured, strict=True)]
+        errors += [o.apart(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True)]
         return np.concatenate(errors), np.concatenate([*blocks, *rates])
 
 

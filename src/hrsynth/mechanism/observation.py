@@ -10,6 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..errors import BadMechanism
+from .so3 import wrapped
 from .vectors import Array, frozen, hat, unit
 
 
@@ -46,6 +47,10 @@ class Observation:
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
         """The rate of :meth:`value` for each joint velocity; one row a component."""
         raise NotImplementedError
+
+    def apart(self, value: Array, wanted: Array) -> Array:
+        """By how much a measured value is off a wanted one."""
+        return value - wanted
 
     @classmethod
     def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
@@ -187,6 +192,10 @@ class Angle(Encoder):
         mark = X_reference[:3, :3].T @ X_link[:3, :3] @ self.mark
         normal = self.start - (self.axis @ self.start) * self.axis
         return np.array([np.arctan2(self.axis @ np.cross(normal, mark), normal @ mark)])
+
+    def apart(self, value: Array, wanted: Array) -> Array:
+        """The difference without whole turns: at half a turn the angle is π as well as −π."""
+        return np.array([wrapped(float(value[0] - wanted[0]))])
 
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
         """a* · (ω_ℓ − ω_c), shape (1, n); a* = (a − c m) / (1 − c²), c = a · m: dual to the axis a and the mark m."""

@@ -73,7 +73,7 @@ def turn_about(normal: Array, R: Array) -> tuple[float, Array]:
 
 def wrapped(angle: float) -> float:
     """An angle modulo 2π, in (−π, π]."""
-    return float(-((np.pi - angle) % (2 * np.pi)) + np.pi)
+    return angle if -np.pi < angle <= np.pi else float(-((np.pi - angle) % (2 * np.pi)) + np.pi)
 
 
 def quaternions(R: Array) -> Array:

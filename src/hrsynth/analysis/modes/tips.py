@@ -217,7 +217,7 @@ class _Held:
         if not self.measured:
             return np.zeros(0), np.zeros((0, twin.nv))
         _, _, values, rates = measure(twin, q, self.reference, [o for o, _ in self.measured])
-        errors = [value - wanted for value, (_, wanted) in zip(values, self.measured, strict=True)]
+        errors = [o.apart(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True)]
         return np.concatenate(errors), np.vstack(rates)
 
 

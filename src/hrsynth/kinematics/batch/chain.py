@@ -39,10 +39,12 @@ that stay perpendicular."""
 
 @dataclass(frozen=True, eq=False)
 class Ties:
-    """The rows of joints: forces (i, j, n in i, point in i, point in j), moments (i, j, α in i, β in j, level)."""
+    """The rows of joints: forces (i, j, n in i, point in i, point in j), moments (i, j, α in i, β in j, level); and
+    directions that coincide (i, j, α in i, β in j), which moments alone do not tell from opposite ones."""
 
     forces: list[tuple[int, int, Array, Array, Array]] = field(default_factory=list)
     moments: list[tuple[int, int, Array, Array, float]] = field(default_factory=list)
+    upright: list[tuple[int, int, Array, Array]] = field(default_factory=list)
 
     @property
     def count(self) -> int:
@@ -60,6 +62,8 @@ class Ties:
         kind = joint.type.value
         self.forces.extend((i, j, a[:3, k], a[:3, 3] / length, b[:3, 3] / length) for k in _FORCES.get(kind, ()))
         self.moments.extend((i, j, a[:3, k], b[:3, m], 0.0) for k, m in _TURNS.get(kind, ()))
+        kept = (2,) if len(_TURNS.get(kind, ())) == 2 else (0, 2) if kind in _TURNS else ()
+        self.upright.extend((i, j, a[:3, k], b[:3, k]) for k in kept)
         if joint.type is JointType.UNIVERSAL:
             first, second = joint.axes
             self.moments.append((i, j, X_i[:3, :3].T @ first, X_j[:3, :3].T @ second, float(first @ second)))
@@ -67,6 +71,12 @@ class Ties:
     def pin(self, i: int, j: int, at_i: Array, at_j: Array) -> None:
         """The rows that keep two points together."""
         self.forces.extend((i, j, axis, at_i, at_j) for axis in np.eye(3))
+
+    def stand(self, X: Array) -> NDArray[np.bool_]:
+        """Where no direction points the opposite way, (n,)."""
+        R = X[..., :3, :3]
+        signs = [np.sum((R[:, i] @ alpha) * (R[:, j] @ beta), axis=1) > 0 for i, j, alpha, beta in self.upright]
+        return np.all(signs, axis=0) if signs else np.ones(len(X), dtype=bool)
 
     def evaluate(self, X: Array) -> tuple[Array, Array]:
         """Residuals (n, rows) and derivatives by the twists of all links (n, rows, links, 6)."""
@@ -135,7 +145,7 @@ class Chain:
 
     def led(self, X: Array, ends: Array, iterations: int) -> tuple[Array, Array]:
         """States nearest to X (n, links, 4, 4) with the end at ``ends`` (n, 4, 4), characteristic lengths, and the
-        residuals left (n,)."""
+        residuals left (n,), infinite where a joint's axis has turned over."""
         X = X.copy()
         X[:, 1 if 1 not in self.free else -1] = ends
         live = np.arange(len(X))
@@ -153,7 +163,7 @@ class Chain:
             step = -np.linalg.solve(A, J.transpose(0, 2, 1) @ residual[:, :, None])[..., 0]
             step *= np.minimum(1.0, LONGEST / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
             X[live[:, None], self.free] = moved(X[live[:, None], self.free], step.reshape(len(live), -1, 6))
-        return X, size
+        return X, np.where(self.ties.stand(X), size, np.inf)
 
     def answers(self, X: Array) -> tuple[Array, Array, Array]:
         """u (n, 3); its rate by the twist of the end (n, 3, 6); the wrenches that the leg transmits to the end, as an
