@@ -17,7 +17,7 @@ from pathlib import Path
 
 CERTAIN = re.compile(r"\b(prove[ns]?|proved|proofs?|certif\w+|complete\w*|cannot|never|always|exact\w*|enclose[sd]?|"
                      r"enclosures?|guarantee\w*|impossible|unique\w*|rigorous\w*|isolated|necessarily|separated|"
-                     r"same aspect|controllable|uncontrollable)\b", re.IGNORECASE)
+                     r"same aspect|only beyond|controllable|uncontrollable)\b", re.IGNORECASE)
 """The words that make a text a claim."""
 
 
@@ -96,10 +96,17 @@ CLAIMS = (
           (r"enclosed ", r"each enclosed with existence and uniqueness proved", r"not proved")),
     Claim("the real robot cannot be assembled there", "modes, view, report",
           "no closed configuration of the whole real robot has the platform at this pose",
-          "each leg is closed alone from its known closed forms, or from random starts",
-          "random starts find a closure where there is one",
-          "tests/kinematics/test_assembly.py::test_a_pose_far_away_names_the_legs_that_do_not_close",
-          (r"robot cannot be assembled", r"\(cannot be assembled\)", r"^impossible: ")),
+          "a distance that a leg named there would have to bridge lies outside of its reach, or its rods ask for "
+          "different values of one joint, in ball arithmetic, for all poses within the mode's radius and 1e-7",
+          EXACT_GEOMETRY + ", axes that meet to 1e-9 do so; limits of joints do not matter",
+          "tests/kinematics/test_closures.py::test_what_is_said_of_assembly_holds_by_brute_force",
+          (r"robot cannot be assembled", r"cannot be assembled\b", r"^impossible: ")),
+    Claim("the real robot can be assembled there only beyond the limits of …", "modes, view, report",
+          "the whole robot closes at this pose, and in no closure are all joints within their limits",
+          "all values of a joint that a leg's closures allow are listed in ball arithmetic, and none is within its "
+          "limits, turns modulo 2π", EXACT_GEOMETRY + ", axes that meet to 1e-9 do so",
+          "tests/kinematics/test_closures.py::test_limits_of_turns_count_modulo_whole_turns",
+          (r"only beyond the limits of",)),
     Claim("same aspect (certified)", "path, select",
           "the path that is printed joins the two poses, and the hidden robot meets no Type 2 singularity on it",
           "interval arithmetic along the path", EXACT_GEOMETRY,

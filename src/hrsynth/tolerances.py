@@ -23,6 +23,10 @@ PASSED_BY = 1e-3
 CLOSED = 1e-10
 """Residual (characteristic lengths, radians) below which a configuration counts as closed."""
 
+OUT_OF_REACH = 1e-7
+"""Radius (part of the extents) of the balls around a pose within which no leg's closure is refused: a leg that is
+nearer to its reach than that stays undecided."""
+
 NEAREST = 1e-10
 """Projected gradient (characteristic lengths, radians) at which a pose counts as the nearest one."""
 

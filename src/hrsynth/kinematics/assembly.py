@@ -1,10 +1,16 @@
-"""A robot assembled at a given pose of its platform's bodies, leg by leg: does every leg close there?"""
+"""A robot assembled at a given pose of its platform's bodies, leg by leg: does every leg close there?
+
+That it does is shown by a configuration; that it does not, or only beyond a joint's limits, is said where the list of a
+leg's closures proves it (:mod:`closures`). Starts from which nothing closes prove nothing.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
+from typing import Any
 
 import numpy as np
 
@@ -13,29 +19,52 @@ from ..mechanism import Joint, JointType, Mechanism, Observation
 from ..mechanism.legs import Anatomy, Leg
 from ..mechanism.vectors import Array, inverse
 from ..tolerances import CLOSED, SAME_POINT, SOLVED
+from .closures import UNDECIDED, Closures, End, Miss, leg_closures
 from .configuration import ClosedConfiguration, Target, closed
 from .locked import placed
 from .misses import alone
 from .twin import Twin
+from .ways import Part, ways
 
 STARTS = 24
-"""Configurations of a leg, the zero configuration first, from which it is closed at a pose."""
+"""Configurations of a leg, the zero configuration first, from which it is closed at a pose: for each of its listed
+closures, and as many without a list."""
+FAR = 400
+"""Iterations more that a leg may need to reach a pose far away, at most."""
+
+ASSEMBLED, BEYOND, IMPOSSIBLE, NOT_FOUND = "yes", "beyond limits", "no", "not found"
+"""Whether a robot can be assembled: a configuration is at hand; only beyond joints' limits, and it cannot, both proved;
+none of these."""
 
 
 @dataclass(frozen=True, eq=False)
 class Assembly:
-    """What became of a robot at a pose: the configuration, or None and the legs that do not close (``open``); joints
-    that are outside their limits there (``beyond``); the poses (4, 4) of the platform's links."""
+    """What became of a robot at a pose: the configuration, or None and the legs that were not closed (``open``), with
+    what proves of legs that they cannot be (``misses``); joints that are outside their limits there (``beyond``), and
+    whether all closures of a leg are (``held``); the poses (4, 4) of the platform's links."""
 
     configuration: ClosedConfiguration | None
     open: tuple[str, ...] = ()
     beyond: tuple[str, ...] = ()
     platform: Mapping[str, Array] | None = None
+    misses: tuple[tuple[str, Miss], ...] = ()
+    held: bool = False
 
     @property
-    def reachable(self) -> bool:
-        """Whether the whole robot closes, within the limits of its joints."""
-        return self.configuration is not None and not self.beyond
+    def verdict(self) -> str:
+        """``ASSEMBLED``, ``BEYOND``, ``IMPOSSIBLE`` or ``NOT_FOUND``."""
+        if self.misses:
+            return IMPOSSIBLE
+        if self.configuration is None:
+            return NOT_FOUND
+        if self.beyond:
+            return BEYOND if self.held else NOT_FOUND
+        return ASSEMBLED
+
+    @property
+    def reachable(self) -> bool | None:
+        """Whether the whole robot closes, within the limits of its joints; None where neither was found."""
+        return {ASSEMBLED: True, NOT_FOUND: None}.get(self.verdict, False)
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,37 +106,72 @@ class Assembler:
                 return {link: twin.pose(q, link) for link in self.anatomy.platform}
         raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, "inside the platform")
 
-    def at(self, bodies: Mapping[str, Array], measured: Sequence[tuple[Observation, Array]]) -> Assembly:
-        """The robot with the bodies (on which legs end) at these poses (4, 4) and the measured values as given."""
+    @cached_property
+    def _ways(self) -> dict[str, list[tuple[Part, ...]]]:
+        return {leg.label: list(ways(self.anatomy, leg)) for leg in self.anatomy.legs}
+
+    def at(self, bodies: Mapping[str, Array], measured: Sequence[tuple[Observation, Array]], within: float = 0.0
+           ) -> Assembly:
+        """The robot with the bodies (on which legs end) at these poses (4, 4), known to ``within`` (characteristic
+        lengths, radians), and the measured values as given."""
         platform = self.platform(bodies)
         poses = dict(platform)
-        missing, beyond = list[str](), list[str]()
+        missing, beyond, misses, held = list[str](), list[str](), list[tuple[str, Miss]](), False
         for leg in self.anatomy.legs:
-            found = self._leg(leg, bodies[leg.attach], [each for each in measured if each[0].leg == leg.label])
-            if found is None:
+            own = [each for each in measured if each[0].leg == leg.label]
+            closing = self._leg(leg, bodies[leg.attach], own, within)
+            if closing.found is None:
                 missing.append(leg.label)
+                misses += [] if closing.miss is None else [(leg.label, closing.miss)]
                 continue
-            twin, q = found
+            twin, q = closing.found
             poses.update({link: twin.pose(q, link) for link in leg.links if link not in poses})
-            beyond += _beyond(twin, q, leg)
+            beyond += outside(twin, q, leg.joints)
+            held |= closing.held
         if missing:
-            return Assembly(None, tuple(missing), (), platform)
+            return Assembly(None, tuple(missing), (), platform, tuple(misses))
         mechanism = self.anatomy.mechanism
         whole = Twin(placed(mechanism, {mechanism.base: mechanism.links[mechanism.base].pose, **poses}), self.length)
-        return Assembly(ClosedConfiguration.of(whole, whole.q0), (), tuple(beyond), platform)
+        return Assembly(ClosedConfiguration.of(whole, whole.q0), (), tuple(beyond), platform, (), held)
 
-    def _leg(self, leg: Leg, X: Array, measured: Sequence[tuple[Observation, Array]]) -> tuple[Twin, Array] | None:
-        """A configuration of one leg with its end at X, within its joints' limits where there is such a one."""
+    def _leg(self, leg: Leg, X: Array, measured: Sequence[tuple[Observation, Array]], within: float) -> _Closing:
+        """One leg with its end at X: within its joints' limits where it was found there."""
         twin = self._twins[leg.label]
         target = Target(leg.attach, X, self.anatomy.point, self.reference, tuple(measured))
-        outside = None
-        for start in _starts(twin):
-            q, residual = closed(twin, start, target, tolerance=SOLVED, iterations=60)
-            if residual <= CLOSED and (target.point is not None or _turned_as(twin.pose(q, leg.attach), X)):
-                if not _beyond(twin, q, leg):
-                    return twin, q
-                outside = outside or (twin, q)
-        return outside
+        first = self._closed(twin, twin.q0, target)
+        if first is not None and not outside(twin, first, leg.joints):
+            return _Closing((twin, first))
+        zero = self.anatomy.mechanism.links[leg.attach].pose
+        end = End(X @ inverse(zero), self.length, within, target.point is None)
+        known = leg_closures(self._ways[leg.label], end)
+        if known.miss is not None:
+            return _Closing(None, known.miss)
+        limited = twin.mechanism.joints
+        held = any(_never(limited[joint], values) for joint, values in known.values)
+        for start in () if held and first is not None else _starts(twin, known):
+            q = self._closed(twin, start, target)
+            if q is not None and (held or not outside(twin, q, leg.joints)):
+                return _Closing((twin, q), None, held)
+            first = q if first is None else first
+        return _Closing(None if first is None else (twin, first), None, held)
+
+    def _closed(self, twin: Twin, start: Array, target: Target) -> Array | None:
+        """The closed configuration that a start leads to."""
+        # a step moves a joint by half a characteristic length at most
+        away = float(np.linalg.norm(target.pose[:3, 3])) / twin.length
+        q, residual = closed(twin, start, target, tolerance=SOLVED, iterations=60 + min(FAR, int(4 * away)))
+        turned = target.point is not None or _turned_as(twin.pose(q, target.link), target.pose)
+        return q if residual <= CLOSED and turned else None
+
+
+@dataclass(frozen=True, eq=False)
+class _Closing:
+    """A leg at a pose: its closed configuration (twin, q), or what proves that there is none, or neither; whether all
+    its closures are beyond limits."""
+
+    found: tuple[Twin, Array] | None
+    miss: Miss | None = None
+    held: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,27 +190,50 @@ def _turned_as(X: Array, wanted: Array) -> bool:
     return float(np.trace(X[:3, :3].T @ wanted[:3, :3])) > 1.0
 
 
-def _starts(twin: Twin) -> Iterator[Array]:
-    """The zero configuration, then random ones, always the same."""
-    yield twin.q0
+def _starts(twin: Twin, known: Closures = UNDECIDED) -> Iterator[Array]:
+    """Configurations with the joints' values that are known, other joints as at zero, then at random, always the same;
+    last without values."""
     rng = np.random.default_rng(0)
-    for _ in range(STARTS - 1):
-        yield twin.moved(twin.q0, rng.uniform(-np.pi, np.pi, twin.nv))
+    joints = [twin.coordinates[joint] for joint, _ in known.values if joint in twin.coordinates]
+    lists = [[float(value.mid()) / (twin.length if twin.mechanism.joints[joint].type.slides else 1.0)
+              for value in values if value.is_finite()] for joint, values in known.values if joint in twin.coordinates]
+    for combination in (*product(*lists), None):
+        for number in range(STARTS):
+            step = rng.uniform(-np.pi, np.pi, twin.nv) if number else np.zeros(twin.nv)
+            if combination is not None:
+                for (place,), value in zip(joints, combination, strict=True):
+                    step[place] = value
+            yield twin.moved(twin.q0, step)
 
 
-def _beyond(twin: Twin, q: Array, leg: Leg) -> list[str]:
-    """The joints of a leg, turning or sliding about one axis, whose coordinates are outside their limits."""
+def outside(twin: Twin, q: Array, joints: Sequence[str]) -> list[str]:
+    """Those joints, turning or sliding about one axis, whose coordinates are outside their limits; turns count
+    modulo 2π."""
     moved = twin.difference(twin.q0, q)
     found = []
-    for name in leg.joints:
+    for name in joints:
         joint, at = twin.mechanism.joints.get(name), twin.coordinates.get(name)
-        if joint is None or joint.limits is None or at is None or len(at) != 1:
+        if joint is None or at is None or len(at) != 1:
             continue
-        slides = joint.type is JointType.PRISMATIC
-        value = float(moved[at[0]]) * (twin.length if slides else 1.0)
-        lower, upper = joint.limits.lower, joint.limits.upper
-        turns = (0.0,) if slides else (0.0, 2 * np.pi, -2 * np.pi)
-        if not any((lower is None or value + turn >= lower - SAME_POINT) and
-                   (upper is None or value + turn <= upper + SAME_POINT) for turn in turns):
+        value = float(moved[at[0]]) * (twin.length if joint.type is JointType.PRISMATIC else 1.0)
+        if _beyond(joint, value, value):
             found.append(name)
     return found
+
+
+def _beyond(joint: Joint, low: float, high: float) -> bool:
+    """Whether no coordinate from ``low`` to ``high`` is within a joint's limits."""
+    if joint.limits is None:
+        return False
+    lower, upper = (-np.inf if joint.limits.lower is None else joint.limits.lower - SAME_POINT,
+                    np.inf if joint.limits.upper is None else joint.limits.upper + SAME_POINT)
+    if joint.type is not JointType.REVOLUTE:
+        return high < lower or low > upper
+    # the smallest turn 2πk that brings ``high`` to the lower limit must take ``low`` beyond the upper one
+    turns = np.ceil((lower - high) / (2 * np.pi)) if np.isfinite(lower) else -np.inf
+    return bool(low + 2 * np.pi * turns > upper)
+
+
+def _never(joint: Joint, values: Sequence[Any]) -> bool:
+    """Whether all values of a list, as balls, are outside a joint's limits."""
+    return all(value.is_finite() and _beyond(joint, float(value.lower()), float(value.upper())) for value in values)

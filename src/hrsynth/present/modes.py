@@ -14,11 +14,12 @@ from ..analysis.modes.modes import AssemblyModes
 from ..description.files import require_folder, write_whole
 from ..errors import BadRequest
 from ..mechanism.vectors import Array
-from .scenes import CLOSES, GOAL, NEAR, OPEN, Placed, Scene, scene
+from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, Placed, Scene, scene
 from .sketch import Box, Sketch
 
 MARKS = {GOAL: ("*", 15.0, "the pose itself"), CLOSES: ("o", 8.0, "mode, robot can be assembled"),
-         OPEN: ("X", 9.0, "mode, robot cannot be assembled"), NEAR: ("D", 7.0, "near mode")}
+         OPEN: ("X", 9.0, "mode, robot cannot be assembled"),
+         UNKNOWN: ("P", 8.0, "mode, assembly not found"), NEAR: ("D", 7.0, "near mode")}
 COLOURS = ("tab:orange", "tab:green", "tab:red", "tab:purple", "saddlebrown", "deeppink", "darkcyan", "olive", "navy",
            "goldenrod", "maroon", "black")
 REACHES = ("black", "tab:brown", "tab:gray", "darkslateblue", "darkolivegreen", "teal")

@@ -42,7 +42,7 @@ def _rows(claim: Claim) -> Iterator[tuple[str, ...]]:
         yield (*head, ", ".join(f"{v:g}" for v in each.place), _written(mode), f"{apart:.0f} mm", each.remark)
     for mode in found.modes:
         if mode not in met:
-            reached = "" if mode.reachable else f"; legs {', '.join(mode.open)} do not reach it"
+            reached = f"; legs {', '.join(mode.open)} do not reach it" if mode.reachable is False else ""
             yield (*head, "–", _written(mode), "–", f"not printed{reached}")
 
 

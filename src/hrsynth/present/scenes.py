@@ -19,7 +19,8 @@ from ..mechanism.vectors import Array, inverse
 from .coupler import chains, points, swept, traced
 from .skeleton import legs_of, outline
 
-GOAL, CLOSES, OPEN, NEAR = "goal", "reachable", "unreachable", "near"
+GOAL, CLOSES, OPEN, UNKNOWN, NEAR = "goal", "reachable", "unreachable", "unknown", "near"
+_STATES = {True: CLOSES, False: OPEN, None: UNKNOWN}
 AROUND = 1.3
 """Lines and planes are drawn over this many times the extent of what lies about them."""
 FINE, COARSE, TURN = 241, 61, 73
@@ -104,13 +105,14 @@ def _placed(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) -
     goal = found.goal
     bodies = tuple(outline(goal.twin.mechanism, body, X) for body, X in mode.bodies.items())
     strokes = () if mode.configuration is None else legs_of(mode.configuration, tuple(mode.bodies))
-    state = NEAR if label.startswith(NEAR) else GOAL if mode.goal else CLOSES if mode.reachable else OPEN
+    state = NEAR if label.startswith(NEAR) else GOAL if mode.goal else _STATES[mode.reachable]
+    said = "not found" if mode.reachable is None else "not assembled"
     if mode.goal:
         words = "the pose itself"
     elif mode.open:
-        words = "not assembled: " + ("legs " if len(mode.open) > 1 else "leg ") + ", ".join(mode.open)
+        words = f"{said}: " + ("legs " if len(mode.open) > 1 else "leg ") + ", ".join(mode.open)
     else:
-        words = "not assembled: beyond limits" if mode.beyond else "assembled"
+        words = f"{said}: beyond limits" if mode.beyond else "assembled"
     return Placed(label, state, words, plot.marked(mode), bodies, strokes)
 
 

@@ -18,8 +18,8 @@ TYPES = {"type1": "a Type 1 singularity", "type2": "a Type 2 singularity", "type
 
 @dataclass(frozen=True)
 class Modes:
-    """How many assembly modes there are with the directions of a pose, how many of them the robot can take, and
-    whether these are proved to be all; ``why`` they are not listed, else empty."""
+    """How many assembly modes there are with the directions of a pose, in how many of them the robot was found
+    assembled, and whether these are proved to be all; ``why`` they are not listed, else empty."""
 
     count: int | None
     reachable: int | None
@@ -29,7 +29,7 @@ class Modes:
     @classmethod
     def of(cls, found: AssemblyModes) -> Modes:
         """Of a list of modes."""
-        return cls(len(found.modes), sum(mode.reachable for mode in found.modes), found.found.complete)
+        return cls(len(found.modes), sum(mode.reachable is True for mode in found.modes), found.found.complete)
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""

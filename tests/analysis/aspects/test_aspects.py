@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 
 from analysis.aspects.certified import check_certified
 from hrsynth.analysis.aspects.answer import SAME, SEPARATED, UNDECIDED
-from hrsynth.analysis.aspects.balls import balls, below, centred, cross, det, dot, jets
 from hrsynth.analysis.aspects.carriage import Stretch
 from hrsynth.analysis.aspects.crossing import crossing
 from hrsynth.analysis.aspects.path import BUDGET, Aspects, path
@@ -26,6 +25,7 @@ from hrsynth.analysis.aspects.region import Region
 from hrsynth.analysis.singularity.agreement import smallest_of
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
+from hrsynth.kinematics.balls import balls, below, centred, cross, det, dot, jets
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.sampling import wander
 from strategies import planar

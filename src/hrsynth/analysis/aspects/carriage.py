@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...kinematics.balls import Field, widened
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.parts import PlatformMotion
 from ...kinematics.relation import Question, relation
@@ -18,7 +19,6 @@ from ...mechanism.legs import Anatomy
 from ...mechanism.so3 import exponential, logarithm
 from ...mechanism.vectors import Array, hats, inverse
 from ...tolerances import FOLLOWED, RANK_CUTOFF
-from .balls import Field, widened
 
 Place = tuple[Array, Array]
 """A pose: the point (3,) and the platform's rotation (3, 3)."""

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...kinematics.balls import Field
 from ...mechanism.vectors import Array
-from .balls import Field
 from .limbs import Limb
 from .limits import Bound
 from .sources import Source, traced

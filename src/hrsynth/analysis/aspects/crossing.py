@@ -7,9 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...kinematics.balls import Field, cross, widened
 from ...mechanism.vectors import Array
 from ...tolerances import FOLLOWED
-from .balls import Field, cross, widened
 from .carriage import Carriage, Place, Rigid
 from .limbs import Limb, OnCrank, OnRail
 

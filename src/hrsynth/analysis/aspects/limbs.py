@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...kinematics.balls import Field, cross, dot, normed
 from ...mechanism.vectors import Array
 from ...tolerances import FOLLOWED
-from .balls import Field, cross, dot, normed
 from .carriage import Rigid
 
 

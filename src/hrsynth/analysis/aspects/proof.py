@@ -10,9 +10,9 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...kinematics.balls import Field, above_zero, balls, below, centred, cross, det, dot, finite, jets
 from ...mechanism.vectors import Array
 from ..singularity.condition import Named, rows
-from .balls import Field, above_zero, balls, below, centred, cross, det, dot, finite, jets
 from .carriage import Stretch
 from .chart import Chart
 from .crossing import Crossing

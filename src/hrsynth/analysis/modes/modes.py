@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRequest
-from ...kinematics.assembly import Assembler, Assembly
+from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, outside
+from ...kinematics.closures import Miss
 from ...kinematics.configuration import ClosedConfiguration, Wanted, measure
 from ...kinematics.reach import reach
 from ...kinematics.relation import Question
@@ -39,10 +40,11 @@ class AssemblyMode:
     The exact pose, of the file's decimals, is within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite where
     nothing was proved: its position and its turn, or those of the bodies on which legs end where ``enclosed`` names
     them; ``residual``: the largest distance of a tip from its curve (characteristic lengths). ``goal``: whether it is
-    the pose itself from which the measurements were taken. ``reachable``: whether the whole real robot, legs that
-    are not watched included, closes there within its joints' limits; ``open`` names the legs that do not close,
-    ``beyond`` the joints. ``type2_distance``: the smallest singular value of Mᵀ there, as ``check`` gives it; None
-    where the robot does not close.
+    the pose itself from which the measurements were taken. ``reachable`` and ``assembly``: whether the whole real
+    robot, legs that are not watched included, closes there within its joints' limits, as of :class:`Assembly` (the
+    first None where neither was found); ``open`` names the legs that were not closed, ``beyond`` the joints,
+    ``misses`` what proves of legs that they cannot be closed. ``type2_distance``: the smallest singular value of Mᵀ
+    there, as ``check`` gives it; None where the robot was not closed.
     """
 
     pose: Pose
@@ -50,10 +52,12 @@ class AssemblyMode:
     turn: float
     residual: float
     goal: bool
-    reachable: bool
+    reachable: bool | None
     type2_distance: float | None
+    assembly: str = NOT_FOUND
     open: tuple[str, ...] = ()
     beyond: tuple[str, ...] = ()
+    misses: tuple[tuple[str, Miss], ...] = ()
     configuration: ClosedConfiguration | None = None
     multiplicity: int = 1
     proved: bool = False
@@ -67,7 +71,7 @@ class AssemblyMode:
     """Poses (4, 4) of the bodies on which legs end."""
 
     def __repr__(self) -> str:
-        said = "the pose itself" if self.goal else "reachable" if self.reachable else "out of the real robot's reach"
+        said = "the pose itself" if self.goal else f"assembled: {self.assembly}"
         return f"<{type(self).__name__}: {self.pose}, {said}>"
 
     @property
@@ -82,7 +86,9 @@ class AssemblyMode:
                 "radius_m": self.shift if known else None, "radius_rad": self.turn if known else None,
                 "bodies": list(self.enclosed),
                 "residual": self.residual, "goal": self.goal, "reachable": self.reachable,
-                "type2_distance": self.type2_distance, "open": list(self.open), "beyond": list(self.beyond),
+                "assembly": self.assembly, "open": list(self.open), "beyond": list(self.beyond),
+                "reasons": [{"leg": leg, **miss.to_dict()} for leg, miss in self.misses],
+                "type2_distance": self.type2_distance,
                 "multiplicity": self.multiplicity, "proved": self.proved, "rounded": self.rounded}
 
 
@@ -206,15 +212,24 @@ class _Reader:
         at_goal = nearest and self.away(mode) <= SAME_RELATION
         near = mode.near
         held = () if near else self.measured
-        found = Assembly(self.goal) if at_goal and not near else self.assembler.at(bodies, held)
         scale = self.made.system.size / size
+        found = Assembly(self.goal)
+        if not at_goal or near or outside(self.goal.twin, self.goal.q, [*self.goal.twin.mechanism.joints]):
+            found = self.assembler.at(bodies, held, 0.0 if near else self.known(mode))
         X = self.goal.pose(self.motion.link) if found.platform is None else found.platform[self.motion.link]
         shift, turn = self.radius(mode, bodies, X)
         return AssemblyMode(
             self.motion.pose(X), shift, turn, mode.residual * scale, at_goal, found.reachable,
             None if found.configuration is None else weakest(found.configuration, self.question),
-            found.open, found.beyond, found.configuration, mode.multiplicity, mode.proved, mode.rounded,
-            () if self.motion.link in bodies else tuple(bodies), size, bodies)
+            found.verdict, found.open, found.beyond, found.misses, found.configuration, mode.multiplicity,
+            mode.proved, mode.rounded, () if self.motion.link in bodies else tuple(bodies), size, bodies)
+
+    def known(self, mode: Mode) -> float:
+        """How far the bodies' exact poses can be from the system's (characteristic lengths, radians); 0 where nothing
+        was proved of them: the told poses are meant."""
+        length = self.goal.twin.length
+        found = max(mode.shift / length, mode.turn) + self.made.system.error / length
+        return found if np.isfinite(found) else 0.0
 
     def radius(self, mode: Mode, bodies: dict[str, Array], X: Array) -> tuple[float, float]:
         """How far the exact pose can be from the pose X (4, 4) that is told (m, rad): the system's, with what its frame

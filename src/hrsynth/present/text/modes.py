@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ...analysis.modes.modes import AssemblyMode, AssemblyModes
@@ -48,15 +50,25 @@ def proved(mode: AssemblyMode) -> str:
 
 def at_mode(mode: AssemblyMode, kind: str) -> list[tuple[str, str]]:
     """What the real robot does at a mode."""
-    if mode.open:
-        legs = "legs" if len(mode.open) > 1 else "leg"
-        return [("", f"the real robot cannot be assembled there: {legs} {', '.join(mode.open)}")]
-    rows = []
-    if mode.beyond:
-        rows.append(("", f"the real robot can be assembled there only beyond the limits of {', '.join(mode.beyond)}"))
-    else:
-        rows.append(("", "the real robot can be assembled there"))
+    rows = [("", words) for words in assembly(mode)]
     if mode.type2_distance is not None:
         matrix = "Mᵀ" if kind == "hidden" else "the motors' Jacobian (motor rates by platform twist)"
         rows.append(("", f"smallest singular value of {matrix} {mode.type2_distance:.3g}"))
     return rows
+
+
+def assembly(mode: AssemblyMode) -> list[str]:
+    """Whether the real robot can be assembled at a mode, and why not."""
+    def legs(labels: Sequence[str]) -> str:
+        return f"{'legs' if len(labels) > 1 else 'leg'} {', '.join(labels)}"
+
+    match mode.assembly:
+        case "yes":
+            return ["the real robot can be assembled there"]
+        case "beyond limits":
+            return [f"the real robot can be assembled there only beyond the limits of {', '.join(mode.beyond)}"]
+        case "no":
+            return [f"the real robot cannot be assembled there: {legs([leg for leg, _ in mode.misses])}",
+                    *(f"leg {leg}: {miss}" for leg, miss in mode.misses)]
+    where = f"beyond the limits of {', '.join(mode.beyond)}" if mode.beyond else f"without {legs(mode.open)}"
+    return [f"the real robot was not found assembled there but {where}: that says nothing"]

@@ -27,7 +27,7 @@ def selection(found: Selection) -> str:
         heads = ["legs", "mm", "degrees", "modes", "aspect", *(["seen"] if found.sight else []), "run"]
         blocks.append(table([_row(each, found.sight is not None) for each in found.kept], heads))
         blocks.append("mm, degrees: largest errors at the goal; modes: those of the start / of the goal, in brackets\n"
-                      "those that the robot can take; – not asked")
+                      "those that the robot was found to take; – not asked")
     if found.unexamined:
         blocks.append(table([_row(each, found.sight is not None)[:3] for each in found.unexamined],
                             ["not examined", "mm", "degrees"]))

@@ -19,11 +19,13 @@ from .states import listed, place
 @dataclass(frozen=True, eq=False)
 class Ghost:
     """An assembly mode that is not the pose itself: its number as in ``modes``, its pose, whether the robot can be
-    assembled there, and the displacement (7,) of each link, None of those whose place is not known."""
+    assembled there, as ``AssemblyMode`` says it twice, and the displacement (7,) of each link, None of those whose
+    place is not known."""
 
     label: str
     pose: Pose
-    reachable: bool
+    reachable: bool | None
+    assembly: str
     places: tuple[Array | None, ...]
 
     @property
@@ -37,7 +39,8 @@ class Ghost:
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
         places = [None if each is None else listed(each[None])[0] for each in self.places]
-        return {"label": self.label, "words": self.words, "reachable": self.reachable, "places": places}
+        return {"label": self.label, "words": self.words, "reachable": self.reachable,
+                "assembly": self.assembly, "places": places}
 
 
 def ghosts(setting: Setting, goal: ClosedConfiguration | None = None) -> tuple[tuple[Ghost, ...], tuple[str, ...]]:
@@ -63,4 +66,5 @@ def _ghost(setting: Setting, label: str, mode: AssemblyMode) -> Ghost:
             return None
         return place(X @ inverse(setting.mechanism.links[link].pose))
 
-    return Ghost(label, mode.pose, mode.reachable, tuple(where(link) for link in setting.mechanism.links))
+    places = tuple(where(link) for link in setting.mechanism.links)
+    return Ghost(label, mode.pose, mode.reachable, mode.assembly, places)

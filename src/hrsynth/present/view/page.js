@@ -186,6 +186,7 @@ class Page {
   }
 }
 
+const ASSEMBLY = { yes: "", no: " (cannot be assembled)", "beyond limits": " (only beyond limits)", "not found": " (assembly not found)" };
 const written = (value, unit) => unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)} m`;
 
 /* The sliders: stored configurations, one coordinate at a time, or any of them solved by the server. */
@@ -250,7 +251,7 @@ class Panel {
       const row = element("label", $("modes"));
       const input = element("input", row, undefined, { type: "checkbox", checked: this.chosen[i] });
       element("b", row, record.label).style.background = "#" + new THREE.Color(GHOSTS[i % GHOSTS.length]).getHexString();
-      element("span", row, `${record.words}${record.reachable ? "" : " (cannot be assembled)"}`);
+      element("span", row, `${record.words}${ASSEMBLY[record.assembly]}`);
       input.onchange = () => { this.chosen[i] = input.checked; this.reveal(); };
     });
     this.page.haunt(ghosts);

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mechanism.vectors import Array
+from ..mechanism.vectors import Array
 
 Field = NDArray[Any]
 """Floats, or objects that are balls."""
@@ -44,6 +44,13 @@ def balls(low: Sequence[float] | Array, high: Sequence[float] | Array) -> Field:
 
     return np.array([arb(a).union(arb(b)) for a, b in zip(map(float, low), map(float, high), strict=True)],
                     dtype=object)
+
+
+def around(x: Array, radius: float) -> Field:
+    """Balls of a radius around numbers, in the same shape."""
+    from flint import arb
+
+    return np.array([arb(float(v), radius) for v in np.ravel(x)], dtype=object).reshape(np.shape(x))
 
 
 def jets(boxes: Field) -> Field:

@@ -1,0 +1,138 @@
+"""The ways of a leg from the base to its end as screws at the zero configuration: the end's displacement is the product
+of the joints' displacements, E_1(q_1) … E_n(q_n).
+
+A leg with inner loops has several ways; each alone asks less than the leg, so what no way allows the leg does not.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+
+from ..mechanism import Joint, JointType
+from ..mechanism.legs import Anatomy, Leg
+from ..mechanism.lines import common_perpendicular, distance
+from ..mechanism.vectors import Array
+from ..tolerances import SAME_GEOMETRY
+from .balls import Field
+
+WAYS = 16
+"""Ways of one leg that are looked at, at most."""
+OBLIQUE = 1e-2
+"""Sine of the angle between two axes from which the point where they meet is taken as known."""
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """A turn about ``axis`` through ``point`` (R), a shift along ``axis`` (P), or turns about several axes through
+    ``point`` (``axis`` None: S, U, axes that meet), which are taken for any turn about it. ``joints`` are those it is
+    made of; ``pair`` are the two axes, from the base, where it has no more."""
+
+    slides: bool
+    point: Array
+    axis: Array | None
+    joints: tuple[str, ...]
+    pair: tuple[Array, Array] | None = None
+
+    @property
+    def wrist(self) -> bool:
+        """Whether it turns about a point."""
+        return self.axis is None
+
+    @property
+    def turns(self) -> bool:
+        """Whether it turns about one axis."""
+        return self.axis is not None and not self.slides
+
+    @property
+    def direction(self) -> Field:
+        """The axis, to be multiplied by balls."""
+        assert self.axis is not None
+        return self.axis.astype(object)
+
+    @property
+    def joint(self) -> str | None:
+        """The joint whose coordinate is the part's, where it is one R or P."""
+        return self.joints[0] if self.axis is not None and len(self.joints) == 1 else None
+
+    def reversed(self) -> Part:
+        """The part seen from its other side: the same coordinate, the opposite motion."""
+        pair = None if self.pair is None else (self.pair[1], self.pair[0])
+        return replace(self, axis=None if self.axis is None else -self.axis, pair=pair)
+
+
+def ways(anatomy: Anatomy, leg: Leg) -> Iterator[tuple[Part, ...]]:
+    """The ways from the base to the link on which a leg ends, up to ``WAYS``, without those through a free joint; where
+    the platform is a point, any turn about it is their last part."""
+    mechanism = anatomy.mechanism
+    frame, point = mechanism.links[mechanism.platform].pose, anatomy.point
+    last = () if point is None else (Part(False, frame[:3, :3] @ point + frame[:3, 3], None, ()),)
+    joints = [mechanism.joints[name] for name in leg.joints]
+
+    def onward(link: str, been: tuple[str, ...], parts: tuple[Part, ...]) -> Iterator[tuple[Part, ...]]:
+        if link == leg.attach:
+            yield parts
+            return
+        for joint in joints:
+            if link in joint.links and joint.other(link) not in been and joint.type is not JointType.FREE:
+                beyond = joint.other(link)
+                if beyond == leg.attach or beyond in leg.links:
+                    yield from onward(beyond, (*been, beyond), (*parts, *_parts(joint, link)))
+
+    for way in islice(onward(mechanism.base, (mechanism.base,), ()), WAYS):
+        yield gathered((*way, *last), SAME_GEOMETRY * mechanism.length)
+
+
+def _parts(joint: Joint, near: str) -> list[Part]:
+    """A joint as parts, seen from one of its links."""
+    seen = joint if joint.predecessor == near else joint.turned()
+    point, name = np.asarray(seen.point), (joint.name,)
+    one = (*name, "") if joint.type.freedoms > 1 else name
+    match joint.type:
+        case JointType.FIXED:
+            return []
+        case JointType.SPHERICAL:
+            return [Part(False, point, None, name)]
+        case JointType.REVOLUTE | JointType.UNIVERSAL:
+            return [Part(False, point, axis, one) for axis in seen.axes]
+        case JointType.PRISMATIC:
+            return [Part(True, point, seen.axis, name)]
+        case JointType.CYLINDRICAL:
+            return [Part(True, point, seen.axis, one), Part(False, point, seen.axis, one)]
+        case _:
+            x, y = np.linalg.svd(seen.axis[None, :])[2][1:]
+            return [Part(True, point, x, one), Part(True, point, y, one), Part(False, point, seen.axis, one)]
+
+
+def gathered(parts: tuple[Part, ...], tolerance: float) -> tuple[Part, ...]:
+    """The parts with neighbours that turn about one point or one axis made one; ``tolerance`` in metres, by which
+    axes may miss each other."""
+    found: list[Part] = []
+    for part in parts:
+        merged = _merged(found[-1], part, tolerance) if found else None
+        if merged is None:
+            found.append(part)
+        else:
+            found[-1] = merged
+    return tuple(found)
+
+
+def _merged(one: Part, other: Part, tolerance: float) -> Part | None:
+    joints = tuple(dict.fromkeys((*one.joints, *other.joints)))
+    if one.slides or other.slides:
+        return None
+    if one.axis is not None and other.axis is not None:
+        near, far = common_perpendicular(one.point, one.axis, other.point, other.axis)
+        if np.linalg.norm(far - near) > tolerance:
+            return None
+        sine = np.linalg.norm(np.cross(one.axis, other.axis))
+        if sine > OBLIQUE:
+            return Part(False, 0.5 * (near + far), None, joints, (one.axis, other.axis))
+        return Part(False, one.point, one.axis, (*joints, "")) if sine <= SAME_GEOMETRY else None
+    wrist, turn = (one, other) if one.axis is None else (other, one)
+    apart = (np.linalg.norm(wrist.point - turn.point) if turn.axis is None
+             else distance(wrist.point, turn.point, turn.axis))
+    return Part(False, wrist.point, None, joints) if apart <= tolerance else None
