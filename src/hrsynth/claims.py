@@ -120,8 +120,11 @@ CLAIMS = (
           (r"^separated$", r"enclosed with opposite signs", r"not certified by intervals")),
     Claim("never (Type 2 singularities)", "singular",
           "the hidden robot has no Type 2 singularity",
-          "the vectors of the condition are constant and not parallel", EXACT_GEOMETRY,
-          "tests/analysis/test_legs.py::test_all_sets_obey",
+          "no direction lies along every constant line and is normal to every constant axis and normal of the held "
+          "legs' tips (rank 3), or the held legs leave the platform no motion",
+          f"{EXACT_GEOMETRY}; how the held legs' tips may move is recognised at the samples",
+          "tests/analysis/singularity/test_never.py::"
+          "test_a_rail_that_is_not_normal_to_a_cranks_axis_is_never_parallel_to_its_tangent",
           (r"never: ", r"never zero", r"^never$")),
     Claim("always … never seen", "singular, path",
           "the robot's watched directions never show these freedoms", "as for *partially controllable*", "numerical",

@@ -28,7 +28,9 @@ CHUNK = 250
 ON_LOCUS = 10
 """Poses on the locus that are constructed, where there are so many."""
 TRIES = 4
-"""Starts from which a pose is sought on a locus across which the expression has no sign."""
+"""Weakest poses from which a pose is sought on a locus across which the expression has no sign, or none was met."""
+MORE = 8
+"""Further starts, the weakest poses of parts of the walk, where these find nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,12 +49,14 @@ class Agreement:
     sides: tuple[int, int]
     """Random poses with the expression positive and negative, where it has a sign."""
     on_locus: tuple[ClosedConfiguration, ...]
+    searches: int
+    """Changes of sign and weak poses from which a pose on the locus was sought."""
 
     def to_dict(self) -> dict[str, object]:
         """The record of the command line."""
         return {"points": self.points, "disagreements": self.disagreements, "largest_angle": self.largest_angle,
                 "smallest_singular_value": self.smallest, "positive": self.sides[0], "negative": self.sides[1],
-                "on_locus": len(self.on_locus)}
+                "on_locus": len(self.on_locus), "searches": self.searches}
 
 
 def agreement(start: ClosedConfiguration, question: Question, structure: Structure, condition: Condition,
@@ -70,6 +74,7 @@ def agreement(start: ClosedConfiguration, question: Question, structure: Structu
     signs: list[float] = []
     sizes: list[tuple[float, float]] = []
     low: list[tuple[float, ClosedConfiguration]] = []
+    parts: list[tuple[float, ClosedConfiguration]] = []
     quick = Quick.of(placer, question)
     walks = wander(start, count, seed) if quick is None else quick.placer.wander(count, seed)
     for number, chunk in enumerate(_chunks(walks)):
@@ -90,26 +95,34 @@ def agreement(start: ClosedConfiguration, question: Question, structure: Structu
             walk += chunk
             signs += list(np.sign(values))
             sizes += zip(np.abs(values), _volumes(matrices), strict=True)
-        low = sorted([*low, *zip(ranks.tolist(), chunk, strict=True)], key=lambda pair: pair[0])[:TRIES]
+        low = sorted([*low, *zip(ranks.tolist(), chunk, strict=True)], key=_size)[:TRIES]
+        parts.append(min(zip(ranks.tolist(), chunk, strict=True), key=_size))
         if progress is not None:
             progress()
-    crossings = (_crossings(walk, signs, structure, condition) if condition.signed
-                 else _descents(low, question, structure, condition))
-    on_locus = []
+    on_locus: list[ClosedConfiguration] = []
     if all(leg.tip.link == leg.body for leg in structure.legs):
         wrong += _out_of_proportion(np.array(sizes))
     loops = WEAKEST * start.kernel()[1].weakest
     freedoms = max(relation(at, question).dof.value for at in [start, *(at for _, at in low)])
-    for at in [] if condition.never else crossings:
-        if at.kernel()[1].weakest < loops or relation(at, question).dof.value < freedoms:
-            continue
-        sigma = float(_weakest(structure.scene([at]), question, condition)[0][0])
-        if sigma > RANK_CUTOFF:
-            wrong += 1
-        on_locus.append(at)
-        if len(on_locus) == ON_LOCUS:
+    others = [pair for pair in sorted(parts, key=_size) if all(pair[1] is not at for _, at in low)][:MORE]
+    searches = 0
+    for starts in ([] if condition.never else
+                   [_crossings(walk, signs, structure, condition), _descents(low, question, structure, condition),
+                    _descents(others, question, structure, condition)]):
+        for at in starts:
+            searches += 1
+            if (at is None or at.kernel()[1].weakest < loops or relation(at, question).dof.value < freedoms
+                    or _known(at, on_locus, question)):
+                continue
+            sigma = float(_weakest(structure.scene([at]), question, condition)[0][0])
+            if sigma > RANK_CUTOFF:
+                wrong += 1
+            on_locus.append(at)
+            if len(on_locus) == ON_LOCUS:
+                break
+        if on_locus:
             break
-    found = Agreement(met, wrong, angle, smallest, (positive, negative), tuple(on_locus))
+    found = Agreement(met, wrong, angle, smallest, (positive, negative), tuple(on_locus), searches)
     if wrong or angle > RANK_CUTOFF * RANK_GAP:
         raise Disagreement(start.twin.mechanism.name, wrong, angle)
     return found
@@ -200,8 +213,9 @@ def _weakest(scene: Scene, question: Question, condition: Condition) -> tuple[Ar
 
 
 def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], structure: Structure,
-               condition: Condition) -> Iterator[ClosedConfiguration]:
-    """Zeros of the expression between neighbours of a walk at which it has different signs."""
+               condition: Condition) -> Iterator[ClosedConfiguration | None]:
+    """Zeros of the expression between neighbours of a walk at which it has different signs, None where one is not
+    found."""
     from scipy.optimize import brentq
 
     for (one, a), (two, b) in pairwise(zip(walk, signs, strict=True)):
@@ -219,12 +233,12 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], stru
             return float(condition.expressed(structure.scene([there(fraction)]))[0])
 
         if value(0.0) * value(1.0) >= 0:
+            yield None
             continue
         root = there(float(brentq(value, 0.0, 1.0, xtol=1e-15, rtol=1e-14)))
         if root.residual <= CLOSED:
             found = _sharpened(ClosedConfiguration.of(twin, root.q), step, structure, condition)
-            if abs(float(condition.expressed(structure.scene([found]))[0])) <= FOLLOWED:
-                yield found
+            yield found if abs(float(condition.expressed(structure.scene([found]))[0])) <= FOLLOWED else None
 
 
 def _stepped(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
@@ -251,17 +265,20 @@ def _sharpened(at: ClosedConfiguration, step: Array, structure: Structure, condi
 
 
 def _descents(low: Sequence[tuple[float, ClosedConfiguration]], question: Question, structure: Structure,
-              condition: Condition) -> Iterator[ClosedConfiguration]:
-    """Zeros of the rows found from the weakest poses: rows(q) x = 0 with |x| = 1."""
-    seen: list[Array] = []
+              condition: Condition) -> Iterator[ClosedConfiguration | None]:
+    """Zeros of the rows sought from weak poses: rows(q) x = 0 with |x| = 1; None where one is not found."""
     for _, start in low:
-        found = descend(start, question, structure, condition)
-        if found is None:
-            continue
-        X = found.pose(question.platform)
-        if all(np.linalg.norm(X - other) > SAME_SPOT for other in seen):
-            seen.append(X)
-            yield found
+        yield descend(start, question, structure, condition)
+
+
+def _size(pair: tuple[float, ClosedConfiguration]) -> float:
+    return pair[0]
+
+
+def _known(at: ClosedConfiguration, others: Sequence[ClosedConfiguration], question: Question) -> bool:
+    """Whether a configuration's platform pose is one of others'."""
+    X = at.pose(question.platform)
+    return any(np.linalg.norm(X - other.pose(question.platform)) <= SAME_SPOT for other in others)
 
 
 def descend(start: ClosedConfiguration, question: Question, structure: Structure,

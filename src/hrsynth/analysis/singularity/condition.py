@@ -18,7 +18,7 @@ from ...kinematics.relation import Question
 from ...mechanism.vectors import Array, hats
 from ...tolerances import SAME_RELATION
 from .algebra import evaluate, products, vector
-from .features import Carried, Feature
+from .features import Carried, Feature, Tangent
 from .structure import HeldLeg, Scene, Structure, forbidden, projectors
 
 Values = Mapping[str, Array]
@@ -161,7 +161,27 @@ def _translations(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:
         several = "all " if len(lines) > 2 else ""
         never = f"never: {names} are constant and not {several}parallel"
         return _named(structure, never, expression, False, never=True)
+    if reason := _apart(structure):
+        return _named(structure, f"never: {reason}", expression, False, never=True)
     return _named(structure, words, expression, signed)
+
+
+def _apart(structure: Structure) -> str | None:
+    """Why held legs leave no translation x in common at any pose, None where this is not known: x would have to lie
+    along each line that is constant, and be normal to each constant axis about which a tip turns and to each constant
+    normal of a tip's plane; no x does where these rows have rank 3."""
+    rows, reasons = [], []
+    for leg in structure.legs:
+        line, axis = leg.line, leg.line.axis if isinstance(leg.line, Tangent) else leg.normal
+        if isinstance(line, Carried) and line.link == structure.base:
+            rows.append(np.eye(3) - np.outer(line.direction, line.direction))
+            reasons.append(f"along {_symbol(line)}")
+        elif isinstance(axis, Carried) and axis.link == structure.base:
+            rows.append(axis.direction[None])
+            reasons.append(f"normal to the {axis.meaning}")
+    if not rows or np.linalg.svd(np.vstack(rows), compute_uv=False)[2:].sum() <= SAME_RELATION:
+        return None
+    return f"a translation that all legs leave would be {_and(reasons)}, which are constant, and there is none"
 
 
 def _planar(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:

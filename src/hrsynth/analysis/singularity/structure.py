@@ -63,7 +63,7 @@ class Structure:
     """The links of the platform on which legs end."""
     legs: tuple[HeldLeg, ...] = ()
     plane: Feature | None = None
-    """The normal of the plane in which everything moves, or None."""
+    """The normal of the plane in which everything moves, of ``translations`` that in which all tips move, or None."""
     slide: Feature | None = None
 
     @property
@@ -184,7 +184,7 @@ def _translating(anatomy: Anatomy, legs: tuple[HeldLeg, ...], samples: Sequence[
         poses = poses_at(samples, [link for line in lines for link in line.links])
         _, s, Vt = np.linalg.svd(np.concatenate([line.value(poses) for line in lines]))
         if s[1] > SAME_RELATION * s[0] > s[2]:
-            plane = _normal(anatomy.mechanism, Vt[2])
+            plane = _normal(anatomy.mechanism, Vt[2], "direction normal to the lines along which the tips move")
     return Structure("translations", anatomy.mechanism.base, attached(anatomy), legs, plane=plane)
 
 
@@ -243,11 +243,11 @@ def _plane_of(motions: Array) -> Array | None:
     return normal if s[1] < SAME_RELATION and flat < SAME_RELATION else None
 
 
-def _normal(mechanism: Mechanism, normal: Array) -> Carried:
+def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the plane of motion") -> Carried:
     """A constant direction, of the sense in which its largest component is positive."""
     sense = np.sign(normal[np.argmax(np.abs(normal))])
     direction = mechanism.links[mechanism.base].pose[:3, :3].T @ (normal * sense)
-    return Carried("n", "normal of the plane of motion", mechanism.base, frozen(direction))
+    return Carried("n", meaning, mechanism.base, frozen(direction))
 
 
 def _held(anatomy: Anatomy, leg: Leg, question: Question, samples: Sequence[ClosedConfiguration]) -> HeldLeg | None:

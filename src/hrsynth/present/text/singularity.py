@@ -29,7 +29,8 @@ def singularity(found: Singularity, file: str | None = None) -> str:
             rows.append(("", f"expression positive at {checked.sides[0]}, negative at {checked.sides[1]} of the random "
                          "poses"))
     if condition is not None and not condition.never and not found.examples:
-        rows.append(("singular at", "no pose was found"))
+        searches = 0 if checked is None else checked.searches
+        rows.append(("singular at", f"not found by {searches} searches, which does not say that there is none"))
     for i, each in enumerate(found.examples):
         rows += [("singular at" if i == 0 else "", str(each.pose)),
                  ("", f"  singular value {each.sigma:.1e}, a centimetre away up to {each.nearby:.1e}; lost: "
