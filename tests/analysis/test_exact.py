@@ -418,6 +418,8 @@ def test_the_architecture_in_a_table_of_legs() -> None:
     assert "exact" in lines[2].split()
     assert sum("proved" in line for line in lines) == sum(each.verdict == CONTROLLABLE for each in found.sets) == 9
     assert sum("5 instances" in line for line in lines) == 6
+    assert "exact but for a chance below 1e-14: identities tested at random instances" in lines
+    assert not any("chance" in line for line in text.legs(legs(prepare_robot("3rrr_m1"))).splitlines())
 
 
 def test_what_is_not_decided_is_said(monkeypatch: pytest.MonkeyPatch) -> None:

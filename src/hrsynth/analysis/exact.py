@@ -160,7 +160,7 @@ class ExactArchitecture:
         random = f"exact at {instances} random instance" + "s" * (instances > 1)
         reason = "proved in exact arithmetic" if proved else random
         if chance:
-            reason += f", but for a chance below 1e{math.ceil(math.log10(chance))}"
+            reason += f", but for a chance below {power_above(chance)}"
         if basis.observed:
             reason += f" of geometry with {len(basis.observed)} relations observed at samples ({basis.observed[0]})"
         reason += basis.nearly
@@ -248,6 +248,11 @@ def architecture_of(mechanism: Mechanism, question: Question, at: Sequence[Close
     directions = [o for o in question.observations if type(o) is Direction]
     relations = recognise(mechanism, frames_at(at), directions, question.point)
     return ExactArchitecture(mechanism, relations, directions, selected(relation, places), at[0].kernel()[0].shape[1])
+
+
+def power_above(chance: float) -> str:
+    """The power of ten next above a chance."""
+    return f"1e{math.ceil(math.log10(chance))}"
 
 
 def _same(what: str, here: int, there: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from ...analysis.controllability import Legs, Verdict
 from ...analysis.derive import Derivation
-from ...analysis.exact import ExactVerdict
+from ...analysis.exact import ExactVerdict, power_above
 from ...kinematics.certificate import Certificate
 from ...tolerances import RANK_GAP, SAME_RELATION
 from .tables import listing, table
@@ -94,6 +94,9 @@ def legs(found: Legs) -> str:
              f"smallest sets of the best rank: {found.smallest}"]
     lines += [f"not decided in exact arithmetic: {reason}"
               for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)]
+    chance = max(each.chance for each in found.exact)
+    if chance:
+        lines.append(f"exact but for a chance below {power_above(chance)}: identities tested at random instances")
     if not found.complete:
         lines.append("not all sets were tried: there are too many legs")
     return "\n".join(lines)
