@@ -54,6 +54,10 @@ def judge(case: Case, told: Any, at: str | None, real: bool) -> None:
     if search is None:
         case.say("modes", UNCLEAR, "what is held is not known here")
         return
+    if search.regular(goal)[0]:
+        listed = any(apart(case, mode.pose, goal) < 1e-4 for mode in told.modes)
+        case.say("the pose itself", HELD if listed else WRONG, "" if listed else (
+            f"{told.pose} is none of {len(told.modes)} modes told (complete: {told.found.complete}; {told.kind}, at={at})"))
     found = search.all()
     complete(case, told, search, found)
     for mode in told.modes:
@@ -184,7 +188,8 @@ def complete(case: Case, told: Any, search: Search, found: State) -> None:
     """Whether a list that is called complete has every pose that was found."""
     kind = "real modes" if told.kind == "real" else "hidden modes"
     if not told.found.complete:
-        case.say(kind, SILENT, "not called complete")
+        short = any(not any(apart(case, mode.pose, found[[k]]) < 1e-4 for mode in told.modes) for k in range(len(found)))
+        case.say(kind, SILENT, f"not called complete, and {'some missing' if short else 'all there'}")
         return
     missing = [k for k in range(len(found))
                if not any(apart(case, mode.pose, found[[k]]) < 1e-4 for mode in told.modes)]
