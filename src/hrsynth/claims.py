@@ -81,8 +81,10 @@ CLAIMS = (
     Claim("proved to be all among …", "modes, path, servo, select, report",
           "no other pose of the named kind has the same measurements",
           "all branches of each held leg's end are read from the leg's joints in closed form; for each choice of "
-          "branches an exact resultant whose roots are isolated",
-          EXACT_GEOMETRY + ", axes within 1e-7 of parallel or meeting are so; parallelograms are not crossed",
+          "branches an exact resultant whose roots are isolated, or as many enclosed complex solutions, apart from "
+          "each other, as such a system has at most (Bézout; six spheres: 40)",
+          EXACT_GEOMETRY + ", axes within 1e-7 of parallel or meeting are so; parallelograms are not crossed; joint "
+          "centres that coincide but for rounding do, and solutions beyond 1e7 sizes are at infinity",
           "tests/analysis/modes/test_branches.py::test_all_branches_of_random_legs_are_listed",
           (r"proved to be all", r"exact resultant", r" isolated", r"nothing proved", r"not complete", r"^<p>Proof: ",
            r"the controller cannot$")),

@@ -114,6 +114,18 @@ class BranchPoint(HrsynthError):
                          + "; no verdict is given; start in one of them")
 
 
+class MeaningUndecided(HrsynthError):
+    """Whether a special geometry is meant: the largest defect that would be accepted, the smallest that would not (both
+    in sizes of the mechanism), and how far apart they have to be."""
+
+    exit_status = 3
+
+    def __init__(self, what: str, largest: float, smallest: float, gap: float) -> None:
+        super().__init__(f"{what} are {largest:.2g} sizes of the mechanism apart, others {smallest:.2g}: not "
+                         f"{gap:g} times as far, so that it is not clear which are meant; --as-written takes the "
+                         "numbers as they are")
+
+
 class PoseNotReached(HrsynthError):
     """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much
     (mm, degrees), or None where each leg alone reaches it; how far the robot came (0 to 1), and to which pose."""

@@ -105,6 +105,14 @@ VANISHES = 1e-9
 NEAR_MODE = 1e-2
 """Distance of tips from their curves (sizes of the mechanism) up to which a pose that matches almost is reported."""
 
+MEANT = 1e-5
+"""Distance (sizes of the mechanism) up to which joint centres count as meant to coincide, where the next larger one is
+``RANK_GAP`` times as large at least."""
+
+FARTHEST = 1e7
+"""Distance (sizes of the mechanism) beyond which a solution is at infinity but for rounding, where the next nearer one
+is ``RANK_GAP`` times as near at least."""
+
 NEARLY_DOUBLE = 1e-6
 """Distance between two solutions, in their parameters, below which the pose counts as singular."""
 

@@ -86,6 +86,8 @@ def modes(
     observe: Observe = "all",
     camera: Camera = None,
     real: Annotated[bool, typer.Option("--real", help="The real robot with its own motors held instead.")] = False,
+    as_written: Annotated[bool, typer.Option("--as-written", help="Take the file's numbers as they are: joint centres "
+                                             "that coincide but for rounding stay apart.")] = False,
     output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Draw the modes (.png).")] = None,
     json: Json = False,
     seed: Seed = 0,
@@ -100,7 +102,8 @@ def modes(
 
     pictures.writable(output)
     with Progress() as progress:
-        found = run(robot.load(), listed(observe), camera, at=at, real=real, seed=seed, progress=progress.tell)
+        found = run(robot.load(), listed(observe), camera, at=at, real=real, as_written=as_written,
+                    seed=seed, progress=progress.tell)
     why = pictures.nothing(found)
     if output is not None and why is not None:
         typer.echo(f"hrsynth: {output} is not drawn: {why}", err=True)

@@ -151,3 +151,14 @@ SURFACES = {
     "two bodies, a circle and two spheres": Family(lambda rng: on_two_bodies(rng, ("C", "SS")), 8),
 }
 """Tips on surfaces that only msolve solves."""
+
+
+def six_rods(rng: Rng, platform: str, base: str, noise: float = 0.0) -> Draw:
+    """Six rods between balls; rods with the same letter share one, but for ``noise``."""
+    goal = pose(rng.normal(size=3), random_rotation(rng))
+    sides = [scale * rng.normal(size=(6, 3)) for scale in (1.0, 2.0)]
+    tips, centres = (np.array([side["ABCDEF".index(letter)] for letter in letters]) + noise * rng.normal(size=(6, 3))
+                     for side, letters in zip(sides, (platform, base), strict=True))
+    at = goal[:3, 3] + tips @ goal[:3, :3].T
+    spheres = tuple(Sphere(c, float(np.linalg.norm(tip - c))) for tip, c in zip(at, centres, strict=True))
+    return Draw(Spatial(spheres, tips), goal)

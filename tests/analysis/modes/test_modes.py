@@ -262,6 +262,18 @@ def test_a_singular_pose_is_said(kind: str):
         assert among(np.eye(4), modes) < 1e-6, modes.proof
 
 
+@pytest.mark.parametrize("seed", range(6))
+def test_a_camera_that_sees_an_equilateral_triangle_has_eight_regular_modes(seed: int):
+    """Modes share parameters of the lines, exactly or but for rounding: they are told apart."""
+    rng = np.random.default_rng(seed)
+    R, o = (random_rotation(rng), rng.normal(size=3)) if seed else (np.eye(3), np.zeros(3))
+    turns = 2 * np.pi / 3 * np.arange(3)
+    tips = np.column_stack([np.cos(turns), np.sin(turns), 0 * turns])
+    modes = solve(Spatial(tuple(Line(o, R @ (tip + (0, 0, 2.5))) for tip in tips), tips))
+    assert (modes.complex, len(modes.modes), modes.complete, modes.degenerate) == (8, 8, True, None)
+    assert all(mode.proved and mode.multiplicity == 1 and mode.radius < 1e-11 for mode in modes.modes)
+
+
 def singular(kind: str, rng: np.random.Generator) -> Modes:
     """The modes of a platform at the origin whose curves' normals meet in one point."""
     tips, centre = rng.normal(size=(3, 2)), np.array([0.3, -0.4])

@@ -14,7 +14,7 @@ from ...mechanism.vectors import Array
 from ...tolerances import PARALLEL
 from .certify import Equation
 from .conics import Conic, Numbers, direction, spatial_frame, spokes
-from .curves import Circle, Curve, Line, Point, Surface, cross, extent, length, shifted
+from .curves import Circle, Curve, Line, Point, Sphere, Surface, cross, extent, length, shifted
 from .quadrics import Chart, Moving, normals, on_circle, shifting
 from .squares import Square, on_plane, single, sum_on_plane, sum_on_sphere
 from .systems import ROUNDING, Shifting
@@ -62,6 +62,18 @@ class Articulated(Shifting):
         """How far the bodies can be from their places at q (m); they do not turn."""
         sides = [[each for k, each in apart.items() if self.bodies[k] == body] for body in (0, 1)]
         return max(min(side, default=math.inf) for side in sides), 0.0
+
+    def bound(self, legs: Sequence[int]) -> tuple[int, str] | None:
+        """Bézout for p in space and the slide's circle (degree 2): of a body's spheres all but one are planes by their
+        differences, and those of the other body are linear in p then: 2 · 2 m, m the other body's conditions; without
+        spheres 2 m."""
+        sides = [[k for k in legs if self.bodies[k] == body] for body in (0, 1)]
+        counts = [sum(self.forbids[k] for k in side) for side in sides]
+        round_ = [any(isinstance(self.curves[k], Circle | Sphere) for k in side) for side in sides]
+        if sum(counts) != self.freedoms or not all(counts):
+            return None
+        found = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
+        return min(found), "the product of degrees in space and on the circle (Bézout)"
 
     def chart(self, number: int) -> Chart:
         """p, cos θ and sin θ."""

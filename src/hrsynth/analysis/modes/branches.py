@@ -75,7 +75,8 @@ def _together(found: Sequence[Modes], tips: Sequence[Tip], size: float) -> Modes
     special = found[0].degenerate or next((f"on other branches of the legs: {each.degenerate}" for each in found
                                            if each.degenerate is not None), None)
     return Modes(sum(each.complex for each in found) - twice, modes, all(each.complete for each in found), proof, near,
-                 special)
+                 special, None, next((each.bound for each in found if each.bound != "resultant"), "resultant"),
+                 all(each.enclosed for each in found), found[0].meant)
 
 
 def _once(modes: Sequence[Mode], size: float) -> tuple[Mode, ...]:

@@ -31,7 +31,7 @@ def model(confined: Confinement) -> Model:
     """The system for the way in which the platform moves."""
     made = {"translations": _translating, "planar": _planar, "spatial": _spatial,
             "bodies": _articulated}[confined.motion](confined)
-    return replace(made, system=replace(made.system, error=confined.error))
+    return replace(made, system=replace(made.system, error=confined.error, as_written=confined.as_written))
 
 
 def _translating(confined: Confinement) -> Model:

@@ -115,6 +115,11 @@ class AssemblyModes(Result):
         """Among which poses the modes are all."""
         return None if self.confined is None else WITHIN[self.confined.motion]
 
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The legs whose ends are confined."""
+        return () if self.confined is None else tuple(tip.leg for tip in self.confined.tips)
+
     def headline(self) -> str:
         """The robot and how many modes there are."""
         count = "a continuum" if self.found.continuum is not None else f"{len(self.modes)} real of {self.found.complex}"
@@ -125,31 +130,36 @@ class AssemblyModes(Result):
         found = self.found
         return {"kind": self.kind, "at": self.pose.to_dict(), "within": self.within,
                 "observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
-                "complex": None if found.continuum else found.complex, "complete": found.complete, "proof": found.proof,
+                "complex": None if found.continuum else found.complex, "complete": found.complete,
+                "bound": found.bound, "proof": found.proof,
                 "modes": [each.to_dict() for each in self.modes], "near": [each.to_dict() for each in self.near],
-                "degenerate": found.degenerate, "continuum": found.continuum}
+                "degenerate": found.degenerate, "continuum": found.continuum,
+                "meant": [each.to_dict(self.labels) for each in found.meant]}
 
 
 def modes(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-          at: Pose | str | None = None, real: bool = False, seed: int = 0,
+          at: Pose | str | None = None, real: bool = False, as_written: bool = False, seed: int = 0,
           progress: Callable[[str], None] = silent) -> AssemblyModes:
     """All poses with the directions that are observed at ``at`` (default: the zero configuration), or with ``real`` the
     motors' coordinates: complex solutions counted, real ones enclosed (theory 5; MMT 3.3, 4.1.2, 4.2).
 
     A Π counts as a parallelogram throughout, never crossed; where legs or measurements keep the platform from turning,
     poses that are turned all the same (another operation mode) are not looked for. ``observe`` and ``camera`` as for
-    ``derive``.
+    ``derive``. Joint centres that nearly coincide, and solutions nearly at infinity, are taken to be so where that is
+    clearly meant, unless ``as_written`` is true.
 
     Raises ``BadRequest`` for names that there are not, ``PoseNotReached`` for a pose out of reach, ``NotConfined``
-    where the tips' paths are none of those known, ``MissingExtra`` where only an external solver could list the modes.
+    where the tips' paths are none of those known, ``MeaningUndecided`` where special geometry may be meant or not,
+    ``MissingExtra`` where only an external solver could list the modes.
     """
     if real and observe not in (None, "all", ["all"]):
         raise BadRequest("the motors are held instead of directions", f"real with observe {observe}", "one of the two")
     progress("sampling")
-    return modes_with(prepare(robot, observe, camera, seed=seed), at, real=real, progress=progress)
+    return modes_with(prepare(robot, observe, camera, seed=seed), at, real=real, as_written=as_written,
+                      progress=progress)
 
 
-def modes_with(setting: Setting, at: Pose | str | None = None, *, real: bool = False,
+def modes_with(setting: Setting, at: Pose | str | None = None, *, real: bool = False, as_written: bool = False,
                progress: Callable[[str], None] = silent) -> AssemblyModes:
     """All assembly modes with the measurements at a pose of a setting, as :func:`modes`."""
     goal, wanted = setting.everything.start, None
@@ -157,11 +167,11 @@ def modes_with(setting: Setting, at: Pose | str | None = None, *, real: bool = F
         pose = Pose.parse(at) if isinstance(at, str) else at
         wanted = setting.motion.goal(pose, setting.robot.name)
         goal = reach(goal, setting.everything.question, pose, setting.motion)
-    return modes_at(setting, goal, wanted, real=real, progress=progress)
+    return modes_at(setting, goal, wanted, real=real, as_written=as_written, progress=progress)
 
 
 def modes_at(setting: Setting, goal: ClosedConfiguration, wanted: Wanted | None = None, *, real: bool = False,
-             progress: Callable[[str], None] = silent) -> AssemblyModes:
+             as_written: bool = False, progress: Callable[[str], None] = silent) -> AssemblyModes:
     """All assembly modes with the measurements of a configuration of a setting, as :func:`modes`; ``wanted`` is the
     pose that the configuration was asked for."""
     measured = Measured.driven(setting) if real else Measured.watched(setting)
@@ -175,7 +185,7 @@ def modes_at(setting: Setting, goal: ClosedConfiguration, wanted: Wanted | None 
                              (), ())
     progress("modes")
     confined = confinement(setting.anatomy, measured.question, measured.structure, goal)
-    confined = replace(confined, error=drift(goal, wanted))
+    confined = replace(confined, error=drift(goal, wanted), as_written=as_written)
     made, found = solve_all(confined)
     reader = _Reader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...tolerances import NEARLY_DOUBLE
+from ...tolerances import FARTHEST, NEARLY_DOUBLE, RANK_GAP
 from .algebra import Eliminant, cycle, height, pair, primitive, univariate, without
 from .certify import Equation, Polynomial, krawczyk
 from .conics import UNIT, Balls, Conic, Within, parameter
@@ -77,10 +77,17 @@ class Roots:
     continuum: bool = False
     closest: float = np.inf
     method: str = "exact resultant"
+    far: int = 0
+    """Solutions at infinity but for rounding, which ``complex`` does not count."""
+    undecided: bool = False
+    """Whether it is not clear which are."""
+    apart: bool = False
+    """Whether each complex solution is enclosed, apart from all others, for all input in the balls."""
 
 
-def solve_square(square: Square, balls: Within = Balls) -> Roots:
-    """All solutions of a square system: those of the rounded input counted, those of all in the balls enclosed."""
+def solve_square(square: Square, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
+    """All solutions of a square system: those of the rounded input counted, those of all in the balls enclosed; those
+    beyond the distance ``farthest`` (sizes) are taken to be at infinity."""
     from flint import ctx
 
     if not square.unknowns:
@@ -96,7 +103,7 @@ def solve_square(square: Square, balls: Within = Balls) -> Roots:
             if _vanishes(eliminant.polynomial, other.polynomial):
                 zeros += 1
                 continue
-            found = _roots(_Enclosing(square, turn, balls, equations, thick), order, eliminant)
+            found = _roots(_Enclosing(square, turn, balls, farthest, equations, thick), order, eliminant)
             if found.complete:
                 return found
             fallback = max(fallback, found, key=lambda each: each.complex)
@@ -153,12 +160,28 @@ def _roots(enclosing: _Enclosing, order: tuple[int, ...], eliminant: Eliminant) 
     if kept_round:
         polynomial, pairs = without(polynomial, fmpz_poly([1, 0, 1]))
         extraneous = 2 * pairs
-    resolved = all_solutions(polynomial, lambda x, m: _over(x, m, order, eliminant, square.round))
+    solutions = all_solutions(polynomial, lambda x, m: _over(x, m, order, eliminant, square.round))
+    resolved, far, undecided = nearer(solutions, enclosing.distance, enclosing.farthest)
     with ctx.workprec(PRECISION):
         real = tuple(enclosing.enclosed([v.real for v in values], m) for values, m in resolved if is_real(values))
         real += tuple(enclosing.middle(values) for values, m in resolved if almost_real(values))
-    found = gathered(polynomial.degree(), resolved, real)
-    return replace(found, extraneous=extraneous, complete=found.complete and not at_infinity)
+    found = gathered(polynomial.degree() - far, resolved, real)
+    return replace(found, extraneous=extraneous, far=far, undecided=undecided,
+                   complete=found.complete and not at_infinity and not undecided)
+
+
+def nearer(solutions: Sequence[Solution], distance: Callable[[Sequence[Any]], float], farthest: float
+           ) -> tuple[list[Solution], int, bool]:
+    """The solutions within a distance (sizes), which are not at infinity but for rounding, how many are beyond, and
+    whether that is not clear; ``distance`` gives that of a solution (sizes)."""
+    if not np.isfinite(farthest):
+        return list(solutions), 0, False
+    placed = [(distance(values), (values, m)) for values, m in solutions]
+    near = [each for size, each in placed if size <= farthest]
+    nearest_beyond = min((size for size, _ in placed if size > farthest), default=np.inf)
+    if max((size for size, _ in placed if size <= farthest), default=0.0) * RANK_GAP > nearest_beyond:
+        return list(solutions), 0, True
+    return near, sum(m for size, (_, m) in placed if size > farthest), False
 
 
 def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solution]]) -> list[Solution]:
@@ -239,14 +262,15 @@ class _Enclosing:
     square: Square
     turn: float
     balls: Within
+    farthest: float
     equations: Sequence[Equation]
     thick: Sequence[Equation]
 
     def enclosed(self, start: Sequence[Any], multiplicity: int) -> Root:
         """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
-        values, unique, wide = boxed(self.equations, self.thick, start, multiplicity)
+        values, unique, wide = boxed(self.equations, self.thick, start)
         own = self._parameters(values)
-        return Root(own, self._misses(own, values), multiplicity, unique, wide)
+        return Root(own, self._misses(own, values), 1 if unique else multiplicity, unique, wide)
 
     def middle(self, values: Sequence[Any]) -> Root:
         """The real part of a conjugate pair, and how far its curves' points are from it at most."""
@@ -261,6 +285,14 @@ class _Enclosing:
         assert frame is not None
         return [[math.hypot(*(float(each.rad()) for each in row if not isinstance(each, int))) * frame.size / UNIT
                  for row in path.N] for path in self.square.conics(self.turn, self.balls)]
+
+    def distance(self, values: Sequence[Any]) -> float:
+        """How far away the points of a solution are, complex ones too (sizes)."""
+        found = []
+        for curve, t in zip(self.square.unknowns, values, strict=True):
+            z = complex(t)
+            found.append(abs(z) if not isinstance(curve, Circle) else max(1.0, abs(z)) ** 2 / abs(1.0 + z * z))
+        return max(found)
 
     def _parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
         square = self.square
@@ -290,15 +322,13 @@ class _Enclosing:
                                          for x, c in zip(powers @ path.N, centre.tolist(), strict=True)))
 
 
-def boxed(equations: Sequence[Polynomial], thick: Sequence[Polynomial], start: Sequence[Any], multiplicity: int
+def boxed(equations: Sequence[Polynomial], thick: Sequence[Polynomial], start: Sequence[Any]
           ) -> tuple[list[Any], bool, bool]:
-    """The box about a simple solution, whether it holds exactly one, and whether it does so for the exact input."""
-    if multiplicity == 1:
-        box, wide = krawczyk(thick, start), True
-        if box is None:
-            box, wide = krawczyk(equations, start), False
+    """The box about a regular solution, whether it holds exactly one, and whether it does so for the exact input."""
+    for each in (thick, equations):
+        box = krawczyk(each, start)
         if box is not None:
-            return box, True, wide
+            return box, True, each is thick
     return list(start), False, False
 
 

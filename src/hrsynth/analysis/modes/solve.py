@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
 
 import numpy as np
 
 from ...mechanism.vectors import Array, frozen
-from ...tolerances import NEAR_MODE, NEARLY_DOUBLE, VANISHES
+from ...tolerances import FARTHEST, NEAR_MODE, NEARLY_DOUBLE, VANISHES
+from .meant import Meant, as_meant
 from .near import dimension, residual, stationary
 from .quadrics import Whole
 from .roots import Root, Roots, nearly_double, solve_square
@@ -65,7 +66,9 @@ class Modes:
 
     Where more is observed than needed, ``complex`` counts only the modes. ``complete`` holds only if every complex
     solution is isolated and every real one enclosed. ``near`` are poses that match almost (none unless more is observed
-    than needed); ``degenerate`` says what is special about the input: a continuum, of dimension ``continuum``, a
+    than needed); ``bound`` says by what there are no more: ``resultant``, ``class`` (the degrees of such systems) or
+    ``none``, where a solver's count is trusted; ``enclosed`` that each solution that was counted has its enclosure;
+    ``degenerate`` says what is special about the input: a continuum, of dimension ``continuum``, a
     singular pose, tips on one line.
     """
 
@@ -76,10 +79,14 @@ class Modes:
     near: tuple[Mode, ...] = ()
     degenerate: str | None = None
     continuum: int | None = None
+    bound: str = "none"
+    enclosed: bool = False
+    meant: tuple[Meant, ...] = ()
+    """What was made exact."""
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
-        return {"complex": self.complex, "complete": self.complete, "proof": self.proof,
+        return {"complex": self.complex, "complete": self.complete, "bound": self.bound, "proof": self.proof,
                 "modes": [each.to_dict() for each in self.modes], "near": [each.to_dict() for each in self.near],
                 "degenerate": self.degenerate, "continuum": self.continuum}
 
@@ -93,18 +100,23 @@ def solve(system: System, *, near: bool = True) -> Modes:
     Tips on surfaces are left to :func:`solve_by_msolve` where no square part decides the pose; it raises
     ``MissingExtra`` where that is not installed.
     """
+    system, told = as_meant(system)
+    return replace(_solved(system, near), meant=told)
+
+
+def _solved(system: System, near: bool) -> Modes:
     if system.missing:
         return _too_few(system)
     square = None
     for square in system.squares():
-        roots = solve_square(square, system.balls(square.frame))
+        roots = solve_square(square, system.balls(square.frame), system.farthest)
         if not roots.continuum:
             if not near:
                 return _judged(system, square, roots, None)
             others = (each for each in system.squares() if each.legs != square.legs)
             return _judged(system, square, roots, ((each, solve_square(each)) for each in islice(others, CHOICES)))
     if system.surfaces and not isinstance(system, Translating):
-        return solve_by_msolve(system, near=near)
+        return _proposed(system, near)
     return _undecided(system, square is not None)
 
 
@@ -114,11 +126,16 @@ def solve_by_msolve(system: System, *, near: bool = True) -> Modes:
     As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
     one choice of legs alone. Raises ``MissingExtra``, ``Unsolved``.
     """
+    system, told = as_meant(system)
+    return replace(_proposed(system, near), meant=told)
+
+
+def _proposed(system: System, near: bool) -> Modes:
     if system.missing:
         return _too_few(system)
     part = None
     for part in islice(wholes(system), CHOICES):
-        roots = solve_whole(part, system.balls(part.chart.frame))
+        roots = solve_whole(part, system.balls(part.chart.frame), system.farthest)
         if not roots.continuum:
             return _judged(system, part, roots, () if near else None)
     return _undecided(system, part is not None)
@@ -148,14 +165,27 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
     """The modes among the solutions of a square part; near ones are looked for from those of others too (not at all
     where these are None)."""
     found = [_mode(system, square, root) for root in roots.real]
-    complete = roots.complete and all(mode.proved or (not square.whole and mode.residual > NEAR_MODE) for mode in found)
+    enclosed = roots.complete and all(mode.proved or (not square.whole and mode.residual > NEAR_MODE)
+                                      for mode in found)
+    bound, proof = ("resultant", _proof(roots)) if isinstance(square, Square) else _bounded(system, square, roots)
+    complete = enclosed and bound != "none"
     if square.whole:
-        return Modes(roots.complex, tuple(found), complete, _proof(roots), degenerate=_special(roots))
+        return Modes(roots.complex, tuple(found), complete, proof, (), _special(roots), None, bound, enclosed)
     modes = tuple(mode for mode in found if mode.residual <= VANISHES)
     near = () if others is None else _near(system, found, modes, others)
-    proof = (f"from {len(square.legs)} of {len(system.curves)} legs: {_proof(roots)}; "
+    proof = (f"from {len(square.legs)} of {len(system.curves)} legs: {proof}; "
              f"the other legs fit at {len(modes)} of these, to {VANISHES:g} of the robot's size")
-    return Modes(len(modes), modes, complete, proof, near, _special(roots))
+    return Modes(len(modes), modes, complete, proof, near, _special(roots), None, bound, enclosed)
+
+
+def _bounded(system: System, part: Whole, roots: Roots) -> tuple[str, str]:
+    """By what there are no more solutions than msolve proposes, and the proof in words (theory 10)."""
+    most = system.bound(part.legs)
+    if most is not None and roots.apart and roots.complex == most[0]:
+        return "class", (f"{_proof(roots)}; the complex ones are enclosed too, apart from each other, and there are "
+                         f"at most {most[0]}: {most[1]}")
+    limit = "" if most is None else f", of at most {most[0]}"
+    return "none", f"{_proof(roots)}; found by msolve, whose count is trusted{limit}"
 
 
 def _near(system: System, found: Sequence[Mode], modes: Sequence[Mode], others: Iterable[tuple[Part, Roots]]
@@ -192,6 +222,8 @@ def _proof(roots: Roots) -> str:
     text = f"{roots.method} of degree {roots.degree}"
     if roots.extraneous:
         text += f" (besides {roots.extraneous} roots at infinity, which are no poses)"
+    if roots.far:
+        text += f" (besides {roots.far} beyond {FARTHEST:g} sizes: at infinity, but for rounding)"
     text += f", {roots.complex} {'root' if roots.complex == 1 else 'roots'} isolated"
     if roots.real:
         thin = sum(root.unique and not root.thick for root in roots.real)
@@ -209,6 +241,9 @@ def _proof(roots: Roots) -> str:
 
 
 def _special(roots: Roots) -> str | None:
+    if roots.undecided:
+        return ("solutions of all distances: which of them a special geometry that is meant would send to infinity is "
+                "not decided")
     if not nearly_double(roots):
         return None
     if any(root.multiplicity > 1 for root in roots.real):

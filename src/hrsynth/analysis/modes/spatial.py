@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
@@ -13,7 +14,7 @@ from ...mechanism.vectors import Array, pose
 from ...tolerances import SAME_POINT
 from .certify import Equation
 from .conics import Conic, Numbers, spatial_frame
-from .curves import Point, Surface, cross, curves_of, extent, length
+from .curves import Line, Plane, Point, Sphere, Surface, cross, curves_of, extent, length
 from .quadrics import Chart
 from .squares import Square, distance, on_sphere, single
 from .study import study
@@ -38,6 +39,25 @@ class Spatial(System):
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
         return registered(self.tips, apart)
+
+    def bound(self, legs: Sequence[int]) -> tuple[int, str] | None:
+        """Six conditions *on a sphere or plane* are linear in (1, R, p, Rᵀp, |p|²), in which poses are of degree 40
+        (M. Gallet, G. Nawratil, J. Schicho, J. Geom. 106, 2015; F. Ronga, T. Vust 1995): at most 40, and no curve
+        besides 40. With a tip at rest, or six planes that leave p to R, three quadrics of the quaternion are left: 8;
+        three rods in one ball let it be in two places.
+        """
+        curves = [self.curves[k] for k in legs]
+        if sum(self.forbids[k] for k in legs) != self.freedoms:
+            return None
+        if any(isinstance(curve, Point) for curve in curves):
+            return 8, "three quadrics of the quaternion (Bézout)"
+        if all(isinstance(curve, Line | Plane) for curve in curves):
+            return 8, "three quadrics of the quaternion (Bézout)"
+        balls = [Counter(tuple(point) for point in points) for points in (
+            (self.tips[k] for k in legs), (self.curves[k].centre for k in legs))]
+        if all(isinstance(curve, Sphere) for curve in curves) and max(max(each.values()) for each in balls) > 2:
+            return 16, "two places of a ball with three rods, three quadrics of the quaternion for each (Bézout)"
+        return 40, "six conditions on points of a rigid body (degree of the poses among 16 coordinates)"
 
     def chart(self, number: int) -> Chart:
         """Study's coordinates, with a linear form of the quaternion that depends on the number made 1."""

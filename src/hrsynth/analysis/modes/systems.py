@@ -17,6 +17,7 @@ import numpy as np
 
 from ...errors import BadRequest
 from ...mechanism.vectors import Array, frozen, pose
+from ...tolerances import FARTHEST
 from .conics import SLACK, UNIT, Balls, Frame, Within
 from .curves import Point, Reach, curves_of, extent, length, shifted
 from .quadrics import Chart
@@ -34,6 +35,8 @@ class System:
     tips: Array
     error: float = field(default=0.0, kw_only=True)
     """How far a point that the numbers give can be from that of the exact input (m), besides rounding: closed loops."""
+    as_written: bool = field(default=False, kw_only=True)
+    """Whether the numbers count as they are, and no special geometry is meant."""
 
     freedoms: ClassVar[int]
     """How many coordinates a pose has; the first d are lengths (m), the others angles (rad)."""
@@ -70,6 +73,11 @@ class System:
     def surfaces(self) -> bool:
         """Whether a tip is confined to a surface only."""
         return len(curves_of(self.curves)) < len(self.curves)
+
+    @property
+    def farthest(self) -> float:
+        """Beyond which a solution is at infinity but for rounding (sizes)."""
+        return math.inf if self.as_written else FARTHEST
 
     def balls(self, frame: Frame | None) -> Within:
         """Balls that hold the exact input in a working frame; the finest where it is not known how far it is."""
@@ -116,6 +124,11 @@ class System:
     def squares(self) -> Iterator[Square]:
         """The choices of legs that can be solved by elimination, best first."""
         raise NotImplementedError
+
+    def bound(self, legs: Sequence[int]) -> tuple[int, str] | None:
+        """How many complex poses meet the conditions of a choice of legs, as many as freedoms, at most where they are
+        finitely many, and why; None where that is not known."""
+        return None
 
     def chart(self, number: int) -> Chart:
         """Coordinates of the pose; where there are many charts, that of a number."""

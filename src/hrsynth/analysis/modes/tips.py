@@ -73,6 +73,8 @@ class Confinement:
     error: float = 0.0
     """How far a point of the robot can be from where it is at the exact goal (m)."""
     doubt: str | None = None
+    as_written: bool = False
+    """Whether the numbers count as they are, and no special geometry is meant."""
 
 
 def confinement(anatomy: Anatomy, question: Question, structure: Structure, goal: ClosedConfiguration) -> Confinement:

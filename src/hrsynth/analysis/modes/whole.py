@@ -14,10 +14,11 @@ from typing import Any
 
 import numpy as np
 
-from .certify import Quadric
-from .conics import UNIT, Balls, Within
+from ...tolerances import FARTHEST
+from .certify import Quadric, krawczyk
+from .conics import UNIT, Balls, Rounded, Within
 from .msolve import Parametrisation, parametrised
-from .quadrics import Chart, Whole
+from .quadrics import Chart, Moving, Whole
 from .roots import (
     PRECISION,
     PRECISIONS,
@@ -29,11 +30,15 @@ from .roots import (
     boxed,
     gathered,
     is_real,
+    nearer,
     sharp,
 )
 from .systems import System
 
-METHOD = "msolve's parametrisation (Gröbner basis, lifted from many primes, for the rounded geometry: trusted)"
+METHOD = "msolve's parametrisation"
+
+CLEAR = 1e-12
+"""What is added to boxes, relative to their places and radii, before they count as apart."""
 
 FINE = 2.0 ** -256
 """Radius of a ball that holds zero at which the number in it counts as zero."""
@@ -53,8 +58,10 @@ def wholes(system: System, number: int = 0) -> Iterator[Whole]:
                 yield Whole(legs, chart, False)
 
 
-def solve_whole(part: Whole, balls: Within = Balls) -> Roots:
-    """All solutions of a choice of legs, distinct ones once. Raises ``MissingExtra``, ``Unsolved``."""
+def solve_whole(part: Whole, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
+    """All solutions of a choice of legs, as :func:`solve_square`, distinct ones once.
+
+    Raises ``MissingExtra``, ``Unsolved``."""
     from flint import ctx
 
     equations, nonzero = part.equations(), part.chart.nonzero
@@ -64,15 +71,46 @@ def solve_whole(part: Whole, balls: Within = Balls) -> Roots:
     if answer is None:
         return Roots(complete=False, continuum=True, method=METHOD)
     found = all_solutions(answer.polynomial, lambda t, m: _over(answer, nonzero, t, m))
-    resolved = [each for each in found if not _no_pose(nonzero, each[0])]
+    poses = [each for each in found if not _no_pose(nonzero, each[0])]
+    chart = part.chart
+    tips = chart.tips(Rounded)
+    resolved, far, undecided = nearer(poses, lambda values: _distance(tips, values), farthest)
     with ctx.workprec(PRECISION):
         thick = part.equations(balls)
-        real = tuple(_enclosed(part.chart, balls, equations, thick, values, m)
+        real = tuple(_enclosed(chart, balls, equations, thick, values, m)
                      for values, m in resolved if is_real(values))
-        real += tuple(_middle(part.chart, balls, values) for values, _ in resolved if almost_real(values))
-    extraneous = len(found) - len(resolved)
-    roots = gathered(answer.polynomial.degree() - extraneous, resolved, real, METHOD)
-    return replace(roots, extraneous=extraneous)
+        real += tuple(_middle(chart, balls, values) for values, _ in resolved if almost_real(values))
+        apart = all(root.real and root.thick for root in real) and _apart(chart, thick, [
+            *(root.parameters for root in real), *(values for values, _ in resolved if not is_real(values))])
+    extraneous = len(found) - len(poses)
+    roots = gathered(answer.polynomial.degree() - extraneous - far, resolved, real, METHOD)
+    return replace(roots, extraneous=extraneous, apart=apart and not far, far=far, undecided=undecided,
+                   complete=roots.complete and not undecided)
+
+
+def _distance(tips: Sequence[Moving], values: Sequence[Any]) -> float:
+    """How far away the tips of a solution are, complex ones too (sizes)."""
+    x = np.array([1.0, *(complex(v) for v in values)])
+    return max(float(np.abs(np.einsum("i,ijd,j->d", x, tip.N.astype(float), x)).max()
+                     / (abs(x @ tip.w.astype(float) @ x) * UNIT + 1e-300)) for tip in tips)
+
+
+def _apart(chart: Chart, thick: Sequence[Any], solutions: Sequence[Sequence[Any]]) -> bool:
+    """Whether all solutions, real ones in their boxes already, have boxes with one pose each, and no two the same."""
+    from flint import arb
+
+    middles, radii = [], []
+    for start in solutions:
+        box = start if isinstance(start[0], arb) else krawczyk(thick, start)
+        if box is None or (chart.nonzero is not None and chart.nonzero.value(box).contains(0)):
+            return False
+        middles.append([complex(v.mid()) for v in box])
+        radii.append([float(v.rad()) * (1.0 + CLEAR) + CLEAR * abs(m) for v, m in zip(box, middles[-1], strict=True)])
+    if not middles:
+        return True
+    m, r = np.array(middles), np.array(radii)
+    touching = np.all(np.abs(m[:, None] - m[None]) <= r[:, None] + r[None], axis=2)
+    return bool(touching.sum() == len(m))
 
 
 def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
@@ -94,8 +132,8 @@ def _no_pose(nonzero: Quadric | None, values: Sequence[Any]) -> bool:
 
 def _enclosed(chart: Chart, balls: Within, equations: Sequence[Any], thick: Sequence[Any], values: Sequence[Any],
               multiplicity: int) -> Root:
-    box, unique, wide = boxed(equations, thick, [v.real for v in values], multiplicity)
-    return Root(tuple(box), _misses(chart, balls, box), multiplicity, unique, wide)
+    box, unique, wide = boxed(equations, thick, [v.real for v in values])
+    return Root(tuple(box), _misses(chart, balls, box), 1 if unique else multiplicity, unique, wide)
 
 
 def _middle(chart: Chart, balls: Within, values: Sequence[Any]) -> Root:

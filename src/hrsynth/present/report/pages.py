@@ -25,7 +25,7 @@ from ..drawings.graph import graph_svg
 from ..modes import nothing
 from ..modes import picture as modes_picture
 from ..text.accuracy import field_rows
-from ..text.modes import at_mode, proved
+from ..text.modes import all_of, at_mode, proved
 from ..text.verdicts import exact_cell, exact_words
 from .formulas import barred, collected, formula, indexed
 from .legs import actuators, pairs
@@ -169,8 +169,7 @@ def _modes(found: AssemblyModes) -> dict[str, Any]:
             for number, mode in enumerate(found.modes, 1)]
     words = None
     if count.continuum is None:
-        among = f"proved to be all among {found.within}" if count.complete else "not proved to be all"
-        words = f"{len(found.modes)} real of {count.complex} complex, {among}."
+        words = f"{len(found.modes)} real of {count.complex} complex, {all_of(found)}."
     return {"pose": str(found.pose), "words": words, "proof": words and count.proof, "special": count.degenerate,
             "rows": rows, "near": [(str(mode.pose), f"{mode.residual:.2e}") for mode in found.near],
             "picture": None if why is not None else _png(modes_picture(found)),

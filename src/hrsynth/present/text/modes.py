@@ -21,9 +21,12 @@ def modes(found: AssemblyModes, file: str | None = None) -> str:
         rows.insert(1, ("observed", ", ".join(f"{o.leg} ({o.link})" for o in setting.observed)))
     if count.continuum is None:
         real = len(found.modes)
-        rows += [("modes", f"{real} real of {count.complex} complex, "
-                           + (f"proved to be all among {found.within}" if count.complete else "not proved to be all")),
+        rows += [("modes", f"{real} real of {count.complex} complex, {all_of(found)}"),
                  ("proof", count.proof)]
+    for each in count.meant:
+        legs = ", ".join(found.labels[k] for k in each.legs)
+        rows.append(("meant", f"legs {legs} share a joint centre of the {each.where} (to {each.defect:.1e} m; "
+                              "--as-written takes the numbers as they are)"))
     if count.degenerate is not None:
         rows.append(("special", count.degenerate))
     for number, mode in enumerate(found.modes, 1):
@@ -35,6 +38,13 @@ def modes(found: AssemblyModes, file: str | None = None) -> str:
     if file is not None:
         rows += [("", ""), ("picture", file)]
     return listing(rows)
+
+
+def all_of(found: AssemblyModes) -> str:
+    """Whether the modes are all."""
+    if found.found.complete:
+        return f"proved to be all among {found.within}"
+    return "found, not proved to be all"
 
 
 def proved(mode: AssemblyMode) -> str:
