@@ -1,4 +1,4 @@
-"""The standing adversary finds what is planted."""
+"""The standing adversary finds nothing in the engine, and finds what is planted."""
 
 from __future__ import annotations
 
@@ -11,9 +11,10 @@ import pytest
 import hrsynth
 from adversary.case import HELD, WRONG, Case
 from adversary.claims import enclosures, endings, errors, lists, loci, poses, rewritten, verdicts, ways
-from adversary.run import ALL, made
+from adversary.run import ALL, attacked, made, tasks, wrong
 
 ROBOTS = Path(__file__).resolve().parents[2] / "robots"
+SHARDS = 60
 
 
 def shipped(name: str) -> Case:
@@ -54,6 +55,8 @@ def test_a_mode_dropped_from_a_list_is_found(name, real):
     case.found.clear()
     lists.judge(case, replace(told, modes=told.modes[:-1]), None, real)
     assert outcomes(case, claim) == {WRONG}
+    lists.judge(case, replace(told, modes=told.modes[1:], found=replace(told.found, complete=False)), None, real)
+    assert WRONG in outcomes(case, "the pose itself")
 
 
 def test_a_false_word_about_assembly_is_found():
@@ -202,3 +205,10 @@ def test_a_singular_pose_that_is_none_is_found():
     assert outcomes(case, "singular pose") == {WRONG}
     loci.judge(case, replace(told, condition=None, examples=()))
     assert outcomes(case, "always singular") == {WRONG}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("shard", range(SHARDS))
+def test_it_finds_nothing_in_three_hundred_robots(shard):
+    records = [attacked(*task) for task in tasks(300, 0)[shard::SHARDS]]
+    assert not wrong(records)

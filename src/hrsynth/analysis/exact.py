@@ -199,7 +199,7 @@ class ExactArchitecture:
         places = [self._places[o.key] for o in observed]
         found = [self.instance(0)]
         spins = sum(self._spins(link, places) for link in self.mechanism.links)
-        tested = self.basis.kept
+        tested = self.basis.kept + bool(self.basis.kept)  # each relation, and that the rank of A is the largest on F
         if found[0].mobility - found[0].ranks(places)[0] != spins:
             tested += 1
             found += [self.instance(i) for i in range(1, TESTS)]

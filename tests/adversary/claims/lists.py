@@ -54,6 +54,10 @@ def judge(case: Case, told: Any, at: str | None, real: bool) -> None:
     if search is None:
         case.say("modes", UNCLEAR, "what is held is not known here")
         return
+    if search.regular(goal)[0]:
+        listed = any(apart(case, mode.pose, goal) < 1e-4 for mode in told.modes)
+        text = f"{told.pose} is none of {len(told.modes)} modes told (complete: {told.found.complete}; {told.kind})"
+        case.say("the pose itself", HELD if listed else WRONG, "" if listed else text)
     found = search.all()
     complete(case, told, search, found)
     for mode in told.modes:
@@ -183,12 +187,11 @@ class Search:
 def complete(case: Case, told: Any, search: Search, found: State) -> None:
     """Whether a list that is called complete has every pose that was found."""
     kind = "real modes" if told.kind == "real" else "hidden modes"
-    if not told.found.complete:
-        case.say(kind, SILENT, "not called complete")
-        return
     missing = [k for k in range(len(found))
                if not any(apart(case, mode.pose, found[[k]]) < 1e-4 for mode in told.modes)]
-    if missing:
+    if not told.found.complete:
+        case.say(kind, SILENT, f"not called complete, and {'some missing' if missing else 'all there'}")
+    elif missing:
         x, R = (each[missing[0]] for each in case.study.poses(found))
         case.say(kind, WRONG, f"{len(told.modes)} told as complete at {told.pose}, {len(found)} exist; "
                               f"missing {x.tolist()} {R.tolist()}")
