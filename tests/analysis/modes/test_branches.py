@@ -7,10 +7,13 @@ import pytest
 
 from analysis.modes.drives import closings, driven
 from analysis.modes.pods import displacements, pods
+from hrsynth.analysis.modes.chain import Body, Chain, Underived
+from hrsynth.analysis.modes.curves import Line
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
+from hrsynth.analysis.modes.reaches import reaches
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
-from hrsynth.mechanism.vectors import Array
+from hrsynth.mechanism.vectors import Array, unit
 
 SAME = 1e-6
 """Distance (m, pure numbers) at which two poses are one."""
@@ -106,3 +109,24 @@ def test_a_list_is_not_called_all_where_a_leg_is_not_understood():
     found = modes(robot)
     assert not found.found.complete
     assert "coupler" in found.found.proof
+
+
+def offset_u(offset: float) -> Chain:
+    """Two oblique axes that miss each other by an offset, and a slide along the watched direction."""
+    a, b, d = unit([0, 0.3, 1]), unit([1, 0.2, -0.1]), unit([0.3, 0.5, 0.8])
+    off = offset * unit(np.cross(a, b))
+    bodies = (Body(None, np.zeros(3)), Body(a, np.zeros(3), off), Body(b, off, 0.9 * d, (d,), watched=(d,)))
+    return Chain(bodies, False, 1.0)
+
+
+def test_an_offset_parts_the_two_lines_of_a_u():
+    """None: one line; a millimetre: two, which the other solution of the direction parts; between: no answer."""
+    assert len(reaches(offset_u(0.0))) == 1
+    for offset in (1e-3, 0.1):
+        (one, gain), (other, more) = reaches(offset_u(offset))
+        assert isinstance(one, Line)
+        assert isinstance(other, Line)
+        assert gain == 1.0 < more
+        assert 1e-3 * offset < np.linalg.norm(one.miss(other.centre)) < 3 * offset
+    with pytest.raises(Underived, match="lie only"):
+        reaches(offset_u(1e-8))

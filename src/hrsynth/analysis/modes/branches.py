@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from itertools import islice, product
+from itertools import combinations, islice, product
 
 import numpy as np
 
-from ...tolerances import SAME_POINT
+from ...tolerances import RANK_GAP, SAME_POINT
 from .build import Model, model
 from .solve import Mode, Modes, solve
 from .tips import Confinement, Tip
@@ -64,27 +64,33 @@ def _together(found: Sequence[Modes], tips: Sequence[Tip], size: float) -> Modes
     if found[0].continuum is not None:
         return found[0]
     modes = _once([mode for each in found for mode in each.modes], size)
-    near = tuple(mode for mode in _once([mode for each in found for mode in (*each.modes, *each.near)], size)
-                 if mode not in modes)
+    near = _once([*modes, *(mode for each in found for mode in each.near)], size)[len(modes):]
+    unclear = sum(_apart(one, other, size) <= one.radius + other.radius for one, other in combinations(modes, 2))
     twice = sum(len(each.modes) for each in found) - len(modes)
     legs = ", ".join(f"leg {tip.leg}: {1 + len(tip.others)}" for tip in tips if tip.others)
     counts = [f"{each} complex in {count}" for each, count in Counter(each.complex for each in found).items()]
     proofs = [f"{count} × ({text})" if count > 1 else text for text, count in Counter(e.proof for e in found).items()]
     proof = (f"{len(found)} choices of the held legs' branches ({legs}), {', '.join(counts)}"
-             + (f", {twice} in two of them" if twice else "") + f": {'; '.join(proofs)}")
+             + (f", {twice} in two of them" if twice else "")
+             + (f", {unclear} pairs not told apart" if unclear else "") + f": {'; '.join(proofs)}")
     special = found[0].degenerate or next((f"on other branches of the legs: {each.degenerate}" for each in found
                                            if each.degenerate is not None), None)
-    return Modes(sum(each.complex for each in found) - twice, modes, all(each.complete for each in found), proof, near,
-                 special, None, next((each.bound for each in found if each.bound != "resultant"), "resultant"),
+    complete = not unclear and all(each.complete for each in found)
+    return Modes(sum(each.complex for each in found) - twice, modes, complete, proof, near, special, None,
+                 next((each.bound for each in found if each.bound != "resultant"), "resultant"),
                  all(each.enclosed for each in found), found[0].meant)
 
 
 def _once(modes: Sequence[Mode], size: float) -> tuple[Mode, ...]:
-    """Each pose once, the first of those that are alike."""
+    """Each pose once, the first of those that are one to rounding."""
     found: list[Mode] = []
-    scale = np.ones((4, 4))
-    scale[:3, 3] = 1 / size
     for mode in modes:
-        if not any(np.max(np.abs((mode.pose - other.pose) * scale)) <= SAME_POINT for other in found):
+        if all(_apart(mode, other, size) > SAME_POINT / RANK_GAP for other in found):
             found.append(mode)
     return tuple(found)
+
+
+def _apart(one: Mode, other: Mode, size: float) -> float:
+    """How far two poses are apart (sizes, entries of the rotations)."""
+    gap = np.abs(one.pose - other.pose)
+    return float(max(np.max(gap[:3, 3]) / size, np.max(gap[:3, :3])))

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -22,7 +23,7 @@ from ...mechanism.notation import Rods
 from ...mechanism.observation import Direction, Encoder
 from ...mechanism.screws import normals
 from ...mechanism.vectors import Array, unit
-from ...tolerances import SAME_POINT
+from ...tolerances import RANK_GAP, SAME_DIRECTION, SAME_POINT
 
 
 class Underived(Exception):
@@ -79,11 +80,15 @@ def chain(anatomy: Anatomy, leg: Leg, held: Sequence[Observation], goal: ClosedC
           end: Array | str) -> Chain:
     """The chain of a leg to its ``tip`` (3,); ``end`` is ``free``, ``kept`` (its body's orientation) or the normal of
     the plane in which that turns. Raises :class:`Underived`."""
-    walk = _Walk(anatomy, leg, held, goal)
-    bodies = walk.bodies(tip)
-    if isinstance(end, str):
-        return Chain(bodies, end == "kept", goal.twin.length)
-    return Chain((*bodies, Body(end, tip)), True, goal.twin.length)
+    bodies = _Walk(anatomy, leg, held, goal).bodies(tip)
+    if not isinstance(end, str):
+        bodies = (*bodies, Body(end, tip))
+    for one, other in pairwise(bodies):
+        if one.axis is not None and other.axis is not None:
+            sine = float(np.linalg.norm(np.cross(one.axis, other.axis)))
+            if SAME_DIRECTION / RANK_GAP < sine < SAME_DIRECTION:
+                raise Underived(f"two of its axes are only {sine:.1e} from parallel")
+    return Chain(bodies, end != "free" if isinstance(end, str) else True, goal.twin.length)
 
 
 class _Walk:

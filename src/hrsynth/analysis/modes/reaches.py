@@ -14,7 +14,7 @@ import numpy as np
 
 from ...mechanism import lines
 from ...mechanism.vectors import Array
-from ...tolerances import SAME_POINT
+from ...tolerances import RANK_GAP, SAME_POINT
 from .chain import Body, Chain, Underived
 from .curves import Circle, Line, Plane, Point, Reach, Sphere
 from .turns import Known, groups, orientations, ways
@@ -22,13 +22,19 @@ from .turns import Known, groups, orientations, ways
 
 def reaches(chain: Chain) -> list[tuple[Reach, float]]:
     """All components of the places of the tip, each once, the goal's own first; and by what an error of the goal grows
-    in each (1 in the goal's own). Raises :class:`Underived`."""
+    in each (1 in the goal's own).
+
+    Raises :class:`Underived`, also where two branches are nearly one: neither the same to 1e-10 nor 1e-7 apart.
+    """
     found: list[tuple[Reach, float]] = []
     far = sum(float(np.linalg.norm(body.shift)) for body in chain.bodies) / chain.length
     for known, gain in orientations(chain):
         reach = _sum(chain, known)
-        if not any(same_reach(reach, other, SAME_POINT * chain.length) for other, _ in found):
+        gap = min((apart(reach, other, chain.length) for other, _ in found), default=np.inf)
+        if gap > SAME_POINT:
             found.append((reach, gain * (1.0 + far) if found else 1.0))
+        elif gap > SAME_POINT / RANK_GAP:
+            raise Underived(f"two of its branches lie only {gap:.1e} characteristic lengths apart")
     return found
 
 
@@ -158,17 +164,15 @@ def _spins(total: _Sum, body: Body) -> None:
     total.lines += [d] * len(body.slides)
 
 
-def same_reach(one: Reach, other: Reach, small: float) -> bool:
-    """Whether two reaches are one, to a length."""
+def apart(one: Reach, other: Reach, length: float) -> float:
+    """How far two reaches are apart (characteristic lengths, radians); infinite where they are of different kinds."""
     if type(one) is not type(other):
-        return False
-    if isinstance(one, Line) and isinstance(other, Line):
-        return lines.parallel(one.direction, other.direction) and float(np.linalg.norm(one.miss(other.centre))) <= small
-    if isinstance(one, Plane) and isinstance(other, Plane):
-        return lines.parallel(one.normal, other.normal) and float(np.linalg.norm(one.miss(other.centre))) <= small
-    if isinstance(one, Circle) and isinstance(other, Circle) and not lines.parallel(one.axis, other.axis):
-        return False
-    apart = [float(np.linalg.norm(one.centre - other.centre))]
+        return np.inf
+    between = one.miss(other.centre) if isinstance(one, Line | Plane) else one.centre - other.centre
+    found = [float(np.linalg.norm(between)) / length]
+    for name in ("direction", "normal", "axis"):
+        if hasattr(one, name):
+            found.append(float(np.linalg.norm(np.cross(getattr(one, name), getattr(other, name)))))
     if isinstance(one, Circle | Sphere) and isinstance(other, Circle | Sphere):
-        apart.append(abs(one.radius - other.radius))
-    return max(apart) <= small
+        found.append(abs(one.radius - other.radius) / length)
+    return max(found)

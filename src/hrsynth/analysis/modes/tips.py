@@ -108,7 +108,8 @@ def _tip(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfigu
     here = found[0][0]
     if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= FOLLOWED * goal.twin.length:
         return Tip(leg.label, leg.body, place, here, tuple(found[1:]))
-    doubt = f"its joints taken one by one leave {here.freedoms} freedoms, together {freedoms}"
+    doubt = (f"its joints taken one by one leave {here.freedoms} freedoms, together {freedoms}"
+             if here.freedoms != freedoms else "its joints put its end elsewhere")
     return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=doubt), leg, goal)
 
 

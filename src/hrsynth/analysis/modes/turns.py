@@ -19,8 +19,8 @@ import numpy as np
 
 from ...mechanism import lines
 from ...mechanism.vectors import Array, rotation_about
-from ...tolerances import SAME_POINT, SAME_RELATION
-from .chain import Chain
+from ...tolerances import EXACT, SAME_RELATION
+from .chain import Chain, Underived
 
 Known = tuple[Array | None, ...]
 """The orientation (3, 3) of each body, counted from the goal, or None where it is not a fixed one."""
@@ -171,7 +171,7 @@ def _about(axis: Array, start: Array, end: Array) -> tuple[Array, float] | None:
     The angle is that of two vectors of length r normal to the axis, each off by at most 2 ε."""
     if not _same(np.array([axis @ start]), np.array([axis @ end])):
         return None
-    if _same(start, end):
+    if np.max(np.abs(start - end)) <= EXACT:
         return np.eye(3), 1.0
     angle = math.atan2(float(axis @ np.cross(start, end)), float(start @ end - (axis @ start) * (axis @ end)))
     return rotation_about(axis, angle), 3.0 + 4.0 / float(np.linalg.norm(np.cross(axis, start)))
@@ -179,7 +179,7 @@ def _about(axis: Array, start: Array, end: Array) -> tuple[Array, float] | None:
 
 def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Array, float]] | None:
     """All (R(a, α), R(b, β)) with R(a, α) R(b, β) start = end, with their gains, the one that turns nothing first; None
-    where α or β is free.
+    where α or β is free. Raises :class:`Underived` where two solutions nearly coincide.
 
     z = R(b, β) start has b·z = b·start, a·z = a·end and is of length 1: z = p a + q b ± s a × b. Errors ε of a, b,
     start and end leave δα (a × end) + δβ (R(a, α) b × end) of at most 6 ε.
@@ -193,9 +193,11 @@ def _cones(a: Array, b: Array, start: Array, end: Array) -> list[tuple[Array, Ar
     s = math.sqrt(max(square, 0.0))
     found = []
     ends = [p * a + q * b + sign * s * np.cross(a, b) for sign in (1.0, -1.0)]
-    for z in sorted(ends[: 1 + (s > SAME_POINT)], key=lambda z: float(np.linalg.norm(z - start))):
-        if lines.parallel(z, b) or lines.parallel(z, a):
-            return None
+    if any(lines.parallel(z, axis) for z in ends for axis in (a, b)):
+        return None
+    if EXACT < s <= SAME_RELATION:
+        raise Underived("it is where two of its branches nearly meet")
+    for z in sorted(ends[: 1 + (s > EXACT)], key=lambda z: float(np.linalg.norm(z - start))):
         second, first = _about(b, start, z), _about(a, z, end)
         if first is not None and second is not None:
             slopes = np.column_stack([np.cross(a, end), np.cross(first[0] @ b, end)])
