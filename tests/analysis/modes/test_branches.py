@@ -108,6 +108,7 @@ def test_a_list_is_not_called_all_where_a_leg_is_not_understood():
     robot = driven("four-bar", 2, watched="coupler")
     found = modes(robot)
     assert not found.found.complete
+    assert found.found.bound == "none"
     assert "coupler" in found.found.proof
 
 

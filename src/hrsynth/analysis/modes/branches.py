@@ -39,7 +39,7 @@ def solve_all(confined: Confinement, *, near: bool = True) -> tuple[Model, Modes
         doubts.append(f"only {len(made)} of {total} choices of the legs' branches were solved")
     if doubts and modes.continuum is None:
         proof = f"{modes.proof}; there may be other branches ({'; '.join(doubts)})"
-        modes = replace(modes, complete=False, proof=proof)
+        modes = replace(modes, complete=False, bound="none", proof=proof)
     return made[0], modes
 
 
