@@ -40,6 +40,9 @@ Solution = tuple[list[Any], int]
 SHARP = 2.0 ** -60
 """Radius of a ball, relative to 1 plus its middle, above which a solution is sought with more digits."""
 
+NEARLY_REAL = 1e-2
+"""Distance from real ones within which a complex solution has to be shown to be none of them for all input."""
+
 LOUD = 1 << 16
 """A resultant counts as zero if changes of the input in the last bit change it by more than this part of its size."""
 
@@ -165,9 +168,11 @@ def _roots(enclosing: _Enclosing, order: tuple[int, ...], eliminant: Eliminant) 
     with ctx.workprec(PRECISION):
         real = tuple(enclosing.enclosed([v.real for v in values], m) for values, m in resolved if is_real(values))
         real += tuple(enclosing.middle(values) for values, m in resolved if almost_real(values))
+        surely = all(enclosing.complex_for_all(values) for values, _ in resolved
+                     if NEARLY_DOUBLE / 2 <= off_real(values) < NEARLY_REAL)
     found = gathered(polynomial.degree() - far, resolved, real)
     return replace(found, extraneous=extraneous, far=far, undecided=undecided,
-                   complete=found.complete and not at_infinity and not undecided)
+                   complete=found.complete and not at_infinity and not undecided and surely)
 
 
 def nearer(solutions: Sequence[Solution], distance: Callable[[Sequence[Any]], float], farthest: float
@@ -249,10 +254,15 @@ def is_real(values: Sequence[Any]) -> bool:
     return all(v.imag.is_zero() for v in values)
 
 
+def off_real(values: Sequence[Any]) -> float:
+    """How far a solution is from real ones, relative to its unknowns."""
+    return max(abs(float(v.imag)) / (1.0 + abs(float(v.real))) for v in values)
+
+
 def almost_real(values: Sequence[Any]) -> bool:
     """Whether a solution is the first of a conjugate pair that nearly is one real solution."""
-    size = max(abs(float(v.imag)) / (1.0 + abs(float(v.real))) for v in values)
-    return 0.0 < size < NEARLY_DOUBLE / 2 and next(float(v.imag) for v in values if not v.imag.is_zero()) > 0
+    first = next((float(v.imag) for v in values if not v.imag.is_zero()), 0.0)
+    return off_real(values) < NEARLY_DOUBLE / 2 and first > 0
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,6 +281,11 @@ class _Enclosing:
         values, unique, wide = boxed(self.equations, self.thick, start)
         own = self._parameters(values)
         return Root(own, self._misses(own, values), 1 if unique else multiplicity, unique, wide)
+
+    def complex_for_all(self, values: Sequence[Any]) -> bool:
+        """Whether a complex solution is proved to be no real one for all input in the balls."""
+        box = krawczyk(self.thick, values)
+        return box is not None and any(not v.imag.contains(0) for v in box)
 
     def middle(self, values: Sequence[Any]) -> Root:
         """The real part of a conjugate pair, and how far its curves' points are from it at most."""
