@@ -8,8 +8,8 @@ from adversary.case import Case
 from adversary.claims import enclosures, endings, errors, lists, loci, poses, rewritten, verdicts, ways
 
 CLAIMS: dict[str, tuple[Callable[[Case], None], float]] = {
-    "verdicts": (verdicts.verdicts, 0.8),
-    "hidden modes": (lists.hidden, 0.5),
+    "verdicts": (verdicts.verdicts, 0.7),
+    "hidden modes": (lists.hidden, 0.45),
     "real modes": (lists.real, 0.35),
     "cures": (verdicts.cures, 0.25),
     "errors": (errors.errors, 0.2),
