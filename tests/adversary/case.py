@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from adversary.drafts import turn
 from adversary.robot import Array, Items, Robot, State, things
 from adversary.search import Study, polished, scattered, solve
 
@@ -39,6 +40,8 @@ class Case:
     bars: Sequence[tuple[str, str]] = ()
     turned: Sequence[tuple[str, str]] = ()
     found: list[Said] = field(default_factory=list)
+    enough: Sequence[Sequence[str]] = ()
+    """The smallest sets of legs that see all, where that is known."""
 
     @cached_property
     def engine(self) -> Any:
@@ -63,6 +66,16 @@ class Case:
         configuration's own ranks are clear."""
         at, good = self.study.walk(self.rng, self.robot.zero(), 6, 14, 0.05)
         return at[good], good
+
+    def observe(self) -> list[str] | None:
+        """The legs that are watched: all of them (None), or some, at times so many as are needed."""
+        count = len(self.robot.motors)
+        if count < 3 or self.rng.random() < 0.4:
+            return None
+        if self.enough and self.rng.random() < 0.8:
+            return list(self.enough[int(self.rng.integers(len(self.enough)))])
+        some = 1 + self.rng.permutation(count)[: int(self.rng.integers((count + 1) // 2, count + 1))]
+        return sorted(map(str, some))
 
     def say(self, claim: str, outcome: str, detail: str = "") -> None:
         """Note what was found of a claim."""
@@ -95,7 +108,7 @@ class Case:
             given.append((each.link, np.asarray(each.direction, dtype=float), False))
         return things(robot or self.robot, given)
 
-    def fitted(self, configuration: Any, start: State | None = None) -> State | None:
+    def fitted(self, configuration: Any) -> State | None:
         """The own configuration in which all links lie as in the engine's; None if there is none."""
         robot = self.robot
         names = [name for name in configuration.twin.mechanism.links if name in robot.links and name != robot.links[0]]
@@ -105,8 +118,7 @@ class Case:
             given += [(name, np.zeros(3), True), *((name, e, False) for e in np.eye(3)[:2])]
             values += [X[:3, 3], X[:3, 0], X[:3, 1]]
         rows = robot.held(things(robot, given), np.array(values))
-        starts = robot.zero() if start is None else start
-        at, residual = solve(robot, rows, starts)
+        at, residual = solve(robot, rows, aligned(robot, {name: configuration.pose(name) for name in names}))
         if not residual.min() < 1e-7:
             at, residual = solve(robot, rows, scattered(robot, self.rng, 24, robot.zero()))
         best = int(np.argmin(residual))
@@ -120,6 +132,53 @@ class Case:
         x, R = (each[0] for each in self.study.poses(at))
         place = ",".join(f"{name}={float(v)!r}" for name, v in zip("xyz", x, strict=True))
         return place if self.robot.point is not None else f"{place},rpy={'/'.join(repr(float(a)) for a in rpy_of(R))}"
+
+
+def aligned(robot: Robot, known: dict[str, Array]) -> State:
+    """Coordinates read off from the poses (4, 4) of links, joint by joint from the base outward; of two R through a
+    link that is not known the first turns the second one's axis to where the link after it has it."""
+    at, ball, known = robot.zero(), 0, dict(known)
+    for joint in reversed(robot.tree):
+        if joint.kind == "F" and joint.after in known and joint.before not in known:
+            X = np.eye(4)
+            X[:3, :3] = known[joint.after][:3, :3] @ joint.R.T
+            X[:3, 3] = known[joint.after][:3, 3] - X[:3, :3] @ joint.p
+            known[joint.before] = X
+    frames = {robot.links[0]: (np.eye(3), np.zeros(3))}
+    after = {joint.before: joint for joint in robot.tree}
+    for joint in robot.tree:
+        R, p = frames[joint.before]
+        R, p = R @ joint.R, R @ joint.p + p
+        X = known.get(joint.after)
+        if joint.kind == "R":
+            pairs = [] if X is None else list(zip(R.T, X[:3, :3].T, strict=True))
+            follows = after.get(joint.after)
+            if X is None and follows is not None and follows.kind == "R" and follows.after in known:
+                pairs = [(R @ follows.R @ follows.axis, known[follows.after][:3, :3] @ follows.axis)]
+            a = R @ joint.axis
+            sine = sum(float(a @ np.cross(u, v)) for u, v in pairs)
+            cosine = sum(float(u @ v - (a @ u) * (a @ v)) for u, v in pairs)
+            at.theta[0, joint.place] = np.arctan2(sine, cosine)
+            R = R @ turn(joint.axis, float(at.theta[0, joint.place]))
+        elif joint.kind == "P" and X is not None:
+            at.theta[0, joint.place] = (R @ joint.axis) @ (X[:3, 3] - p)
+            p = p + R @ joint.axis * at.theta[0, joint.place]
+        elif joint.kind == "S":
+            if X is not None:
+                at.quats[0, ball] = quaternion(R.T @ X[:3, :3])
+                R = X[:3, :3]
+            ball += 1
+        frames[joint.after] = (R, p) if X is None else (X[:3, :3], X[:3, 3])
+    return at
+
+
+def quaternion(R: Array) -> Array:
+    """A unit quaternion (w, x, y, z) of a rotation, half turns included."""
+    K = np.array([[1 + np.trace(R), R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]], *[[0.0] * 4] * 3])
+    K[1:, 0] = K[0, 1:]
+    K[1:, 1:] = R + R.T + (1 - np.trace(R)) * np.eye(3)
+    best = K[int(np.argmax(np.diag(K)))]
+    return best / np.linalg.norm(best)
 
 
 def rpy_of(R: Array) -> tuple[float, float, float]:

@@ -23,7 +23,7 @@ def enclosures(case: Case) -> None:
         dof = int(np.sum(np.linalg.svd(case.study.locals(walked[:1])[0].T, compute_uv=False) > 1e-6))
         if dof == 6:
             at = case.text_of(walked[[0]])
-    told = case.asked("enclosure", lambda: hrsynth.modes(case.engine, at=at))
+    told = case.asked("enclosure", lambda: hrsynth.modes(case.engine, case.observe(), at=at))
     if told is not None and told.found.continuum is None:
         judge(case, told, at)
 

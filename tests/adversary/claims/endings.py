@@ -21,7 +21,7 @@ def endings(case: Case) -> None:
         return
     texts = [case.text_of(case.robot.zero()), case.text_of(at[[int(case.rng.integers(len(at)))]])]
     start, goal = texts if case.rng.random() < 0.5 else texts[::-1]
-    told = case.asked("ending", lambda: hrsynth.servo(case.engine, start=start, goal=goal))
+    told = case.asked("ending", lambda: hrsynth.servo(case.engine, case.observe(), start=start, goal=goal))
     if told is not None:
         judge(case, told)
 

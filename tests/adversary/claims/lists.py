@@ -34,7 +34,8 @@ def lists(case: Case, real: bool) -> None:
     walked, _ = case.walked
     if len(walked) and case.rng.random() < 0.5:
         at = case.text_of(walked[[int(case.rng.integers(len(walked)))]])
-    told = case.asked("modes", lambda: hrsynth.modes(case.engine, at=at, real=real))
+    observe = None if real else case.observe()
+    told = case.asked("modes", lambda: hrsynth.modes(case.engine, observe, at=at, real=real))
     if told is not None:
         judge(case, told, at, real)
 

@@ -14,7 +14,7 @@ def loci(case: Case) -> None:
     """``singular`` with few random poses."""
     import hrsynth
 
-    told = case.asked("singular", lambda: hrsynth.singular(case.engine, points=20))
+    told = case.asked("singular", lambda: hrsynth.singular(case.engine, case.observe(), points=20))
     if told is not None:
         judge(case, told)
 

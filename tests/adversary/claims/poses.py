@@ -22,7 +22,7 @@ def poses(case: Case) -> None:
     chosen = at[[int(case.rng.integers(len(at)))]]
     for asked in (case.text_of(chosen), half_turned(case)):
         told = None if asked is None else case.asked("asked pose", lambda asked=asked: hrsynth.check(
-            case.engine, at=[asked]))
+            case.engine, case.observe(), at=[asked]))
         if told is not None:
             judge(case, told, asked)
 

@@ -19,7 +19,7 @@ def rewritten(case: Case) -> None:
     """``derive``: the verdict, and the hidden robot at zero and where small steps lead."""
     import hrsynth
 
-    told = case.asked("hidden robot", lambda: hrsynth.derive(case.engine))
+    told = case.asked("hidden robot", lambda: hrsynth.derive(case.engine, case.observe()))
     if told is None:
         return
     own = generic(case, case.directions(told.setting.observed))

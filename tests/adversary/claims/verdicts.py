@@ -45,6 +45,7 @@ def verdicts(case: Case) -> None:
     if told is None or seen is None:
         return
     segments = {each.leg: each for each in seen.setting.segments}
+    case.enough = told.minimal
     judge(case, told, segments)
     if case.rng.random() < 0.1:
         again = case.asked("seeds", lambda: hrsynth.legs(case.engine, seed=int(case.rng.integers(1, 99))))
@@ -72,7 +73,7 @@ def cures(case: Case) -> None:
     """Every cure of ``advise`` (some of them, where there are many)."""
     import hrsynth
 
-    told = case.asked("cure", lambda: hrsynth.advise(case.engine))
+    told = case.asked("cure", lambda: hrsynth.advise(case.engine, case.observe()))
     if told is None or not told.sets:
         return
     chosen = case.rng.permutation(len(told.sets))[:6]

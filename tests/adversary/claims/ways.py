@@ -30,7 +30,7 @@ def ways(case: Case) -> None:
     start, goal = case.text_of(case.robot.zero()), case.text_of(at[[int(case.rng.integers(len(at)))]])
     if case.rng.random() < 0.3:
         goal = half_turned(case) or goal
-    told = case.asked("path", lambda: hrsynth.path(case.engine, start=start, goal=goal, budget=3000))
+    told = case.asked("path", lambda: hrsynth.path(case.engine, case.observe(), start=start, goal=goal, budget=3000))
     if told is not None:
         asked_of(case, "ends of a path", start, told.start.pose)
         asked_of(case, "ends of a path", goal, told.goal.pose)
