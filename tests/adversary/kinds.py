@@ -394,7 +394,7 @@ def translational(rng: Rng) -> Made:
     """Three legs of four or five R and P whose R have one or two directions: translations, at times by a hair."""
     made = above(rng, "translational")
     A, B = ring(rng, 3, 0.35, 0.0, 0.1), ring(rng, 3, 0.15, 0.0, 0.1) + made.at
-    chain = str(rng.choice(["aaPa", "abba", "abPba", "aabb", "aaPbb", "Paaa", "aPa", "Pabba", "aabba", "PaPa"]))
+    chain = str(rng.choice(["aaPa", "abba", "abPba", "aabb", "aaPbb", "Paaa", "Pabba", "aabba", "PaPa"]))
     tangential = rng.random() < 0.5
     T = tangents(A)
     size = miss(rng, made, "not quite parallel", 0.15)
