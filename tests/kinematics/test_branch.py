@@ -2,20 +2,27 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
-from hrsynth.analysis.controllability import verdict_of
+from hrsynth.analysis.advice import advised
+from hrsynth.analysis.controllability import legs, verdict_of
+from hrsynth.analysis.derive import derive
 from hrsynth.analysis.setting import prepare, restricted
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
+from hrsynth.description import load
 from hrsynth.errors import BranchPoint
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.relation import Question
+from hrsynth.kinematics.relation import Question, relation
 from hrsynth.kinematics.sampling import draw, wander
 from hrsynth.kinematics.twin import Twin
-from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.pose import Pose
 from hrsynth.mechanism.vectors import rotation_about
 
 POD = "(Pk*-Utn-Unt)+(Pz*-2SSt)+(Pz*-Utn-S)+(Rt*-2SSt)"
@@ -80,3 +87,80 @@ def test_samples_of_a_pod_stay_in_its_operation_mode(dimensions: int, seed: int)
     verdict = verdict_of(setting, ("2", "3"), restricted(setting.everything, segments[1:3]))
     assert (verdict.rank, verdict.dof) == (2, 3)
     assert [freedom.name for freedom in verdict.lost] == ["translation along z"]
+
+
+def test_another_operation_mode_is_named_and_can_be_asked_for() -> None:
+    """Beside its translations this pod has a mode in which it turns: legs 2 and 3 see all of that."""
+    robot = mechanism(parse(POD), 572)
+    found = legs(robot)
+    (other,) = found.setting.everything.met
+    assert (found.setting.everything.signature.motion, other.signature.motion) == ("3T", "3R")
+    assert "legs 2, 3 see 3 of 3" in found.setting.beside()[0]
+    there = legs(robot, at=str(Pose.of(other.at.pose("platform"))))
+    ranks = [{each.legs: each.rank for each in answer.sets}["2", "3"] for answer in (found, there)]
+    assert ranks == [2, 3]
+
+
+def test_a_cure_cures_on_the_whole_branch() -> None:
+    """Legs of this robot have closures beside each other, 0.01 rad apart; samples of two make 18 wrong cures of 36."""
+    setting = prepare(mechanism(parse("3(Ph*-Ra-Rb-Rb-Pj)"), 4))
+    advice = advised(setting)
+    assert advice.cured
+    assert (len(advice.sets), advice.undecided) == (18, 0)
+    places = list(wander(setting.everything.start, 24, seed=5, steps=6))[3::4]
+    for cure in advice.sets:
+        watched = (*setting.observed, *(each.observation for each in cure.measurements))
+        question = replace(setting.everything.question, observations=watched)
+        assert all(relation(at, question).rank == setting.dof for at in places)
+
+
+CASSIE = """<mujoco model="leg"><compiler eulerseq="zyx" autolimits="true"/><worldbody><body name="hip">
+  <body name="achilles-rod" pos="0 0 0.045" xyaxes="0.7922 -0.60599 -0.072096 0.60349 0.79547 -0.054922">
+    <joint name="achilles-rod" type="ball"/></body>
+  <body name="knee" pos="0.12 0 0.0045" xyaxes="0.70711 -0.70711 0 0.70711 0.70711 0">
+    <joint name="knee" type="hinge" ref="-45"/>
+    <body name="shin" pos="0.06068 0.04741 0"><joint name="shin" type="hinge"/>
+      <body name="tarsus" pos="0.43476 0.02 0" xyaxes="0.52992 0.84805 0 -0.84805 0.52992 0">
+        <joint name="tarsus" type="hinge" ref="58"/>
+        <body name="heel-spring" pos="-0.01269 -0.03059 0.00092"
+              xyaxes="-0.91211 0.40829 0.036948 -0.40992 -0.90952 -0.068841">
+          <joint name="heel-spring" type="hinge"/></body>
+        <body name="foot-crank" pos="0.058 -0.034 0.02275"><joint name="foot-crank" type="hinge"/>
+          <body name="plantar-rod" pos="0.055 0 -0.00791"><joint name="plantar-rod" type="hinge"/></body></body>
+        <body name="foot" pos="0.408 -0.04 0"><joint name="foot" type="hinge"/></body>
+      </body></body></body></body></worldbody>
+  <equality><connect body1="plantar-rod" body2="foot" anchor="0.35012 0 0"/>
+    <connect body1="achilles-rod" body2="heel-spring" anchor="0.5012 0 0"/></equality>
+  <actuator><motor name="knee" joint="knee"/><motor name="foot" joint="foot"/></actuator></mujoco>
+"""
+"""A leg of the walking robot Cassie between hip and foot (dimensions of its MuJoCo model): at zero the spring's heel is
+at a dead point."""
+
+
+def test_the_verdict_of_a_leg_at_a_dead_point_is_that_of_its_branch(tmp_path: Path) -> None:
+    """Where the heel has left its dead point, the leg with the spring sees one freedom, the other none."""
+    file = tmp_path / "leg.xml"
+    file.write_text(CASSIE)
+    robot = load(str(file), base="hip", platform="foot")
+    for seed in range(3):
+        assert [each.rank for each in legs(robot, seed=seed).sets] == [1, 0, 2]
+    found = derive(robot)
+    assert (found.verdict.rank, found.dof, found.certificate.passed) == (2, 3, True)
+
+
+@pytest.mark.parametrize(("tilt", "rank", "near"), [
+    (1e-3, 2, False), (1e-6, 2, True), (1e-8, 1, True), (0.0, 1, False)])
+def test_the_distance_to_another_verdict_is_told(tilt: float, rank: int, near: bool) -> None:
+    """Parallel rails leave a translation unseen; rails that are nearly so show it by as little as they are aslant."""
+    robot = load("prrrp_parallel")
+    rails = [joint for joint in robot.joints.values() if joint.type is JointType.PRISMATIC]
+    turned = replace(rails[0], axes=(rotation_about(np.array([0.0, 0.0, 1.0]), tilt) @ rails[0].axis,))
+    robot = robot.changed(joints=[turned if joint.name == turned.name else joint for joint in robot.joints.values()])
+    for seed in range(3):
+        verdict = legs(robot, seed=seed).sets[-1]
+        assert (verdict.rank, verdict.near) == (rank, near)
+        margin = verdict.margin
+        assert margin["dropped"] < margin["cutoff"] < margin["counted"]
+        if near:
+            value = margin["counted" if rank == 2 else "dropped"]
+            assert tilt / 10 < value < 10 * tilt

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ..errors import RankUndecided
 from ..kinematics.ranks import Rank
@@ -17,11 +17,14 @@ from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
 from .exact import ExactVerdict, architecture
 from .freedoms import Freedom, name_freedoms, point_text
-from .setting import Setting, prepare, restricted
+from .setting import Setting, prepare, restricted, started
 from .verdict import BLIND as BLIND
 from .verdict import CONTROLLABLE as CONTROLLABLE
 from .verdict import PARTIAL as PARTIAL
 from .verdict import word
+
+if TYPE_CHECKING:
+    from ..mechanism.pose import Pose
 
 LARGEST_COMPLETE = 10
 """Number of legs up to which all sets are tried; beyond, sets of up to three legs and the whole."""
@@ -69,6 +72,7 @@ class Verdict(Result):
 class Legs(Result):
     """The verdict of every set of observed legs, and the smallest sets of the best rank."""
 
+    setting: Setting
     robot: str
     architecture: str
     dof: int
@@ -93,7 +97,7 @@ class Legs(Result):
         return {"robot": self.robot, "architecture_ascii": self.architecture, "dof": self.dof,
                 "sets": [{**each.to_dict(), "exact": exact.exact, "architecture": exact.to_dict()}
                          for each, exact in zip(self.sets, self.exact, strict=True)], "complete": self.complete,
-                "minimal": [list(each) for each in self.minimal]}
+                "minimal": [list(each) for each in self.minimal], **self.setting.modes_dict()}
 
 
 def verdict_of(setting: Setting, legs: Sequence[str], samples: Samples) -> Verdict:
@@ -132,10 +136,11 @@ def _lost(setting: Setting, samples: Samples, legs: tuple[str, ...], count: int)
     return tuple(replace(each, name=f"{each.name} (with the platform at {point_text(position)})") for each in named)
 
 
-def legs(robot: Mechanism, camera: str | None = None, *, progress: Callable[[], None] | None = None,
-         seed: int = 0) -> Legs:
-    """The verdict of every set of legs at their default segments (theory 3, verdicts)."""
-    setting = prepare(robot, None, camera, seed=seed)
+def legs(robot: Mechanism, camera: str | None = None, *, at: Pose | str | None = None,
+         progress: Callable[[], None] | None = None, seed: int = 0) -> Legs:
+    """The verdict of every set of legs at their default segments (theory 3, verdicts), on the branch of the zero
+    configuration, or of the pose ``at``."""
+    setting = prepare(robot if at is None else started(robot, at, seed), None, camera, seed=seed)
     anatomy = setting.anatomy
     segments = setting.segments
     labels = labels_of(segments)
@@ -154,4 +159,5 @@ def legs(robot: Mechanism, camera: str | None = None, *, progress: Callable[[], 
     best = max(each.rank for each in sets)
     smallest = min(len(each.legs) for each in sets if each.rank == best)
     minimal = tuple(each.legs for each in sets if each.rank == best and len(each.legs) == smallest)
-    return Legs(robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), tuple(exact), complete, minimal)
+    return Legs(setting, robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), tuple(exact), complete,
+                minimal)

@@ -27,7 +27,7 @@ from .controllability import Verdict, verdict_of
 from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
-from .setting import Mobility, Setting, prepare, silent
+from .setting import Mobility, Setting, prepare, silent, started
 
 if TYPE_CHECKING:
     from ..mechanism.pose import Pose
@@ -112,30 +112,33 @@ class Derivation(Result):
                          "as_written": {"total": written.total, "idle": written.idle}},
             "verdict": self.verdict.verdict,
             "lost": [freedom.to_dict() for freedom in self.verdict.lost],
-            "rank": self.verdict.rank,
+            "rank": self.verdict.rank, "margin": self.verdict.margin,
             "point_platform": self.setting.anatomy.point is not None,
             "interaction_matrix": self.verdict.graph,
             "architecture": self.exact.to_dict(),
             "paper_form": self.paper and self.paper.to_dict(),
             "steps": [{"rule": s.rule, "leg": s.leg, "accepted": s.accepted, "reason": s.reason,
                        "largest_angle": s.largest_angle} for s in self.steps],
-            "certificate": self.certificate.to_dict(),
+            "certificate": self.certificate.to_dict(), **self.setting.modes_dict(),
         }
 
 
 def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-           form: str = "simplified", seed: int = 0, progress: Callable[[str], None] | None = None) -> Derivation:
+           at: Pose | str | None = None, form: str = "simplified", seed: int = 0,
+           progress: Callable[[str], None] | None = None) -> Derivation:
     """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; theory 2 and 3).
 
     ``observe`` holds leg labels or link names (default: all legs); ``camera`` names the link that carries the camera
-    (default: the base); ``form`` is ``simplified`` or ``general``. Raises ``BadRequest`` for unknown names,
+    (default: the base); ``at`` is a pose that takes the place of the zero configuration, in another operation mode if
+    need be; ``form`` is ``simplified`` or ``general``. Raises ``BadRequest`` for unknown names,
     ``NotCertified`` if even the exact lift fails.
     """
     if form not in FORMS:
         raise BadRequest("unknown form", form, FORMS)
     tell = progress or silent
     tell("sampling")
-    return derived(prepare(robot, observe, camera, seed=seed), form=form, progress=tell)
+    setting = prepare(robot if at is None else started(robot, at, seed), observe, camera, seed=seed)
+    return derived(setting, form=form, progress=tell)
 
 
 def derived(setting: Setting, *, form: str = "simplified", beside: bool = True,

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled
+from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled, PoseNotReached
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.locked import rezeroed
 from ..kinematics.parts import PlatformMotion
 from ..kinematics.ranks import range_basis
 from ..kinematics.relation import Question, Relation, relation
@@ -20,6 +21,7 @@ from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import Anatomy, default_observation, dissect, observation_of
 from ..mechanism.normal import NormalForm, normal_form
 from ..mechanism.observation import Direction, labels_of
+from ..mechanism.pose import Pose
 from ..mechanism.sensors import encoders
 
 if TYPE_CHECKING:
@@ -88,6 +90,13 @@ class Setting:
         """The samples, for the observed segments alone."""
         return restricted(self.everything, self.observed)
 
+    def beside(self) -> tuple[str, ...]:
+        """The other operation modes that were met: what the platform does in each, what legs see there, and where."""
+        drawn = self.everything
+        labels = [o.leg for o in drawn.question.observations]
+        return tuple(f"{mode.beside(drawn.signature, labels)}, at {Pose.of(mode.at.pose(drawn.question.platform))}"
+                     for mode in drawn.met)
+
     @property
     def dof(self) -> int:
         """The robot's dof: the dimension of its platform's twists."""
@@ -137,6 +146,36 @@ class Setting:
         """What is observed, and from which link, as the records of the command line begin."""
         return {"observed": [{"leg": o.leg, "link": o.link} for o in self.observed],
                 "camera": self.mechanism.reference}
+
+    def modes_dict(self) -> dict[str, Any]:
+        """The samples' operation mode and the others that were met, as the records of the command line have them."""
+        drawn = self.everything
+        own, labels = drawn.signature, [o.leg for o in drawn.question.observations]
+        return {"operation_mode": {"dof": own.dof, "motion": own.motion, "mobility": own.mobility},
+                "other_modes": [
+                    {"dof": mode.signature.dof, "motion": mode.signature.motion, "mobility": mode.signature.mobility,
+                     "words": mode.beside(own, labels),
+                     "pose": Pose.of(mode.at.pose(drawn.question.platform)).to_dict()} for mode in drawn.met]}
+
+
+def started(robot: Mechanism, at: Pose | str, seed: int = 0) -> Mechanism:
+    """The robot in normal form whose zero configuration is the one at a pose: on the branch of the file's zero
+    configuration where that reaches it, else in another operation mode that was met.
+
+    Raises ``BadRequest`` and ``PoseNotReached`` for poses of neither.
+    """
+    from ..kinematics.reach import reach
+
+    setting = prepare(robot, seed=seed)
+    drawn, wanted = setting.everything, Pose.parse(at) if isinstance(at, str) else at
+    refused: HrsynthError | None = None
+    for start in (drawn.start, *(mode.at for mode in drawn.met)):
+        try:
+            return replace(rezeroed(reach(start, drawn.question, wanted)), file=robot.file)
+        except (BadRequest, PoseNotReached) as error:
+            refused = refused or error
+    assert refused is not None
+    raise refused
 
 
 def silent(text: str) -> None:

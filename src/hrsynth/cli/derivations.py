@@ -13,6 +13,8 @@ from .progress import Progress
 def derive(
     observe: Observe = "all",
     camera: Camera = None,
+    at: Annotated[str | None, typer.Option("--at", metavar="POSE", help="Start there instead of at the zero "
+                                           "configuration, in another operation mode if need be.")] = None,
     form: Annotated[str, typer.Option(help="simplified (as in the paper) or general (sliders, all legs kept).")]
     = "simplified",
     output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Write the hidden robot.")]
@@ -35,7 +37,8 @@ def derive(
         targets(output)
     pages.writable(report)
     with Progress() as progress:
-        found = run(robot.load(), listed(observe), camera, form=form, seed=seed, progress=progress.tell)
+        found = run(robot.load(), listed(observe), camera, at=at, form=form, seed=seed,
+                    progress=progress.tell)
         if report is not None:
             robot.require_other(found.robot, report)
             page = pages.report(found, listed(observe), camera, seed=seed, progress=progress.tell)
@@ -55,14 +58,22 @@ def derive(
         typer.echo("hrsynth: nothing was written: every leg is blind, there is no hidden robot", err=True)
 
 
-def legs(camera: Camera = None, json: Json = False, seed: Seed = 0, *, robot: Source) -> None:
+def legs(
+    camera: Camera = None,
+    at: Annotated[str | None, typer.Option("--at", metavar="POSE", help="Start there instead of at the zero "
+                                           "configuration, in another operation mode if need be.")] = None,
+    json: Json = False,
+    seed: Seed = 0,
+    *,
+    robot: Source,
+) -> None:
     """Every set of observed legs: its verdict, the freedoms it loses, and the smallest sets that see most."""
     from ..analysis.controllability import legs as run
     from ..present import records
     from ..present.text.verdicts import legs as written
 
     with Progress() as progress:
-        found = run(robot.load(), camera, seed=seed, progress=progress.tell)
+        found = run(robot.load(), camera, at=at, seed=seed, progress=progress.tell)
     typer.echo(records.record("legs", found.robot, found.to_dict()) if json else written(found))
 
 

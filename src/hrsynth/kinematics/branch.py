@@ -27,13 +27,15 @@ EVENLY = 0.2
 
 def follows(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) -> bool:
     """Whether ``there``, which the tangent ``step`` (nv,) from ``here`` was corrected to, lies beside ``here`` on its
-    branch: same mobility, tangent spaces close, singular values alike half way, at the step's end and there."""
+    branch: same mobility, tangent spaces close, no sheet beside it, singular values alike half way, at the step's end
+    and there."""
     kept = here.strengths
     if len(there.strengths) != len(kept):
         return False
     if not len(kept):
         return True
-    return (_alike(kept, there.strengths) and largest_angle(here.kernel()[0], there.kernel()[0]) <= TURNED
+    return (_alike(kept, there.strengths) and _same_side(here, there)
+            and largest_angle(here.kernel()[0], there.kernel()[0]) <= TURNED
             and all(_alike(kept, _values(here, part * step, len(kept))) for part in (0.5, 1.0)))
 
 
@@ -47,14 +49,21 @@ def nears(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) ->
     T, tangent = here.kernel()[0], there.kernel()[0]
     if np.linalg.norm(T - tangent @ (tangent.T @ T), 2) > np.sin(TURNED):
         return False
-    U, _, Vt = np.linalg.svd(here.twin.jacobian(here.q), full_matrices=False)
-    middle, end = (float(U[:, others] @ here.twin.jacobian(here.twin.moved(here.q, part * step)) @ Vt[others])
-                   / kept[others] for part in (0.5, 1.0))
+    w, n = here.loops.left[:, others], here.loops.right[:, others]
+    middle, end = (float(w @ here.twin.jacobian(here.twin.moved(here.q, part * step)) @ n) / kept[others]
+                   for part in (0.5, 1.0))
     if not (-NUDGE <= end < 1 and abs(middle - (1 + end) / 2) < EVENLY):
         return False
     if len(ahead) == len(kept) and not _alike(ahead, _values(here, step, len(kept))):
         return False
     return _alike(kept[:others], ahead[:others]) and _alike(kept[:others], _values(here, step, others))
+
+
+def _same_side(here: ClosedConfiguration, there: ClosedConfiguration) -> bool:
+    """Whether the determinant of the loops, in the bases of their range and corange at ``here``, keeps its sign: two
+    sheets of the configuration space beside each other have opposite ones (for y (y − d) = 0, ∓d)."""
+    across = here.loops.left.T @ there.twin.jacobian(there.q) @ here.loops.right
+    return bool(np.linalg.slogdet(across)[0] > 0)
 
 
 def _values(here: ClosedConfiguration, step: Array, count: int) -> Array:

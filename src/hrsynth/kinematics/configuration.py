@@ -19,7 +19,7 @@ from ..mechanism.observation import Observation
 from ..mechanism.so3 import logarithm
 from ..mechanism.vectors import Array, frozen, hat
 from ..tolerances import CLOSED
-from .ranks import Rank, kernel_and_values
+from .ranks import Rank, Spectrum, spectrum
 from .twin import Twin
 
 
@@ -49,17 +49,18 @@ class ClosedConfiguration:
         return self.twin.velocity(self.q, link)
 
     @cached_property
-    def _kernel(self) -> tuple[Array, Rank, Array]:
-        return kernel_and_values(self.twin.jacobian(self.q))
+    def loops(self) -> Spectrum:
+        """The constraints' Jacobian taken apart."""
+        return spectrum(self.twin.jacobian(self.q))
 
     def kernel(self) -> tuple[Array, Rank]:
         """A basis of T_qC, shape (nv, mobility), and the constraints' rank."""
-        return self._kernel[:2]
+        return self.loops.kernel, self.loops.rank
 
     @property
     def strengths(self) -> Array:
         """The singular values of the constraints that count, descending, (rank,)."""
-        return self._kernel[2]
+        return self.loops.values
 
 
 class Wanted(Protocol):

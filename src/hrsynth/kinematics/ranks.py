@@ -61,17 +61,31 @@ def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]
 
 def kernel_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
     """An orthonormal basis of the kernel, shape (columns, nullity), with the rank of the matrix."""
-    return kernel_and_values(matrix, scale)[:2]
+    found = spectrum(matrix, scale)
+    return found.kernel, found.rank
 
 
-def kernel_and_values(matrix: Array, scale: float | None = None) -> tuple[Array, Rank, Array]:
-    """As :func:`kernel_basis`, with the singular values that count, descending."""
-    columns = matrix.shape[1]
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """A matrix taken apart: a basis of its kernel (columns, nullity), its rank, the singular values that count,
+    descending (rank,), and their left (rows, rank) and right (columns, rank) vectors."""
+
+    kernel: Array
+    rank: Rank
+    values: Array
+    left: Array
+    right: Array
+
+
+def spectrum(matrix: Array, scale: float | None = None) -> Spectrum:
+    """The spectrum of a matrix; ``scale`` as in :func:`rank_of`."""
+    rows, columns = matrix.shape
     if 0 in matrix.shape:
-        return np.eye(columns), Rank(0, CLEAN), np.zeros(0)
-    _, s, Vt = np.linalg.svd(matrix, full_matrices=matrix.shape[0] < columns)
+        return Spectrum(np.eye(columns), Rank(0, CLEAN), np.zeros(0), np.zeros((rows, 0)), np.zeros((columns, 0)))
+    U, s, Vt = np.linalg.svd(matrix, full_matrices=rows < columns)
     rank = rank_of(s, scale)
-    return Vt[rank.value :].T, rank, s[: rank.value]
+    r = rank.value
+    return Spectrum(Vt[r:].T, rank, s[:r], U[:, :r], Vt[:r].T)
 
 
 def singular_values(matrices: Array) -> Array:

@@ -16,11 +16,11 @@ import numpy as np
 from ..errors import BadMechanism, BranchPoint, NotSampled
 from ..mechanism.observation import Observation
 from ..mechanism.vectors import Array
-from ..tolerances import CLOSED, FOLLOWED, INVERTED, PASSED_BY, RANK_GAP, SHARP, SOLVED
+from ..tolerances import CLOSED, EXACT, FOLLOWED, INVERTED, NUDGE, PASSED_BY, RANK_GAP, SHARP, SOLVED
 from .branch import CORRECTED, follows
 from .configuration import ClosedConfiguration, Target, closed, limited
 from .operation import OperationMode, Signature, grouped
-from .ranks import range_basis
+from .ranks import kernel_basis, largest_angle, range_basis
 from .relation import Question, Relation, relation
 from .twin import Twin
 
@@ -30,12 +30,24 @@ HALVED = tuple(2.0**-k for k in range(10))
 """Parts of a step that are tried; where the last does not follow the branch, a singularity of the loops lies ahead."""
 TURNS = 3
 """Directions that a walk tries before a singularity before it is given up."""
-STEADY = 1e-7
-"""Turn (radians) of the tangent space that the residual may cause: residual / (weakest singular value)²."""
+BEYOND = 24
+"""Steps of such a walk."""
+STEADY = 1e-10
+"""Turn (radians) of the tangent space that the residual may cause."""
 LEAVING = 24
 """Steps in random directions by which the branches at a singular zero configuration are sought."""
-MET = 24
-"""Configurations beyond a singularity that are asked whether they belong to another operation mode."""
+ASKED = 40
+"""Configurations beyond a singularity that are asked whether they may be of another operation mode."""
+MET = 6
+"""How many of those that may are confirmed by walks from there."""
+BEYOND = 16
+"""Steps of such a walk."""
+STEADY = 1e-10
+"""Turn (radians) of the tangent space that the residual may cause."""
+LEAVING = 24
+"""Steps in random directions by which the branches at a singular zero configuration are sought."""
+MET = 6
+"""Configurations beyond a singularity from which walks are sent, to see whether they are of another operation mode."""
 STEPS = 4
 """Steps from the zero configuration to a sample."""
 EASY = 10
@@ -64,6 +76,8 @@ class Samples:
     members: tuple[Sample, ...]
     discarded: int
     met: tuple[OperationMode, ...] = ()
+    led: bool = True
+    """Whether the robot finds all samples again, led along their ways: not where its zero configuration is special."""
 
     @property
     def mobility(self) -> int:
@@ -81,48 +95,51 @@ def draw(twin: Twin, question: Question, count: int, seed: int = 0, *, led_by: S
     """``count`` random samples of one operation mode; raises ``NotSampled`` where too few can be reached,
     ``BranchPoint`` where the zero configuration belongs to several.
 
-    The robot must find its way again led by the platform's pose and the observations ``led_by`` (default: all).
+    The robot should find its way again led by the platform's pose and the observations ``led_by`` (default: all); where
+    it does not, the samples say so. Idle motions are left out of the walks where that shows what is generic.
     """
     leading = {o.key for o in (question.observations if led_by is None else led_by)}
     start = ClosedConfiguration.of(twin, twin.q0)
     if relation(start, question).dimension == 0:
         raise BadMechanism(f"{twin.mechanism.name}: neither the platform nor a segment of a leg can move", None,
                            "a mechanism with at least one freedom")
-    walks = _Walks(question, leading, np.random.default_rng(seed))
-    roots = [start] if _regular(start, question, np.random.default_rng(seed)) else _ways_out(start, question, seed)
-    members: list[Sample] = []
-    discarded = 0
-    for number in range(4 * count):
-        sample = walks.walk(roots[number % len(roots)])
-        if sample is None:
-            discarded += 1
-            continue
-        members.append(sample)
-        if progress is not None:
-            progress()
-        if len(members) == count:
+    rng = np.random.default_rng(seed)
+    roots = [start] if _regular(start, rng) else _ways_out(start, question, rng)
+    for freely in (False, True):
+        walks = _Walks(question, leading, np.random.default_rng(seed), freely)
+        members, discarded, led = walks.draw(roots, count, progress)
+        if freely or not (far := _far(roots[0])):
             break
-    else:
-        raise NotSampled(twin.mechanism.name, len(members), count)
+        probe = _mode(_firmest(far), question)
+        if probe is None or probe.signature.agrees(Signature.of(members[0].relation)):
+            break
     groups = grouped([OperationMode(Signature.of(m.relation), m.configuration) for m in members])
     _require_one(groups, question, "the configurations reached differ as only those of several operation modes do")
     own = groups[0][0].signature
-    beyond = grouped([each for at in walks.beyond[:MET] if (each := _mode(at, question))])
-    met = tuple(group[0] for group in beyond if not group[0].signature.agrees(own))
-    return Samples(question, twin, start, tuple(members), discarded, met)
+    return Samples(question, twin, start, tuple(members), discarded, _others(walks.beyond, own, question), led)
+
+
+def _others(beyond: Sequence[ClosedConfiguration], own: Signature, question: Question) -> tuple[OperationMode, ...]:
+    """The operation modes other than one's own to which configurations belong, each confirmed by walks from there."""
+    some = beyond[:: max(1, len(beyond) // ASKED)]
+    strange = [at for at in some if (each := _mode(at, question)) and not each.signature.agrees(own)]
+    found = grouped([each for at in strange[:MET]
+                     if (far := _far(at, BEYOND)) and (each := _mode(_firmest(far), question))])
+    return tuple(group[0] for group in found if not group[0].signature.agrees(own))
 
 
 def _mode(at: ClosedConfiguration, question: Question) -> OperationMode | None:
-    """The operation mode that a configuration shows; None where its ranks are not clear."""
-    found = relation(at, question)
+    """The operation mode that a configuration shows; None where its ranks are not clear, as beside a singularity."""
+    if (steady := _steady(at)) is None or steady.kernel()[1].dropped > EXACT:
+        return None
+    found = relation(steady, question)
     return OperationMode(Signature.of(found), at) if found.gap >= RANK_GAP else None
 
 
-def _ways_out(start: ClosedConfiguration, question: Question, seed: int) -> list[ClosedConfiguration]:
+def _ways_out(start: ClosedConfiguration, question: Question, rng: np.random.Generator) -> list[ClosedConfiguration]:
     """Configurations beside a singular zero configuration; raises ``BranchPoint`` where they are not of one mode."""
-    rng = np.random.default_rng(seed)
-    found = [each for _ in range(LEAVING) if (moving := _velocity(start, question, None, rng)) is not None
-             and (beside := _moved(start, moving[0], leaving=True)) is not None
+    found = [each for _ in range(LEAVING)
+             if (beside := _moved(start, _anywhere(start, rng), leaving=True)) is not None
              and (each := _mode(beside, question)) is not None]
     if not found:
         raise NotSampled(start.twin.mechanism.name, 0, 1)
@@ -162,20 +179,64 @@ def _velocity(at: ClosedConfiguration, question: Question, wish: Array | None, r
     return kernel @ np.linalg.lstsq(image, wanted, rcond=INVERTED)[0], wanted
 
 
-class _Walks:
-    """Random walks of one seed; ``beyond`` collects closed configurations that too long steps came to."""
+def _far(start: ClosedConfiguration, steps: int = STEPS) -> list[ClosedConfiguration]:
+    """The configurations of two random walks in all of the mechanism's freedoms, the second half of each."""
+    try:
+        walk = list(wander(start, 2 * steps, steps=steps))
+    except NotSampled:
+        return []
+    return [at for number, at in enumerate(walk) if number % steps >= steps // 2]
 
-    def __init__(self, question: Question, leading: set[tuple[str, ...]], rng: np.random.Generator) -> None:
-        self.question, self.leading, self.rng = question, leading, rng
+
+def _firmest(found: Sequence[ClosedConfiguration]) -> ClosedConfiguration:
+    """The configuration farthest from a singularity of the loops."""
+    return max(found, key=lambda at: at.kernel()[1].weakest)
+
+
+class _Walks:
+    """Random walks of one seed, in idle motions too where they go ``freely``; ``beyond`` collects closed configurations
+    that too long steps came to."""
+
+    def __init__(self, question: Question, leading: set[tuple[str, ...]], rng: np.random.Generator, freely: bool
+                 ) -> None:
+        self.question, self.leading, self.rng, self.freely = question, leading, rng, freely
         self.beyond: list[ClosedConfiguration] = []
 
+    def draw(self, roots: Sequence[ClosedConfiguration], count: int, progress: Callable[[], None] | None
+             ) -> tuple[list[Sample], int, bool]:
+        """So many samples, how many were discarded, and whether the robot finds all of them again; raises
+        ``NotSampled``."""
+        members, lonely = list[Sample](), list[Sample]()
+        discarded = 0
+        for number in range(4 * count):
+            sample = self.walk(roots[number % len(roots)])
+            if sample is None:
+                discarded += 1
+                continue
+            (members if self._found_again(sample) else lonely).append(sample)
+            if progress is not None:
+                progress()
+            if len(members) == count:
+                return members, discarded + len(lonely), True
+        if len(members) + len(lonely) < count:
+            raise NotSampled(roots[0].twin.mechanism.name, len(members) + len(lonely), count)
+        return [*members, *lonely][:count], discarded, False
+
+    def _found_again(self, sample: Sample) -> bool:
+        led = [replace(t, measured=tuple(pair for pair in t.measured if pair[0].key in self.leading))
+               for t in sample.way]
+        return followed(sample.configuration.twin, led, iterations=EASY)[1] <= FOLLOWED
+
     def walk(self, start: ClosedConfiguration) -> Sample | None:
-        """The sample at the end of a random walk; None where it is blocked, or the robot does not find its way."""
+        """The sample at the end of a random walk; None where it is blocked, or its ranks are not clear."""
         question = self.question
         here, wish = start, None
         way: list[Target] = []
         weakest = WEAKEST * start.kernel()[1].weakest
         for _ in range(STEPS):
+            if self.freely:
+                idly = _anywhere(here, self.rng)
+                here = next((m for part in HALVED if (m := _moved(here, 2 * idly, part)) is not None), here)
             moved = None
             for attempt in range(TURNS):
                 moving = _velocity(here, question, None if attempt else wish, self.rng)
@@ -186,14 +247,9 @@ class _Walks:
                 return None
             here, wish = moved
             way.append(question.target(here))
-        here = _sharpened(here)
-        if here.residual > STEADY * here.kernel()[1].weakest ** 2:
-            return None
-        found = relation(here, question)
-        led = [replace(t, measured=tuple(pair for pair in t.measured if pair[0].key in self.leading)) for t in way]
-        if found.gap < RANK_GAP or followed(here.twin, led, iterations=EASY)[1] > FOLLOWED:
-            return None
-        return Sample(here, tuple(way), found)
+        steady = _steady(here)
+        found = None if steady is None else relation(steady, question)
+        return None if steady is None or found is None or found.gap < RANK_GAP else Sample(steady, tuple(way), found)
 
     def _stride(self, here: ClosedConfiguration, velocity: Array, direction: Array, weakest: float
                 ) -> tuple[ClosedConfiguration, Array] | None:
@@ -202,7 +258,7 @@ class _Walks:
         came, part = 0.0, 1.0
         while came < 1:
             part = min(part, 1 - came)
-            there = _moved(here, part * velocity, self.beyond)
+            there = _moved(here, velocity, part, self.beyond)
             if there is None:
                 part /= 2
                 if part < HALVED[-1]:
@@ -219,19 +275,24 @@ class _Walks:
         return here, direction
 
 
-def _sharpened(here: ClosedConfiguration) -> ClosedConfiguration:
-    """The same configuration, its loops closed as well as numbers allow where it is near a singularity."""
+def _steady(here: ClosedConfiguration) -> ClosedConfiguration | None:
+    """The same configuration, its loops closed so well that T_qC does not turn by the residual; None where numbers do
+    not allow that, near a singularity."""
     if here.residual <= STEADY * here.kernel()[1].weakest ** 2:
         return here
-    return ClosedConfiguration.of(here.twin, closed(here.twin, here.q, tolerance=SHARP, iterations=5)[0])
+    twin = here.twin
+    here = ClosedConfiguration.of(twin, closed(twin, here.q, tolerance=SHARP, iterations=5)[0])
+    aside, _ = kernel_basis(twin.jacobian(twin.moved(here.q, NUDGE * here.loops.right[:, -1])))
+    turn = largest_angle(here.kernel()[0], aside) / NUDGE  # radians for each unit of the weakest direction
+    return here if turn * max(here.residual, SHARP) / here.strengths[-1] <= STEADY else None
 
 
-def _moved(here: ClosedConfiguration, velocity: Array, beyond: list[ClosedConfiguration] | None = None, *,
-           leaving: bool = False) -> ClosedConfiguration | None:
-    """The configuration a step along ``velocity`` leads to; None where it does not close near its prediction, or does
-    not follow the branch: what it closes to goes to ``beyond`` then. ``leaving`` a singular configuration, any branch
-    will do."""
-    step = limited(STEP * velocity, 3 * STEP)
+def _moved(here: ClosedConfiguration, velocity: Array, part: float = 1.0,
+           beyond: list[ClosedConfiguration] | None = None, *, leaving: bool = False) -> ClosedConfiguration | None:
+    """The configuration a ``part`` of a step along ``velocity`` leads to; None where it does not close near its
+    prediction, or does not follow the branch: what it closes to goes to ``beyond`` then. ``leaving`` a singular
+    configuration, any branch will do."""
+    step = part * limited(STEP * velocity, 3 * STEP)
     predicted = here.twin.moved(here.q, step)
     q, residual = closed(here.twin, predicted, tolerance=SOLVED)
     if not residual <= CLOSED:
@@ -242,16 +303,22 @@ def _moved(here: ClosedConfiguration, velocity: Array, beyond: list[ClosedConfig
         return there if apart <= length / 2 else None
     if apart <= CORRECTED * length + 1e-9 and follows(here, step, there):
         return there
-    if beyond is not None:
+    if beyond is not None and part == 1:
         beyond.append(there)
     return None
 
 
-def _regular(start: ClosedConfiguration, question: Question, rng: np.random.Generator) -> bool:
+def _regular(start: ClosedConfiguration, rng: np.random.Generator) -> bool:
     """Whether some step from a configuration, however short, follows its branch: not so where branches meet."""
-    moving = _velocity(start, question, None, rng)
-    parts = (*HALVED[::3], 1e-4, 1e-5)
-    return moving is not None and any(_moved(start, part * moving[0]) is not None for part in parts)
+    velocity = _anywhere(start, rng)
+    return any(_moved(start, velocity, part) is not None for part in (*HALVED[::3], 1e-4, 1e-5))
+
+
+def _anywhere(at: ClosedConfiguration, rng: np.random.Generator) -> Array:
+    """A random joint velocity, idle motions included, a unit vector."""
+    kernel, _ = at.kernel()
+    velocity: Array = kernel @ rng.normal(size=kernel.shape[1])
+    return velocity / np.linalg.norm(velocity)
 
 
 def wander(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40) -> Iterator[ClosedConfiguration]:
@@ -266,7 +333,7 @@ def wander(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 4
             kernel, _ = here.kernel()
             velocity = kernel @ (kernel.T @ velocity + rng.normal(size=kernel.shape[1]) / 2)
             velocity /= np.linalg.norm(velocity)
-            moved = next((m for part in HALVED if (m := _moved(here, 2 * part * velocity)) is not None), None)
+            moved = next((m for part in HALVED if (m := _moved(here, 2 * velocity, part)) is not None), None)
             if moved is None or moved.kernel()[1].weakest < weakest:
                 failed += 1
                 break

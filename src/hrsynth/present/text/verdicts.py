@@ -5,8 +5,9 @@ from __future__ import annotations
 from ...analysis.controllability import Legs, Verdict
 from ...analysis.derive import Derivation
 from ...analysis.exact import ExactVerdict, power_above
+from ...analysis.setting import Setting
 from ...kinematics.certificate import Certificate
-from ...tolerances import RANK_GAP, SAME_RELATION
+from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
 from .tables import listing, table
 
 
@@ -29,6 +30,8 @@ def derivation(found: Derivation, hidden_file: str | None = None, report: str | 
         *([("camera on", reference)] if reference != found.setting.mechanism.base else []),
         ("hidden robot", str(hidden) if hidden else "none: every observed direction is constant"),
         ("verdict", found.verdict.verdict),
+        *([("", near(found.verdict))] if found.verdict.near else []),
+        *[("" if i else "mode", text) for i, text in enumerate(_modes(found.setting))],
         ("architecture", exact_words(found.exact, found.verdict.rank)),
         *[("lost at zero" if i == 0 else "", freedom.name) for i, freedom in enumerate(found.verdict.lost)],
         *([] if found.verdict.graph else
@@ -48,6 +51,23 @@ def derivation(found: Derivation, hidden_file: str | None = None, report: str | 
     steps = [(step.rule, step.leg or "all", "yes" if step.accepted else "no", _angle(step.largest_angle), step.reason)
              for step in found.steps]
     return "\n".join([listing(rows), "", table(steps, ("rule", "leg", "taken", "angle", "why"))])
+
+
+def _modes(setting: Setting) -> list[str]:
+    """For which operation mode a verdict holds, where others were met."""
+    found = setting.beside()
+    own = setting.everything.signature
+    return [f"for the operation mode of the zero configuration: {own.dof} dof ({own.motion}), mobility {own.mobility}",
+            *(f"another that was met: {text}" for text in found)] if found else []
+
+
+def near(found: Verdict) -> str:
+    """How far a verdict is from another one, where that is not far."""
+    if found.rank and found.counted < SURELY_SOMETHING:
+        return (f"near another verdict: a motion that counts as seen has the singular value {found.counted:.1e}, which "
+                f"counts above {RANK_CUTOFF:.0e} (rates of the directions, characteristic lengths, radians)")
+    return (f"near another verdict: a motion that counts as not seen has the singular value {found.dropped:.1e}, which "
+            f"counts above {RANK_CUTOFF:.0e} (rates of the directions, characteristic lengths, radians)")
 
 
 def certificate(found: Certificate) -> str:
@@ -97,6 +117,8 @@ def legs(found: Legs) -> str:
     chance = max(each.chance for each in found.exact)
     if chance:
         lines.append(f"exact but for a chance below {power_above(chance)}: identities tested at random instances")
+    lines += [f"legs {', '.join(each.legs)}: {near(each)}" for each in found.sets if each.near]
+    lines += _modes(found.setting)
     if not found.complete:
         lines.append("not all sets were tried: there are too many legs")
     return "\n".join(lines)
