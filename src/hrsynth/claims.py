@@ -110,14 +110,21 @@ CLAIMS = (
           "tests/kinematics/test_closures.py::test_limits_of_turns_count_modulo_whole_turns",
           (r"only beyond the limits of",)),
     Claim("same aspect (certified)", "path, select",
-          "the path that is printed joins the two poses, and the hidden robot meets no Type 2 singularity on it",
-          "interval arithmetic along the path", EXACT_GEOMETRY,
+          "a path leads from the one pose to the other, in the working modes that are told, and the condition of Type "
+          "2 is not met on it",
+          "points, axes and lengths of the legs' closed forms are read from the file's joints; condition, reach and "
+          "limits are enclosed in ball arithmetic all along, for all numbers within 1e-9; where a form had to be "
+          "fitted to samples it is not certified",
+          EXACT_GEOMETRY + "; the condition is the robot's (compared with ranks at samples), and where rods close the "
+          "whole leg closes (seen at samples to 1e-9): which links keep parallel is not proved",
           "tests/analysis/aspects/test_aspects.py::test_a_certified_path_is_free_of_singularities_and_within_reach",
           (r"same aspect", r"^(not )?certified$", r"enclosed away from zero", r"no path was proved",
            r"path shown is proved but for its last part", r"not proved$", r"no path can be certified")),
-    Claim("separated", "path, select",
-          "every path between the two poses meets a Type 2 singularity of the hidden robot",
-          "the condition's expression is enclosed with opposite signs at the two poses", EXACT_GEOMETRY,
+    Claim("separated (certified)", "path, select",
+          "every path between the two poses meets a zero of the condition of Type 2",
+          "the condition's expression is enclosed with opposite signs at the two poses, as for *same aspect*; without "
+          "*certified*: it has opposite signs in floating point",
+          "as for *same aspect*; the expression is continuous where the loops keep their rank",
           "tests/analysis/aspects/test_aspects.py::test_opposite_signs_are_separated_and_equal_signs_never",
           (r"^separated$", r"enclosed with opposite signs", r"not certified by intervals")),
     Claim("never (Type 2 singularities)", "singular",

@@ -112,7 +112,7 @@ def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
 def test_a_pose_beyond_a_limit_is_named_and_still_separated():
     robot = load("3rrr_m1")
     free = Aspects.of(robot)
-    places = list(wander(free.setting.samples.start, 30, 0))
+    places = list(wander(free.setting.samples.start, 120, 0))
     values = [coordinates(at, "elbow_1") for at in places]
     low, high = np.quantile(values, [0.2, 0.8])
     aspects = Aspects.of(with_limits(robot, {"elbow_1": Limits(low, high)}))

@@ -108,27 +108,29 @@ def stretched(p: Array, R: Array, q: Array, S: Array, fractions: Array) -> tuple
 
 @dataclass(frozen=True, eq=False)
 class Rigid:
-    """A vector that the pose alone decides: ``follows`` p + R ``turned`` + ``constant``."""
+    """A vector that the pose alone decides: ``follows`` p + R ``turned`` + ``constant``; ``fitted`` to samples, else
+    read from the file's joints."""
 
     follows: bool
     turned: Array
     constant: Array
+    fitted: bool = False
 
     def value(self, p: Field, R: Field) -> Field:
-        """The vectors (n, 3) at poses (n, 3), (n, 3, 3)."""
+        """The vectors (n, 3) at poses (n, 3), (n, 3, 3); of balls, with all that the rounded numbers stand for."""
         found = (p if self.follows else 0 * p) + self.constant
-        return np.asarray(found + R @ self.turned if np.any(self.turned) else found)
+        return widened(np.asarray(found + R @ self.turned if np.any(self.turned) else found), FOLLOWED)
 
 
 def rigid(values: Array, p: Array, R: Array) -> Rigid | None:
     """The rule that vectors (n, 3) follow at poses (n, 3), (n, 3, 3), by least squares; None where there is none."""
     if np.max(np.abs(values - values[0])) < FOLLOWED:
-        return Rigid(False, np.zeros(3), values[0])
+        return Rigid(False, np.zeros(3), values[0], True)
     rows = np.concatenate([R, np.broadcast_to(np.eye(3), R.shape)], axis=2).reshape(-1, 6)
     for follows in (False, True):
         wanted = (values - p if follows else values).reshape(-1)
         found = np.linalg.lstsq(rows, wanted, rcond=RANK_CUTOFF)[0]
         if np.max(np.abs(rows @ found - wanted)) < FOLLOWED:
             turned, constant = np.where(np.abs(found) < FOLLOWED, 0.0, found).reshape(2, 3)
-            return Rigid(follows, turned, constant)
+            return Rigid(follows, turned, constant, True)
     return None

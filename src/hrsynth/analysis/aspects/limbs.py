@@ -7,11 +7,12 @@ carriage, or the direction of a rod that slides.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from ...kinematics.balls import Field, cross, dot, normed
+from ...kinematics.balls import Field, cross, dot, normed, widened
 from ...mechanism.vectors import Array
 from ...tolerances import FOLLOWED
 from .carriage import Rigid
@@ -24,6 +25,8 @@ class Limb:
     leg: str
     tip: Rigid
     branch: float
+    fitted: bool = field(default=False, kw_only=True)
+    """Whether the leg's form or its tip was found by fitting samples, not read from its joints."""
 
     def solve(self, tip: Field, branch: Field | float) -> tuple[Field, Field]:
         """The reserve (n,) and the vector that the tip decides (n, 3), for tips (n, 3)."""
@@ -45,11 +48,12 @@ class OnRail(Limb):
     rod: float
 
     def solve(self, tip: Field, branch: Field | float) -> tuple[Field, Field]:
-        D = tip - self.start
-        along = dot(D, self.axis)
-        across = D - along[:, None] * self.axis
-        reserve = self.rod**2 - dot(across, across)
-        return reserve, self.start + (along + branch * np.sqrt(reserve))[:, None] * self.axis
+        start, axis, rod = (known(x, tip) for x in (self.start, self.axis, self.rod))
+        D = tip - start
+        along = dot(D, axis)
+        across = D - along[:, None] * axis
+        reserve = rod**2 - dot(across, across)
+        return reserve, start + (along + branch * np.sqrt(reserve))[:, None] * axis
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,14 +67,15 @@ class OnCrank(Limb):
     rod: float
 
     def solve(self, tip: Field, branch: Field | float) -> tuple[Field, Field]:
-        D = tip - self.centre
-        flat = D - dot(D, self.axis)[:, None] * self.axis
+        centre, axis, crank, rod = (known(x, tip) for x in (self.centre, self.axis, self.crank, self.rod))
+        D = tip - centre
+        flat = D - dot(D, axis)[:, None] * axis
         far = dot(flat, flat)
-        share = (dot(D, D) + self.crank**2 - self.rod**2) * 0.5
-        reserve = self.crank**2 * far - share * share
+        share = (dot(D, D) + crank**2 - rod**2) * 0.5
+        reserve = crank**2 * far - share * share
         aside = branch * np.sqrt(reserve)
-        spoke = share[:, None] * flat + aside[:, None] * cross(np.broadcast_to(self.axis, D.shape), flat)
-        return reserve, self.centre + spoke / far[:, None]
+        spoke = share[:, None] * flat + aside[:, None] * cross(np.broadcast_to(axis, D.shape), flat)
+        return reserve, centre + spoke / far[:, None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,15 +88,24 @@ class Sliding(Limb):
     aside: float
 
     def solve(self, tip: Field, branch: Field | float) -> tuple[Field, Field]:
-        D = tip - self.centre
+        D = tip - known(self.centre, tip)
         if self.axis is None:
             return dot(D, D), normed(D) * np.asarray(branch)[..., None]
-        flat = D - dot(D, self.axis)[:, None] * self.axis
+        axis, aside = known(self.axis, tip), known(self.aside, tip)
+        flat = D - dot(D, axis)[:, None] * axis
         far = dot(flat, flat)
-        reserve = far - self.aside**2
+        reserve = far - aside**2
         drawn = branch * np.sqrt(reserve)
-        turned = cross(np.broadcast_to(self.axis, D.shape), flat)
-        return reserve, (drawn[:, None] * flat - self.aside * turned) / far[:, None]
+        turned = cross(np.broadcast_to(axis, D.shape), flat)
+        return reserve, (drawn[:, None] * flat - aside * turned) / far[:, None]
+
+
+def known(value: Any, like: Field) -> Any:
+    """A number or vector of the geometry, for numbers; among balls, one that holds what it was rounded from."""
+    if like.dtype != object:
+        return value
+    found = widened(np.asarray(value, dtype=object), FOLLOWED)
+    return found[()] if found.ndim == 0 else found
 
 
 def on_rail(leg: str, tip: Rigid, tips: Array, ends: Array, axis: Array) -> OnRail | None:

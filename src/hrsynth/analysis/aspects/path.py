@@ -6,23 +6,26 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
+import numpy as np
+
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.parts import PlatformMotion
 from ...kinematics.reach import reach
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
-from ...tolerances import RANK_CUTOFF, RANK_GAP
+from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
 from ..setting import Setting, prepare
 from ..singularity.agreement import smallest_of
 from ..singularity.condition import Condition, Named
 from ..singularity.measured import Measured
 from ..singularity.structure import Structure
 from .answer import SAME, SEPARATED, UNDECIDED, End, PathAnswer, between
-from .carriage import carriages
+from .carriage import Place, carriages
+from .crossing import Crossing
 from .limits import limited
 from .pattern import Pattern, pattern
 from .plan import Plan, plan
-from .proof import Reading, enclosed, sign_of
+from .proof import Reading, Way, enclosed, sign_of
 from .region import Region
 from .sources import NoChart
 
@@ -111,12 +114,14 @@ class Aspects:
         p, R = carriage.of([answer.start.configuration, answer.goal.configuration, *self.members])
         sure, values = zip(*(enclosed(readings[i].unlimited, p[i], R[i]) for i in range(2)), strict=True)
         margin = min(map(abs, values))
+        fitted = self.pattern.fitted
+        forms = f", for forms that are fitted to samples: {', '.join(fitted)}" if fitted else ""
         if not all(sure) or margin == 0:
             return replace(answer, reason="at a pose reach or value cannot be enclosed away from zero")
         if readings[0].signed and values[0] * values[1] < 0:
-            return replace(answer, verdict=SEPARATED, certified=True, margin=margin, boxes=2, reason=(
+            return replace(answer, verdict=SEPARATED, certified=not fitted, margin=margin, boxes=2, reason=(
                 "the expression is enclosed with opposite signs at the two configurations: every path between them "
-                "crosses its zeros"))
+                f"crosses its zeros{forms}"))
         if answer.signed and answer.start.value * answer.goal.value < 0:
             return _pointwise(answer, "its sign is that of a determinant")
         for end, reading, place, turn in zip(("start", "goal"), readings, p, R, strict=False):
@@ -128,8 +133,10 @@ class Aspects:
         answer = self._shown(answer, found, self.pattern)
         if not found.proved:
             return replace(answer, reason=_unproved(found, readings, budget))
-        return replace(answer, verdict=SAME, certified=True, margin=found.margin, reason=(
-            "the condition and the reach of all legs are enclosed away from zero along the path"))
+        if not leads(found.ways, (p[0], R[0]), (p[1], R[1]), readings):
+            return replace(answer, reason="no path was proved: what was found does not lead from pose to pose")
+        return replace(answer, verdict=SAME, certified=not fitted, margin=found.margin, reason=(
+            f"the condition and the reach of all legs are enclosed away from zero along the path{forms}"))
 
     def _shown(self, answer: PathAnswer, found: Plan, known: Pattern) -> PathAnswer:
         """The answer with a plan's ways, and the joints whose limits these keep."""
@@ -167,6 +174,22 @@ def path(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: s
     tell("poses")
     ends = [reach(samples.start, samples.question, pose, aspects.motion) for pose in wanted]
     return aspects.join(*ends, seed=seed, budget=budget, progress=lambda: tell("road map"))
+
+
+def leads(ways: Sequence[Way], start: Place, goal: Place, readings: Sequence[Reading]) -> bool:
+    """Whether ways lead from pose to pose and from working mode to working mode without a gap."""
+    here, modes = start, list(readings[0].chart.modes)
+    for way in ways:
+        if _gap(here, (way.p, way.R)) > SOLVED:
+            return False
+        here = way.end
+        if isinstance(way, Crossing):
+            modes[way.limb] *= -1
+    return _gap(here, goal) <= SOLVED and tuple(modes) == readings[1].chart.modes
+
+
+def _gap(one: Place, other: Place) -> float:
+    return max(float(np.max(np.abs(a - b))) for a, b in zip(one, other, strict=True))
 
 
 def _unproved(found: Plan, readings: Sequence[Reading], budget: int) -> str:

@@ -12,11 +12,12 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Joint, JointType, Mechanism
 from ...mechanism.legs import Anatomy, Leg
 from ...mechanism.vectors import Array
-from ...tolerances import FOLLOWED, SAME_RELATION
+from ...tolerances import EXACT, FOLLOWED, SAME_RELATION
 from ..singularity.features import Feature, Segment, Spot, Tangent, axis_of, centre_of, poses_at
 from .carriage import Carriage, Rigid, rigid
 from .chart import Chart
-from .limbs import Limb, on_crank, on_rail, sliding
+from .derived import Derived
+from .limbs import Limb, Sliding, on_crank, on_rail, sliding
 from .limits import Bound, bounds
 from .sources import Borne, Made, NoChart, Source
 
@@ -32,6 +33,12 @@ class Pattern:
     points: tuple[str, ...]
     bounds: tuple[Bound, ...] = ()
     """Limits of joints that are kept."""
+
+    @property
+    def fitted(self) -> tuple[str, ...]:
+        """What was fitted to samples and not read from the joints: legs, and vectors by their symbols."""
+        legs = dict.fromkeys(f"leg {limb.leg}" for limb in self.limbs if limb.fitted)
+        return (*legs, *(symbol for symbol, source in self.vectors.items() if source.fitted))
 
     def chart(self, at: ClosedConfiguration) -> Chart:
         """The chart in the working mode of a configuration; raises ``NoChart`` where a leg does not follow its form."""
@@ -50,7 +57,7 @@ class Pattern:
 def pattern(anatomy: Anatomy, features: Sequence[Feature], carriage: Carriage,
             configurations: Sequence[ClosedConfiguration]) -> Pattern:
     """The forms of all legs and of the wanted features; raises ``NoChart`` where one fits none."""
-    sight = Sight(anatomy.mechanism, carriage, configurations)
+    sight = Sight(anatomy.mechanism, carriage, configurations, Derived.of(anatomy, carriage, configurations))
     found: list[tuple[Limb, Feature]] = []
     for leg in anatomy.legs:
         of_leg = list(sight.limbs(leg))
@@ -70,19 +77,25 @@ class Sight:
     mechanism: Mechanism
     carriage: Carriage
     configurations: Sequence[ClosedConfiguration]
+    derived: Derived
 
     def values(self, feature: Feature) -> Array:
         return feature.value(poses_at(self.configurations, feature.links))
 
-    def rule(self, values: Array) -> Rigid | None:
-        return rigid(values, *self.carriage.of(self.configurations))
+    def rule(self, feature: Feature) -> Rigid | None:
+        """How a vector follows from the pose: read from the joints, if that is what samples show, else fitted."""
+        values, places = self.values(feature), self.carriage.of(self.configurations)
+        found = self.derived.rule(feature)
+        if found is not None and np.max(np.abs(found.value(*places) - values)) < FOLLOWED:
+            return found
+        return rigid(values, *places)
 
     def limbs(self, leg: Leg) -> Iterator[tuple[Limb, Feature]]:
         """The rods of a leg with the vectors that they carry, each equation once; else its sliding rod."""
         seen: list[tuple[Array, Array]] = []
-        for tip, tips in self.tips(leg):
-            for limb, end in self.rods(leg, tip, tips):
-                ends = self.values(end)
+        for tip, spot in self.tips(leg):
+            for limb, end in self.rods(leg, tip, spot):
+                ends, tips = self.values(end), self.values(spot)
                 if all(max(np.ptp(ends - a, axis=0).max(), np.max(np.abs(ends - a - tips + b))) > FOLLOWED
                        for a, b in seen):
                     seen.append((ends, tips))
@@ -90,19 +103,21 @@ class Sight:
         if not seen:
             yield from self.slides(leg)
 
-    def tips(self, leg: Leg) -> Iterator[tuple[Rigid, Array]]:
+    def tips(self, leg: Leg) -> Iterator[tuple[Rigid, Spot]]:
         """Joint centres of a leg, and the point whose position is told, that the pose alone decides."""
         for joint in self.joints(leg):
             if self.mechanism.base not in joint.links:
-                values = self.values(self.centre(joint, joint.successor))
-                rule = self.rule(values)
+                spot = self.centre(joint, joint.successor)
+                rule = self.rule(spot)
                 if rule is not None and (rule.follows or np.any(rule.turned)):
-                    yield rule, values
+                    yield rule, spot
         if not self.carriage.turning:
-            yield Rigid(True, np.zeros(3), np.zeros(3)), self.carriage.of(self.configurations)[0]
+            motion = self.carriage.motion
+            yield (Rigid(True, np.zeros(3), np.zeros(3)),
+                   Spot("P", "the point", motion.link, motion.point / self.carriage.length))
 
-    def rods(self, leg: Leg, tip: Rigid, tips: Array) -> Iterator[tuple[Limb, Feature]]:
-        joints = self.joints(leg)
+    def rods(self, leg: Leg, tip: Rigid, spot: Spot) -> Iterator[tuple[Limb, Feature]]:
+        joints, tips = self.joints(leg), self.values(spot)
         for foot in joints:
             if self.mechanism.base not in foot.links or foot.type not in (JointType.REVOLUTE, JointType.PRISMATIC):
                 continue
@@ -119,12 +134,15 @@ class Sight:
                 else:
                     found = on_rail(leg.label, tip, tips, ends, axis)
                 if found is not None:
-                    yield found, end
+                    # one link holds the rod's two ends, so that its length is constant
+                    rod = set(self.derived.holders(spot)) & set(self.derived.holders(end))
+                    yield replace(found, fitted=tip.fitted or not rod), end
 
     def slides(self, leg: Leg) -> Iterator[tuple[Limb, Feature]]:
         joints = self.joints(leg)
         feet = [joint for joint in joints if self.mechanism.base in joint.links]
-        for tip, tips in self.tips(leg):
+        for tip, spot in self.tips(leg):
+            tips = self.values(spot)
             for foot in feet:
                 centre = self.values(self.centre(foot, self.mechanism.base))[0]
                 turns = foot.type is JointType.REVOLUTE
@@ -134,26 +152,49 @@ class Sight:
                         direction = axis_of(self.mechanism, slide, "p")
                         found = sliding(leg.label, tip, tips, centre, axis, self.values(direction))
                         if found is not None:
-                            yield found, direction
+                            fitted = tip.fitted or not self.drawn(foot, slide, spot, found)
+                            yield replace(found, fitted=fitted), direction
                             return
 
+    def drawn(self, foot: Joint, slide: Joint, tip: Spot, limb: Sliding) -> bool:
+        """Whether a P joint between a link that holds the foot's centre and one that holds the tip makes the form: its
+        axis passes through both, or stays normal to the foot's axis."""
+        centre = self.centre(foot, self.mechanism.base)
+        near, far = self.derived.holders(centre), self.derived.holders(tip)
+        if not any(one in near and slide.other(one) in far for one in slide.links):
+            return False
+        if limb.axis is None:
+            arm = self.derived.zero(tip) - self.derived.zero(centre)
+            return bool(np.linalg.norm(np.cross(arm, slide.axis)) <= EXACT * max(1.0, float(np.linalg.norm(arm))))
+        return foot.type is JointType.REVOLUTE and bool(abs(foot.axis @ slide.axis) <= EXACT)
+
     def source(self, feature: Feature, carried: Sequence[Feature]) -> Source:
-        """How a vector follows from pose and limbs."""
-        values = self.values(feature)
-        rule = self.rule(values)
+        """How a vector follows from pose and limbs: read from the joints where that can be, else fitted to samples."""
+        found = list(self.sources(feature, carried))
+        if not found:
+            raise NoChart(f"{feature.symbol} ({feature.meaning}) does not follow from the pose by a known form")
+        return next((each for each in found if not each.fitted), found[0])
+
+    def sources(self, feature: Feature, carried: Sequence[Feature]) -> Iterator[Source]:
+        values, rule = self.values(feature), self.rule(feature)
         if rule is not None:
-            return rule
+            yield rule
         for i, each in enumerate(carried):
+            same = self.derived.same(feature, each)
+            if same:
+                yield Borne(i, same, np.zeros(3))
             for sense in (1.0, -1.0):
                 offset = values - sense * self.values(each)
                 if np.max(np.ptp(offset, axis=0)) < FOLLOWED:
-                    return Borne(i, sense, np.where(np.abs(offset[0]) < FOLLOWED, 0.0, offset[0]))
-        if isinstance(feature, Tangent | Segment):
-            start, end = (self.source(part, carried) for part in (feature.start, feature.end))
-            axis = self.source(feature.axis, carried) if isinstance(feature, Tangent) else None
-            if not any(isinstance(part, Made) for part in (start, end, axis)) and self.lasting(feature):
-                return Made(cast(Rigid | Borne, start), cast(Rigid | Borne, end), cast(Rigid | Borne | None, axis))
-        raise NoChart(f"{feature.symbol} ({feature.meaning}) does not follow from the pose by a known form")
+                    yield Borne(i, sense, np.where(np.abs(offset[0]) < FOLLOWED, 0.0, offset[0]), True)
+        if isinstance(feature, Tangent | Segment) and self.lasting(feature):
+            try:
+                start, end = (self.source(part, carried) for part in (feature.start, feature.end))
+                axis = self.source(feature.axis, carried) if isinstance(feature, Tangent) else None
+            except NoChart:
+                return
+            if not any(isinstance(part, Made) for part in (start, end, axis)):
+                yield Made(cast(Rigid | Borne, start), cast(Rigid | Borne, end), cast(Rigid | Borne | None, axis))
 
     def lasting(self, feature: Tangent | Segment) -> bool:
         """Whether the vector of which a feature is the direction keeps its length, so that it never vanishes."""

@@ -23,6 +23,7 @@ class Borne:
     limb: int
     sense: float
     offset: Array
+    fitted: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,6 +33,11 @@ class Made:
     start: Rigid | Borne
     end: Rigid | Borne
     axis: Rigid | Borne | None
+
+    @property
+    def fitted(self) -> bool:
+        """Whether one of its parts was."""
+        return any(part is not None and part.fitted for part in (self.start, self.end, self.axis))
 
 
 Source = Rigid | Borne | Made

@@ -1,0 +1,152 @@
+"""Rules read from the joints of a file: which point or direction is fixed in several links at once, and how those that
+the platform carries follow from its pose.
+
+A point is fixed in both links of a joint if it lies on the R's axis or is the centre of a U or S; a direction, if the
+joint is a P, or an R or C along it. All of it holds at the zero configuration to ``EXACT``, and hence in motion.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...kinematics.configuration import ClosedConfiguration
+from ...mechanism import Joint, JointType, Mechanism
+from ...mechanism.legs import Anatomy
+from ...mechanism.lines import distance
+from ...mechanism.vectors import Array
+from ...tolerances import EXACT, FOLLOWED
+from ..singularity.features import Carried, Feature, Spot
+from .carriage import Carriage, Rigid
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A link that the pose carries: the rule of its ``anchor`` (3,) (at zero, characteristic lengths), and whether it
+    turns with the platform (True), not at all (False), or otherwise (None)."""
+
+    rule: Rigid
+    anchor: Array
+    turns: bool | None
+
+
+@dataclass(frozen=True, eq=False)
+class Derived:
+    """What the joints of a mechanism say of its points and directions; ``bodies``: links that the pose carries."""
+
+    mechanism: Mechanism
+    length: float
+    bodies: Mapping[str, Body]
+
+    @classmethod
+    def of(cls, anatomy: Anatomy, carriage: Carriage, configurations: Sequence[ClosedConfiguration]
+           ) -> Derived:
+        """The base, and the platform's links from joint to joint. Which of these turn is seen at configurations; that
+        the joints between them allow it follows from the joints."""
+        mechanism, length, link = anatomy.mechanism, carriage.length, carriage.motion.link
+        frame = mechanism.links[link].pose
+        anchor = (frame[:3, :3] @ carriage.motion.point + frame[:3, 3]) / length
+        follows = Rigid(True, np.zeros(3), np.zeros(3))
+        bodies = {mechanism.base: Body(Rigid(False, np.zeros(3), np.zeros(3)), np.zeros(3), False)}
+        known = cls(mechanism, length, bodies)
+        bodies[link] = Body(follows, anchor, _turns(mechanism, link, carriage, configurations))
+        reached = [link]
+        for one in reached:
+            for joint in mechanism.joints_of(one):
+                other = joint.other(one)
+                if other in anatomy.platform and other not in bodies and _points(joint):
+                    rule = known.point(one, joint.point / length)
+                    if rule is not None:
+                        turns = _turns(mechanism, other, carriage, configurations)
+                        bodies[other] = Body(rule, joint.point / length, turns)
+                        reached.append(other)
+        return known
+
+    def rule(self, feature: Feature) -> Rigid | None:
+        """The rule of a point or direction, where a link that the pose carries holds it too."""
+        if isinstance(feature, Spot):
+            x = self.zero(feature)
+            rules = (self.point(link, x) for link in self.holders(feature) if link in self.bodies)
+            return next((rule for rule in rules if rule is not None), None)
+        if isinstance(feature, Carried):
+            d = self.zero(feature)
+            turns = [self.bodies[link].turns for link in self.holders(feature) if link in self.bodies]
+            if False in turns:
+                return Rigid(False, np.zeros(3), d)
+            if True in turns:
+                return Rigid(False, self._turned(d), np.zeros(3))
+        return None
+
+    def point(self, link: str, x: Array) -> Rigid | None:
+        """The rule of a point (3,) (at zero, characteristic lengths) of a link that the pose carries."""
+        body = self.bodies[link]
+        arm = x - body.anchor
+        if np.linalg.norm(arm) <= EXACT:
+            return body.rule
+        if body.turns is None:
+            return None
+        turned, constant = (self._turned(arm), np.zeros(3)) if body.turns else (np.zeros(3), arm)
+        return Rigid(body.rule.follows, body.rule.turned + turned, body.rule.constant + constant)
+
+    def zero(self, feature: Spot | Carried) -> Array:
+        """A point (characteristic lengths) or direction at the zero configuration."""
+        X = self.mechanism.links[feature.link].pose
+        if isinstance(feature, Carried):
+            return np.asarray(X[:3, :3] @ feature.direction)
+        return np.asarray(X[:3, :3] @ feature.place + X[:3, 3] / self.length)
+
+    def holders(self, feature: Spot | Carried) -> tuple[str, ...]:
+        """The links in which a point or direction is fixed."""
+        value, found = self.zero(feature), [feature.link]
+        shared = self._same_point if isinstance(feature, Spot) else _same_direction
+        for link in found:
+            for joint in self.mechanism.joints_of(link):
+                if joint.other(link) not in found and shared(joint, value):
+                    found.append(joint.other(link))
+        return tuple(found)
+
+    def same(self, one: Feature, other: Feature) -> float:
+        """±1 where two points, or directions of this sense, are the same in all configurations; else 0."""
+        if type(one) is not type(other) or not isinstance(one, Spot | Carried) or not isinstance(other, Spot | Carried):
+            return 0.0
+        if not set(self.holders(one)) & set(self.holders(other)):
+            return 0.0
+        a, b = self.zero(one), self.zero(other)
+        for sense in (1.0, -1.0) if isinstance(one, Carried) else (1.0,):
+            if np.linalg.norm(a - sense * b) <= EXACT:
+                return sense
+        return 0.0
+
+    def _same_point(self, joint: Joint, x: Array) -> bool:
+        if joint.type is JointType.REVOLUTE:
+            return distance(x, joint.point / self.length, joint.axis) <= EXACT
+        return _points(joint) and bool(np.linalg.norm(x - joint.point / self.length) <= EXACT)
+
+    def _turned(self, vector: Array) -> Array:
+        """A vector at zero in the platform's frame."""
+        link = next(name for name, body in self.bodies.items() if body.rule.follows)
+        return np.asarray(self.mechanism.links[link].pose[:3, :3].T @ vector)
+
+
+def _points(joint: Joint) -> bool:
+    """Whether a joint's centre is fixed in both its links."""
+    return joint.type in (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL, JointType.FIXED)
+
+
+def _same_direction(joint: Joint, d: Array) -> bool:
+    if joint.type in (JointType.PRISMATIC, JointType.FIXED):
+        return True
+    along = joint.type in (JointType.REVOLUTE, JointType.CYLINDRICAL, JointType.PLANAR)
+    return along and bool(np.linalg.norm(np.cross(joint.axis, d)) <= EXACT)
+
+
+def _turns(mechanism: Mechanism, link: str, carriage: Carriage, configurations: Sequence[ClosedConfiguration]
+           ) -> bool | None:
+    zero, platform = mechanism.links[link].pose[:3, :3], mechanism.links[carriage.motion.link].pose[:3, :3]
+    turns = np.array([at.pose(link)[:3, :3] @ zero.T for at in configurations])
+    if np.max(np.abs(turns - np.eye(3))) < FOLLOWED:
+        return False
+    with_it = np.array([at.pose(carriage.motion.link)[:3, :3] @ platform.T for at in configurations])
+    return True if carriage.turning and np.max(np.abs(turns - with_it)) < FOLLOWED else None
