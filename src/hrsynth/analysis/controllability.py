@@ -43,9 +43,10 @@ class Verdict(Result):
     graph: bool = True
     """Whether Mᵀ exists: no observed direction moves while the platform rests."""
     counted: float = 1.0
-    """The smallest singular value of the measured rates on ρ that counts as seen, over all samples."""
+    """The smallest singular value of the measured rates on ρ that counts as seen, at the sample farthest from losing it:
+    single samples may lie near a singularity, whatever the dimensions."""
     dropped: float = 0.0
-    """The largest that does not."""
+    """The largest that does not, at the sample where it is least."""
 
     @property
     def near(self) -> bool:
@@ -109,9 +110,9 @@ def verdict_of(setting: Setting, legs: Sequence[str], samples: Samples) -> Verdi
     found = [member.relation for member in samples.members]
     rank = max(each.rank for each in found)
     what = f"what legs {', '.join(legs)} see"
-    counted, dropped = min(each.seen.weakest for each in found), max(each.seen.dropped for each in found)
     if any(each.rank != rank for each in found):
-        raise RankUndecided(f"{what} is not the same at all configurations", counted / dropped, RANK_GAP)
+        between = min(each.seen.weakest for each in found) / max(each.seen.dropped for each in found)
+        raise RankUndecided(f"{what} is not the same at all configurations", between, RANK_GAP)
     gap = min(min(each.gap, each.lost_rank.gap) for each in found)
     Rank(rank, gap).decided(what)
     dof = setting.dof
@@ -119,7 +120,8 @@ def verdict_of(setting: Setting, legs: Sequence[str], samples: Samples) -> Verdi
     if rank < dof:
         lost = _lost(setting, samples, tuple(legs), dof - rank)
     graph = not any(each.unexplained for each in found)
-    return Verdict(tuple(legs), word(rank, dof), dof, rank, lost, gap, graph, counted, dropped)
+    return Verdict(tuple(legs), word(rank, dof), dof, rank, lost, gap, graph,
+                   max(each.seen.weakest for each in found), min(each.seen.dropped for each in found))
 
 
 def _lost(setting: Setting, samples: Samples, legs: tuple[str, ...], count: int) -> tuple[Freedom, ...]:
