@@ -43,7 +43,7 @@ class Verdict(Result):
     graph: bool = True
     """Whether Mᵀ exists: no observed direction moves while the platform rests."""
     counted: float = 1.0
-    """The smallest singular value of the measured rates on ρ that counts as seen, at the sample farthest from losing it:
+    """The smallest singular value of the measured rates on ρ that counts as seen, at the sample where it is largest:
     single samples may lie near a singularity, whatever the dimensions."""
     dropped: float = 0.0
     """The largest that does not, at the sample where it is least."""
