@@ -64,7 +64,7 @@ class Case:
     def walked(self) -> tuple[State, Array]:
         """Configurations to which small steps lead from zero, those that stayed on one sheet; how far the zero
         configuration's own ranks are clear."""
-        at, good = self.study.walk(self.rng, self.robot.zero(), 6, 14, 0.05)
+        at, good = self.study.walk(np.random.default_rng(self.seed), self.robot.zero(), 6, 14, 0.05)
         return at[good], good
 
     def observe(self) -> list[str] | None:
@@ -118,9 +118,14 @@ class Case:
             given += [(name, np.zeros(3), True), *((name, e, False) for e in np.eye(3)[:2])]
             values += [X[:3, 3], X[:3, 0], X[:3, 1]]
         rows = robot.held(things(robot, given), np.array(values))
-        at, residual = solve(robot, rows, aligned(robot, {name: configuration.pose(name) for name in names}))
-        if not residual.min() < 1e-7:
-            at, residual = solve(robot, rows, scattered(robot, self.rng, 24, robot.zero()))
+        first = aligned(robot, {name: configuration.pose(name) for name in names})
+        at, residual = solve(robot, rows, first)
+        if not residual.min() < 1e-7:  # links between three R that the engine takes for one S: anywhere
+            starts = scattered(robot, self.rng, 96, first)
+            for joint in robot.tree:
+                if joint.kind in "RP" and {joint.before, joint.after} <= {robot.links[0], *names}:
+                    starts.theta[:, joint.place] = first.theta[0, joint.place]
+            at, residual = solve(robot, rows, starts)
         best = int(np.argmin(residual))
         if not residual[best] < 1e-7:
             return None

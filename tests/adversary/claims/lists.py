@@ -125,7 +125,9 @@ class Search:
         at = at[size < 1e-8]
         at, size = polished(robot, self.rows, at, free=self.free)
         at = at[size < 1e-11]
-        at = at[~self.crossed(at)]
+        at = at[~self.crossed(at)] if len(at) else at
+        if not len(at):
+            return at
         at = at[distinct(*case.study.poses(at), robot.length)]
         return at[self.regular(at)]
 

@@ -140,6 +140,6 @@ def reached(case: Case, at: State, held: Items, place: Place, part: float, turni
     """The configuration near ``at`` with the link where it is at this part of the way."""
     x, R = place(part)
     rows = case.robot.held(held, np.array([x, *(R.T if turning else ())]))
-    moved, size = polished(case.robot, rows, at, steps=5)
+    moved, size = polished(case.robot, rows, at, steps=12)
     far = float(np.max(np.abs(moved.theta - at.theta), initial=0.0))
     return moved if size[0] < 1e-9 and far < 0.7 else None
