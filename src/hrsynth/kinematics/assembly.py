@@ -30,7 +30,7 @@ STARTS = 24
 """Configurations of a leg, the zero configuration first, from which it is closed at a pose: for each of its listed
 closures, and as many without a list."""
 FAR = 400
-"""Iterations more that a leg may need to reach a pose far away, at most."""
+"""Iterations in which a leg is closed, at most: each moves a joint by half a characteristic length or less."""
 
 ASSEMBLED, BEYOND, IMPOSSIBLE, NOT_FOUND = "yes", "beyond limits", "no", "not found"
 """Whether a robot can be assembled: a configuration is at hand; only beyond joints' limits, and it cannot, both proved;
@@ -157,9 +157,7 @@ class Assembler:
 
     def _closed(self, twin: Twin, start: Array, target: Target) -> Array | None:
         """The closed configuration that a start leads to."""
-        # a step moves a joint by half a characteristic length at most
-        away = float(np.linalg.norm(target.pose[:3, 3])) / twin.length
-        q, residual = closed(twin, start, target, tolerance=SOLVED, iterations=60 + min(FAR, int(4 * away)))
+        q, residual = closed(twin, start, target, tolerance=SOLVED, iterations=FAR)
         turned = target.point is not None or _turned_as(twin.pose(q, target.link), target.pose)
         return q if residual <= CLOSED and turned else None
 

@@ -19,6 +19,7 @@ from typing import Any
 
 import numpy as np
 
+from ..mechanism.so3 import logarithm
 from ..mechanism.vectors import Array, inverse, perpendicular
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY
 from .balls import Field, around, cross
@@ -74,6 +75,11 @@ class End:
 
 def closures(way: Sequence[Part], end: End) -> Closures:
     """All closures of a way, seen from the base or, where the end's turn counts, from the end."""
+    turning = [part for part in way if not part.slides]
+    if end.turns and len(turning) == 1 and turning[0].joint is not None:
+        # one part alone turns the end: entries of D off by w change its angle by 3w at most
+        angle = float(logarithm(end.D[:3, :3]) @ turning[0].direction)
+        return Closures(None, ((turning[0].joint, (*around(np.array([angle]), 3 * max(end.within, OUT_OF_REACH)),)),))
     found = _closures(way, end)
     if end.turns and found is UNDECIDED:
         found = _closures([part.reversed() for part in way[::-1]], replace(end, D=inverse(end.D)))
