@@ -13,7 +13,7 @@ what it carries to T is known. A list is complete for every pose and geometry in
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -130,7 +130,9 @@ def _closures(way: Sequence[Part], end: End) -> Closures:
     if first.axis is not None:
         words = f"the rod from {_name(way[1])} to {_name(last)} is {{sought}} long, {{span}} would do"
         laws = [_distance(first, end.ball(B), T, rod, words) for T, rod in zip(targets, rods, strict=True)]
-        return _solved(laws, None, first, B, targets[0], end)
+        # seen from the first part, the rod's far end must be where the U between them can bring it
+        return _solved(laws, None, first, B, targets[0], end, lambda q: _tilted(
+            way[1], end.ball(far[0]), _moved(first, targets[0], -q)))
     if last.axis is not None:
         return UNDECIDED
     # two rods between three centres: |AB| − |BC| ≤ |AC| ≤ |AB| + |BC|
@@ -240,9 +242,10 @@ def _circle(turning: Part, x: Field) -> tuple[Field, Field, Field]:
     return turning.point + along, v, cross(axis, v)
 
 
-def _solved(laws: Sequence[_Law], first: Part | None, moving: Part | None, x: Array, target: Field, end: End
-            ) -> Closures:
-    """All values of the moving part by laws that hold together, and of the first part's joint with each."""
+def _solved(laws: Sequence[_Law], first: Part | None, moving: Part | None, x: Array, target: Field, end: End,
+            more: Callable[[Any], list[Miss]] = lambda q: []) -> Closures:
+    """All values of the moving part by laws that hold together and by what ``more`` refuses, and of the first part's
+    joint with each."""
     misses = [miss for law in laws if (miss := law.miss()) is not None]
     if misses:
         return Closures(max(misses, key=lambda miss: miss.by))
@@ -251,7 +254,7 @@ def _solved(laws: Sequence[_Law], first: Part | None, moving: Part | None, x: Ar
         return UNDECIDED
     sharpest = min(lists, key=lambda roots: max(float(root.rad()) for root in roots))
     failed = [[miss for law in laws if (miss := law.missed(law.at(q), law.at(q))) is not None]
-              + _tilted(first, _moved(moving, end.ball(x), q), target) for q in sharpest]
+              + _tilted(first, _moved(moving, end.ball(x), q), target) + more(q) for q in sharpest]
     values = tuple(q for q, missed in zip(sharpest, failed, strict=True) if not missed)
     if not values:
         worst = [max(missed, key=lambda miss: miss.by) for missed in failed]
