@@ -291,3 +291,15 @@ def test_modes_are_plain_numbers_as_a_record():
     assert record["complex"] == 6
     assert len(record["modes"]) in (2, 4, 6)
     assert np.shape(record["modes"][0]["pose"]) == (4, 4)
+
+
+@pytest.mark.parametrize("apart", [0.0, 1e-17, 1e-16, 1e-15])
+@pytest.mark.parametrize("seed", range(4))
+def test_centres_that_are_one_but_for_rounding_give_no_size(seed: int, apart: float):
+    """Two lines that are given by the very point in which they meet."""
+    rng = np.random.default_rng(seed)
+    p = rng.normal(scale=0.2, size=3)
+    curves = (Line(p, rng.normal(size=3)), Line(p + apart * unit(rng.normal(size=3)), rng.normal(size=3)))
+    modes = solve(Translating(curves, np.zeros((2, 3))))
+    assert (modes.complex, len(modes.modes), modes.complete) == (1, 1, True)
+    assert modes.modes[0].pose[:3, 3] == pytest.approx(p, abs=1e-14)

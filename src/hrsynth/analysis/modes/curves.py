@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from ...errors import BadRequest
 from ...mechanism.vectors import Array, frozen, perpendicular
+from ...tolerances import EXACT
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,14 +168,16 @@ def length(v: Array) -> float:
 
 
 def extent(curves: Sequence[Reach], tips: Array) -> float:
-    """The size that residuals are divided by: the largest spread of centres, radius, or spread of tips (m)."""
+    """The size that residuals are divided by: the largest spread of centres, radius, or spread of tips (m); 1 where
+    these are no more than rounding."""
     spreads = []
     for points in ([curve.centre for curve in curves], list(tips)):
         middle = sum(points) / len(points)
         spreads += [length(point - middle) for point in points]
     radii = [curve.radius for curve in curves if isinstance(curve, Circle | Sphere)]
     size = max([*spreads, *radii])
-    return size if size > 0 else 1.0
+    rounding = EXACT * max(length(curve.centre) for curve in curves)
+    return size if size > rounding else 1.0
 
 
 def _vector(values: ArrayLike) -> Array:
