@@ -212,3 +212,17 @@ def test_a_singular_pose_that_is_none_is_found():
 def test_it_finds_nothing_in_three_hundred_robots(shard):
     records = [attacked(*task) for task in tasks(300, 0)[shard::SHARDS]]
     assert not wrong(records)
+
+
+FOUND = (
+    ("fivebars", 5, "hidden modes"),  # two lines in one plane that were taken for a continuum
+    ("fivebars", 17, "hidden modes"),
+    ("fivebars", 1000, "hidden modes"),
+)
+"""What was found wrong once: kind, seed, check."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("kind", "seed", "check"), FOUND)
+def test_what_was_wrong_once_is_right(kind, seed, check):
+    assert not wrong([attacked(kind, seed, only=[check])])
