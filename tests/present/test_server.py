@@ -91,7 +91,8 @@ def test_beyond_the_workspace_it_stops_at_its_edge(found: View, address: str):
     law_closed(found, reply["state"])
 
 
-@pytest.mark.parametrize("body", [{"values": [0.1]}, {"values": ["a", "b"]}, {"values": [float("nan")] * 2}, {}, [1],
+@pytest.mark.parametrize("body", [{"values": [0.1]}, {"values": ["a", "b"]}, {"values": [float("nan")] * 2},
+                                  {"values": [1e300, 0.0]}, {"values": [0.0, -1e6]}, {}, [1],
                                   b"no json", b"x" * 20_000])
 @pytest.mark.parametrize("found", [FIVE_BAR], indirect=True)
 def test_what_is_no_question_is_refused(found: View, address: str, body: object):

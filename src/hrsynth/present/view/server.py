@@ -51,7 +51,7 @@ class Session:
         ``modes`` the other assembly modes there. Raises ``ValueError`` for what is no such question."""
         mover = self.found.mover
         wanted = np.array(asked["values"], dtype=float)
-        if wanted.shape != mover.coordinates.values.shape or not np.isfinite(wanted).all():
+        if wanted.shape != mover.coordinates.values.shape or not np.isfinite(wanted).all() or mover.far(wanted):
             raise ValueError("values")
         with self.lock:
             if asked.get("home"):

@@ -25,6 +25,8 @@ from .shapes import FINE
 REAL, HIDDEN = "real", "hidden"
 TURN, WAY = 1.0, 1.0
 """How far a slider turns (rad) and moves (characteristic lengths) the platform each way at most."""
+FAR = 100.0
+"""Such distances beyond which no slider sends the platform."""
 STEPS = 10
 """Configurations on each side of a slider's home."""
 EASY = 60
@@ -111,6 +113,11 @@ class Mover:
         followed = self._followed(here, [there])
         found = followed[-1] if followed else here
         return found, values + aim.apart(found.real.pose(self.setting.motion.link))
+
+    def far(self, values: Array) -> bool:
+        """Whether coordinates (n,) are so far from home that no slider means them."""
+        spans = np.where(np.array(self.coordinates.places) >= 3, TURN, WAY * self.home.real.twin.length)
+        return bool(np.any(np.abs(values - self.coordinates.values) > FAR * spans))
 
     def sliders(self) -> tuple[Slider, ...]:
         """Each coordinate alone changed from home, as far as the robot, and the hidden one with it, goes."""
