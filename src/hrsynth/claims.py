@@ -96,6 +96,15 @@ CLAIMS = (
           EXACT_GEOMETRY + "; loops that repeat others are consistent; sixteen ulps a chain of joints",
           "tests/analysis/modes/test_enclosures.py::test_the_exact_pose_is_within_the_radius",
           (r"enclosed ", r"each enclosed with existence and uniqueness proved", r"not proved")),
+    Claim("fits all legs to …, which does not prove it; excluded by the legs", "modes, report",
+          "more is watched than needed; the pose is a solution of as many legs as decide it, and it is not known "
+          "whether it is a mode; what is excluded is none; with *proved to be all* no other pose is a mode",
+          "a solution is excluded where a condition on a leg's tip is not zero in the ball that its enclosure "
+          "leaves to the tip, or two tips are not as far apart as on the platform; the goal, the only one whose "
+          "enclosure meets it, is a mode by construction; for the others floats give the distance to what tips reach "
+          "(below 1e-9)",
+          EXACT_GEOMETRY, "tests/analysis/modes/test_fits.py::test_the_goal_is_not_excluded_and_all_others_are",
+          (r"which does not prove it",)),
     Claim("the real robot cannot be assembled there", "modes, view, report",
           "no closed configuration of the whole real robot has the platform at this pose",
           "a distance that a leg named there would have to bridge lies outside of its reach, or its rods ask for "

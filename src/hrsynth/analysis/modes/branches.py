@@ -30,7 +30,8 @@ def solve_all(confined: Confinement, *, near: bool = True) -> tuple[Model, Modes
     """The goal's own system, and the modes of all choices of branches together, each pose once."""
     made = [model(each) for each in islice(choices(confined), MOST)]
     size = made[0].system.size
-    found = [_scaled(solve(each.system, near=near), each.system.size / size) for each in made]
+    found = [_scaled(solve(each.system, near=near, goal=None if k else each.home), each.system.size / size)
+             for k, each in enumerate(made)]
     total = int(np.prod([1 + len(tip.others) for tip in confined.tips]))
     modes = found[0] if len(found) == 1 else _together(found, confined.tips, size)
     doubts = [f"leg {tip.leg}: {tip.doubt}" for tip in confined.tips if tip.doubt is not None]

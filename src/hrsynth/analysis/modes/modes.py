@@ -64,6 +64,9 @@ class AssemblyMode:
     """Whether there is exactly one mode within the radius, for all that the file's decimals and closed loops allow."""
     rounded: bool = False
     """Whether that is proved for the rounded geometry alone, of which the radius then speaks."""
+    fits: float | None = None
+    """How well all legs fit (characteristic lengths) where more is observed than needed and that is all that is known;
+    the radius is then that of the mode, if it is one."""
     enclosed: tuple[str, ...] = ()
     length: float = 1.0
     """The robot's characteristic length (m)."""
@@ -89,7 +92,8 @@ class AssemblyMode:
                 "assembly": self.assembly, "open": list(self.open), "beyond": list(self.beyond),
                 "reasons": [{"leg": leg, **miss.to_dict()} for leg, miss in self.misses],
                 "type2_distance": self.type2_distance,
-                "multiplicity": self.multiplicity, "proved": self.proved, "rounded": self.rounded}
+                "multiplicity": self.multiplicity, "proved": self.proved, "rounded": self.rounded,
+                "fits": self.fits}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -232,7 +236,8 @@ class _Reader:
             self.motion.pose(X), shift, turn, mode.residual * scale, at_goal, found.reachable,
             None if found.configuration is None else weakest(found.configuration, self.question),
             found.verdict, found.open, found.beyond, found.misses, found.configuration, mode.multiplicity,
-            mode.proved, mode.rounded, () if self.motion.link in bodies else tuple(bodies), size, bodies)
+            mode.proved, mode.rounded, mode.residual * scale if mode.fits else None,
+            () if self.motion.link in bodies else tuple(bodies), size, bodies)
 
     def known(self, mode: Mode) -> float:
         """How far the bodies' exact poses can be from the system's (characteristic lengths, radians); 0 where nothing

@@ -67,9 +67,13 @@ class Planar(System):
         """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
         return registered(self.tips, apart)
 
+    def frame(self) -> Frame:
+        """A working frame in the plane of motion."""
+        return planar_frame(self.curves, self.X_plane, self.size)
+
     def chart(self, number: int) -> Chart:
         """x, y, cos and sin of the turn from the working frame to the platform's."""
-        frame = planar_frame(self.curves, self.X_plane, self.size)
+        frame = self.frame()
 
         def tips(numbers: Numbers) -> list[Moving]:
             found = []

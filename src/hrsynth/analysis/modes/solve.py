@@ -10,7 +10,9 @@ from typing import Any
 import numpy as np
 
 from ...mechanism.vectors import Array, frozen
-from ...tolerances import FARTHEST, NEAR_MODE, NEARLY_DOUBLE, VANISHES
+from ...tolerances import FARTHEST, NEARLY_DOUBLE, VANISHES
+from .curves import Point
+from .fits import excluded, meets, torn, words
 from .meant import Meant, as_meant
 from .near import dimension, residual, stationary
 from .quadrics import Whole
@@ -49,6 +51,9 @@ class Mode:
     multiplicity: int = 1
     proved: bool = False
     """Whether there is exactly one mode within the radius, for all input within its error."""
+    fits: bool = False
+    """Whether the radius encloses exactly one solution of the square part, and all legs fit there to ``residual``: that
+    does not prove it to be a mode."""
     rounded: bool = False
     """Whether that is proved for the rounded input alone; then the radius is for it alone too."""
     near: bool = False
@@ -57,7 +62,8 @@ class Mode:
     def to_dict(self) -> dict[str, Any]:
         """Plain numbers."""
         return {"parameters": list(self.parameters), "radius": self.radius, "residual": self.residual,
-                "pose": self.pose.tolist(), "multiplicity": self.multiplicity}
+                "pose": self.pose.tolist(), "multiplicity": self.multiplicity,
+                "fits": self.residual if self.fits else None}
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,20 +97,21 @@ class Modes:
                 "degenerate": self.degenerate, "continuum": self.continuum}
 
 
-def solve(system: System, *, near: bool = True) -> Modes:
+def solve(system: System, *, near: bool = True, goal: Array | None = None) -> Modes:
     """All modes of a system: the solutions of its first square part that is not degenerate at which all tips fit.
 
-    Where more is observed than needed, a pose is a mode if its residual is at most ``VANISHES``; ``near`` are the poses
-    with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, found from several square parts (unless
-    ``near`` is false).
+    Where more is observed than needed, the ``goal``, coordinates of a pose at which all tips fit by construction, is
+    proved to be a mode; others are modes that fit if their residual is at most ``VANISHES`` and they are not excluded.
+    ``near`` are the poses with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, found from
+    several square parts (unless ``near`` is false).
     Tips on surfaces are left to :func:`solve_by_msolve` where no square part decides the pose; it raises
     ``MissingExtra`` where that is not installed.
     """
     system, told = as_meant(system)
-    return replace(_solved(system, near), meant=told)
+    return replace(_solved(system, near, goal), meant=told)
 
 
-def _solved(system: System, near: bool) -> Modes:
+def _solved(system: System, near: bool, goal: Array | None) -> Modes:
     if system.missing:
         return _too_few(system)
     square = None
@@ -112,32 +119,33 @@ def _solved(system: System, near: bool) -> Modes:
         roots = solve_square(square, system.balls(square.frame), system.farthest)
         if not roots.continuum:
             if not near:
-                return _judged(system, square, roots, None)
+                return _judged(system, square, roots, None, goal)
             others = (each for each in system.squares() if each.legs != square.legs)
-            return _judged(system, square, roots, ((each, solve_square(each)) for each in islice(others, CHOICES)))
+            return _judged(system, square, roots,
+                           ((each, solve_square(each)) for each in islice(others, CHOICES)), goal)
     if system.surfaces and not isinstance(system, Translating):
-        return _proposed(system, near)
+        return _proposed(system, near, goal)
     return _undecided(system, square is not None)
 
 
-def solve_by_msolve(system: System, *, near: bool = True) -> Modes:
+def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = None) -> Modes:
     """All modes of a system in the pose's own coordinates, counted by msolve and enclosed here.
 
     As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
     one choice of legs alone. Raises ``MissingExtra``, ``Unsolved``.
     """
     system, told = as_meant(system)
-    return replace(_proposed(system, near), meant=told)
+    return replace(_proposed(system, near, goal), meant=told)
 
 
-def _proposed(system: System, near: bool) -> Modes:
+def _proposed(system: System, near: bool, goal: Array | None) -> Modes:
     if system.missing:
         return _too_few(system)
     part = None
     for part in islice(wholes(system), CHOICES):
         roots = solve_whole(part, system.balls(part.chart.frame), system.farthest)
         if not roots.continuum:
-            return _judged(system, part, roots, () if near else None)
+            return _judged(system, part, roots, () if near else None, goal)
     return _undecided(system, part is not None)
 
 
@@ -161,21 +169,37 @@ def continuum(text: str, size: int | None) -> Modes:
     return Modes(0, (), False, "a continuum is not counted", degenerate=text, continuum=size)
 
 
-def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[Part, Roots]] | None) -> Modes:
+def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[Part, Roots]] | None,
+            goal: Array | None) -> Modes:
     """The modes among the solutions of a square part; near ones are looked for from those of others too (not at all
     where these are None)."""
     found = [_mode(system, square, root) for root in roots.real]
-    enclosed = roots.complete and all(mode.proved or (not square.whole and mode.residual > NEAR_MODE)
-                                      for mode in found)
+    enclosed = roots.complete and all(mode.proved for mode in found)
     bound, proof = ("resultant", _proof(roots)) if isinstance(square, Square) else _bounded(system, square, roots)
-    complete = enclosed and bound != "none"
     if square.whole:
-        return Modes(roots.complex, tuple(found), complete, proof, (), _special(roots), None, bound, enclosed)
-    modes = tuple(mode for mode in found if mode.residual <= VANISHES)
+        return Modes(roots.complex, tuple(found), enclosed and bound != "none", proof, (), _special(roots), None, bound,
+                     enclosed)
+    whole = [mode for mode, root in zip(found, roots.real, strict=True) if not _torn(system, square, root)]
+    at_goal = _goal(system, roots, whole, goal)
+    left = [mode for mode in whole if mode is at_goal
+            or not (mode.proved and excluded(system, mode.q, mode.shift, mode.turn))]
+    modes = tuple(mode if mode is at_goal else replace(mode, proved=False, fits=mode.proved)
+                  for mode in left if mode is at_goal or mode.residual <= VANISHES)
+    enclosed = roots.complete and len(modes) == len(left) and all(mode.proved or mode.fits for mode in modes)
     near = () if others is None else _near(system, found, modes, others)
-    proof = (f"from {len(square.legs)} of {len(system.curves)} legs: {proof}; "
-             f"the other legs fit at {len(modes)} of these, to {VANISHES:g} of the robot's size")
-    return Modes(len(modes), modes, complete, proof, near, _special(roots), None, bound, enclosed)
+    near = tuple(_nearly(system, mode.q) for mode in found if mode not in left and mode.residual <= VANISHES) + near
+    fitting = [mode.residual for mode in modes if mode is not at_goal]
+    proof = (f"from {len(square.legs)} of {len(system.curves)} legs: {proof}; of these "
+             + words(at_goal is not None, fitting, len(found) - len(left), len(left) - len(modes)))
+    return Modes(len(modes), modes, enclosed and bound != "none", proof, near, _special(roots), None, bound, enclosed)
+
+
+def _goal(system: System, roots: Roots, found: Sequence[Mode], goal: Array | None) -> Mode | None:
+    """The solution that is the goal: the only one that can be, where all are known."""
+    if goal is None or not roots.complete:
+        return None
+    able = [mode for mode in found if not mode.proved or meets(system, mode.q, goal, mode.shift, mode.turn)]
+    return able[0] if len(able) == 1 and able[0].proved else None
 
 
 def _bounded(system: System, part: Whole, roots: Roots) -> tuple[str, str]:
@@ -202,14 +226,32 @@ def _mode(system: System, square: Part, root: Root) -> Mode:
     q = square.place(parameters)
     if isinstance(square, Square):
         own = parameters
-        points = [curve.at(s) for curve, s in zip(square.unknowns, own, strict=True)]
-        apart = system.apart(q, square.legs, list(zip(points, root.misses, strict=True)))
+        apart = system.apart(q, square.legs, _points(square, root))
     else:
         own, apart = (), {k: miss + ROUNDING * system.size for k, miss in enumerate(root.misses)}
     shift, turn = system.spread(q, apart)
-    sure = bool(np.isfinite(system.error) and root.unique and root.thick and np.isfinite(shift))
+    sure = _sure(system, root) and bool(np.isfinite(shift))
     return Mode(own, max(shift / system.size, turn), shift, turn, residual(system, q), frozen(system.pose(q)),
                 frozen(q), square.legs, root.multiplicity, sure, root.unique and not sure)
+
+
+def _points(square: Square, root: Root) -> list[tuple[Array, float]]:
+    """The points of a square's curves at a solution, and how far the exact ones can be from them (m)."""
+    points = [curve.at(float(s.mid())) for curve, s in zip(square.unknowns, root.parameters, strict=True)]
+    return list(zip(points, root.misses, strict=True))
+
+
+def _torn(system: System, square: Part, root: Root) -> bool:
+    """Whether the tips of a solution's legs are torn from a rigid platform; where none rests, the square part's
+    equations are that they are not."""
+    return (isinstance(square, Square) and system.rigid and _sure(system, root)
+            and any(isinstance(system.curves[k], Point) for k in square.legs)
+            and torn(system, system.known(square.legs, _points(square, root))))
+
+
+def _sure(system: System, root: Root) -> bool:
+    """Whether a root's enclosure is proved for all input within its error."""
+    return bool(np.isfinite(system.error) and root.unique and root.thick)
 
 
 def _nearly(system: System, q: Array) -> Mode:

@@ -18,7 +18,7 @@ import numpy as np
 from ...errors import BadRequest
 from ...mechanism.vectors import Array, frozen, pose
 from ...tolerances import FARTHEST
-from .conics import SLACK, UNIT, Balls, Frame, Within
+from .conics import SLACK, UNIT, Balls, Frame, Within, spatial_frame
 from .curves import Point, Reach, curves_of, extent, length, shifted
 from .quadrics import Chart
 from .squares import Square
@@ -42,6 +42,8 @@ class System:
     """How many coordinates a pose has; the first d are lengths (m), the others angles (rad)."""
     space: ClassVar[int] = 3
     """d: in how many directions a tip moves."""
+    rigid: ClassVar[bool] = True
+    """Whether all tips are those of one body that turns, and the points solved for theirs."""
 
     def __post_init__(self) -> None:
         tips = frozen(self.tips)
@@ -85,14 +87,22 @@ class System:
             return Balls
         return Within(SLACK + UNIT * self.error / min(frame.size, self.size))
 
+    def frame(self) -> Frame:
+        """A working frame for all tips and what they can reach."""
+        return spatial_frame(self.curves, self.size)
+
     def apart(self, q: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, float]:
         """How far the tips of some legs can be from those at q (m), with the point on each leg's curve and how far the
         exact one is from it (m); a tip at rest has no such point."""
+        at, error = self.reached(q), self.error + ROUNDING * self.size
+        return {k: miss + length(point - at[k]) + error for k, (point, miss) in self.known(legs, points).items()}
+
+    def known(self, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, tuple[Array, float]]:
+        """The ``points`` of those of some legs that are not at rest, in their order, and the places of those that
+        are."""
         resting = [k for k in legs if isinstance(self.curves[k], Point)]
         known = {k: (self.curves[k].centre, 0.0) for k in resting}
-        known |= dict(zip((k for k in legs if k not in resting), points, strict=False))
-        at, error = self.reached(q), self.error + ROUNDING * self.size
-        return {k: miss + length(point - at[k]) + error for k, (point, miss) in known.items()}
+        return known | dict(zip((k for k in legs if k not in resting), points, strict=False))
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """How far the platform's frame (m) and turn (rad) can be from those at q, with tips within the distances
@@ -155,6 +165,8 @@ def registered(tips: Array, apart: Mapping[int, float]) -> tuple[float, float]:
 @dataclass(frozen=True, eq=False)
 class Shifting(System):
     """A platform whose bodies only translate; q starts with the position p of the first."""
+
+    rigid = False
 
     @cached_property
     def paths(self) -> tuple[Reach, ...]:

@@ -65,7 +65,8 @@ class Translating(Shifting):
         for i, j in pairs:
             if isinstance(curves[j], Line) and isinstance(curves[i], Circle):
                 i, j = j, i
-            whole = len(self.curves) == 2 and coplanar(curves[i], curves[j], self.size)
+            flat = isinstance(curves[j], Circle) and coplanar(curves[i], curves[j], self.size)
+            whole = len(self.curves) == 2 and flat
             yield self._on_curve((i, j), curves[i], curves[j], whole)
         for i in moving:
             for j, surface in surfaces.items():

@@ -31,9 +31,11 @@ def modes(found: AssemblyModes, file: str | None = None) -> str:
         rows.append(("special", count.degenerate))
     for number, mode in enumerate(found.modes, 1):
         rows += [("", ""), (f"mode {number}", f"{mode.pose}" + ("   (the pose itself)" if mode.goal else "")),
-                 ("", f"{proved(mode)}, residual {mode.residual:.1e}"), *at_mode(mode, found.kind)]
+                 ("", proved(mode) if mode.fits is not None else f"{proved(mode)}, residual {mode.residual:.1e}"),
+                 *at_mode(mode, found.kind)]
     for number, mode in enumerate(found.near, 1):
-        rows += [("", ""), (f"near {number}", f"{mode.pose}   residual {mode.residual:.2e}: almost a mode, and none"),
+        rows += [("", ""), (f"near {number}", f"{mode.pose}   residual {mode.residual:.2e}: almost a mode"
+                 + (", and none" if count.complete else "")),
                  *at_mode(mode, found.kind)]
     if file is not None:
         rows += [("", ""), ("picture", file)]
@@ -43,7 +45,9 @@ def modes(found: AssemblyModes, file: str | None = None) -> str:
 def all_of(found: AssemblyModes) -> str:
     """Whether the modes are all."""
     if found.found.complete:
-        return f"proved to be all among {found.within}"
+        fitting = sum(mode.fits is not None for mode in found.modes)
+        return f"proved to be all among {found.within}" + (
+            f"; {fitting} of them fit{'s' * (fitting == 1)}, not proved" if fitting else "")
     return "found, not proved to be all"
 
 
@@ -53,6 +57,8 @@ def proved(mode: AssemblyMode) -> str:
                                                                                  else "")
     if mode.proved:
         return f"{', '.join(mode.enclosed)}{' ' if mode.enclosed else ''}enclosed {within}"
+    if mode.fits is not None:
+        return f"fits all legs to {mode.fits:.1e}, which does not prove it; if it is a mode, known {within}"
     if mode.rounded:
         return f"not proved: enclosed {within} for the rounded geometry, not for the file's".replace("  ", " ")
     return f"not proved, {'a multiple one' if mode.multiplicity > 1 else 'known'} {within}".rstrip()
