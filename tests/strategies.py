@@ -378,6 +378,16 @@ def split(mechanism: Mechanism, rng: Rng, kinds: Collection[str] = SPLITS) -> Me
     return _serial(mechanism, rng, joint, axes)
 
 
+def oblique(mechanism: Mechanism, rng: Rng, name: str, angles: Sequence[float]) -> Mechanism:
+    """An S replaced by R at its centre, neighbours ``angles`` apart: it can make every small turn, not all turns."""
+    axes = [random_direction(rng)]
+    normal = random_normal(rng, axes[0])
+    for angle in angles:
+        axes.append(rotation_about(normal, angle) @ axes[-1])
+        normal = rotation_about(axes[-1], rng.uniform(0.5, 2.5)) @ normal
+    return _serial(mechanism, rng, mechanism.joints[name], axes)
+
+
 def _serial(mechanism: Mechanism, rng: Rng, joint: Joint, axes: Sequence[Array]) -> Mechanism:
     """A joint replaced by R joints at its centre, through bare links; the last one closes the loop if it did."""
     last = len(axes) - 1

@@ -115,7 +115,8 @@ CLAIMS = (
     Claim("the real robot can be assembled there only beyond the limits of …", "modes, view, report",
           "the whole robot closes at this pose, and in no closure are all joints within their limits",
           "all values of a joint that a leg's closures allow are listed in ball arithmetic, and none is within its "
-          "limits, turns modulo 2π", EXACT_GEOMETRY + ", axes that meet to 1e-9 do so",
+          "limits, turns modulo 2π; of three R through one point, the angle between first and last axis is outside of "
+          "what they reach in every closure", EXACT_GEOMETRY + ", axes that meet to 1e-9 do so",
           "tests/kinematics/test_closures.py::test_limits_of_turns_count_modulo_whole_turns",
           (r"only beyond the limits of",)),
     Claim("same aspect (certified)", "path, select",

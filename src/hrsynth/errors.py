@@ -128,15 +128,20 @@ class MeaningUndecided(HrsynthError):
 
 class PoseNotReached(HrsynthError):
     """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much
-    (mm, degrees), or None where each leg alone reaches it; how far the robot came (0 to 1), and to which pose."""
+    (mm, degrees), or None where each leg alone reaches it; how far the robot came (0 to 1), and to which pose; the
+    ``wrist``, a joint that stands for several R, that is near the end of its turns there."""
 
     exit_status = 3
 
     def __init__(self, robot: str, pose: str, came: float, last: str, leg: str | None = None,
-                 millimetres: float = 0.0, degrees: float = 0.0, origin: str = "its zero configuration") -> None:
+                 millimetres: float = 0.0, degrees: float = 0.0, origin: str = "its zero configuration",
+                 wrist: str | None = None) -> None:
         self.robot, self.pose, self.came, self.last = robot, pose, came, last
         self.leg, self.millimetres, self.degrees = leg, millimetres, degrees
-        if leg is None:
+        self.wrist = wrist
+        if wrist is not None:
+            reason = f"joint {wrist}, which stands for several R through one point, is near the end of its turns"
+        elif leg is None:
             reason = ("each leg alone can close there, but the straight way to it is blocked (a leg at its limit, "
                       "another working mode)")
         else:

@@ -19,6 +19,7 @@ from ..mechanism import Joint, JointType, Mechanism, Observation
 from ..mechanism.legs import Anatomy, Leg
 from ..mechanism.vectors import Array, inverse
 from ..tolerances import CLOSED, SAME_POINT, SOLVED
+from . import wrists
 from .closures import UNDECIDED, Closures, End, Miss, leg_closures
 from .configuration import ClosedConfiguration, Target, closed
 from .locked import placed
@@ -147,7 +148,9 @@ class Assembler:
         if known.miss is not None:
             return _Closing(None, known.miss)
         limited = twin.mechanism.joints
-        held = any(_never(limited[joint], values) for joint, values in known.values)
+        held = (any(_never(limited[joint], values) for joint, values in known.values)
+                or any(wrists.never(way, dict(known.values), end.D, within, len(self._ways[leg.label]) == 1)
+                       for way in self._ways[leg.label]))
         for start in () if held and first is not None else _starts(twin, known):
             q = self._closed(twin, start, target)
             if q is not None and (held or not outside(twin, q, leg.joints)):
@@ -205,10 +208,10 @@ def _starts(twin: Twin, known: Closures = UNDECIDED) -> Iterator[Array]:
 
 
 def outside(twin: Twin, q: Array, joints: Sequence[str]) -> list[str]:
-    """Those joints, turning or sliding about one axis, whose coordinates are outside their limits; turns count
-    modulo 2π."""
+    """Those joints, turning or sliding about one axis, whose coordinates are outside their limits (turns count
+    modulo 2π), and the wrists beyond their intervals."""
     moved = twin.difference(twin.q0, q)
-    found = []
+    found = [name for name in wrists.beyond(twin, q) if name in joints]
     for name in joints:
         joint, at = twin.mechanism.joints.get(name), twin.coordinates.get(name)
         if joint is None or at is None or len(at) != 1:

@@ -44,7 +44,8 @@ class Miss:
 
 @dataclass(frozen=True, eq=False)
 class Closures:
-    """What a way of a leg allows at a pose: nothing (``miss``), or of some joints all values, as balls."""
+    """What a way of a leg allows at a pose: nothing (``miss``), or of some joints all values, as balls, turns modulo
+    2π; those of one way in the same order."""
 
     miss: Miss | None = None
     values: tuple[tuple[str, tuple[Any, ...]], ...] = ()
@@ -291,7 +292,9 @@ def _carried(first: Part, x: Field, target: Field) -> Any:
     if first.slides:
         return _dot(target - x, first.direction)
     _, v, w = _circle(first, x)
-    return arb.atan2(_dot(w, target - first.point), _dot(v, target - first.point))
+    sine, cosine = _dot(w, target - first.point), _dot(v, target - first.point)
+    # a ball across atan2's cut would be a whole turn
+    return arb.atan2(sine, cosine) if cosine > 0 else arb.pi() + arb.atan2(-sine, -cosine)
 
 
 def _missed(low: Any, high: Any | None, wanted: Any, words: str) -> Miss | None:

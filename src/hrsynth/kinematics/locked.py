@@ -114,7 +114,9 @@ def placed(mechanism: Mechanism, poses: Mapping[str, Array]) -> Mechanism:
     joints = []
     for joint in mechanism.joints.values():
         point, axes = carried(mechanism, joint, poses.__getitem__)
-        joints.append(replace(joint, point=point, axes=tuple(axes)))
+        wrist = None if joint.wrist is None else joint.wrist.carried(
+            *(poses[link][:3, :3] @ mechanism.links[link].pose[:3, :3].T for link in joint.links))
+        joints.append(replace(joint, point=point, axes=tuple(axes), wrist=wrist))
     return mechanism.changed(links=[replace(link, pose=poses[name]) for name, link in mechanism.links.items()],
                              joints=joints)
 

@@ -18,6 +18,7 @@ from .parts import Goal, PlatformMotion
 from .relation import Question
 from .sampling import wander
 from .steps import HALVINGS, led, nearest
+from .wrists import at_end, beyond
 
 FIRST = 40
 """Cells of a grid, nearest first, that are tried from the zero configuration before the grid counts as unreachable."""
@@ -46,13 +47,14 @@ def reach(start: ClosedConfiguration, question: Question, pose: Pose,
     if came < 1 or not _arrived(found, goal):
         leg, lengths, angles = worst_leg(start.twin, motion, goal)
         last = str(motion.pose(here.pose(motion.link)))
-        raise PoseNotReached(robot, str(pose), came, last, leg, 1e3 * lengths, float(np.degrees(angles)))
+        raise PoseNotReached(robot, str(pose), came, last, leg, 1e3 * lengths, float(np.degrees(angles)),
+                             wrist=at_end(here))
     return found
 
 
 def _arrived(at: ClosedConfiguration, goal: Goal) -> bool:
-    """Whether a configuration is at the wanted pose, by its matrix."""
-    return goal.met(at.pose(goal.link), AS_PRINTED * max(1.0, at.twin.length))
+    """Whether a configuration is at the wanted pose, by its matrix, and no wrist is beyond its interval."""
+    return goal.met(at.pose(goal.link), AS_PRINTED * max(1.0, at.twin.length)) and not beyond(at.twin, at.q)
 
 
 def sweep(start: ClosedConfiguration, question: Question, grid: Grid, motion: PlatformMotion | None = None,

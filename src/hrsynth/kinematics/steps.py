@@ -13,6 +13,7 @@ from .configuration import Aim, ClosedConfiguration, closed, limited, system
 from .parts import Goal, PlatformMotion
 from .ranks import kernel_basis, range_basis
 from .twin import Twin
+from .wrists import beyond
 
 STRIDE = 0.1
 """Longest step along the way to a pose (characteristic lengths, radians)."""
@@ -102,13 +103,13 @@ def _beyond(before: Array, after: Array) -> bool:
 
 
 def _corrected(here: ClosedConfiguration, step: Array, goal: Aim | None) -> ClosedConfiguration | None:
-    """The closed configuration at the goal after a step; None where there is none, the correction is a jump, or the
-    step does not follow the branch."""
+    """The closed configuration at the goal after a step; None where there is none, the correction is a jump, the step
+    does not follow the branch, or a wrist cannot make the turn."""
     twin = here.twin
     predicted = twin.moved(here.q, step)
     q, residual = closed(twin, predicted, goal, tolerance=SOLVED, iterations=15)
     allowed = max(0.5 * float(np.linalg.norm(step)), JUMP)
-    if not residual <= CLOSED or np.linalg.norm(q - predicted) > allowed:
+    if not residual <= CLOSED or np.linalg.norm(q - predicted) > allowed or beyond(twin, q):
         return None
     there = ClosedConfiguration.of(twin, q)
     return there if follows(here, step, there) or nears(here, step, there) else None

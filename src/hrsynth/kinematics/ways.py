@@ -16,6 +16,7 @@ from ..mechanism import Joint, JointType
 from ..mechanism.legs import Anatomy, Leg
 from ..mechanism.lines import common_perpendicular, distance
 from ..mechanism.vectors import Array
+from ..mechanism.wrist import Wrist
 from ..tolerances import SAME_GEOMETRY
 from .balls import Field
 
@@ -29,13 +30,14 @@ OBLIQUE = 1e-2
 class Part:
     """A turn about ``axis`` through ``point`` (R), a shift along ``axis`` (P), or turns about several axes through
     ``point`` (``axis`` None: S, U, axes that meet), which are taken for any turn about it. ``joints`` are those it is
-    made of; ``pair`` are the two axes, from the base, where it has no more."""
+    made of; ``pair`` are the two axes, from the base, where it has no more; ``limit`` is the wrist of one S."""
 
     slides: bool
     point: Array
     axis: Array | None
     joints: tuple[str, ...]
     pair: tuple[Array, Array] | None = None
+    limit: Wrist | None = None
 
     @property
     def wrist(self) -> bool:
@@ -61,7 +63,8 @@ class Part:
     def reversed(self) -> Part:
         """The part seen from its other side: the same coordinate, the opposite motion."""
         pair = None if self.pair is None else (self.pair[1], self.pair[0])
-        return replace(self, axis=None if self.axis is None else -self.axis, pair=pair)
+        limit = None if self.limit is None else self.limit.turned()
+        return replace(self, axis=None if self.axis is None else -self.axis, pair=pair, limit=limit)
 
 
 def ways(anatomy: Anatomy, leg: Leg) -> Iterator[tuple[Part, ...]]:
@@ -95,7 +98,7 @@ def _parts(joint: Joint, near: str) -> list[Part]:
         case JointType.FIXED:
             return []
         case JointType.SPHERICAL:
-            return [Part(False, point, None, name)]
+            return [Part(False, point, None, name, limit=seen.wrist)]
         case JointType.REVOLUTE | JointType.UNIVERSAL:
             return [Part(False, point, axis, one) for axis in seen.axes]
         case JointType.PRISMATIC:

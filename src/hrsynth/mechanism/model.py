@@ -20,6 +20,7 @@ from ..tolerances import SAME_GEOMETRY
 from .graphs import Adjacency, adjacency
 from .observation import Observation
 from .vectors import Array, frozen, unit
+from .wrist import Wrist
 
 if TYPE_CHECKING:
     import networkx as nx
@@ -103,6 +104,8 @@ class Joint:
     """Whether a file writes it as a tree joint (else as a loop)."""
     xml: tuple[str, ...] = ()
     line: int | None = None
+    wrist: Wrist | None = None
+    """What limits a spherical joint that stands for several R (normal form)."""
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "type", JointType(self.type))
@@ -137,7 +140,8 @@ class Joint:
     def turned(self) -> Joint:
         """The same joint with predecessor and successor exchanged (its coordinate keeps its sign)."""
         axes = tuple(-axis for axis in reversed(self.axes))
-        return replace(self, predecessor=self.successor, successor=self.predecessor, axes=axes)
+        wrist = None if self.wrist is None else self.wrist.turned()
+        return replace(self, predecessor=self.successor, successor=self.predecessor, axes=axes, wrist=wrist)
 
     def relinked(self, old: str, new: str) -> Joint:
         """The joint with its end on ``old`` moved to ``new``."""
@@ -232,6 +236,11 @@ class Mechanism(Result):
     def adjacency(self) -> Adjacency:
         """The links in order, each with those that a joint joins it to."""
         return adjacency(self.links, (joint.links for joint in self.joints.values()))
+
+    @cached_property
+    def wrists(self) -> dict[str, Wrist]:
+        """The spherical joints that cannot make every turn."""
+        return {name: joint.wrist for name, joint in self.joints.items() if joint.wrist is not None}
 
     @cached_property
     def length(self) -> float:

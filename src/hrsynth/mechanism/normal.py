@@ -3,7 +3,7 @@
 * links held together by a fixed joint are one link;
 * two coaxial R are one R, two parallel P one P;
 * two perpendicular R that meet are a U; three independent R that meet (or a U and an R) are an S; an R through the
-  centre of an S adds nothing.
+  centre of an S adds nothing. What turns the S then cannot make is kept as its ``wrist``.
 
 A link between two merged joints disappears; the base, the platform, the camera's link and observed links never do.
 """
@@ -21,6 +21,7 @@ from . import graphs, lines
 from .model import Joint, JointType, Mechanism
 from .observation import Direction
 from .vectors import Array
+from .wrist import Interval, Wrist, between, chained
 
 
 @dataclass(frozen=True, eq=False)
@@ -120,23 +121,41 @@ def _pair(mechanism: Mechanism, a: Joint, b: Joint) -> Joint | None:
         if lines.distance(centre, arm.point, arm.axis) <= near:
             axes = np.array([*a.axes, *b.axes])
             if abs(np.linalg.det(axes)) > 1e-3:
-                return _joined(a, b, JointType.SPHERICAL, centre)
+                return _joined(a, b, JointType.SPHERICAL, centre, wrist=_wrist(a, b))
             inner = a.axes[-1], b.axes[0]
             if lines.parallel(*inner):
                 return _joined(a, b, JointType.UNIVERSAL, centre, (a.axes[0], b.axes[-1]))
     elif kinds in ("RS", "SR"):
         ball, arm = (a, b) if a.type is JointType.SPHERICAL else (b, a)
         if lines.distance(ball.point, arm.point, arm.axis) <= near:
-            return _joined(a, b, JointType.SPHERICAL, ball.point)
+            return _joined(a, b, JointType.SPHERICAL, ball.point, wrist=_wrist(a, b))
     return None
 
 
 def _joined(a: Joint, b: Joint, type: JointType | None = None, point: Array | None = None,
-            axes: tuple[Array, ...] = ()) -> Joint:
+            axes: tuple[Array, ...] = (), wrist: Wrist | None = None) -> Joint:
     """One joint from a's predecessor to b's successor, without limits: of a's type and place where none is given."""
     if type is None or point is None:
         return replace(a, predecessor=a.predecessor, successor=b.successor, limits=None)
-    return replace(a, type=type, point=point, axes=axes, predecessor=a.predecessor, successor=b.successor, limits=None)
+    return replace(a, type=type, point=point, axes=axes, predecessor=a.predecessor, successor=b.successor, limits=None,
+                   wrist=wrist)
+
+
+def _wrist(*joints: Joint) -> Wrist | None:
+    """What turns several joints about one centre, one after the other, cannot make together."""
+    ends: tuple[Array, Array] | None = None
+    span: Interval = 0.0, 0.0
+    for joint in joints:
+        if joint.axes:
+            angle = between(joint.axes[0], joint.axes[-1])
+            first, last, own = joint.axes[0], joint.axes[-1], (angle, angle)
+        elif joint.wrist is not None:
+            first, last, own = joint.wrist.first, joint.wrist.last, (joint.wrist.low, joint.wrist.high)
+        else:
+            return None
+        span = own if ends is None else chained(span, between(ends[1], first), own)
+        ends = (first if ends is None else ends[0]), last
+    return None if ends is None else Wrist.of(*ends, span)
 
 
 def _triple(mechanism: Mechanism, a: Joint, b: Joint, c: Joint) -> Joint | None:
@@ -146,7 +165,7 @@ def _triple(mechanism: Mechanism, a: Joint, b: Joint, c: Joint) -> Joint | None:
     centre = lines.meeting_point([(j.point, j.axis) for j in (a, b, c)], near)
     if centre is None or abs(np.linalg.det(np.array([a.axis, b.axis, c.axis]))) < 1e-3:
         return None
-    return _joined(a, c, JointType.SPHERICAL, centre)
+    return _joined(a, c, JointType.SPHERICAL, centre, wrist=_wrist(a, b, c))
 
 
 def _chains_of_three(mechanism: Mechanism, free: set[str]) -> Iterator[tuple[Joint, Joint, Joint]]:

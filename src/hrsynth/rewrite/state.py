@@ -108,4 +108,4 @@ def towards(joint: Joint, before: str) -> Joint:
 
 def ball_to_universal(joint: Joint, before: str, axes: tuple[Array, Array]) -> Joint:
     """An S made a U whose first axis is fixed in ``before``."""
-    return replace(towards(joint, before), type=JointType.UNIVERSAL, axes=axes)
+    return replace(towards(joint, before), type=JointType.UNIVERSAL, axes=axes, wrist=None)

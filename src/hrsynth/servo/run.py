@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import LoopsNotClosed
+from ..kinematics import wrists
 from ..kinematics.chart import WIDE, Chart
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Question
@@ -209,7 +210,7 @@ def limited(mechanism: Mechanism) -> list[tuple[str, float, float]]:
 
 
 def margins(at: ClosedConfiguration) -> dict[str, float]:
-    """How far each joint that has limits is from the nearer one (m, rad); negative beyond it."""
+    """How far each joint that has limits, or is a wrist, is from the nearer one (m, rad); negative beyond it."""
     twin = at.twin
     moved = twin.difference(twin.q0, at.q)
     found = {}
@@ -217,7 +218,7 @@ def margins(at: ClosedConfiguration) -> dict[str, float]:
         slides = twin.mechanism.joints[name].type is JointType.PRISMATIC
         value = float(moved[twin.coordinates[name][0]]) * (twin.length if slides else 1.0)
         found[name] = min(value - lower, upper - value)
-    return found
+    return found | wrists.margins(twin, at.q)
 
 
 def clearance(at: ClosedConfiguration) -> float:

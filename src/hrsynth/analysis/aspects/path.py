@@ -142,7 +142,8 @@ class Aspects:
         """The answer with a plan's ways, and the joints whose limits these keep."""
         kept = tuple(bound.joint for bound in known.bounds)
         answer = replace(answer, boxes=found.boxes, limits=kept,
-                         unlimited=tuple(name for name in limited(self.setting.robot) if name not in kept))
+                         unlimited=(*(name for name in limited(self.setting.robot) if name not in kept),
+                                    *self.setting.mechanism.wrists))
         if not found.ways:
             return answer
         poses = answer.start.pose, *between(answer, known.carriage, found.ways), answer.goal.pose

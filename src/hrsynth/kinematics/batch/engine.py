@@ -89,14 +89,15 @@ class Batch:
     @classmethod
     def of(cls, anatomy: Anatomy, observations: Sequence[Observation], motion: PlatformMotion,
            configurations: Sequence[ClosedConfiguration]) -> Batch | None:
-        """Compile a mechanism with one direction a leg; None where something else is observed, or not from the base.
+        """Compile a mechanism with one direction a leg; None where something else is observed, or not from the base,
+        or a wrist cannot make every turn.
 
         ``configurations`` are closed ones, the zero configuration first: what is recognised must hold at all of them.
         """
         mechanism = anatomy.mechanism
         seen = {o.leg: o for o in observations if isinstance(o, Direction) and o.seen_from is None}
-        if (mechanism.couplings or mechanism.reference != mechanism.base or len(seen) < len(observations)
-                or set(seen) != set(anatomy.labels)):
+        if (mechanism.couplings or mechanism.wrists or mechanism.reference != mechanism.base
+                or len(seen) < len(observations) or set(seen) != set(anatomy.labels)):
             return None
         frames = frames_at(configurations)
         stage = Stage.of(motion, frames, tuple(dict.fromkeys((*anatomy.platform, mechanism.platform))),

@@ -1,0 +1,82 @@
+"""Spherical joints that stand for several R (:mod:`mechanism.wrist`): whether a configuration asks for a turn that
+those R cannot make, and the proof that every closure of a leg does."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ..mechanism.vectors import Array
+from ..mechanism.wrist import Wrist
+from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY, SAME_POINT
+from .balls import Field, around, cross, dot
+from .configuration import ClosedConfiguration
+from .twin import Twin
+from .ways import Part
+
+AT_END = 1e-2
+"""Angle (rad) from the end of a wrist's interval within which it is named where a way ends."""
+
+
+def margins(twin: Twin, q: Array) -> dict[str, float]:
+    """How far each wrist is from the nearer end of its interval (rad); negative beyond it."""
+    mechanism = twin.mechanism
+    found = {}
+    for name, wrist in mechanism.wrists.items():
+        turns = (twin.pose(q, link)[:3, :3] @ mechanism.links[link].pose[:3, :3].T
+                 for link in mechanism.joints[name].links)
+        found[name] = wrist.carried(*turns).margin()
+    return found
+
+
+def beyond(twin: Twin, q: Array) -> list[str]:
+    """The wrists that would have to make a turn that they cannot."""
+    return [name for name, margin in margins(twin, q).items() if margin < -SAME_POINT]
+
+
+def at_end(at: ClosedConfiguration) -> str | None:
+    """The wrist nearest to an end of its interval, where it is there."""
+    name, margin = min(margins(at.twin, at.q).items(), key=lambda item: item[1], default=(None, np.inf))
+    return name if margin < AT_END else None
+
+
+def never(way: Sequence[Part], values: Mapping[str, Sequence[Any]], D: Array, within: float, alone: bool) -> bool:
+    """Whether the wrist on a way is beyond its interval in all closures, as balls: of every other part that turns all
+    ``values`` are known, in one order where the way is ``alone``, and it ends displaced by D (4, 4), each number known
+    to ``within``."""
+    parts = [part for part in way if not part.slides]
+    places = [i for i, part in enumerate(parts) if part.limit is not None]
+    if len(places) != 1 or any(part.joint not in values for part in parts if part.limit is None):
+        return False
+    before, wrist, after = parts[: places[0]], parts[places[0]].limit, parts[places[0] + 1 :]
+    assert wrist is not None
+    end = around(D[:3, :3], max(within, OUT_OF_REACH))
+    lists = [values[str(part.joint)] for part in (*before, *after)]
+    closures = zip(*lists, strict=True) if alone and lists else product(*lists)
+    return all(_outside(wrist, _cosine(wrist, before, after, turns, end)) for turns in closures)
+
+
+def _cosine(wrist: Wrist, before: Sequence[Part], after: Sequence[Part], turns: Sequence[Any], end: Field) -> Any:
+    """E_1 … E_k first · D E_n⁻¹ … E_l⁻¹ last, for the parts before and after the wrist turned by ``turns``."""
+    first, last = (around(axis, SAME_GEOMETRY) for axis in (wrist.first, wrist.last))
+    for part, q in reversed(list(zip(before, turns, strict=False))):
+        first = _rotated(part, first, q)
+    for part, q in zip(after, turns[len(before) :], strict=True):
+        last = _rotated(part, last, -q)
+    return dot(first, dot(end, last))[()]
+
+
+def _rotated(part: Part, v: Field, q: Any) -> Field:
+    """A vector turned by q about a part's axis (Rodrigues)."""
+    axis = part.direction
+    along = dot(axis, v)[()] * axis
+    return np.asarray(along + (v - along) * q.cos() + cross(axis, v) * q.sin())
+
+
+def _outside(wrist: Wrist, cosine: Any) -> bool:
+    """Whether a wrist is beyond its interval, by a ball of the cosine."""
+    return bool((wrist.upper is not None and cosine < np.cos(wrist.upper) - SAME_POINT)
+                or (wrist.lower is not None and cosine > np.cos(wrist.lower) + SAME_POINT))

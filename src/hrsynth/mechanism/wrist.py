@@ -1,0 +1,75 @@
+"""What turns about axes through one point can do: the angle between the first and the last axis stays in an interval.
+
+Turns about a₁ … aₙ, neighbours γᵢ apart, make R = R₁ … Rₙ. As R₁ and Rₙ are free, all that limits R is the angle of a₁
+and R aₙ: the distance of the ends of a chain of great arcs γᵢ on the unit sphere. It runs over all of [0, π] for three
+axes only where neighbours are perpendicular.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..tolerances import SAME_DIRECTION
+from .vectors import Array
+
+Interval = tuple[float, float]
+
+
+@dataclass(frozen=True, eq=False)
+class Wrist:
+    """A spherical joint that stands for turns about axes through its centre: the ``first``, fixed in the predecessor,
+    and the ``last``, fixed in the successor, unit vectors at the zero configuration, are ``low`` to ``high`` (rad)
+    apart. At an end of the interval the axes lie in a plane, and the turns lose a freedom."""
+
+    first: Array
+    last: Array
+    low: float
+    high: float
+
+    @classmethod
+    def of(cls, first: Array, last: Array, interval: Interval) -> Wrist | None:
+        """None where every turn can be made."""
+        wrist = cls(first, last, *interval)
+        return wrist if wrist.lower is not None or wrist.upper is not None else None
+
+    @property
+    def lower(self) -> float | None:
+        """The lower end (rad), where it limits anything."""
+        return self.low if self.low > SAME_DIRECTION else None
+
+    @property
+    def upper(self) -> float | None:
+        """The upper end (rad), where it limits anything."""
+        return self.high if self.high < np.pi - SAME_DIRECTION else None
+
+    def turned(self) -> Wrist:
+        """The same with predecessor and successor exchanged."""
+        return Wrist(self.last, self.first, self.low, self.high)
+
+    def carried(self, predecessor: Array, successor: Array) -> Wrist:
+        """With its axes where two links turned by these (3, 3) carry them."""
+        return Wrist(predecessor @ self.first, successor @ self.last, self.low, self.high)
+
+    def margin(self) -> float:
+        """How far the angle is from the nearer end (rad); negative beyond it."""
+        angle = between(self.first, self.last)
+        return min(np.inf if self.lower is None else angle - self.lower,
+                   np.inf if self.upper is None else self.upper - angle)
+
+
+def between(one: Array, other: Array) -> float:
+    """The angle of two unit vectors, 0 to π."""
+    return float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))
+
+
+def chained(one: Interval, gap: float, other: Interval) -> Interval:
+    """Distances of the ends of three arcs on the unit sphere, end to end: one of a length in ``one``, ``gap``, one of a
+    length in ``other``; two sides leave |a − b| ≤ c ≤ π − |π − a − b| to the third."""
+    return _third(_third(one, (gap, gap)), other)
+
+
+def _third(a: Interval, b: Interval) -> Interval:
+    low = max(a[0] - b[1], b[0] - a[1], 0.0)
+    return low, np.pi - max(np.pi - a[1] - b[1], a[0] + b[0] - np.pi, 0.0)

@@ -1,0 +1,189 @@
+"""Three R through one point make every small turn, not every turn: what stands for them asks for none that they cannot
+make. The three angles are computed here, from the axes as drawn."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.errors import PoseNotReached
+from hrsynth.kinematics.assembly import ASSEMBLED, BEYOND, Assembler
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.reach import reach
+from hrsynth.kinematics.wrists import margins
+from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.pose import Pose
+from hrsynth.mechanism.so3 import logarithm
+from hrsynth.mechanism.vectors import rotation_about
+from hrsynth.servo.run import clearance
+from strategies import oblique, pods, random_direction, random_rotation, transformed
+
+Rng = np.random.Generator
+
+
+def product(axes: list[np.ndarray], angles: np.ndarray) -> np.ndarray:
+    R = np.eye(3)
+    for axis, angle in zip(axes, angles, strict=True):
+        R = R @ rotation_about(axis, angle)
+    return R
+
+
+def three_angles(axes: list[np.ndarray], R: np.ndarray) -> np.ndarray | None:
+    """Angles with R = R₁ R₂ R₃: a₁·R₂ a₃ = a₁·R a₃ gives the second, then the others; None where there are none."""
+    a, b, c = axes
+    K, A, B = (a @ b) * (b @ c), a @ c - (a @ b) * (b @ c), a @ np.cross(b, c)
+    cosine = (a @ R @ c - K) / np.hypot(A, B)
+    if abs(cosine) > 1:
+        return None
+    second = np.arctan2(B, A) + np.arccos(cosine)
+
+    def turn(axis: np.ndarray, one: np.ndarray, other: np.ndarray) -> float:
+        return float(np.arctan2(axis @ np.cross(one, other), one @ other - (axis @ one) * (axis @ other)))
+
+    first = turn(a, rotation_about(b, second) @ c, R @ c)
+    rest = logarithm((rotation_about(a, first) @ rotation_about(b, second)).T @ R)
+    angles = np.array([first, second, rest @ c])
+    np.testing.assert_allclose(product(axes, angles), R, atol=1e-6)
+    return angles
+
+
+def chain(axes: list[np.ndarray], rng: Rng, types: str) -> Mechanism:
+    """base – joints through one point, ends exchanged at random – tip, and a loop around."""
+    b, rest = Builder("chain"), list(axes)
+    for name in ("base", *(f"link_{i}" for i in range(1, len(types))), "tip"):
+        b.link(name)
+    names = ["base", *(f"link_{i}" for i in range(1, len(types))), "tip"]
+    for i, letter in enumerate(types):
+        own = [rest.pop(0) for _ in range(2 if letter == "U" else 1)]
+        ends = [names[i], names[i + 1]]
+        if rng.integers(2):
+            ends, own = ends[::-1], [-axis for axis in own[::-1]]
+        b.joint(f"joint_{i}", letter, *ends, at=(0, 0, 0), axis=own[0], axis2=own[1] if letter == "U" else None)
+    b.joint("loop", "S", "base", "tip", at=(1, 1, 1), loop=True)
+    return b.build("tip")
+
+
+@pytest.mark.parametrize("types", ["RRR", "RRRR", "UR", "RU", "RUR", "RRRRR"])
+@pytest.mark.parametrize("seed", range(6))
+def test_the_interval_is_what_the_axes_reach(types: str, seed: int) -> None:
+    """Turns of the axes are within it, and their extremes, refined by halving steps, come to its ends."""
+    rng = np.random.default_rng(seed)
+    axes: list[np.ndarray] = []
+    for letter in types:
+        axes.append(random_direction(rng))
+        if letter == "U":
+            axes.append(np.cross(axes[-1], random_direction(rng)))
+            axes[-1] /= np.linalg.norm(axes[-1])
+    mechanism = normal_form(chain(axes, rng, types)).mechanism
+    (joint,) = (joint for name, joint in mechanism.joints.items() if name != "loop")
+    assert joint.type == "S"
+    if joint.predecessor != "base":
+        joint = joint.turned()
+    low, high = (0.0, np.pi) if joint.wrist is None else (joint.wrist.low, joint.wrist.high)
+
+    def angle(angles: np.ndarray) -> float:
+        return float(np.arccos(np.clip(axes[0] @ product(axes, angles) @ axes[-1], -1, 1)))
+
+    for sign, end in ((1, low), (-1, high)):
+        best, size = rng.uniform(-np.pi, np.pi, len(axes)), 2.0
+        while size > 1e-4:
+            trials = [best + size * rng.normal(size=len(axes)) for _ in range(20)]
+            for each in trials:
+                assert low - 1e-7 <= angle(each) <= high + 1e-7
+                if joint.wrist is not None:
+                    carried = joint.wrist.carried(np.eye(3), product(axes, each))
+                    assert carried.margin() > -1e-7
+            better = min(trials, key=lambda each: sign * angle(each))
+            best, size = (better, size) if sign * angle(better) < sign * angle(best) else (best, size / 2)
+        assert angle(best) == pytest.approx(end, abs=1e-3)
+
+
+def test_perpendicular_neighbours_make_every_turn() -> None:
+    rng = np.random.default_rng(0)
+    first, second, third = random_rotation(rng).T
+    for types in ("RRR", "UR", "RU"):
+        assert not normal_form(chain([first, second, third], rng, types)).mechanism.wrists
+    lean = rotation_about(first, 0.3) @ third
+    assert normal_form(chain([first, second, lean], rng, "UR")).mechanism.wrists
+
+
+def robots(seed: int) -> tuple[Setting, Setting, list[np.ndarray]]:
+    """A robot whose first tip is an S, aslant; the same with three oblique R for it; their axes."""
+    rng = np.random.default_rng(seed)
+    # axes normal to the rods: all legs follow large turns
+    free = transformed(pods(["RPS", *["UPS"] * 4], rng, square=True), random_rotation(rng), rng.normal(size=3))
+    held = oblique(free, rng, "tip_1", rng.uniform(0.2, 0.4, 2))
+    axes = [held.joints[f"tip_1__{k}"].axis for k in (1, 2, 3)]
+    return prepare(free, samples=3), prepare(held, samples=3), axes
+
+
+def turned_platforms(free: Setting, rng: Rng, count: int) -> list[np.ndarray]:
+    """Poses of the platform turned about the centre of its first tip, which all legs can follow."""
+    mechanism, found = free.mechanism, []
+    for _ in range(count):
+        D, centre = np.eye(4), mechanism.joints["tip_1"].point
+        D[:3, :3] = rotation_about(random_direction(rng), rng.uniform(0.05, 1.1))
+        D[:3, 3] = centre - D[:3, :3] @ centre
+        found.append(D @ mechanism.links["platform"].pose)
+    return found
+
+
+def turn_of_tip(at: ClosedConfiguration) -> np.ndarray:
+    """The turn of the first tip, seen from the rod."""
+    links = at.twin.mechanism.links
+    A, B = (at.pose(link)[:3, :3] @ links[link].pose[:3, :3].T for link in ("upper_1", "platform"))
+    return A.T @ B
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_robot_is_assembled_where_its_three_axes_can_turn(seed: int) -> None:
+    """Within the limits exactly where three angles exist; beyond them it is proved, by the margins too."""
+    free, setting, axes = robots(seed)
+    (name,) = setting.mechanism.wrists
+    assert setting.batch is None
+    build = Assembler(setting.anatomy, setting.everything.twin.length, setting.mechanism.reference)
+    # the assembled configuration has a zero of its own, at which no joint has turned
+    zero = {link: setting.mechanism.links[link].pose for link in ("upper_1", "platform")}
+    seen = set()
+    for X in turned_platforms(free, np.random.default_rng(seed), 16):
+        found = build.at({leg.attach: X for leg in setting.anatomy.legs}, ())
+        at = found.configuration
+        assert at is not None
+        A, B = (at.pose(link)[:3, :3] @ zero[link][:3, :3].T for link in ("upper_1", "platform"))
+        possible = three_angles(axes, A.T @ B) is not None
+        seen.add(possible)
+        assert (found.verdict, found.beyond) == ((ASSEMBLED, ()) if possible else (BEYOND, (name,)))
+        for value in (margins(at.twin, at.q)[name], clearance(at), at.twin.mechanism.wrists[name].margin()):
+            assert (value >= 0) == possible
+    assert seen == {True, False}
+
+
+def reached(setting: Setting, pose: Pose) -> ClosedConfiguration | PoseNotReached:
+    try:
+        return reach(setting.everything.start, setting.everything.question, pose, setting.motion)
+    except PoseNotReached as error:
+        return error
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_way_ends_where_the_three_axes_turn_no_further(seed: int) -> None:
+    """What is reached has three angles; else, and where the way to it passes where there are none, the answer names the
+    joint. The robot with an S reaches all."""
+    free, setting, axes = robots(seed)
+    (name,) = setting.mechanism.wrists
+    count = {True: 0, False: 0}
+    for X in turned_platforms(free, np.random.default_rng(seed), 8):
+        pose = Pose.of(X)
+        there, here = reached(free, pose), reached(setting, pose)
+        assert isinstance(there, ClosedConfiguration)
+        if isinstance(here, ClosedConfiguration):
+            assert three_angles(axes, turn_of_tip(here)) is not None
+            assert three_angles(axes, turn_of_tip(there)) is not None
+        else:
+            assert here.wrist == name
+            assert f"joint {name}, which stands for several R" in str(here)
+        count[isinstance(here, ClosedConfiguration)] += 1
+    assert min(count.values()) > 0
