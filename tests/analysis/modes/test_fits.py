@@ -122,3 +122,12 @@ def test_robots_with_more_legs_than_needed_do_not_prove_the_mirrored_mode(
         assert not told["proved"]
         assert told["fits"] == mode.fits == mode.residual < 1e-12
         assert "which does not prove it" in text(found)
+
+
+def test_the_pose_itself_is_a_mode_wherever_it_is_said_to_be():
+    """Where its enclosure cannot be told to be its own: nothing is said against it."""
+    found = modes(load(shipped()["delta"]), at="x=0.05,y=0.02,z=-0.6")
+    first = replace(found.modes[0], proved=False, fits=1e-15)
+    said = text(replace(found, modes=(first,)))
+    assert "a mode by construction, its place not proved" in said
+    assert "which does not prove it" not in said.split("mode 1")[1]

@@ -45,7 +45,7 @@ def modes(found: AssemblyModes, file: str | None = None) -> str:
 def all_of(found: AssemblyModes) -> str:
     """Whether the modes are all."""
     if found.found.complete:
-        fitting = sum(mode.fits is not None for mode in found.modes)
+        fitting = sum(mode.fits is not None and not mode.goal for mode in found.modes)
         return f"proved to be all among {found.within}" + (
             f"; {fitting} of them fit{'s' * (fitting == 1)}, not proved" if fitting else "")
     return "found, not proved to be all"
@@ -57,6 +57,8 @@ def proved(mode: AssemblyMode) -> str:
                                                                                  else "")
     if mode.proved:
         return f"{', '.join(mode.enclosed)}{' ' if mode.enclosed else ''}enclosed {within}"
+    if mode.fits is not None and mode.goal:
+        return f"a mode by construction, its place not proved, known {within}"
     if mode.fits is not None:
         return f"fits all legs to {mode.fits:.1e}, which does not prove it; if it is a mode, known {within}"
     if mode.rounded:
