@@ -53,7 +53,8 @@ class Articulated(Shifting):
         origins = np.array([q[:3], q[:3] + self.slide.at(float(q[3]))])
         return np.asarray(origins[list(self.bodies)] + self.tips)
 
-    def apart(self, q: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, float]:
+    def apart(self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
+              ) -> dict[int, float]:
         """As for any system; the points are a place of one body and one of the second relative to the first."""
         error = self.error + ROUNDING * self.size
         return dict.fromkeys(legs, sum(miss for _, miss in points) + error)

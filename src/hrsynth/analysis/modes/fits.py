@@ -40,9 +40,9 @@ def excluded(system: System, q: Array, shift: float, turn: float) -> bool:
     not zero anywhere in the ball that holds it. The worst legs are tried first."""
     from flint import ctx
 
-    at, frame = system.reached(q), system.frame()
+    at, frame = system.reached(q), system.frame
     numbers = system.balls(frame)
-    misses = np.linalg.norm(system.misses(q), axis=1)
+    misses = np.linalg.norm(system.off(at), axis=1)
     with ctx.workprec(PRECISION):
         for k in np.argsort(-misses).tolist():
             radius = off(system, k, at[k], shift, turn)
@@ -60,7 +60,7 @@ def torn(system: System, places: Mapping[int, tuple[Array, float]]) -> bool:
     they are on it: no pose brings them there."""
     from flint import ctx
 
-    frame = system.frame()
+    frame = system.frame
     numbers = system.balls(frame)
     with ctx.workprec(PRECISION):
         tips = {k: (numbers.vector(frame.point(at), (miss + rounded(system, at)) / frame.size * UNIT),

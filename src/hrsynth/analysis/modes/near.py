@@ -22,7 +22,7 @@ FAR = 0.3
 
 def residual(system: System, q: Array) -> float:
     """The largest distance of a tip from its curve, in sizes of the mechanism."""
-    return float(np.linalg.norm(system.misses(q), axis=1).max()) / system.size
+    return system.residual(system.reached(q))
 
 
 def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) -> list[Array]:

@@ -6,6 +6,7 @@ import cmath
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import combinations
 from typing import Any
 
@@ -67,13 +68,14 @@ class Planar(System):
         """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
         return registered(self.tips, apart)
 
+    @cached_property
     def frame(self) -> Frame:
         """A working frame in the plane of motion."""
         return planar_frame(self.curves, self.X_plane, self.size)
 
     def chart(self, number: int) -> Chart:
         """x, y, cos and sin of the turn from the working frame to the platform's."""
-        frame = self.frame()
+        frame = self.frame
 
         def tips(numbers: Numbers) -> list[Moving]:
             found = []

@@ -99,14 +99,15 @@ def solve_square(square: Square, balls: Within = Balls, farthest: float = FARTHE
     for turn in STARTS:
         equations = square.equations(turn)
         with ctx.workprec(PRECISION):
-            thick = square.equations(turn, balls)
+            conics = square.conics(turn, balls)
+            thick = square.build(conics, balls)
         noisy = _perturbed(equations, thick)
         zeros = 0
         for (order, eliminant), (_, other) in zip(_eliminants(equations), _eliminants(noisy), strict=True):
             if _vanishes(eliminant.polynomial, other.polynomial):
                 zeros += 1
                 continue
-            found = _roots(_Enclosing(square, turn, balls, farthest, equations, thick), order, eliminant)
+            found = _roots(_Enclosing(square, turn, balls, farthest, equations, thick, conics), order, eliminant)
             if found.complete:
                 return found
             fallback = max(fallback, found, key=lambda each: each.complex)
@@ -275,6 +276,8 @@ class _Enclosing:
     farthest: float
     equations: Sequence[Equation]
     thick: Sequence[Equation]
+    conics: Sequence[Conic]
+    """The unknowns' curves in balls."""
 
     def enclosed(self, start: Sequence[Any], multiplicity: int) -> Root:
         """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
@@ -299,7 +302,7 @@ class _Enclosing:
         frame = self.square.frame
         assert frame is not None
         return [[math.hypot(*(float(each.rad()) for each in row if not isinstance(each, int))) * frame.size / UNIT
-                 for row in path.N] for path in self.square.conics(self.turn, self.balls)]
+                 for row in path.N] for path in self.conics]
 
     def distance(self, values: Sequence[Any]) -> float:
         """How far away the points of a solution are, complex ones too (sizes)."""

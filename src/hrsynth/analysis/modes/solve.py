@@ -224,14 +224,15 @@ def _near(system: System, found: Sequence[Mode], modes: Sequence[Mode], others: 
 def _mode(system: System, square: Part, root: Root) -> Mode:
     parameters = tuple(float(each.mid()) for each in root.parameters)
     q = square.place(parameters)
+    at = system.reached(q)
     if isinstance(square, Square):
         own = parameters
-        apart = system.apart(q, square.legs, _points(square, root))
+        apart = system.apart(q, at, square.legs, _points(square, root))
     else:
         own, apart = (), {k: miss + ROUNDING * system.size for k, miss in enumerate(root.misses)}
     shift, turn = system.spread(q, apart)
     sure = _sure(system, root) and bool(np.isfinite(shift))
-    return Mode(own, max(shift / system.size, turn), shift, turn, residual(system, q), frozen(system.pose(q)),
+    return Mode(own, max(shift / system.size, turn), shift, turn, system.residual(at), frozen(system.pose(q)),
                 frozen(q), square.legs, root.multiplicity, sure, root.unique and not sure)
 
 

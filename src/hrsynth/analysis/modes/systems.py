@@ -10,7 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -87,14 +87,16 @@ class System:
             return Balls
         return Within(SLACK + UNIT * self.error / min(frame.size, self.size))
 
+    @cached_property
     def frame(self) -> Frame:
         """A working frame for all tips and what they can reach."""
         return spatial_frame(self.curves, self.size)
 
-    def apart(self, q: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, float]:
-        """How far the tips of some legs can be from those at q (m), with the point on each leg's curve and how far the
-        exact one is from it (m); a tip at rest has no such point."""
-        at, error = self.reached(q), self.error + ROUNDING * self.size
+    def apart(self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
+              ) -> dict[int, float]:
+        """How far the tips of some legs can be from those at q (m), which are ``at`` (legs, 3), with the point on each
+        leg's curve and how far the exact one is from it (m); a tip at rest has no such point."""
+        error = self.error + ROUNDING * self.size
         return {k: miss + length(point - at[k]) + error for k, (point, miss) in self.known(legs, points).items()}
 
     def known(self, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, tuple[Array, float]]:
@@ -111,7 +113,15 @@ class System:
 
     def misses(self, q: Array) -> Array:
         """What separates each tip from what it can reach at a pose; shape (legs, 3), metres."""
-        return np.array([curve.miss(tip) for curve, tip in zip(self.curves, self.reached(q), strict=True)])
+        return self.off(self.reached(q))
+
+    def off(self, at: Array) -> Array:
+        """What separates tips ``at`` (legs, 3) from what they can reach; shape (legs, 3), metres."""
+        return np.array([curve.miss(tip) for curve, tip in zip(self.curves, at, strict=True)])
+
+    def residual(self, at: Array) -> float:
+        """The largest distance of tips ``at`` (legs, 3) from their curves, in sizes of the mechanism."""
+        return float(np.linalg.norm(self.off(at), axis=1).max()) / self.size
 
     def somewhere(self, rng: np.random.Generator) -> Array:
         """A random pose within the size of the system."""
@@ -153,13 +163,22 @@ def registered(tips: Array, apart: Mapping[int, float]) -> tuple[float, float]:
     of |n × (b − c)|² is at least that of |b − c|² less the largest eigenvalue of Σ (b − c)(b − c)ᵀ (in the plane: all).
     """
     b, e = tips[list(apart)], list(apart.values())
-    mean = b.mean(axis=0)
-    C = b - mean
-    seen = float(np.sum(C * C)) - (float(np.linalg.eigvalsh(C.T @ C)[-1]) if C.shape[1] == 3 else 0.0)
+    mean, seen = _spread(tuple(map(tuple, b.tolist())))
     moved = math.hypot(*e) / math.sqrt(seen) if seen > 0 else math.inf
     if not moved < 2.0:
         return math.inf, math.pi
-    return sum(e) / len(e) + moved * length(mean), 2.0 * math.asin(moved / 2.0)
+    return sum(e) / len(e) + moved * mean, 2.0 * math.asin(moved / 2.0)
+
+
+@lru_cache(maxsize=64)
+def _spread(points: tuple[tuple[float, ...], ...]) -> tuple[float, float]:
+    """How far the mean of points is from the origin, and the least sum of squared distances to an axis through it (a
+    point of the plane)."""
+    b = np.array(points)
+    mean = b.mean(axis=0)
+    C = b - mean
+    seen = float(np.sum(C * C)) - (float(np.linalg.eigvalsh(C.T @ C)[-1]) if C.shape[1] == 3 else 0.0)
+    return length(mean), seen
 
 
 @dataclass(frozen=True, eq=False)

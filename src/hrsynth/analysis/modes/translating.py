@@ -34,7 +34,8 @@ class Translating(Shifting):
         """Where the tips are at a pose; shape (legs, 3), metres."""
         return np.asarray(q + self.tips)
 
-    def apart(self, q: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, float]:
+    def apart(self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
+              ) -> dict[int, float]:
         """As for any system; the points are places of p."""
         error = self.error + ROUNDING * self.size
         return dict.fromkeys(legs, max((miss + length(point - q) for point, miss in points), default=0.0) + error)
