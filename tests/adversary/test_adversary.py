@@ -218,6 +218,9 @@ FOUND = (
     ("fivebars", 5, "hidden modes"),  # two lines in one plane that were taken for a continuum
     ("fivebars", 17, "hidden modes"),
     ("fivebars", 1000, "hidden modes"),
+    ("rods", 1006, "hidden modes"),  # balls that meet to 1e-7, made exact, and the directions of the file as written
+    ("pods", 1014, "hidden modes"),
+    ("offset_u", 3025, "hidden modes"),
 )
 """What was found wrong once: kind, seed, check."""
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from adversary.case import HELD, UNCLEAR, WRONG, Case, apart, matrix_of
+from adversary.claims.lists import Search
 from adversary.robot import Array, Robot, State, things
 
 ROUNDING = 4e-16
@@ -43,18 +44,27 @@ def judge(case: Case, told: Any, asked: str | None) -> None:
         near = case.fitted(mode.configuration)
         if near is None or apart(case, mode.pose, near) > 1e-5:
             continue  # told under another claim
-        found = refined(exact, rows, lifted(exact, near))
-        if found is None:
-            case.say("enclosure", UNCLEAR, "more equations than unknowns, closed to rounding only")
-            continue
-        at, sharp = found
-        slack = ROUNDING + sharp
-        for name, (shift, turn) in distances(case, exact, mode, at).items():
-            good = (shift <= mode.shift + slack * max(case.robot.length, float(np.max(np.abs(matrix_of(mode.pose)[0]))))
-                    and turn <= mode.turn + slack)
-            case.say("enclosure", HELD if good else WRONG, "" if good else (
-                f"{name} at {mode.pose}: within {mode.shift:.2e} m, {mode.turn:.2e} rad told, "
-                f"the mode is {shift:.2e} m, {turn:.2e} rad away"))
+        missed = misses(case, exact, mode, refined(exact, rows, lifted(exact, near)))
+        search = Search.of(case, told, case.fitted(told.goal) or near, real=False)
+        if missed and search is not None:  # another posture of the legs, with all but the same pose, may be meant
+            others = search.at_pose(*matrix_of(mode.pose))
+            every = (refined(exact, rows, lifted(exact, others[[k]])) for k in range(len(others)))
+            missed = missed if all(misses(case, exact, mode, each) for each in every) else ""
+        outcome = UNCLEAR if missed is None else WRONG if missed else HELD
+        case.say("enclosure", outcome, "closed to rounding only" if missed is None else missed)
+
+
+def misses(case: Case, exact: Robot, mode: Any, found: tuple[State, float] | None) -> str | None:
+    """What of a mode lies outside of what is told, "" if nothing; None where no solution is known sharply enough."""
+    if found is None:
+        return None
+    at, sharp = found
+    slack, size = ROUNDING + sharp, max(case.robot.length, float(np.max(np.abs(matrix_of(mode.pose)[0]))))
+    for name, (shift, turn) in distances(case, exact, mode, at).items():
+        if shift > mode.shift + slack * size or turn > mode.turn + slack:
+            return (f"{name} at {mode.pose}: within {mode.shift:.2e} m, {mode.turn:.2e} rad told, "
+                    f"the mode is {shift:.2e} m, {turn:.2e} rad away")
+    return ""
 
 
 def asked_exactly(case: Case, exact: Robot, told: Any, asked: str) -> State | None:

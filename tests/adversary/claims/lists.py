@@ -165,8 +165,8 @@ class Search:
             found[k] = clear and weak > 1e-4 and (not kernel.size or float(np.max(np.abs(Tk @ kernel))) < 1e-9)
         return found
 
-    def at_pose(self, x: Array, R: Array | None, starts: int = 80) -> bool:
-        """Whether the whole robot closes with the platform at a pose and with what is held."""
+    def at_pose(self, x: Array, R: Array | None, starts: int = 80) -> State:
+        """Configurations of the whole robot with the platform at a pose and with what is held."""
         robot, case = self.case.robot, self.case
         point = np.zeros(3) if robot.point is None else robot.point
         given = [(robot.platform, point, True)]
@@ -184,7 +184,7 @@ class Search:
         near = np.max(np.abs(here - x), axis=1) / robot.length < 1e-5
         if R is not None and robot.point is None:
             near &= np.max(np.abs(turned - R), axis=(1, 2)) < 1e-5
-        return bool(np.any((size < 1e-11) & near & ~self.crossed(at)))
+        return at[(size < 1e-11) & near & ~self.crossed(at)]
 
 
 def complete(case: Case, told: Any, search: Search, found: State) -> None:
@@ -214,7 +214,8 @@ def assembled(case: Case, told: Any, mode: Any, search: Search, found: State) ->
         case.say("assembled", HELD if good else WRONG, "" if good else off)
     elif word == "no" and not mode.beyond:
         x, R = matrix_of(mode.pose)
-        there = any(apart(case, mode.pose, found[[k]]) < 1e-5 for k in range(len(found))) or search.at_pose(x, R)
+        there = (any(apart(case, mode.pose, found[[k]]) < 1e-5 for k in range(len(found)))
+                 or len(search.at_pose(x, R)) > 0)
         case.say("cannot be assembled", WRONG if there else HELD, f"{mode.pose} can be" if there else "")
     else:
         case.say("assembled", SILENT, word)
