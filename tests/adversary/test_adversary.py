@@ -221,6 +221,7 @@ FOUND = (
     ("rods", 1006, "hidden modes"),  # balls that meet to 1e-7, made exact, and the directions of the file as written
     ("pods", 1014, "hidden modes"),
     ("offset_u", 3025, "hidden modes"),
+    ("translational", 3020, "paths"),  # a held leg whose tip may move anywhere
 )
 """What was found wrong once: kind, seed, check."""
 

@@ -44,6 +44,11 @@ class HeldLeg:
     turns: int
 
     @property
+    def free(self) -> bool:
+        """Whether the tip may move anywhere."""
+        return self.line is None and self.normal is None and not self.fixed
+
+    @property
     def features(self) -> tuple[Feature, ...]:
         """All named vectors of the leg."""
         return tuple(f for f in (self.tip, self.line, self.normal) if f is not None)
@@ -150,10 +155,14 @@ def recognise(anatomy: Anatomy, question: Question, samples: Sequence[ClosedConf
     other = replace(other, legs=legs)
     motions = _motions(anatomy, question, samples)
     if anatomy.point is not None:
-        return _translating(anatomy, legs, samples)
-    if len(other.bodies) == 1:
-        return _one_body(anatomy, held, legs, motions, samples) or other
-    return _two_bodies(anatomy, legs, motions, samples) or other
+        found: Structure | None = _translating(anatomy, legs, samples)
+    elif len(other.bodies) == 1:
+        found = _one_body(anatomy, held, legs, motions, samples)
+    else:
+        found = _two_bodies(anatomy, legs, motions, samples)
+    # where the turns of all legs are alike, a leg whose tip may move anywhere holds nothing
+    binding = () if found is None else tuple(leg for leg in found.legs if not leg.free)
+    return replace(found, legs=binding) if found is not None and binding else other
 
 
 def _one_body(anatomy: Anatomy, held: dict[str, HeldLeg | None], legs: tuple[HeldLeg, ...], motions: Array,
@@ -180,7 +189,7 @@ def _one_body(anatomy: Anatomy, held: dict[str, HeldLeg | None], legs: tuple[Hel
 def _translating(anatomy: Anatomy, legs: tuple[HeldLeg, ...], samples: Sequence[ClosedConfiguration]) -> Structure:
     lines = [leg.line for leg in legs if leg.line is not None]
     plane = None
-    if len(lines) == len(legs):
+    if lines and len(lines) == sum(not leg.free for leg in legs):
         poses = poses_at(samples, [link for line in lines for link in line.links])
         _, s, Vt = np.linalg.svd(np.concatenate([line.value(poses) for line in lines]))
         if s[1] > SAME_RELATION * s[0] > s[2]:
