@@ -221,6 +221,7 @@ FOUND = (
     ("rods", 1006, "hidden modes"),  # balls that meet to 1e-7, made exact, and the directions of the file as written
     ("pods", 1014, "hidden modes"),
     ("offset_u", 3025, "hidden modes"),
+    ("offset_u", 3036, "enclosures"),  # a fitted curve, where two branches are nearly one
     ("translational", 3020, "paths"),  # a held leg whose tip may move anywhere
 )
 """What was found wrong once: kind, seed, check."""

@@ -189,7 +189,9 @@ def modes_at(setting: Setting, goal: ClosedConfiguration, wanted: Wanted | None 
                              (), ())
     progress("modes")
     confined = confinement(setting.anatomy, measured.question, measured.structure, goal)
-    confined = replace(confined, error=drift(goal, wanted), as_written=as_written)
+    # a curve that was fitted to a leg's moves is not known to hold its exact tip
+    fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
+    confined = replace(confined, error=np.inf if fitted else drift(goal, wanted), as_written=as_written)
     made, found = solve_all(confined)
     reader = _Reader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)

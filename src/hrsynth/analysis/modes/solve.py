@@ -175,7 +175,8 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
     where these are None)."""
     found = [_mode(system, square, root) for root in roots.real]
     enclosed = roots.complete and all(mode.proved for mode in found)
-    bound, proof = ("resultant", _proof(roots)) if isinstance(square, Square) else _bounded(system, square, roots)
+    bound, proof = (("resultant", _proof(system, roots)) if isinstance(square, Square)
+                    else _bounded(system, square, roots))
     if square.whole:
         return Modes(roots.complex, tuple(found), enclosed and bound != "none", proof, (), _special(roots), None, bound,
                      enclosed)
@@ -206,10 +207,10 @@ def _bounded(system: System, part: Whole, roots: Roots) -> tuple[str, str]:
     """By what there are no more solutions than msolve proposes, and the proof in words (theory 10)."""
     most = system.bound(part.legs)
     if most is not None and roots.apart and roots.complex == most[0]:
-        return "class", (f"{_proof(roots)}; the complex ones are enclosed too, apart from each other, and there are "
-                         f"at most {most[0]}: {most[1]}")
+        return "class", (f"{_proof(system, roots)}; the complex ones are enclosed too, apart from each other, and there "
+                         f"are at most {most[0]}: {most[1]}")
     limit = "" if most is None else f", of at most {most[0]}"
-    return "none", f"{_proof(roots)}; found by msolve, whose count is trusted{limit}"
+    return "none", f"{_proof(system, roots)}; found by msolve, whose count is trusted{limit}"
 
 
 def _near(system: System, found: Sequence[Mode], modes: Sequence[Mode], others: Iterable[tuple[Part, Roots]]
@@ -259,7 +260,7 @@ def _nearly(system: System, q: Array) -> Mode:
     return Mode((), np.inf, np.inf, np.pi, residual(system, q), frozen(system.pose(q)), frozen(q), near=True)
 
 
-def _proof(roots: Roots) -> str:
+def _proof(system: System, roots: Roots) -> str:
     if not roots.degree and roots.complex:
         return "tips at rest, which leave one pose"
     text = f"{roots.method} of degree {roots.degree}"
@@ -274,6 +275,7 @@ def _proof(roots: Roots) -> str:
         almost = sum(not root.real for root in roots.real)
         sure = len(roots.real) - almost
         text += f", {sure} real" + (", each enclosed with existence and uniqueness proved" if sure else "")
+        thin = thin if np.isfinite(system.error) else sure
         text += f" ({thin} for the rounded geometry only)" if thin else ""
         text += f" ({double} not: multiple)" if double else ""
         pairs = "one pair" if almost == 1 else f"{almost} pairs"

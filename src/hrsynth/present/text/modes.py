@@ -55,15 +55,16 @@ def proved(mode: AssemblyMode) -> str:
     """What is proved of a mode's place."""
     within = "" if not np.isfinite(mode.radius) else f"to {mode.shift:.1e} m" + (f", {mode.turn:.1e} rad" if mode.turn
                                                                                  else "")
+    known = f"known {within}" if within else "known to no radius"
     if mode.proved:
         return f"{', '.join(mode.enclosed)}{' ' if mode.enclosed else ''}enclosed {within}"
     if mode.fits is not None and mode.goal:
-        return f"a mode by construction, its place not proved, known {within}"
+        return f"a mode by construction, its place not proved, {known}"
     if mode.fits is not None:
-        return f"fits all legs to {mode.fits:.1e}, which does not prove it; if it is a mode, known {within}"
+        return f"fits all legs to {mode.fits:.1e}, which does not prove it; if it is a mode, {known}"
     if mode.rounded:
         return f"not proved: enclosed {within} for the rounded geometry, not for the file's".replace("  ", " ")
-    return f"not proved, {'a multiple one' if mode.multiplicity > 1 else 'known'} {within}".rstrip()
+    return f"not proved, a multiple one {within}".rstrip() if mode.multiplicity > 1 else f"not proved, {known}"
 
 
 def at_mode(mode: AssemblyMode, kind: str) -> list[tuple[str, str]]:
