@@ -205,12 +205,12 @@ def _goal(system: System, roots: Roots, found: Sequence[Mode], goal: Array | Non
 
 def _bounded(system: System, part: Whole, roots: Roots) -> tuple[str, str]:
     """By what there are no more solutions than msolve proposes, and the proof in words (theory 10)."""
-    most = system.bound(part.legs)
+    most, proof = system.bound(part.legs), _proof(system, roots)
     if most is not None and roots.apart and roots.complex == most[0]:
-        return "class", (f"{_proof(system, roots)}; the complex ones are enclosed too, apart from each other, and there "
-                         f"are at most {most[0]}: {most[1]}")
+        return "class", (f"{proof}; the complex ones are enclosed too, apart from each other, and there are at most "
+                         f"{most[0]}: {most[1]}")
     limit = "" if most is None else f", of at most {most[0]}"
-    return "none", f"{_proof(system, roots)}; found by msolve, whose count is trusted{limit}"
+    return "none", f"{proof}; found by msolve, whose count is trusted{limit}"
 
 
 def _near(system: System, found: Sequence[Mode], modes: Sequence[Mode], others: Iterable[tuple[Part, Roots]]
