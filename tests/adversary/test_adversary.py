@@ -221,6 +221,8 @@ FOUND = (
     ("rods", 1006, "hidden modes"),  # balls that meet to 1e-7, made exact, and the directions of the file as written
     ("pods", 1014, "hidden modes"),
     ("offset_u", 3025, "hidden modes"),
+    ("spatial words", 1006, "hidden modes"),  # three skew R that turn less than the S they are taken for
+    ("pods", 3004, "paths"),
     ("offset_u", 3036, "enclosures"),  # a fitted curve, where two branches are nearly one
     ("translational", 3020, "paths"),  # a held leg whose tip may move anywhere
 )
