@@ -91,7 +91,7 @@ def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
     free = Aspects.of(robot)
     places = list(wander(free.setting.samples.start, 40, 2))
     led = []
-    for one, other in zip(places[:8:2], places[::-6], strict=False):
+    for one, other in zip(places[:20:2], places[::-3], strict=False):
         plain = free.join(one, other)
         if plain.verdict != SAME:
             continue
