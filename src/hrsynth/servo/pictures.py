@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 from xml.etree import ElementTree as Xml
@@ -22,6 +22,8 @@ from .noise import PERIOD
 COLOURS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], dtype=float)
 """Of the watched legs, on black; the others are dark grey."""
 GREY = 0.12
+FINER = 3
+"""Drawn pixels a pixel each way where edges are sought: not every driver smooths edges by itself."""
 PURE = 60.0
 """How far (of 255) a pixel may be from the colours between black and a leg's to count as that leg's."""
 BLACK = 8.0
@@ -55,6 +57,8 @@ class Stage:
     camera: Camera
     reference: str
     rods: tuple[Rod, ...]
+    fineness: int = 1
+    """Drawn pixels a pixel each way."""
 
     @cached_property
     def _links(self) -> tuple[str, ...]:
@@ -67,7 +71,8 @@ class Stage:
         root = Xml.Element("mujoco")
         fov = np.degrees(2 * np.arctan(camera.height / 2 / camera.focal))
         visual = Xml.SubElement(root, "visual")
-        Xml.SubElement(visual, "global", offwidth=str(camera.width), offheight=str(camera.height))
+        Xml.SubElement(visual, "global", offwidth=str(FINER * camera.width),
+                       offheight=str(FINER * camera.height))
         Xml.SubElement(visual, "map", znear=str(0.02))
         Xml.SubElement(visual, "quality", offsamples="8")
         Xml.SubElement(visual, "headlight", ambient="1 1 1", diffuse="0 0 0", specular="0 0 0")
@@ -89,7 +94,8 @@ class Stage:
     def _renderer(self) -> Any:
         mujoco = drawing()
         try:
-            renderer = mujoco.Renderer(self._model, self.camera.height, self.camera.width)
+            renderer = mujoco.Renderer(self._model, self.fineness * self.camera.height,
+                                       self.fineness * self.camera.width)
         except (mujoco.FatalError, RuntimeError, AttributeError) as error:
             raise NotRendered(str(error)) from None
         return mujoco.MjData(self._model), renderer
@@ -105,7 +111,13 @@ class Stage:
         self._put(data, "camera__", eye)
         mujoco.mj_forward(self._model, data)
         renderer.update_scene(data, camera="camera__")
-        return np.asarray(renderer.render(), dtype=float)
+        fine = np.asarray(renderer.render(), dtype=float)
+        return fine.reshape(self.camera.height, self.fineness, self.camera.width, self.fineness, 3).mean(axis=(1, 3))
+
+    @cached_property
+    def finer(self) -> Stage:
+        """The same, drawn finely enough to find edges in."""
+        return replace(self, fineness=FINER)
 
     def _put(self, data: Any, name: str, X: Array) -> None:
         mujoco = drawing()
@@ -131,7 +143,7 @@ class Pictures:
         return np.asarray(moved / np.linalg.norm(moved, axis=1, keepdims=True))
 
     def _measured(self, poses: Poses, directions: Array) -> Array:
-        picture = self.stage.picture(poses)
+        picture = self.stage.finer.picture(poses)
         found = directions.copy()
         for number in range(len(self.stage.rods)):
             cover = shade(picture, COLOURS[number % len(COLOURS)])
