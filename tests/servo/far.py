@@ -85,8 +85,8 @@ def _no_mode(found: Servo) -> Iterator[str]:
         return
     mode, motion = listed.modes[found.ending.matched - 1], found.setting.motion
     X = found.settled.pose(motion.link)
-    if mode.goal or not mode.proved:
-        yield f"mode {found.ending.matched} is the goal or not proved"
+    if mode.goal or not (mode.proved or mode.fits is not None):
+        yield f"mode {found.ending.matched} is the goal, or neither proved nor known to fit"
     p = [value or 0.0 for value in (mode.pose.x, mode.pose.y, mode.pose.z)]
     apart = float(np.linalg.norm(motion.position(X) - p))
     turned = 0.0 if mode.pose.rpy is None else float(np.abs(X[:3, :3] - rotation_from_rpy(*mode.pose.rpy)).max())
