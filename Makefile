@@ -66,7 +66,7 @@ docs: setup-all  ## run the notebooks that changed and build the site in build/s
 	@NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mkdocs build --quiet --strict
 
 endings: setup-dev  ## how 100 far servo runs of every robot end, checked, as the table in docs/pages (half an hour)
-	@cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m servo.far 100 -o ../docs/pages/endings.md
+	@cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m simulation.far 100 -o ../docs/pages/endings.md
 
 bench: setup-all  ## run the benchmarks and write their table in docs/pages (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python benchmarks/table.py docs/pages/batches.md

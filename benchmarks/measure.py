@@ -12,12 +12,12 @@ from unittest import mock
 
 import numpy as np
 
-from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.batch import compiled as quick
+from hrsynth.batch.chain import exponentials
+from hrsynth.batch.engine import Batch
 from hrsynth.description import load
-from hrsynth.kinematics.batch import compiled as quick
-from hrsynth.kinematics.batch.chain import exponentials
-from hrsynth.kinematics.batch.engine import Batch
-from hrsynth.mechanism.vectors import Array
+from hrsynth.geometry.vectors import Array
 
 SIDE, TURNS = 201, 5
 Row = tuple[str, str, str, str]
@@ -58,7 +58,7 @@ def alone(command: Sequence[str]) -> tuple[float, float]:
     return used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
 
 
-def compiled(robot: str) -> tuple[Setting, Batch]:
+def compiled(robot: str) -> tuple[ObservedRobot, Batch]:
     setting = prepare(load(robot))
     assert setting.batch is not None
     return setting, setting.batch

@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.exact import architecture
-from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.analysis.observed import ObservedRobot, prepare
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
@@ -27,10 +27,10 @@ from hrsynth.catalog.words import parse
 from hrsynth.description import load, shipped
 from hrsynth.description.writers.mjcf import write
 from hrsynth.errors import HrsynthError
+from hrsynth.geometry.ranks import kernel_basis, largest_angle, range_basis
+from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.locked import rezeroed
-from hrsynth.kinematics.ranks import kernel_basis, largest_angle, range_basis
-from hrsynth.kinematics.twin import Twin
-from hrsynth.mechanism.vectors import Array
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
 
 SYSTEMS, EXTERNAL = 12, 3
 """Instances of each family of assembly modes, and how many of them msolve is given."""
@@ -79,13 +79,13 @@ def jacobians() -> Iterator[Row]:
         return
     for robot in ("quattro", "gough_stewart", "delta"):
         here = rezeroed(prepare(load(robot), samples=3).configurations[0])
-        twin = Twin(here)
+        twin = PinocchioModel(here)
         model = mujoco.MjModel.from_xml_string(write(here)[0])
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         data = mujoco.MjData(model)
 
-        def ours(twin: Twin = twin) -> Array:
+        def ours(twin: PinocchioModel = twin) -> Array:
             return twin.jacobian(twin.q0.copy())
 
         def theirs(model: Any = model, data: Any = data) -> Array:
@@ -159,7 +159,7 @@ def _chosen(seed: int) -> list[list[str]]:
     return [rng.sample(sorted({unmoved(word) for word in make()}), 3 * EXACT) for make in GROUPS.values()]
 
 
-def _prepared(words: list[str]) -> Iterator[Setting]:
+def _prepared(words: list[str]) -> Iterator[ObservedRobot]:
     """The first ``EXACT`` of the words whose robots move."""
     found = 0
     for word in words:

@@ -19,12 +19,12 @@ import by_hand
 import numpy as np
 from measure import Row, Run, compiled, least, plane, same, threads, told
 
-from hrsynth.analysis.setting import Setting
-from hrsynth.kinematics.batch.engine import Batch
-from hrsynth.kinematics.batch.spread import spreads
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.batch.engine import Batch
+from hrsynth.batch.spread import spreads
+from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.twin import Twin
-from hrsynth.mechanism.vectors import Array
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
 
 CONE = 0.002
 LOOPED = 300
@@ -58,7 +58,7 @@ def exact_maxima() -> Iterator[Row]:
         o for o in setting.everything.question.observations if o.leg in legs))
     assert setting.placer is not None
     some = [at for at in setting.placer.configurations(X[:: len(X) // LOOPED]) if at is not None]
-    twin = Twin(setting.mechanism)
+    twin = PinocchioModel(setting.mechanism)
     basis = batch.stage.twists
 
     def loop() -> None:
@@ -109,12 +109,12 @@ def units(batch: Batch, M: Array) -> Array:
     return np.where(np.arange(M.shape[2]) < shifts, batch.length, 1.0)
 
 
-def rigid(setting: Setting, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
+def rigid(setting: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
     x, y, z = np.ascontiguousarray(X[:, :3, 3].T)
     return lambda: by_hand.quattro_rigid(x, y, z, (int(legs[0]) - 1, int(legs[1]) - 1))
 
 
-def pods(setting: Setting, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
+def pods(setting: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
     joints, home = setting.mechanism.joints, setting.motion.home
     base = np.array([joints[f"shoulder_{leg}"].point for leg in legs])
     tips = (np.array([joints[f"wrist_{leg}"].point for leg in legs]) - home[:3, 3]) @ home[:3, :3]
@@ -122,12 +122,12 @@ def pods(setting: Setting, X: Array, legs: tuple[str, ...]) -> Callable[[], Arra
     return lambda: by_hand.pods(p, R, base, tips)
 
 
-def glide(setting: Setting, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
+def glide(setting: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
     P = np.ascontiguousarray(X[:, :3, 3])
     return lambda: by_hand.orthoglide(P, 0.31, 0.04, tuple(int(leg) - 1 for leg in legs))
 
 
-def planar(setting: Setting, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
+def planar(setting: ObservedRobot, X: Array, legs: tuple[str, ...]) -> Callable[[], Array]:
     mechanism, home = setting.mechanism, setting.motion.home
     chains = [[mechanism.joints[name].point for name in setting.anatomy.leg(leg).joints] for leg in legs]
     base, elbows, ends = (np.array([chain[i] for chain in chains]) for i in range(3))

@@ -13,7 +13,7 @@
 from dataclasses import replace
 
 import hrsynth
-from hrsynth.analysis.setting import prepare
+from hrsynth.analysis.observed import prepare
 from hrsynth.kinematics.certificate import certify
 from hrsynth.mechanism.builder import Builder
 from hrsynth.rewrite.evidence import Evidence

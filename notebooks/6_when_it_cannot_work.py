@@ -10,7 +10,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hrsynth
-from hrsynth.analysis.setting import prepare
+from hrsynth.analysis.observed import prepare
 
 # %% [markdown]
 # ## Two rails

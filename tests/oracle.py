@@ -15,9 +15,9 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from hrsynth.geometry.vectors import Array, hat, inverse, perpendicular, pose, rotation_about
 from hrsynth.mechanism.model import Joint, JointType, Mechanism
 from hrsynth.mechanism.observation import Direction, Observation
-from hrsynth.mechanism.vectors import Array, hat, inverse, perpendicular, pose, rotation_about
 
 CLOSED = 1e-11
 """Largest residual of a closed state (lengths in characteristic lengths, angles in radians)."""

@@ -14,10 +14,10 @@ import networkx as nx
 import numpy as np
 from hypothesis import strategies as st
 
+from hrsynth.geometry.vectors import Array, frozen, perpendicular, pose, rotation_about, unit
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Joint, JointType, Link, Mechanism, Motor
 from hrsynth.mechanism.observation import Direction, Observation
-from hrsynth.mechanism.vectors import Array, frozen, perpendicular, pose, rotation_about, unit
 
 PLANAR_WORDS = ("RRR", "RPR", "PRR", "PPR", "PRP", "RRP")
 POD_WORDS = ("UPS", "RPS", "UPU", "SPS")

@@ -17,22 +17,22 @@ from hrsynth.analysis import check as checks
 from hrsynth.analysis.accuracy import accuracy as accuracies
 from hrsynth.analysis.aspects.path import Aspects
 from hrsynth.analysis.modes.modes import modes_with
-from hrsynth.analysis.setting import Setting, motors, prepare
+from hrsynth.analysis.observed import ObservedRobot, motors, prepare
 from hrsynth.analysis.singularity.agreement import weakest
 from hrsynth.analysis.singularity.singular import locus_of
+from hrsynth.batch.chain import Chain
+from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet, PoseNotReached
-from hrsynth.kinematics.batch.chain import Chain
+from hrsynth.geometry.vectors import Array, rotation_from_rpy
 from hrsynth.kinematics.configuration import ClosedConfiguration, Target
-from hrsynth.kinematics.reach import reach
 from hrsynth.kinematics.steps import led
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.pose import Grid, Pose
-from hrsynth.mechanism.vectors import Array, rotation_from_rpy
 from hrsynth.selection import select as selections
-from hrsynth.servo import scene as scenes
-from hrsynth.servo.desired import whole
-from hrsynth.servo.servo import servo
+from hrsynth.simulation import scene as scenes
+from hrsynth.simulation.desired import whole
+from hrsynth.simulation.servo import servo
 from kinematics.robots import state_of
 from oracle import Oracle
 from strategies import planar, pods, random_direction, random_rotation, transformed
@@ -69,7 +69,7 @@ class Case:
     observe: str | None
 
     @property
-    def setting(self) -> Setting:
+    def setting(self) -> ObservedRobot:
         return sampled(self.robot, self.observe)
 
     @cached_property
@@ -87,7 +87,7 @@ def half_turn(axis: Array) -> Array:
     return 2 * np.outer(axis, axis) - np.eye(3)
 
 
-def wanted_poses(setting: Setting, count: int, seed: int) -> Iterator[tuple[Array, Pose]]:
+def wanted_poses(setting: ObservedRobot, count: int, seed: int) -> Iterator[tuple[Array, Pose]]:
     """Poses (4, 4) near home turned by half a turn about random axes, at first the coordinate axes; as matrices and
     as a user writes them."""
     rng, motion = np.random.default_rng(seed), setting.motion
@@ -109,7 +109,7 @@ def rotation(pose: Pose) -> Array:
     return rotation_from_rpy(*pose.rpy)
 
 
-def assert_there(setting: Setting, at: ClosedConfiguration, X: Array) -> None:
+def assert_there(setting: ObservedRobot, at: ClosedConfiguration, X: Array) -> None:
     """By the poses of all links: the platform is at X, all loops are closed."""
     assert np.abs(at.pose(setting.motion.link) - X).max() < NEAR
     assert Oracle(at.twin.mechanism).error(state_of(at.twin, at.q)) < NEAR
@@ -268,7 +268,7 @@ def test_a_link_that_has_turned_over_does_not_close_its_leg() -> None:
 
 @pytest.fixture(autouse=True)
 def prepared_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    def prepared(robot: Mechanism, observe: str | None = None, *_: object, **__: object) -> Setting:
+    def prepared(robot: Mechanism, observe: str | None = None, *_: object, **__: object) -> ObservedRobot:
         return sampled(robot, observe)
 
     for module in (checks, accuracies, scenes, selections):

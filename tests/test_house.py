@@ -19,13 +19,16 @@ PACKAGE = ROOT / "src" / "hrsynth"
 # A module imports only from its own folder and from those above it here.
 FOLDERS = [
     {"errors", "tolerances", "results", "claims"},
+    {"geometry"},
     {"mechanism"},
     {"description"},
     {"families"},
     {"kinematics"},
+    {"batch"},
     {"rewrite"},
+    {"constraints"},
     {"analysis"},
-    {"servo"},
+    {"simulation"},
     {"selection"},
     {"present"},
     {"catalog"},
@@ -33,7 +36,8 @@ FOLDERS = [
 ]
 LEVEL = {name: level for level, names in enumerate(FOLDERS) for name in names}
 
-ENGINE = {"mechanism", "description", "kinematics", "rewrite", "analysis", "servo", "selection", "present"}
+ENGINE = {"geometry", "mechanism", "description", "batch", "kinematics", "rewrite", "constraints", "analysis"} | {
+    "simulation", "selection", "present"}
 ROBOTS = re.compile(
     r"(?<![a-z])(quattro|delta|orthoglide|gough|stewart|hexaglide|uranesx|i4l|tsai)(?![a-z])", re.IGNORECASE
 )

@@ -11,10 +11,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from hrsynth.geometry.vectors import Array, pose
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Joint, JointType, Link, Mechanism
 from hrsynth.mechanism.observation import Direction, Observation
-from hrsynth.mechanism.vectors import Array, pose
 from oracle import CLOSED, GAP, NotAssembled, Oracle, exponential, logarithm, same_relation, span
 from strategies import (
     chains,

@@ -40,13 +40,6 @@ def test_the_names_survive_the_import_of_their_modules():
     assert run.stdout.split() == ["derive", "legs"]
 
 
-def test_the_folder_named_as_its_function_is_called_like_it():
-    for first in ("", "import hrsynth.servo.law; "):
-        code = first + "import hrsynth; from hrsynth import servo; print(servo is hrsynth.servo and callable(servo))"
-        run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-        assert run.stdout.split() == ["True"]
-
-
 def test_a_derivation_of_a_native_file_imports_only_what_it_uses():
     code = "import sys, hrsynth; hrsynth.derive(hrsynth.load('3rpr_m1')); print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)

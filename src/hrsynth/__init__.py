@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from .present.show import draw, html, text
     from .present.view.view import view
     from .selection.select import select
-    from .servo.servo import servo
+    from .simulation.servo import servo
 
 __version__ = "0.1.0"
 __all__ = ["__version__", "accuracy", "advise", "catalog", "check", "derive", "draw", "html", "legs", "load", "modes",
@@ -35,7 +35,7 @@ _HOME = {
     "path": ".analysis.aspects.path",
     "save": ".description",
     "select": ".selection.select",
-    "servo": ".servo.servo",
+    "servo": ".simulation.servo",
     "shipped": ".description",
     "singular": ".analysis.singularity.singular",
     "text": ".present.show",

@@ -18,12 +18,12 @@ from hrsynth.analysis import advice as module
 from hrsynth.analysis.advice import Advice, advise
 from hrsynth.analysis.candidates import candidates
 from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL
-from hrsynth.analysis.setting import prepare
+from hrsynth.analysis.observed import prepare
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError
+from hrsynth.geometry.vectors import Array, unit
 from hrsynth.mechanism import Mechanism, Observation
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.vectors import Array, unit
 from hrsynth.present.text import advice as text
 from hrsynth.tolerances import RANK_GAP
 from kinematics.robots import ROBOTS, setting_of

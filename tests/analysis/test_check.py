@@ -13,16 +13,16 @@ from hypothesis import HealthCheck, given, settings
 from hrsynth.analysis import posture as posture_module
 from hrsynth.analysis.check import MEASURES, Check, check
 from hrsynth.analysis.classes import Counts, interaction_matrix
+from hrsynth.analysis.observed import prepare
 from hrsynth.analysis.posture import Examiner, Posture
 from hrsynth.analysis.redundancy import redundant_rows, surplus
-from hrsynth.analysis.setting import prepare
 from hrsynth.description import load
+from hrsynth.geometry.ranks import CLEAN
+from hrsynth.geometry.vectors import Array, inverse
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.ranks import CLEAN
 from hrsynth.kinematics.relation import Relation, relation
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.vectors import Array, inverse
 from kinematics.robots import ROBOTS, setting_of, state_of
 from oracle import Oracle, span
 from strategies import parallel_robots, random_rotation

@@ -13,13 +13,13 @@ import yourdfpy
 
 from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.analysis.derive import Derivation, derive
-from hrsynth.analysis.setting import SAMPLES
+from hrsynth.analysis.observed import SAMPLES
 from hrsynth.catalog.geometry import mechanism as catalog_mechanism
 from hrsynth.catalog.words import parse
 from hrsynth.description import load, native
 from hrsynth.errors import BadRequest, NotCertified
 from hrsynth.kinematics.certificate import Certificate
-from hrsynth.kinematics.twin import Twin
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism.model import JointType
 from hrsynth.mechanism.observation import Direction
 from hrsynth.tolerances import ASSEMBLED, FOLLOWED, RANK_GAP, SAME_RELATION
@@ -96,7 +96,7 @@ def emitted(derivation: Derivation) -> None:
     again = native.parse(text)
     assert again.differences(hidden) == []
     assert hidden.differences(again) == []
-    twin = Twin(again)
+    twin = PinocchioModel(again)
     assert np.linalg.norm(twin.residual(twin.q0)) < ASSEMBLED
     assert Oracle(again).error(Oracle(again).zero()) < 1e-11
 

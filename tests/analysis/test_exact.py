@@ -18,18 +18,18 @@ from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL, legs
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.exact import INSTANCES, TESTS, ExactArchitecture, ExactVerdict, architecture, architecture_of
 from hrsynth.analysis.instances import Geometry, Instance, NotRecognised, draw, kernel, rank, seen
-from hrsynth.analysis.setting import Setting, prepare, selected
+from hrsynth.analysis.observed import ObservedRobot, prepare, selected
 from hrsynth.errors import HrsynthError
+from hrsynth.geometry.vectors import Array, frozen, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.relation import Question, relation
-from hrsynth.kinematics.twin import Twin
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
+from hrsynth.kinematics.relation import Measurement, relation
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Coupling
 from hrsynth.mechanism.observation import Direction, Observation
 from hrsynth.mechanism.relations import Relations, Sight
 from hrsynth.mechanism.sensors import encoders
-from hrsynth.mechanism.vectors import Array, frozen, unit
 from hrsynth.present.text import verdicts as text
 from kinematics.robots import ROBOTS, setting_of
 from oracle import Oracle
@@ -38,7 +38,7 @@ from strategies import parallel_robots, planar, random_rotation, spherical, tran
 WORDS = (CONTROLLABLE, PARTIAL, BLIND)
 
 
-def sets(setting: Setting) -> Iterator[tuple[tuple[int, ...], list[Observation]]]:
+def sets(setting: ObservedRobot) -> Iterator[tuple[tuple[int, ...], list[Observation]]]:
     """All sets of default segments: their places and themselves."""
     segments = setting.everything.question.observations[: setting.defaults]
     for size in range(1, len(segments) + 1):
@@ -155,8 +155,8 @@ def test_a_mechanism_without_centres() -> None:
     builder.joint("y", "P", "one", "two", axis=(0, 1, 0))
     builder.observe("1", "two", (1, 2, 3))
     robot = builder.build(platform="two")
-    start = ClosedConfiguration.of(Twin(robot), Twin(robot).q0)
-    question = Question("two", None, "base", robot.observations)
+    start = ClosedConfiguration.of(PinocchioModel(robot), PinocchioModel(robot).q0)
+    question = Measurement("two", None, "base", robot.observations)
     verdict = architecture_of(robot, question, [start], relation(start, question)).verdict(robot.observations)
     assert (verdict.exact, verdict.verdict, verdict.rank) == (True, BLIND, 0)
 
@@ -215,7 +215,7 @@ def test_spherical_robots(seed: int) -> None:
     check_agreement(spherical(np.random.default_rng(seed)))
 
 
-def spinning() -> Setting:
+def spinning() -> ObservedRobot:
     """A robot with rods between balls, the direction seen of the first not along the rod: it moves as the rod spins."""
     robot = setting_of("delta").mechanism
     first, *rest = setting_of("delta").everything.question.observations
@@ -280,10 +280,10 @@ def test_axes_that_are_not_quite_parallel() -> None:
     """A joint with its axis off by 1e-4 is locked: no planar robot any more, neither in fact nor in its instances."""
     robot = planar(["RRR"] * 3, np.random.default_rng(1), [{0}] * 3)
     question = prepare(robot, samples=2).everything.question
-    mobile = relation(ClosedConfiguration.of(Twin(robot), Twin(robot).q0), question)
+    mobile = relation(ClosedConfiguration.of(PinocchioModel(robot), PinocchioModel(robot).q0), question)
     joint = robot.joints["joint_2_2"]
     bent = robot.changed(joints=[replace(joint, axes=(unit(joint.axis + 1e-4 * np.array([0.3, -0.5, 0.7])),))])
-    twin = Twin(bent)
+    twin = PinocchioModel(bent)
     start = ClosedConfiguration.of(twin, twin.q0)
     check_refused(architecture_of(bent, question, [start], mobile), "mobility is 3, but")
     found = legs(bent)
@@ -306,9 +306,9 @@ def test_six_rods_that_meet_one_line() -> None:
         builder.joint(f"tip_{number}", "S", f"rod_{number}", "platform", B, loop=number > 0)
         builder.observe(str(number + 1), f"rod_{number}", along)
     robot = builder.build(platform="platform")
-    twin = Twin(robot)
+    twin = PinocchioModel(robot)
     start = ClosedConfiguration.of(twin, twin.q0)
-    question = Question("platform", None, "base", robot.observations)
+    question = Measurement("platform", None, "base", robot.observations)
     here = relation(start, question)
     assert here.dof.value == 1
     check_refused(architecture_of(robot, question, [start], here), "mobility is 7, but 6")

@@ -16,17 +16,17 @@ from hrsynth.analysis.controllability import CONTROLLABLE, PARTIAL
 from hrsynth.analysis.exact import TESTS, ExactArchitecture, architecture, architecture_of
 from hrsynth.analysis.instances import Instance, draw, instance, ranks_at
 from hrsynth.analysis.kept import degree, kept
-from hrsynth.analysis.setting import Setting, prepare, selected
+from hrsynth.analysis.observed import ObservedRobot, prepare, selected
 from hrsynth.catalog.geometry import mechanism as built
 from hrsynth.catalog.words import parse
 from hrsynth.description import load
 from hrsynth.errors import HrsynthError
+from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.carried import carried, ties
 from hrsynth.mechanism.relations import Relations
-from hrsynth.mechanism.vectors import rotation_about
 from kinematics.robots import ROBOTS, setting_of
 from mechanism.relating import miss, observed, recognised, walked
 from oracle import NotAssembled, Undecided
@@ -201,12 +201,12 @@ def test_identities_are_tested_at_several_instances() -> None:
 # --- operation modes ---------------------------------------------------------------------------------------------
 
 @pytest.fixture(scope="module", params=[0, 7, 42])
-def pod(request: pytest.FixtureRequest) -> Setting:
+def pod(request: pytest.FixtureRequest) -> ObservedRobot:
     """The pod with the catalog's own dimensions and with others, some samples of which may be of another mode."""
     return prepare(built(parse(POD), request.param))
 
 
-def test_a_mixture_of_operation_modes_proves_nothing(pod: Setting) -> None:
+def test_a_mixture_of_operation_modes_proves_nothing(pod: ObservedRobot) -> None:
     generic = architecture(pod)
     verdict = generic.verdict(pod.segments[1:3])
     ranks = {selected(m.relation, (1, 2)).rank for m in pod.everything.members}

@@ -12,7 +12,7 @@ import pytest
 from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL, Legs, Verdict, legs
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
-from hrsynth.mechanism.vectors import Array
+from hrsynth.geometry.vectors import Array
 from hrsynth.tolerances import RANK_GAP
 from kinematics.robots import setting_of, state_of
 from oracle import Oracle

@@ -21,7 +21,7 @@ from catalog.stub import REFUSED, broken, died, entry, source
 from hrsynth.catalog import load
 from hrsynth.catalog.build import build
 from hrsynth.catalog.journal import Journal
-from hrsynth.catalog.lines import decoded, encoded, line
+from hrsynth.catalog.jsonl import decoded, encoded, line
 from hrsynth.catalog.source import architectures
 from hrsynth.errors import BadRequest, BuildStopped, HrsynthError
 

@@ -18,7 +18,7 @@ import pytest
 from catalog.stub import slowly, source
 from catalog.test_build import TESTS, content, lines_in
 from hrsynth.catalog.build import build
-from hrsynth.catalog.crews import crew
+from hrsynth.catalog.executors import crew
 from hrsynth.errors import BadRequest, BuildStopped
 
 pytest.importorskip("distributed")
@@ -100,7 +100,7 @@ def test_a_cluster_that_dies_stops_the_build_and_keeps_the_journal(two_workers, 
     ("tcp://127.0.0.1:none", "address of a cluster, found", 2)])
 def test_a_dead_or_wrong_address_is_one_line(address: str, said: str, status: int, tmp_path: Path,
                                              monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]):
-    monkeypatch.setattr("hrsynth.catalog.crews.PATIENCE", 1.0)
+    monkeypatch.setattr("hrsynth.catalog.executors.PATIENCE", 1.0)
     with pytest.raises((BuildStopped, BadRequest), match=re.escape(said)) as stopped:
         build(tmp_path, source=source(), cluster=address)
     assert stopped.value.exit_status == status

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.setting import prepare
+from hrsynth.analysis.observed import prepare
 from hrsynth.catalog.entry import entry, model
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS, words

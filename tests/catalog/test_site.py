@@ -19,7 +19,7 @@ from catalog.stub import WORKERS
 from hrsynth.catalog import Catalog
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
-from hrsynth.catalog.lines import line, record
+from hrsynth.catalog.jsonl import line, record
 from hrsynth.catalog.site import Site, build, folder, site, study
 from hrsynth.catalog.site.index import LISTS, NUMBERS, TEXTS, columns
 from hrsynth.catalog.site.pages import trace

@@ -9,7 +9,7 @@ import pytest
 from browser import Tab
 from hrsynth.catalog import Catalog
 from hrsynth.catalog.entry import entry
-from hrsynth.catalog.lines import line, record
+from hrsynth.catalog.jsonl import line, record
 from hrsynth.catalog.site import index, site
 from hrsynth.catalog.site.structures import named, structures
 

@@ -10,7 +10,7 @@ from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS, group, words
 from hrsynth.catalog.words import COMPOSITE, Leg, Word, parse
 from hrsynth.errors import BadRequest
-from hrsynth.mechanism.legs import dissect
+from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
 
 LISTED = {name: words(name) for name in GROUPS}
@@ -66,7 +66,7 @@ def _renamed(leg, rng):
 def test_a_mechanism_has_the_joints_of_its_word(text):
     word = parse(text)
     drawn = mechanism(word)
-    anatomy = dissect(normal_form(drawn).mechanism)
+    anatomy = decompose(normal_form(drawn).mechanism)
     assert anatomy.labels == tuple(str(k + 1) for k in range(len(word.legs)))
     assert sum(joint.actuated for joint in drawn.joints.values()) == sum(j.motor for leg in word.legs
                                                                          for j in leg.joints)

@@ -22,7 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hrsynth.analysis.setting import SAMPLES, Setting, prepare
+from hrsynth.analysis.observed import SAMPLES, ObservedRobot, prepare
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
 from hrsynth.catalog.words import Word, parse
@@ -51,7 +51,7 @@ def word(number: int) -> str:
     return str(Word.of([rng.choice([*one.legs, *legs]) for _ in range(count)]))
 
 
-def ranks(setting: Setting) -> list[int]:
+def ranks(setting: ObservedRobot) -> list[int]:
     """What each set of legs sees for certain at some sample; a sample near a singularity may leave it open."""
     signatures = [Signature.of(member.relation) for member in setting.everything.members]
     return [max(low for low, _ in answers) for answers in zip(*(each.seen for each in signatures), strict=True)]

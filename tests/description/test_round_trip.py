@@ -15,9 +15,9 @@ from hrsynth.description import native, numerals, spanning, xml
 from hrsynth.description.closure import LoopEnds, residual
 from hrsynth.description.urdf import LOOP_TYPES
 from hrsynth.errors import BadRequest
+from hrsynth.geometry.vectors import pose, rotation_from_rpy
 from hrsynth.mechanism.model import Coupling, Joint, JointType, Limits, Link, Mechanism, Motor
 from hrsynth.mechanism.observation import Direction, Observation
-from hrsynth.mechanism.vectors import pose, rotation_from_rpy
 from hrsynth.tolerances import ASSEMBLED
 
 IN_TREE = list(JointType)

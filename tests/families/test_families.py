@@ -15,8 +15,8 @@ from hrsynth.errors import BadRequest
 from hrsynth.families import ROBOTS, Shipped, delta, npod, planar
 from hrsynth.families.__main__ import main
 from hrsynth.families.geometry import Z, on_circle, on_line, polar, radial, tangent
+from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.model import JointType, Mechanism
-from hrsynth.mechanism.vectors import Array
 from oracle import Oracle, split_rank
 
 FOLDER = Path(__file__).parents[2] / "robots"

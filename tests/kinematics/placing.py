@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
+from hrsynth.geometry.vectors import hat
 from hrsynth.mechanism import Joint, Mechanism
 from hrsynth.mechanism.legs import Leg
-from hrsynth.mechanism.vectors import hat
 
 SIZES = {"R": 1, "P": 1, "U": 2, "S": 3, "C": 2, "F": 0}
 STEPS = 60

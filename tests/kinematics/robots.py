@@ -8,14 +8,14 @@ from functools import cache
 import numpy as np
 
 from hrsynth.analysis.derive import Derivation, derive
-from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.analysis.observed import ObservedRobot, prepare
 from hrsynth.description import load, shipped
+from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration, Target, closed
-from hrsynth.kinematics.relation import Question
-from hrsynth.kinematics.twin import Twin
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
+from hrsynth.kinematics.relation import Measurement
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.mechanism.observation import Observation
-from hrsynth.mechanism.vectors import Array
 from oracle import Oracle, span
 
 ROBOTS = tuple(shipped())
@@ -23,7 +23,7 @@ ROBOTS = tuple(shipped())
 
 @cache
 def setting_of(robot: str, observe: tuple[str, ...] | None = None, camera: str | None = None,
-               samples: int = 2) -> Setting:
+               samples: int = 2) -> ObservedRobot:
     """The setting of a shipped robot with a few samples."""
     return prepare(load(robot), observe, camera, samples=samples)
 
@@ -35,12 +35,12 @@ def derived(robot: str, observe: tuple[str, ...] | None = None, camera: str | No
     return derive(load(robot), observe, camera, form=form)
 
 
-def state_of(twin: Twin, q: Array) -> Array:
+def state_of(twin: PinocchioModel, q: Array) -> Array:
     """The oracle's state for a configuration of the twin: the poses of all links."""
     return np.array([twin.pose(q, name) for name in twin.mechanism.links])
 
 
-def walked(twin: Twin, seed: int = 0, steps: int = 4, size: float = 0.15) -> ClosedConfiguration:
+def walked(twin: PinocchioModel, seed: int = 0, steps: int = 4, size: float = 0.15) -> ClosedConfiguration:
     """A closed configuration some random steps away from zero."""
     rng = np.random.default_rng(seed)
     at = ClosedConfiguration.of(twin, twin.q0)
@@ -51,7 +51,7 @@ def walked(twin: Twin, seed: int = 0, steps: int = 4, size: float = 0.15) -> Clo
     return at
 
 
-def seen_by_oracle(oracle: Oracle, state: Array, question: Question, length: float) -> Array:
+def seen_by_oracle(oracle: Oracle, state: Array, question: Measurement, length: float) -> Array:
     """The relation by the oracle, with zero rows for observed links that are not in its mechanism."""
     present = [o for o in question.observations if o.link in oracle.mechanism.links]
     basis = oracle.relation(state, present, unit_length=length, point_only=question.point is not None)
@@ -66,7 +66,7 @@ def seen_by_oracle(oracle: Oracle, state: Array, question: Question, length: flo
     return span(np.vstack(blocks)) if basis.shape[1] else np.vstack(blocks)
 
 
-def led(mechanism: Mechanism, question: Question, way: Sequence[Target]) -> tuple[Oracle, Array]:
+def led(mechanism: Mechanism, question: Measurement, way: Sequence[Target]) -> tuple[Oracle, Array]:
     """The oracle of a mechanism, led from zero along the poses and directions of a way, and the state it reaches.
 
     Raises ``oracle.NotAssembled`` where it cannot follow.

@@ -7,29 +7,29 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.analysis.observed import ObservedRobot, prepare
 from hrsynth.description import load, shipped
+from hrsynth.geometry.vectors import pose
 from hrsynth.kinematics.assembly import Assembler
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.mechanism.model import JointType, Limits
-from hrsynth.mechanism.vectors import pose
 
 ROBOTS = sorted(shipped())
 
 
-def prepared(name: str) -> Setting:
+def prepared(name: str) -> ObservedRobot:
     return prepare(load(shipped()[name]), samples=3)
 
 
-def assembler(setting: Setting) -> Assembler:
+def assembler(setting: ObservedRobot) -> Assembler:
     return Assembler(setting.anatomy, setting.everything.twin.length, setting.everything.question.reference)
 
 
-def bodies(setting: Setting, at: ClosedConfiguration) -> dict[str, np.ndarray]:
+def bodies(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, np.ndarray]:
     return {leg.attach: at.pose(leg.attach) for leg in setting.anatomy.legs}
 
 
-def values(at: ClosedConfiguration, setting: Setting) -> list[np.ndarray]:
+def values(at: ClosedConfiguration, setting: ObservedRobot) -> list[np.ndarray]:
     question = setting.everything.question
     return measure(at.twin, at.q, question.reference, question.observations)[2]
 

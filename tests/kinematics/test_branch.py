@@ -11,19 +11,19 @@ import pytest
 from hrsynth.analysis.advice import advised
 from hrsynth.analysis.controllability import legs, verdict_of
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.setting import prepare, restricted
+from hrsynth.analysis.observed import prepare, restricted
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
 from hrsynth.description import load
 from hrsynth.errors import BranchPoint
+from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.relation import Question, relation
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
+from hrsynth.kinematics.relation import Measurement, relation
 from hrsynth.kinematics.sampling import draw, wander
-from hrsynth.kinematics.twin import Twin
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.pose import Pose
-from hrsynth.mechanism.vectors import rotation_about
 
 POD = "(Pk*-Utn-Unt)+(Pz*-2SSt)+(Pz*-Utn-S)+(Rt*-2SSt)"
 
@@ -52,8 +52,8 @@ def parallelogram(angle: float, normal: tuple[float, float, float] = (0, 0, 1)) 
 def test_a_parallelogram_does_not_cross_over(angle: float, normal: tuple[float, float, float]) -> None:
     """The coupler never turns: not in samples, not on long walks towards the flat configurations."""
     robot = parallelogram(angle, normal)
-    twin = Twin(robot)
-    question = Question("coupler", None, "base", robot.observations)
+    twin = PinocchioModel(robot)
+    question = Measurement("coupler", None, "base", robot.observations)
     home = twin.pose(twin.q0, "coupler")[:3, :3]
     start = ClosedConfiguration.of(twin, twin.q0)
     drawn = draw(twin, question, 10)
@@ -67,7 +67,7 @@ def test_a_flat_parallelogram_belongs_to_two_modes(angle: float) -> None:
     """Both ways out are told, and no verdict is given."""
     robot = parallelogram(angle)
     with pytest.raises(BranchPoint) as caught:
-        draw(Twin(robot), Question("coupler", None, "base", robot.observations), 5)
+        draw(PinocchioModel(robot), Measurement("coupler", None, "base", robot.observations), 5)
     assert len(caught.value.modes) == 2
     assert any("1T" in mode for mode in caught.value.modes)
     assert any("1R" in mode for mode in caught.value.modes)

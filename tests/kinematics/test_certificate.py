@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from hrsynth.geometry.ranks import largest_angle
+from hrsynth.geometry.vectors import Array, unit
 from hrsynth.kinematics.certificate import Certificate, certify
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.ranks import largest_angle
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import relation
-from hrsynth.kinematics.twin import Twin
 from hrsynth.mechanism.model import JointType, Mechanism, Motor
-from hrsynth.mechanism.vectors import Array, unit
 from hrsynth.tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
 from kinematics.robots import derived
 
@@ -103,7 +103,7 @@ def test_exchanged_axes_of_a_universal_joint_are_caught(robot: str) -> None:
     """The two orders agree at the zero configuration, and it proves nothing."""
     hidden, samples = hidden_of(robot), derived(robot).setting.samples
     wrong = exchanged(hidden, virtual(hidden)[0])
-    right_twin, wrong_twin = (Twin(each, samples.twin.length) for each in (hidden, wrong))
+    right_twin, wrong_twin = (PinocchioModel(each, samples.twin.length) for each in (hidden, wrong))
     at_zero = [relation(ClosedConfiguration.of(twin, twin.q0), samples.question).basis
                for twin in (right_twin, wrong_twin)]
     assert largest_angle(*at_zero) < SAME_RELATION

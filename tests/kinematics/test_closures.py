@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import hrsynth
+from hrsynth.geometry.vectors import inverse, rotation_about, unit
 from hrsynth.kinematics.assembly import ASSEMBLED, BEYOND, IMPOSSIBLE, NOT_FOUND, Assembler, Assembly
 from hrsynth.mechanism import Joint, Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.legs import dissect
+from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.model import JointType, Limits
-from hrsynth.mechanism.vectors import inverse, rotation_about, unit
 from kinematics.placing import miss
 from strategies import deltas, planar, pods, random_direction, random_normal, random_rotation
 
@@ -50,7 +50,7 @@ def displaced(mechanism: Mechanism, rng: np.random.Generator) -> np.ndarray:
 
 
 def assembled(mechanism: Mechanism, D: np.ndarray) -> Assembly:
-    anatomy = dissect(mechanism)
+    anatomy = decompose(mechanism)
     bodies = {leg.attach: D @ mechanism.links[leg.attach].pose for leg in anatomy.legs}
     return Assembler(anatomy, mechanism.length, mechanism.reference).at(bodies, ())
 
@@ -64,7 +64,7 @@ def test_what_is_said_of_assembly_holds_by_brute_force(kind: str, first: int, co
     for seed in range(first, first + count):
         rng = np.random.default_rng([KINDS.index(kind), seed])
         mechanism = robot(kind, rng)
-        anatomy, D = dissect(mechanism), displaced(mechanism, rng)
+        anatomy, D = decompose(mechanism), displaced(mechanism, rng)
         found = assembled(mechanism, D)
         words[found.verdict] += 1
         assert found.reachable is {ASSEMBLED: True, IMPOSSIBLE: False}[found.verdict]

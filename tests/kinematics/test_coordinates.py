@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrsynth.analysis.setting import prepare
+from hrsynth.analysis.observed import prepare
+from hrsynth.batch.reach import reach
 from hrsynth.description import load
+from hrsynth.geometry.vectors import rotation_from_rpy
 from hrsynth.kinematics.coordinates import Coordinates
-from hrsynth.kinematics.reach import reach
-from hrsynth.mechanism.vectors import rotation_from_rpy
 from oracle import exponential
 from strategies import planar, transformed
 

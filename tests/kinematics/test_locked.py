@@ -7,20 +7,20 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from hrsynth.geometry.ranks import kernel_basis, range_basis
+from hrsynth.geometry.vectors import Array, hat, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction, leg_twists, split
-from hrsynth.kinematics.ranks import kernel_basis, range_basis
-from hrsynth.kinematics.relation import Question, relation
+from hrsynth.kinematics.relation import Measurement, relation
 from hrsynth.kinematics.sampling import WEAKEST, wander
 from hrsynth.mechanism.legs import Leg
 from hrsynth.mechanism.observation import Direction
-from hrsynth.mechanism.vectors import Array, hat, unit
 from hrsynth.tolerances import CLOSED
 from kinematics.robots import ROBOTS, setting_of, state_of
 from oracle import Oracle, Rows, rows_of
 
 
-def by_pinocchio(at: ClosedConfiguration, question: Question) -> Array:
+def by_pinocchio(at: ClosedConfiguration, question: Measurement) -> Array:
     """Singular values of Mᵀ from the relation: the pairs (t, u̇) solved for u̇, what moves with t = 0 left out."""
     found = relation(at, question)
     still, _ = kernel_basis(found.twist_part, 1.0)

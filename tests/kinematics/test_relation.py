@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hrsynth.kinematics.ranks import kernel_basis, largest_angle
+from hrsynth.geometry.ranks import kernel_basis, largest_angle
 from hrsynth.kinematics.relation import platform_motions, relation
 from kinematics.robots import ROBOTS, setting_of
 

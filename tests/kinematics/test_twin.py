@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.relation import Question, relation
-from hrsynth.kinematics.twin import Twin
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
+from hrsynth.kinematics.relation import Measurement, relation
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Mechanism
-from hrsynth.mechanism.vectors import Array
 from kinematics.robots import ROBOTS, seen_by_oracle, setting_of, state_of, walked
 from oracle import Oracle, same_relation
 from strategies import deltas, planar, pods, random_direction, random_normal, random_rotation, recut, transformed
@@ -51,7 +51,7 @@ def cycle(letters: str, rng: np.random.Generator, welded: bool = False) -> Mecha
     return builder.build(platform=names[2])
 
 
-def agrees(at: ClosedConfiguration, question: Question) -> None:
+def agrees(at: ClosedConfiguration, question: Measurement) -> None:
     """Closure, mobility and relation are the same for the twin and for the oracle at one configuration."""
     oracle = Oracle(at.twin.mechanism)
     state = state_of(at.twin, at.q)
@@ -67,8 +67,8 @@ def agrees(at: ClosedConfiguration, question: Question) -> None:
     np.testing.assert_allclose(np.reshape(values, (-1, 3)), oracle.directions(state, question.observations), atol=1e-12)
 
 
-def question_of(mechanism: Mechanism) -> Question:
-    return Question(mechanism.platform, None, mechanism.reference, mechanism.observations)
+def question_of(mechanism: Mechanism) -> Measurement:
+    return Measurement(mechanism.platform, None, mechanism.reference, mechanism.observations)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
@@ -94,7 +94,7 @@ def test_twin_and_oracle_agree_with_a_carried_camera(camera: str) -> None:
 def test_every_type_of_loop(letter: str, seed: int) -> None:
     rng = np.random.default_rng(seed)
     mechanism = cycle(CYCLES[letter], rng, welded=letter == "F")
-    twin = Twin(mechanism)
+    twin = PinocchioModel(mechanism)
     assert letter in {mechanism.joints[name].type.value for name in twin.loops}
     assert np.linalg.norm(twin.residual(twin.q0)) < 1e-12
     agrees(ClosedConfiguration.of(twin, twin.q0), question_of(mechanism))
@@ -103,7 +103,7 @@ def test_every_type_of_loop(letter: str, seed: int) -> None:
 
 @pytest.mark.parametrize("letters", ["RRRRRRR", "UUUU", "CCCC", "ERUUR", "SRSR", "UPSR", "CRSP"])
 def test_mobility_of_a_loop_is_its_freedoms_less_six(letters: str) -> None:
-    twin = Twin(cycle(letters, np.random.default_rng(5)))
+    twin = PinocchioModel(cycle(letters, np.random.default_rng(5)))
     assert walked(twin).kernel()[0].shape[1] == sum(JointType(each).freedoms for each in letters) - 6
 
 
@@ -117,7 +117,7 @@ def test_random_robots_in_any_cut(kind: str, seed: int) -> None:
              else deltas(["R", "P", "R"], ["2-SS", "US", "SS"], rng, seed == 0))
     mobilities = set()
     for each in (robot, recut(robot, rng), transformed(robot, random_rotation(rng), rng.normal(size=3))):
-        twin = Twin(each)
+        twin = PinocchioModel(each)
         at = walked(twin, seed, size=0.05)
         agrees(at, question_of(each))
         mobilities.add(at.kernel()[0].shape[1])
@@ -156,7 +156,7 @@ def test_length_only_scales() -> None:
     """A twin in other units of length has the same poses, and the same relation once the unit is the same."""
     everything = setting_of("delta").everything
     mechanism, question = everything.twin.mechanism, everything.question
-    other = Twin(mechanism, 3 * mechanism.length)
+    other = PinocchioModel(mechanism, 3 * mechanism.length)
     at = ClosedConfiguration.of(other, other.q0)
     np.testing.assert_allclose(at.pose("platform"), everything.start.pose("platform"), atol=1e-14)
     basis = seen_by_oracle(Oracle(mechanism), state_of(other, other.q0), question, 3 * mechanism.length)

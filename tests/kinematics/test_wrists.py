@@ -6,19 +6,19 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.batch.reach import reach
 from hrsynth.errors import PoseNotReached
+from hrsynth.geometry.so3 import logarithm
+from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.assembly import ASSEMBLED, BEYOND, Assembler
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.reach import reach
 from hrsynth.kinematics.wrists import margins
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.pose import Pose
-from hrsynth.mechanism.so3 import logarithm
-from hrsynth.mechanism.vectors import rotation_about
-from hrsynth.servo.run import clearance
+from hrsynth.simulation.run import clearance
 from strategies import oblique, pods, random_direction, random_rotation, transformed
 
 Rng = np.random.Generator
@@ -110,7 +110,7 @@ def test_perpendicular_neighbours_make_every_turn() -> None:
     assert normal_form(chain([first, second, lean], rng, "UR")).mechanism.wrists
 
 
-def robots(seed: int) -> tuple[Setting, Setting, list[np.ndarray]]:
+def robots(seed: int) -> tuple[ObservedRobot, ObservedRobot, list[np.ndarray]]:
     """A robot whose first tip is an S, aslant; the same with three oblique R for it; their axes."""
     rng = np.random.default_rng(seed)
     # axes normal to the rods: all legs follow large turns
@@ -120,7 +120,7 @@ def robots(seed: int) -> tuple[Setting, Setting, list[np.ndarray]]:
     return prepare(free, samples=3), prepare(held, samples=3), axes
 
 
-def turned_platforms(free: Setting, rng: Rng, count: int) -> list[np.ndarray]:
+def turned_platforms(free: ObservedRobot, rng: Rng, count: int) -> list[np.ndarray]:
     """Poses of the platform turned about the centre of its first tip, which all legs can follow."""
     mechanism, found = free.mechanism, []
     for _ in range(count):
@@ -161,7 +161,7 @@ def test_a_robot_is_assembled_where_its_three_axes_can_turn(seed: int) -> None:
     assert seen == {True, False}
 
 
-def reached(setting: Setting, pose: Pose) -> ClosedConfiguration | PoseNotReached:
+def reached(setting: ObservedRobot, pose: Pose) -> ClosedConfiguration | PoseNotReached:
     try:
         return reach(setting.everything.start, setting.everything.question, pose, setting.motion)
     except PoseNotReached as error:

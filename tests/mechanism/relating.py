@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from hrsynth.geometry.vectors import Array, inverse, unit
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.carried import Tie
-from hrsynth.mechanism.legs import default_observation, dissect
+from hrsynth.mechanism.legs import decompose, default_observation
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.relations import Relations, recognise
-from hrsynth.mechanism.vectors import Array, inverse, unit
 from oracle import Oracle
 
 
@@ -30,7 +30,7 @@ def segments(mechanism: Mechanism) -> list[Direction]:
 
 def observed(mechanism: Mechanism) -> Mechanism:
     """The normal form with the default segments of its legs."""
-    anatomy = dissect(normal_form(mechanism).mechanism)
+    anatomy = decompose(normal_form(mechanism).mechanism)
     return anatomy.mechanism.changed(observations=tuple(default_observation(anatomy, leg) for leg in anatomy.legs))
 
 

@@ -11,11 +11,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hrsynth.description import load, shipped
+from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.carried import Tie, carried, ties
 from hrsynth.mechanism.relations import Relations
-from hrsynth.mechanism.vectors import Array
 from mechanism.relating import miss, observed, recognised, walked
 from oracle import NotAssembled, Oracle, Undecided
 from strategies import parallel_robots, planar, random_rotation, spherical, transformed

@@ -10,12 +10,12 @@ from hrsynth.description import load, shipped
 from hrsynth.errors import BadMechanism, BadRequest, BadRobotFile
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.legs import Anatomy, default_observation, dissect, observation_of
+from hrsynth.mechanism.legs import LegDecomposition, decompose, default_observation, observation_of
 from hrsynth.mechanism.normal import normal_form
 
 
-def anatomy(name: str) -> Anatomy:
-    return dissect(normal_form(load(name)).mechanism)
+def anatomy(name: str) -> LegDecomposition:
+    return decompose(normal_form(load(name)).mechanism)
 
 
 @pytest.mark.parametrize(("name", "platform"), [
@@ -74,14 +74,14 @@ def test_a_point_platform_with_its_frame_elsewhere_is_the_same_point() -> None:
     frame = robot.links["platform"].pose.copy()
     frame[:3, 3] += (0.1, 0.05, 0.02)
     moved = robot.changed(links=[replace(robot.links["platform"], pose=frame)])
-    assert np.allclose(dissect(moved).point, (-0.1, -0.05, 0.0))
+    assert np.allclose(decompose(moved).point, (-0.1, -0.05, 0.0))
 
 
 @pytest.mark.parametrize("name", ["delta", "quattro", "3rrr_m1", "rrrrr_m1"])
 def test_names_do_not_matter(name: str) -> None:
     robot = load(name)
     other = strategies.renamed(robot, np.random.default_rng(3))
-    assert dissect(normal_form(other).mechanism).architecture() == anatomy(name).architecture()
+    assert decompose(normal_form(other).mechanism).architecture() == anatomy(name).architecture()
 
 
 def watched(*observations: tuple[str, str]) -> Mechanism:
@@ -96,11 +96,11 @@ def watched(*observations: tuple[str, str]) -> Mechanism:
     ([("1", "dist_1"), ("1", "dist_2")], "two different legs"), ([("1", "dist_1"), ("2", "prox_1")], "is labelled")])
 def test_labels_that_contradict_the_legs_are_refused(observations: list, what: str) -> None:
     with pytest.raises(BadRobotFile, match=what):
-        dissect(watched(*observations))
+        decompose(watched(*observations))
 
 
 def test_labels_of_the_file_are_kept() -> None:
-    found = dissect(watched(("left", "dist_2")))
+    found = decompose(watched(("left", "dist_2")))
     assert found.leg("left").links == ("prox_2", "dist_2")
     assert set(found.labels) == {"1", "left", "3"}
     with pytest.raises(BadRequest, match="no leg"):
@@ -116,7 +116,7 @@ def test_a_segment_without_length_and_a_link_outside_the_legs_are_refused() -> N
     b.link("plate")
     for i in range(3):
         b.joint(f"tip_{i}", "S", f"rod_{i}", "plate", at=(i, i * i, 0 if i == 0 else 1), loop=i > 0)
-    found = dissect(b.build("plate"))
+    found = decompose(b.build("plate"))
     with pytest.raises(BadRequest, match="no length"):
         default_observation(found, found.legs[0])
     with pytest.raises(BadRequest, match="no leg"):
@@ -133,7 +133,7 @@ def test_a_platform_that_no_leg_reaches_is_refused() -> None:
     b.joint("b", "R", "crank", "rod", at=(1, 0, 0), axis=(0, 0, 1))
     b.joint("c", "R", "rod", "base", at=(1, 1, 0), axis=(0, 0, 1), loop=True)
     with pytest.raises(BadMechanism, match="no leg"):
-        dissect(b.build("plate"))
+        decompose(b.build("plate"))
 
 
 def test_a_tool_on_one_revolute_keeps_its_turn() -> None:

@@ -10,13 +10,13 @@ import pytest
 
 from hrsynth.analysis.candidates import candidates
 from hrsynth.description import load
+from hrsynth.geometry.vectors import Array, perpendicular, pose, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure
-from hrsynth.kinematics.twin import Twin
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Direction, Joint, JointType, Observation
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.observation import Angle, LinePosition, Slide
 from hrsynth.mechanism.sensors import encoders, line_position
-from hrsynth.mechanism.vectors import Array, perpendicular, pose, unit
 from kinematics.robots import ROBOTS, setting_of, walked
 from oracle import exponential
 from strategies import random_direction, random_rotation, split
@@ -82,7 +82,7 @@ def test_every_kind_has_a_key_of_its_own() -> None:
 def test_encoders_read_the_coordinates_of_the_twin(robot: str, cut: str) -> None:
     """Value and rate, of tree joints and of cut ones; lengths in characteristic lengths."""
     mechanism = setting_of(robot).mechanism if cut == "normal form" else load(robot)
-    twin = Twin(mechanism)
+    twin = PinocchioModel(mechanism)
     at = walked(twin, seed=1)
     kernel, _ = at.kernel()
     travelled = pin.difference(twin.model, twin.q0, at.q)
@@ -114,7 +114,7 @@ def test_encoders_of_each_type_in_a_tilted_chain(type: str) -> None:
     builder.joint("j", type, "a", "b", rng.normal(size=3), axis=first, axis2=second if type == "U" else None)
     mechanism = builder.build(platform="b")
     for each in (mechanism, mechanism.changed(joints=[mechanism.joints["j"].turned()])):
-        twin = Twin(each)
+        twin = PinocchioModel(each)
         q = twin.moved(twin.q0, rng.uniform(-1, 1, size=twin.nv))
         found = encoders(each, each.joints["j"])
         _, _, values, rates = measure(twin, q, "base", found)
@@ -133,10 +133,10 @@ def test_rates_and_values_of_candidates_have_the_same_units(robot: str) -> None:
     mechanism = setting.mechanism
     observations = [each.observation for each in candidates(setting)]
     rng = np.random.default_rng(5)
-    q_step = rng.normal(size=Twin(mechanism).nv)
+    q_step = rng.normal(size=PinocchioModel(mechanism).nv)
     found = []
     for length in (mechanism.length, 1.0):
-        twin = Twin(mechanism, length)
+        twin = PinocchioModel(mechanism, length)
         slides = [i for j in mechanism.joints.values() if j.type.slides for i in twin.coordinates[j.name][:1]]
         step = q_step.copy()
         step[slides] /= length
@@ -160,7 +160,7 @@ def test_a_split_universal_joint_has_the_encoders_of_its_halves() -> None:
     parts = [name for name in halves.joints if name.startswith(gone + "__")]
     rows = []
     for mechanism, names in ((whole, [gone]), (halves, parts)):
-        twin = Twin(mechanism, whole.length)
+        twin = PinocchioModel(mechanism, whole.length)
         found = [each for name in names for each in encoders(mechanism, mechanism.joints[name])]
         assert len(found) == 2
         _, V, _, rates = measure(twin, twin.q0, mechanism.reference, found, tuple(whole.links))

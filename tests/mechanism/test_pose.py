@@ -12,8 +12,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from hrsynth.errors import BadRequest
+from hrsynth.geometry.vectors import pose, rotation_from_rpy
 from hrsynth.mechanism.pose import Grid, Pose
-from hrsynth.mechanism.vectors import pose, rotation_from_rpy
 from oracle import exponential
 
 numbers = st.floats(-5, 5).map(lambda value: round(value, 4) + 0.0)

@@ -10,12 +10,12 @@ import numpy as np
 import pytest
 
 from hrsynth.description import load, shipped
+from hrsynth.geometry.vectors import Array, inverse, unit
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.relations import Incidence, Relations
 from hrsynth.mechanism.screws import constraints
-from hrsynth.mechanism.vectors import Array, inverse, unit
 from mechanism.relating import observed, recognised, segments, walked
 from oracle import Oracle
 from strategies import deltas, planar, pods, random_rotation, spherical, transformed

@@ -16,7 +16,7 @@ from hrsynth.analysis.derive import derive
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism import JointType, Mechanism
-from hrsynth.mechanism.legs import default_observation, dissect
+from hrsynth.mechanism.legs import decompose, default_observation
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.present.drawings import svg
 from hrsynth.present.drawings.graph import graph_svg
@@ -31,7 +31,7 @@ FEW = ("rrrrr_m1", "quattro", "uranesx")
 def real(name: str) -> tuple[Mechanism, set[str]]:
     """A robot in normal form and the links of its default observations."""
     mechanism = normal_form(load(name)).mechanism
-    anatomy = dissect(mechanism)
+    anatomy = decompose(mechanism)
     return mechanism, {default_observation(anatomy, leg).link for leg in anatomy.legs}
 
 
@@ -132,7 +132,7 @@ def test_any_mechanism_can_be_drawn(mechanism: Mechanism) -> None:
 @pytest.mark.parametrize("name", ["quattro", "rrrrr_m1", "gough_stewart"])
 def test_a_leg_alone_holds_its_own_joints(name: str) -> None:
     mechanism, observed = real(name)
-    for leg in dissect(mechanism).legs:
+    for leg in decompose(mechanism).legs:
         assert sorted(joints_in(read(leg_svg(mechanism, leg.label, observed=observed)))) == sorted(leg.joints)
     with pytest.raises(BadRequest, match="no leg"):
         leg_svg(mechanism, "9")
@@ -141,7 +141,7 @@ def test_a_leg_alone_holds_its_own_joints(name: str) -> None:
 @pytest.mark.parametrize("name", ["quattro", "gough_stewart", "orthoglide"])
 def test_legs_are_rows_from_the_base_to_the_platform(name: str) -> None:
     mechanism, _ = real(name)
-    anatomy, found = dissect(mechanism), plan(mechanism)
+    anatomy, found = decompose(mechanism), plan(mechanism)
     assert sorted(row.label for row in found.rows if row.label) == sorted(anatomy.labels)
     for net in found.nets:
         if net.link == mechanism.base:

@@ -9,8 +9,8 @@ import pytest
 
 from hrsynth import check, load, modes, view
 from hrsynth.description import shipped
+from hrsynth.geometry.vectors import unit
 from hrsynth.mechanism import JointType
-from hrsynth.mechanism.vectors import unit
 from hrsynth.present.view.view import View
 from present.views import mechanism_of, miss, moved, seen, states, turned
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 import pytest
 
-from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.analysis.observed import ObservedRobot, prepare
 from hrsynth.kinematics.certificate import Certificate, certify
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.rewrite import strategy
@@ -48,7 +48,7 @@ CAMERAS = [("delta", "platform"), ("delta", "arm_1"), ("gough_stewart", "platfor
 class Recorder:
     """A check that keeps every proposal which the certificate passes."""
 
-    setting: Setting
+    setting: ObservedRobot
     passed: list[Mechanism] = field(default_factory=list)
     refused: list[tuple[Mechanism, Certificate]] = field(default_factory=list)
 
@@ -61,13 +61,13 @@ class Recorder:
         return found
 
 
-def rewritten(setting: Setting, form: str = "simplified") -> tuple[Rewriting, Recorder]:
+def rewritten(setting: ObservedRobot, form: str = "simplified") -> tuple[Rewriting, Recorder]:
     recorder = Recorder(setting)
     run = strategy.simplified if form == "simplified" else strategy.general
     return run(setting.anatomy, Evidence(setting.anatomy, setting.samples), recorder), recorder
 
 
-def obeys(setting: Setting, form: str = "simplified", thorough: bool = False) -> Rewriting:
+def obeys(setting: ObservedRobot, form: str = "simplified", thorough: bool = False) -> Rewriting:
     """The law, for one robot: every step that passed, or (not ``thorough``) at most six of them, last ones included."""
     result, recorder = rewritten(setting, form)
     samples = setting.samples

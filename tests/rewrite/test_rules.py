@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.analysis.observed import ObservedRobot, prepare
 from hrsynth.kinematics.certificate import certify
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Mechanism
@@ -25,7 +25,7 @@ from strategies import deltas, random_direction, random_rotation
 DIFFERENT = 1e-4
 
 
-def oracle_angle(setting: Setting, mechanism: Mechanism) -> float:
+def oracle_angle(setting: ObservedRobot, mechanism: Mechanism) -> float:
     """The largest angle between the relations of the real robot and a rewritten one over the samples, by the oracle;
     pi/2 where it cannot follow."""
     samples = setting.samples
@@ -42,7 +42,7 @@ def oracle_angle(setting: Setting, mechanism: Mechanism) -> float:
     return angle
 
 
-def is_wrong(setting: Setting, mechanism: Mechanism, bodies: tuple[str, ...] = ()) -> None:
+def is_wrong(setting: ObservedRobot, mechanism: Mechanism, bodies: tuple[str, ...] = ()) -> None:
     """The certificate refuses it, and the oracle sees the difference."""
     certificate = certify(setting.samples, mechanism, bodies=bodies, complete=False)
     assert not certificate.passed
@@ -50,17 +50,17 @@ def is_wrong(setting: Setting, mechanism: Mechanism, bodies: tuple[str, ...] = (
     assert oracle_angle(setting, mechanism) > DIFFERENT
 
 
-def is_right(setting: Setting, mechanism: Mechanism) -> None:
+def is_right(setting: ObservedRobot, mechanism: Mechanism) -> None:
     certificate = certify(setting.samples, mechanism, complete=False)
     assert certificate.passed, certificate.reason
     assert oracle_angle(setting, mechanism) < 1e-6
 
 
-def evidence_of(setting: Setting) -> Evidence:
+def evidence_of(setting: ObservedRobot) -> Evidence:
     return Evidence(setting.anatomy, setting.samples)
 
 
-def simplified(setting: Setting) -> Rewriting:
+def simplified(setting: ObservedRobot) -> Rewriting:
     def check(mechanism: Mechanism, bodies: tuple[str, ...]) -> object:
         return certify(setting.samples, mechanism, bodies=bodies, complete=False)
 
@@ -72,7 +72,7 @@ def proposals(found: Iterable[Proposal | Refusal]) -> tuple[list[Proposal], list
     return ([p for p in everything if isinstance(p, Proposal)], [r for r in everything if isinstance(r, Refusal)])
 
 
-def lifted(setting: Setting) -> State:
+def lifted(setting: ObservedRobot) -> State:
     """The exact lift of all observed legs, motors off."""
     evidence = evidence_of(setting)
     state = State(setting.anatomy, replace(setting.anatomy.mechanism, observations=()))
@@ -162,7 +162,7 @@ def test_the_leg_with_the_camera_is_never_removed() -> None:
     assert "rod_3a" in simplified(setting).state.mechanism.links
 
 
-def turned_carriers(setting: Setting, mechanism: Mechanism, state: State) -> float:
+def turned_carriers(setting: ObservedRobot, mechanism: Mechanism, state: State) -> float:
     """By how much (rad) the carriers of the virtual actuators turn on the way to the samples, by the oracle."""
     turns = []
     for member in setting.samples.members:

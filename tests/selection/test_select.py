@@ -16,17 +16,17 @@ from hrsynth.analysis.accuracy.cones import half_angles
 from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.modes.modes import modes
-from hrsynth.analysis.setting import prepare
+from hrsynth.analysis.observed import prepare
+from hrsynth.batch.reach import reach
 from hrsynth.cli import execute
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
-from hrsynth.kinematics.reach import reach
+from hrsynth.geometry.vectors import pose, rotation_from_rpy
 from hrsynth.mechanism.pose import Pose
-from hrsynth.mechanism.vectors import pose, rotation_from_rpy
 from hrsynth.selection.candidate import Candidate
 from hrsynth.selection.select import Selection, _Work, select
 from hrsynth.selection.sight import Sight, camera_at, hidden
-from hrsynth.servo.camera import Camera, cylinders
+from hrsynth.simulation.camera import Camera, cylinders
 
 START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 

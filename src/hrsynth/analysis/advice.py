@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import RankUndecided
-from ..kinematics.ranks import kernel_basis, largest_angle, range_basis, singular_values
+from ..geometry.ranks import kernel_basis, largest_angle, range_basis, singular_values
+from ..geometry.vectors import Array
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
-from ..mechanism.vectors import Array
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
 from .candidates import Measurement, candidates
 from .controllability import CONTROLLABLE, Verdict, verdict_of
-from .setting import Setting, prepare, restricted, silent
+from .observed import ObservedRobot, prepare, restricted, silent
 
 PROBES = 3
 """Configurations at which all sets are tried; what sees most there is verified at all samples."""
@@ -49,7 +49,7 @@ class Advice(Result):
     """What is missing. ``now`` is the verdict as it stands; ``sets`` are all the smallest sets of the best rank within
     reach, empty where nothing is missing or nothing helps."""
 
-    setting: Setting
+    setting: ObservedRobot
     now: Verdict
     sets: tuple[Cure, ...]
     tried: int
@@ -106,7 +106,7 @@ def advise(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     return advised(prepare(robot, observe, camera, seed=seed), tell)
 
 
-def advised(setting: Setting, tell: Callable[[str], None] = silent, *, most: int | None = None) -> Advice:
+def advised(setting: ObservedRobot, tell: Callable[[str], None] = silent, *, most: int | None = None) -> Advice:
     """What is missing in a setting, as :func:`advise`; of the smallest sets at most so many are verified and given."""
     now = verdict_of(setting, setting.labels, setting.samples)
     if now.verdict == CONTROLLABLE:
@@ -123,7 +123,7 @@ def advised(setting: Setting, tell: Callable[[str], None] = silent, *, most: int
     return Advice(setting, now, kept, search.tried, complete and not undecided, undecided)
 
 
-def _verified(setting: Setting, samples: Samples, sets: Sequence[tuple[Measurement, ...]]) -> list[Cure]:
+def _verified(setting: ObservedRobot, samples: Samples, sets: Sequence[tuple[Measurement, ...]]) -> list[Cure]:
     """Each set with its verdict at all samples; those whose rank has no clear gap are left out."""
     found: list[Cure] = []
     for added in sets:

@@ -8,9 +8,9 @@ from typing import Any
 
 from ..errors import HrsynthError
 from ..mechanism import Direction, JointType, Observation
-from ..mechanism.legs import Anatomy, observation_of
+from ..mechanism.legs import LegDecomposition, observation_of
 from ..mechanism.sensors import encoders, line_position
-from .setting import Setting
+from .observed import ObservedRobot
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
 """The names of the coordinates of joints that have two."""
@@ -46,18 +46,18 @@ class Measurement:
         return {**record, "link": self.observation.link}
 
 
-def candidates(setting: Setting) -> tuple[Measurement, ...]:
+def candidates(setting: ObservedRobot) -> tuple[Measurement, ...]:
     """Everything that could be added: legs, directions of other links, positions of observed lines, encoders."""
     return (*_legs(setting), *_directions(setting), *_lines(setting), *_encoders(setting.anatomy))
 
 
-def _legs(setting: Setting) -> Iterator[Measurement]:
+def _legs(setting: ObservedRobot) -> Iterator[Measurement]:
     for segment in setting.segments:
         if segment.leg not in setting.labels:
             yield Measurement("leg", segment.leg, segment, segment.leg)
 
 
-def _directions(setting: Setting) -> Iterator[Measurement]:
+def _directions(setting: ObservedRobot) -> Iterator[Measurement]:
     """Segments of all legs but the observed ones and those that a leg is; links without a direction are left out."""
     taken = {o.key for o in setting.observed} | {each.observation.key for each in _legs(setting)}
     for leg in setting.anatomy.legs:
@@ -71,13 +71,13 @@ def _directions(setting: Setting) -> Iterator[Measurement]:
                 continue
 
 
-def _lines(setting: Setting) -> Iterator[Measurement]:
+def _lines(setting: ObservedRobot) -> Iterator[Measurement]:
     for seen in setting.observed:
         if isinstance(seen, Direction):
             yield Measurement("line", seen.link, line_position(setting.anatomy, seen), seen.leg)
 
 
-def _encoders(anatomy: Anatomy) -> Iterator[Measurement]:
+def _encoders(anatomy: LegDecomposition) -> Iterator[Measurement]:
     """Encoders on all joints of the normal form, those with motors first; joints between links of an articulated
     platform are of no leg."""
     owner = {joint: leg.label for leg in anatomy.legs for joint in leg.joints}

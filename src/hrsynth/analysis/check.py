@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
-from ..kinematics.reach import reach, sweep
+from ..batch.reach import reach, sweep
 from ..mechanism import Mechanism
 from ..mechanism.pose import SCALARS, Grid, Pose
 from ..results import Result
+from .observed import ObservedRobot, prepare, silent
 from .posture import Examiner, Posture
 from .redundancy import Redundancy, listed
-from .setting import Setting, prepare, silent
 
 UNREACHABLE = "unreachable"
 MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degrees_per_degree")
@@ -51,7 +51,7 @@ class GridCheck:
 class Check(Result):
     """What is observed, the postures at the poses asked for, the loop constraints that are always redundant."""
 
-    setting: Setting
+    setting: ObservedRobot
     postures: tuple[Posture, ...]
     redundant: tuple[Redundancy, ...]
     grid: GridCheck | None = None

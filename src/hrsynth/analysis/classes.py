@@ -8,9 +8,9 @@ from dataclasses import asdict, dataclass
 
 import numpy as np
 
-from ..kinematics.ranks import range_basis
+from ..geometry.ranks import range_basis
+from ..geometry.vectors import Array
 from ..kinematics.relation import Relation
-from ..mechanism.vectors import Array
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 from ..errors import RankUndecided
-from ..kinematics.ranks import Rank
+from ..geometry.ranks import Rank
 from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
@@ -17,7 +17,7 @@ from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
 from .exact import ExactVerdict, architecture
 from .freedoms import Freedom, name_freedoms, point_text
-from .setting import Setting, prepare, restricted, started
+from .observed import ObservedRobot, prepare, restricted, started
 from .verdict import BLIND as BLIND
 from .verdict import CONTROLLABLE as CONTROLLABLE
 from .verdict import PARTIAL as PARTIAL
@@ -73,7 +73,7 @@ class Verdict(Result):
 class Legs(Result):
     """The verdict of every set of observed legs, and the smallest sets of the best rank."""
 
-    setting: Setting
+    setting: ObservedRobot
     robot: str
     architecture: str
     dof: int
@@ -101,7 +101,7 @@ class Legs(Result):
                 "minimal": [list(each) for each in self.minimal], **self.setting.modes_dict()}
 
 
-def verdict_of(setting: Setting, legs: Sequence[str], samples: Samples) -> Verdict:
+def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) -> Verdict:
     """The verdict for ``samples``, whose observations are those of ``legs``.
 
     All samples are of one operation mode and must show one rank. Raises ``RankUndecided`` where its gap is too small at
@@ -124,7 +124,7 @@ def verdict_of(setting: Setting, legs: Sequence[str], samples: Samples) -> Verdi
                    max(each.seen.weakest for each in found), min(each.seen.dropped for each in found))
 
 
-def _lost(setting: Setting, samples: Samples, legs: tuple[str, ...], count: int) -> tuple[Freedom, ...]:
+def _lost(setting: ObservedRobot, samples: Samples, legs: tuple[str, ...], count: int) -> tuple[Freedom, ...]:
     """The lost freedoms at the zero configuration where it is generic, else at a sample."""
     start = relation(samples.start, samples.question)
     position = None

@@ -10,13 +10,13 @@ import numpy as np
 
 from ..description.tree import spanning
 from ..errors import BadRequest, NotCertified
+from ..geometry.ranks import range_basis
+from ..geometry.vectors import Array
 from ..kinematics.certificate import Certificate, certify
-from ..kinematics.ranks import range_basis
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
-from ..mechanism.legs import Anatomy
+from ..mechanism.legs import LegDecomposition
 from ..mechanism.notation import Architecture
-from ..mechanism.vectors import Array
 from ..results import Result
 from ..rewrite import strategy
 from ..rewrite.evidence import Evidence
@@ -27,7 +27,7 @@ from .controllability import Verdict, verdict_of
 from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
-from .setting import Mobility, Setting, prepare, silent, started
+from .observed import Mobility, ObservedRobot, prepare, silent, started
 
 if TYPE_CHECKING:
     from ..mechanism.pose import Pose
@@ -61,7 +61,7 @@ class Derivation(Result):
     """A robot, what is observed, its hidden robot (None where every leg is blind), how it came about, and the proof."""
 
     robot: Mechanism
-    setting: Setting
+    setting: ObservedRobot
     form: str
     architecture: Architecture
     hidden: Mechanism | None
@@ -141,7 +141,7 @@ def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     return derived(setting, form=form, progress=tell)
 
 
-def derived(setting: Setting, *, form: str = "simplified", beside: bool = True,
+def derived(setting: ObservedRobot, *, form: str = "simplified", beside: bool = True,
             progress: Callable[[str], None] = silent) -> Derivation:
     """The certified hidden robot of a setting, as :func:`derive`; ``beside``: with the paper's own form."""
     tell, robot = progress, setting.robot
@@ -173,7 +173,7 @@ def derived(setting: Setting, *, form: str = "simplified", beside: bool = True,
                       certificate, paper)
 
 
-def finished(setting: Setting, state: State) -> Mechanism:
+def finished(setting: ObservedRobot, state: State) -> Mechanism:
     """The hidden robot as a file writes it: a spanning tree, names of its own, its observations."""
     mechanism = state.mechanism
     observations = tuple(o for o in setting.observed if o.link in mechanism.links)
@@ -193,7 +193,7 @@ def _check(samples: Samples, count: int | None) -> strategy.Check:
     return lambda mechanism, bodies: certify(samples, mechanism, count=count, bodies=bodies, complete=False)
 
 
-def _fallback(setting: Setting, evidence: Evidence, samples: Samples, failed: Certificate,
+def _fallback(setting: ObservedRobot, evidence: Evidence, samples: Samples, failed: Certificate,
               asked: Callable[..., Rewriting]) -> tuple[Rewriting, Mechanism, Certificate]:
     """Where the certificate at all samples sees what three did not: check every step of the form that was asked for at
     all samples, then of the general form."""
@@ -216,7 +216,7 @@ def _blind(samples: Samples) -> Certificate:
     return Certificate(len(samples.members), samples.discarded, angle, gap, 0.0, passed, reason)
 
 
-def _paper_form(setting: Setting, evidence: Evidence, samples: Samples, certified: Architecture,
+def _paper_form(setting: ObservedRobot, evidence: Evidence, samples: Samples, certified: Architecture,
                 certificate: Certificate) -> PaperForm:
     """Apply the paper's rules without looking, and compare what they give with the real robot.
 
@@ -250,7 +250,7 @@ def _planar(samples: Samples) -> bool:
     return range_basis(twists[3:], 1.0)[1].value <= 1 and range_basis(twists[:3], 1.0)[1].value <= 2
 
 
-def _exchanged(anatomy: Anatomy, found: Certificate) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
+def _exchanged(anatomy: LegDecomposition, found: Certificate) -> tuple[tuple[Freedom, ...], tuple[Freedom, ...]]:
     """The platform's freedoms that a wrong hidden robot gains and loses, at the configuration where they differ."""
     if found.mismatch is None or found.mismatch.real.twist_rows != 6:
         return (), ()

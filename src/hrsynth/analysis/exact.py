@@ -34,9 +34,9 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from ..kinematics.batch.stage import frames_at
+from ..batch.stage import frames_at
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.relation import Question, Relation
+from ..kinematics.relation import Measurement, Relation
 from ..mechanism import Mechanism, Observation
 from ..mechanism.carried import Tie, carried, ties
 from ..mechanism.model import JointType
@@ -45,7 +45,7 @@ from ..mechanism.relations import Relations, recognise
 from ..tolerances import CLOSED
 from .instances import LARGEST, Instance, NotRecognised, draw, instance, ranks_at
 from .kept import degree, kept
-from .setting import Setting, selected
+from .observed import ObservedRobot, selected
 from .verdict import word
 
 INSTANCES = 5
@@ -234,14 +234,14 @@ class ExactArchitecture:
         return best, INSTANCES
 
 
-def architecture(setting: Setting) -> ExactArchitecture:
+def architecture(setting: ObservedRobot) -> ExactArchitecture:
     """The architecture of a robot, from its zero configuration and its samples."""
     everything = setting.everything
     at = [everything.start, *setting.configurations]
     return architecture_of(setting.mechanism, everything.question, at, everything.members[0].relation)
 
 
-def architecture_of(mechanism: Mechanism, question: Question, at: Sequence[ClosedConfiguration], relation: Relation
+def architecture_of(mechanism: Mechanism, question: Measurement, at: Sequence[ClosedConfiguration], relation: Relation
                     ) -> ExactArchitecture:
     """The architecture of a mechanism from configurations ``at`` which relations must persist, and ρ at one of them."""
     places = [i for i, o in enumerate(question.observations) if type(o) is Direction]

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..kinematics.ranks import kernel_basis, range_basis
+from ..geometry.ranks import kernel_basis, range_basis
+from ..geometry.vectors import Array, unit
 from ..mechanism import JointType
-from ..mechanism.legs import Anatomy
-from ..mechanism.vectors import Array, unit
+from ..mechanism.legs import LegDecomposition
 from ..tolerances import NAMED
 
 _AXES = "xyz"
@@ -27,7 +27,7 @@ class Freedom:
         return {"twist": [round(float(value), 12) + 0.0 for value in self.twist], "name": self.name}
 
 
-def name_freedoms(twists: Array, anatomy: Anatomy, labels: tuple[str, ...] | None = None,
+def name_freedoms(twists: Array, anatomy: LegDecomposition, labels: tuple[str, ...] | None = None,
                   position: Array | None = None) -> tuple[Freedom, ...]:
     """Named twists that span the columns of ``twists`` (6, k), or (3, k) of a point body, in characteristic lengths of
     the mechanism, at the zero configuration.
@@ -90,7 +90,7 @@ def _spanned(twist: Array, found: list[Freedom]) -> bool:
     return bool(np.linalg.norm(_without(twist / np.linalg.norm(twist), found)) < NAMED)
 
 
-def _nice_directions(basis: Array, anatomy: Anatomy) -> list[Array]:
+def _nice_directions(basis: Array, anatomy: LegDecomposition) -> list[Array]:
     """Directions that span ``basis`` (3, k): base axes first, then P axes of the robot, then whatever is left."""
     candidates = [*np.eye(3)]
     candidates += [j.axis for j in anatomy.mechanism.joints.values() if j.type is JointType.PRISMATIC]
@@ -105,7 +105,7 @@ def _nice_directions(basis: Array, anatomy: Anatomy) -> list[Array]:
     return chosen
 
 
-def _name(direction: Array, anatomy: Anatomy) -> str:
+def _name(direction: Array, anatomy: LegDecomposition) -> str:
     for i in range(3):
         if abs(abs(direction[i]) - 1) < NAMED:
             return _AXES[i]
@@ -114,7 +114,7 @@ def _name(direction: Array, anatomy: Anatomy) -> str:
     return f"{point_text(direction)}, the axis of {along[0]}" if along else point_text(direction)
 
 
-def _tips(anatomy: Anatomy, labels: tuple[str, ...] | None) -> list[tuple[str, Array]]:
+def _tips(anatomy: LegDecomposition, labels: tuple[str, ...] | None) -> list[tuple[str, Array]]:
     """The centre of each leg's joints on the platform, by label."""
     tips = []
     for leg in anatomy.legs:
@@ -125,7 +125,7 @@ def _tips(anatomy: Anatomy, labels: tuple[str, ...] | None) -> list[tuple[str, A
     return tips
 
 
-def _lines(anatomy: Anatomy, labels: tuple[str, ...] | None) -> list[tuple[Array, Array, str]]:
+def _lines(anatomy: LegDecomposition, labels: tuple[str, ...] | None) -> list[tuple[Array, Array, str]]:
     """Lines (point, direction, name) that an engineer would name."""
     mechanism = anatomy.mechanism
     origin = mechanism.links[mechanism.platform].pose[:3, 3]
@@ -149,7 +149,7 @@ def _lines(anatomy: Anatomy, labels: tuple[str, ...] | None) -> list[tuple[Array
     return lines
 
 
-def _rotation(anatomy: Anatomy, point: Array, direction: Array) -> Array:
+def _rotation(anatomy: LegDecomposition, point: Array, direction: Array) -> Array:
     origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3]
     return np.concatenate([np.cross(direction, origin - point), direction])
 

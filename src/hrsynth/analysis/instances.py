@@ -16,9 +16,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..kinematics.ranks import rank_of
+from ..geometry.incidences import Incidence
+from ..geometry.ranks import rank_of
 from ..mechanism import Joint, Mechanism, graphs
-from ..mechanism.incidences import Incidence
 from ..mechanism.observation import Direction
 from ..mechanism.relations import Relations, Sight
 from ..mechanism.screws import Numbers, allowed, cross, normals

@@ -8,16 +8,16 @@ from typing import Any
 
 import numpy as np
 
+from ..geometry.ranks import range_basis
+from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.ranks import range_basis
 from ..kinematics.relation import Relation, relation, relation_of
 from ..mechanism.pose import Pose
-from ..mechanism.vectors import Array
 from ..tolerances import PASSED_BY, RANK_GAP
 from .classes import Classes, Counts, gap_of, generic, interaction_matrix
 from .freedoms import Freedom, name_freedoms
+from .observed import Mobility, ObservedRobot
 from .redundancy import Redundancy, Rows, listed, redundant_rows, surplus, usual_rows
-from .setting import Mobility, Setting
 
 UNDECIDED, REGULAR, CONSTRAINT = "undecided", "regular", "constraint"
 
@@ -125,7 +125,7 @@ class Posture:
 class Examiner:
     """A setting with its generic values, against which single configurations are held."""
 
-    setting: Setting
+    setting: ObservedRobot
 
     @cached_property
     def usual(self) -> Counts:

@@ -9,8 +9,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..geometry.ranks import Rank, rank_of
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.ranks import Rank, rank_of
 from ..tolerances import RANK_GAP
 
 
@@ -33,8 +33,8 @@ Rows = tuple[tuple[str, int], ...]
 
 
 def redundant_rows(at: ClosedConfiguration) -> Rows:
-    """Redundant rows of each loop, counted greedily in the order of ``Twin.loops``: all rows of a loop but those by
-    which it raises the rank of the loops before it. Empty where a rank is not decided."""
+    """Redundant rows of each loop, counted greedily in the order of ``PinocchioModel.loops``: all rows of a loop but
+    those by which it raises the rank of the loops before it. Empty where a rank is not decided."""
     J = at.twin.jacobian(at.q)
     names, sizes = at.twin.blocks
     scale = float(np.linalg.norm(J, 2)) if J.size else 1.0

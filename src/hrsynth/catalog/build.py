@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BuildStopped
-from .crews import Crew, crew
+from .executors import Crew, crew
 from .journal import Journal
 from .source import Made, Source, Stopped, architectures, made
 from .store import Store, store

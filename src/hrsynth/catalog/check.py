@@ -8,8 +8,8 @@ from pathlib import Path
 
 from ..errors import BadRequest
 from .build import Tell, made_by
-from .crews import Crew, crew
-from .lines import encoded, word_of
+from .executors import Crew, crew
+from .jsonl import encoded, word_of
 from .source import Source, architectures
 from .store import Folder, Store, store
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 
 from ..errors import HrsynthError
-from ..mechanism.legs import default_observation, dissect
+from ..mechanism.legs import decompose, default_observation
 from ..mechanism.normal import normal_form
 from .geometry import mechanism
 from .words import COMPOSITE, Leg, Word
@@ -57,7 +57,7 @@ def _watched(word: Word) -> dict[int, int]:
     """The place of the observed link in each leg: the joint inside or after which it lies; nothing where the mechanism
     cannot be made."""
     try:
-        anatomy = dissect(normal_form(mechanism(word)).mechanism)
+        anatomy = decompose(normal_form(mechanism(word)).mechanism)
         given = {seen.leg: seen.link for seen in anatomy.mechanism.observations}
         links = [given.get(leg.label) or default_observation(anatomy, leg).link for leg in anatomy.legs]
     except HrsynthError:

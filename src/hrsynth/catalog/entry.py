@@ -14,13 +14,13 @@ from ..analysis.controllability import CONTROLLABLE, Verdict, verdict_of
 from ..analysis.derive import derived
 from ..analysis.exact import ExactArchitecture, architecture
 from ..analysis.modes.modes import counted
-from ..analysis.setting import Setting, prepare, restricted, selected
-from ..analysis.singularity.measured import Measured
+from ..analysis.observed import ObservedRobot, prepare, restricted, selected
+from ..analysis.singularity.measured import MeasuredRobot
 from ..errors import BadRequest, HrsynthError, NotConfined, NotConfirmed, Unsolved
-from ..kinematics.ranks import range_basis
+from ..geometry.ranks import range_basis
 from ..kinematics.relation import Relation
 from ..kinematics.sampling import Samples
-from ..mechanism.legs import dissect
+from ..mechanism.legs import decompose
 from ..mechanism.normal import normal_form
 from ..mechanism.sensors import encoders
 from ..rewrite.strategy import Step
@@ -49,7 +49,7 @@ def entry(text: str) -> dict[str, Any]:
     if isinstance(found, str):
         return {**record, "refused": found}
     drawn = mechanism(word, found.attempt)
-    anatomy = dissect(normal_form(drawn).mechanism)
+    anatomy = decompose(normal_form(drawn).mechanism)
     driven = [joint for joint in drawn.joints.values() if joint.actuated]
     rank = found.driven([joint.name for joint in driven])
     return {**record, "notation": anatomy.architecture().ascii, **found.facts, "attempt": found.attempt or None,
@@ -141,7 +141,7 @@ def _kinds(word: Word) -> list[str]:
     return [f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs]
 
 
-def _smallest(setting: Setting, exact: ExactArchitecture, kinds: Sequence[str], best: Verdict
+def _smallest(setting: ObservedRobot, exact: ExactArchitecture, kinds: Sequence[str], best: Verdict
               ) -> list[tuple[str, ...]]:
     """The smallest sets of legs that see as much as all together, one of those that differ by equal legs; each rank
     exact and confirmed."""
@@ -178,7 +178,7 @@ def _steps(steps: Sequence[Step]) -> list[str]:
             for rule, part in ((rule, list(part)) for rule, part in groupby(taken, key=lambda step: step[0]))]
 
 
-def _motion(setting: Setting) -> str:
+def _motion(setting: ObservedRobot) -> str:
     """Translations and other motions of the platform at a generic configuration: 3T, 2T1R, 1T2R, 3T3R …"""
     twists = setting.everything.members[0].relation.twists
     turns = range_basis(twists[3:], 1.0)[1].value if twists.shape[0] > 3 else 0
@@ -191,14 +191,14 @@ def _general(name: str) -> str:
     return re.split(r" of pitch| (?:along|about the line through|about) \(", name)[0]
 
 
-def _singular(setting: Setting) -> dict[str, Any]:
+def _singular(setting: ObservedRobot) -> dict[str, Any]:
     """When the hidden robot loses a freedom, in words; None where that is not known in words."""
-    return {"condition": Measured.watched(setting).condition.words}
+    return {"condition": MeasuredRobot.watched(setting).condition.words}
 
 
-def _modes(setting: Setting, legs: Sequence[str]) -> dict[str, Any]:
+def _modes(setting: ObservedRobot, legs: Sequence[str]) -> dict[str, Any]:
     """Complex assembly modes of a smallest set of legs, and the most real ones of some configurations."""
-    measured = Measured.watched(replace(setting, observed=tuple(o for o in setting.segments if o.leg in legs)))
+    measured = MeasuredRobot.watched(replace(setting, observed=tuple(o for o in setting.segments if o.leg in legs)))
     bounds, seen = [], []
     try:
         for at in setting.configurations[:INSTANCES]:
@@ -222,7 +222,7 @@ def _cure(found: Advice) -> str:
     return first if found.cured else f"not all by {first}"
 
 
-def _encoders(setting: Setting) -> tuple[Relation, tuple[str, ...]]:
+def _encoders(setting: ObservedRobot) -> tuple[Relation, tuple[str, ...]]:
     """What encoders on all joints see at a configuration, and the joint of each."""
     every = [(joint.name, each) for joint in setting.mechanism.joints.values()
              for each in encoders(setting.mechanism, joint, "")]

@@ -8,7 +8,7 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 from ..errors import BadRequest
-from .lines import Record
+from .jsonl import Record
 
 EXACT = ("group", "dof", "motion", "verdict", "base_motors", "fewest")
 """Fields that have to be equal to what is asked for."""

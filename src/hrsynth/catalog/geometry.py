@@ -14,12 +14,12 @@ from typing import cast
 import numpy as np
 
 from ..errors import BadRequest
+from ..geometry.vectors import Array, perpendicular, rotation_about, unit
 from ..mechanism.builder import Builder
-from ..mechanism.legs import default_observation, dissect, observation_of
+from ..mechanism.legs import decompose, default_observation, observation_of
 from ..mechanism.model import Mechanism
 from ..mechanism.normal import normal_form
 from ..mechanism.observation import Direction
-from ..mechanism.vectors import Array, perpendicular, rotation_about, unit
 from .words import COMPOSITE, Joint, Leg, Word
 
 Z = np.array([0.0, 0.0, 1.0])
@@ -107,7 +107,7 @@ class _Draft:
 def _observed(drawn: Mechanism, word: Word, chords: Mapping[str, Direction]) -> Mechanism:
     """The mechanism with the segments that the word marks, and the chord of the last link (``chords``, by leg) where
     a leg has no segment by the rules, since its axes meet in a point."""
-    anatomy = dissect(normal_form(drawn).mechanism)
+    anatomy = decompose(normal_form(drawn).mechanism)
     found: list[Direction] = []
     for (label, chord), leg, limb in zip(chords.items(), word.legs, anatomy.legs, strict=True):
         try:

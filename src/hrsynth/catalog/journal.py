@@ -10,7 +10,7 @@ from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from ..errors import BadRequest, BuildStopped
-from .lines import head, require_version, word_of
+from .jsonl import head, require_version, word_of
 
 ENDING = ".part"
 

@@ -12,7 +12,7 @@ from typing import Any
 
 from ..errors import BadRequest
 from .fits import EXACT, fits, require
-from .lines import Record, record
+from .jsonl import Record, record
 from .store import DATABASES, Store, shipped, store
 from .words import parse
 

@@ -8,7 +8,7 @@ from itertools import groupby
 from typing import Any
 
 from ..errors import BadRequest, HrsynthError
-from .lines import line
+from .jsonl import line
 
 Group = Callable[[], Iterable[str]]
 Made = list[tuple[str, str]]

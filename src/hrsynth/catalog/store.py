@@ -14,7 +14,7 @@ from ..description.files import drafted
 from ..errors import BadRequest, BuildStopped
 from . import tables
 from .journal import ENDING, Journal
-from .lines import decoded, encoded
+from .jsonl import decoded, encoded
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Endings of a store that is one SQLite file."""

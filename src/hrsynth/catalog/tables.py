@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadRequest
-from .lines import FORMAT, record, require_version, word_of
+from .jsonl import FORMAT, record, require_version, word_of
 from .words import VERSION
 
 COLUMNS = {"legs": "INTEGER", "dof": "INTEGER", "motion": "TEXT", "verdict": "TEXT", "base_motors": "INTEGER",

@@ -37,7 +37,7 @@ def servo(
     """A servo run on the directions of legs, simulated: where it ends, and what it passes on the way."""
     from ..present import records, runs
     from ..present.text.servo import servo as written
-    from ..servo.servo import servo as run
+    from ..simulation.servo import servo as run
 
     runs.writable(output)
     with Progress() as progress:

@@ -20,8 +20,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from ..geometry.vectors import Array, perpendicular
 from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor
-from ..mechanism.vectors import Array, perpendicular
 from ..tolerances import SAME_DIRECTION, SAME_POINT
 
 TIP = "__tip"

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import LoopsNotClosed
+from ..geometry.vectors import Array
 from ..mechanism.model import JointType
-from ..mechanism.vectors import Array
 from ..tolerances import SAME_DIRECTION, SAME_GEOMETRY
 
 

@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..geometry.vectors import Array, frozen
 from ..mechanism.model import JointType, Limits, Motor
-from ..mechanism.vectors import Array, frozen
 
 ORIGIN = frozen(np.eye(4))
 

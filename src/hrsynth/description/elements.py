@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import Defect
+from ..geometry.vectors import Array, unit
 from ..mechanism.model import JointType, Limits
-from ..mechanism.vectors import Array, unit
 from . import numerals, xml
 from .draft import ORIGIN
 

@@ -12,7 +12,7 @@ import re
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..mechanism.vectors import Array, pose, rotation_about, rotation_from_rpy
+from ..geometry.vectors import Array, pose, rotation_about, rotation_from_rpy
 
 ANGLE_DECIMALS = 13
 """Decimals of angles and of the components of axes."""

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 
 from ..errors import BadMechanism
+from ..geometry.vectors import inverse
 from ..mechanism import graphs
 from ..mechanism.model import Joint, JointType, Link, Mechanism
-from ..mechanism.vectors import inverse
 from . import chains
 
 _COST = {

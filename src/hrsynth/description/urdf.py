@@ -8,8 +8,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..geometry.vectors import perpendicular
 from ..mechanism.model import Coupling, JointType, Link, Motor
-from ..mechanism.vectors import perpendicular
 from . import xml
 from .draft import ORIGIN, Edge, End
 from .elements import Elements

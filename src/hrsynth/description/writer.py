@@ -10,9 +10,9 @@ import numpy as np
 from lxml import etree
 
 from ..errors import BadRequest
+from ..geometry.vectors import Array, frozen, inverse, pose, unit
 from ..mechanism.model import Joint, JointType, Limits, Mechanism, Motor
 from ..mechanism.observation import Direction
-from ..mechanism.vectors import Array, frozen, inverse, pose, unit
 from ..tolerances import SAME_DIRECTION
 from . import chains, numerals, xml
 from .tree import outward, spanning

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..geometry.vectors import Array, rotation_about
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
-from ..mechanism.vectors import Array, rotation_about
 from .geometry import Z, on_circle, on_line, polar, radial, tangent
 
 QUATTRO_ANGLES = (-3 * math.pi / 4, -math.pi / 4, math.pi / 4, 3 * math.pi / 4)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..errors import BadRequest
-from ..mechanism.vectors import Array, unit
+from ..geometry.vectors import Array, unit
 
 Z = np.array([0.0, 0.0, 1.0])
 

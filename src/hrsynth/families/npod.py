@@ -12,9 +12,9 @@ import math
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..geometry.vectors import Array, rotation_about, unit
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
-from ..mechanism.vectors import Array, rotation_about, unit
 from .geometry import Z, polar, tangent
 
 THREE_ANGLES = (0.0, 2 * math.pi / 3, 4 * math.pi / 3)

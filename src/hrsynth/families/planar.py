@@ -16,9 +16,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import BadRequest
+from ..geometry.vectors import Array, unit
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
-from ..mechanism.vectors import Array, unit
 from .geometry import Z, on_circle, on_line, polar, radial
 
 Pairs = Sequence[tuple[float, float]]

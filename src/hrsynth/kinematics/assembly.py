@@ -15,16 +15,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import LoopsNotClosed
+from ..geometry.vectors import Array, inverse
 from ..mechanism import Joint, JointType, Mechanism, Observation
-from ..mechanism.legs import Anatomy, Leg
-from ..mechanism.vectors import Array, inverse
+from ..mechanism.legs import Leg, LegDecomposition
 from ..tolerances import CLOSED, SAME_POINT, SOLVED
 from . import wrists
 from .closures import UNDECIDED, Closures, End, Miss, leg_closures
 from .configuration import ClosedConfiguration, Target, closed
+from .leg_reach import alone
 from .locked import placed
-from .misses import alone
-from .twin import Twin
+from .pinocchio_model import PinocchioModel
 from .ways import Part, ways
 
 STARTS = 24
@@ -72,13 +72,13 @@ class Assembly:
 class Assembler:
     """A robot whose legs are closed one at a time between the base and bodies of the platform at given poses."""
 
-    anatomy: Anatomy
+    anatomy: LegDecomposition
     length: float
     reference: str
 
     @cached_property
-    def _twins(self) -> dict[str, Twin]:
-        return {leg.label: Twin(alone(self.anatomy, leg), self.length) for leg in self.anatomy.legs}
+    def _twins(self) -> dict[str, PinocchioModel]:
+        return {leg.label: PinocchioModel(alone(self.anatomy, leg), self.length) for leg in self.anatomy.legs}
 
     @cached_property
     def _platform(self) -> Mechanism:
@@ -98,7 +98,8 @@ class Assembler:
         mechanism, body = self._platform, self.anatomy.legs[0].attach
         displacement = bodies[body] @ inverse(mechanism.links[body].pose)
         poses = {link: displacement @ mechanism.links[link].pose for link in self.anatomy.platform}
-        twin = Twin(placed(mechanism, {mechanism.base: mechanism.links[mechanism.base].pose, **poses}), self.length)
+        base = mechanism.links[mechanism.base].pose
+        twin = PinocchioModel(placed(mechanism, {mechanism.base: base, **poses}), self.length)
         target = _Poses(tuple(bodies.items()))
         residual = np.inf
         for start in _starts(twin):
@@ -132,7 +133,8 @@ class Assembler:
         if missing:
             return Assembly(None, tuple(missing), (), platform, tuple(misses))
         mechanism = self.anatomy.mechanism
-        whole = Twin(placed(mechanism, {mechanism.base: mechanism.links[mechanism.base].pose, **poses}), self.length)
+        base = mechanism.links[mechanism.base].pose
+        whole = PinocchioModel(placed(mechanism, {mechanism.base: base, **poses}), self.length)
         return Assembly(ClosedConfiguration.of(whole, whole.q0), (), tuple(beyond), platform, (), held)
 
     def _leg(self, leg: Leg, X: Array, measured: Sequence[tuple[Observation, Array]], within: float) -> _Closing:
@@ -158,7 +160,7 @@ class Assembler:
             first = q if first is None else first
         return _Closing(None if first is None else (twin, first), None, held)
 
-    def _closed(self, twin: Twin, start: Array, target: Target) -> Array | None:
+    def _closed(self, twin: PinocchioModel, start: Array, target: Target) -> Array | None:
         """The closed configuration that a start leads to."""
         q, residual = closed(twin, start, target, tolerance=SOLVED, iterations=FAR)
         turned = target.point is not None or _turned_as(twin.pose(q, target.link), target.pose)
@@ -170,7 +172,7 @@ class _Closing:
     """A leg at a pose: its closed configuration (twin, q), or what proves that there is none, or neither; whether all
     its closures are beyond limits."""
 
-    found: tuple[Twin, Array] | None
+    found: tuple[PinocchioModel, Array] | None
     miss: Miss | None = None
     held: bool = False
 
@@ -181,7 +183,7 @@ class _Poses:
 
     wanted: tuple[tuple[str, Array], ...]
 
-    def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
         parts = [Target(link, X, None, twin.mechanism.base, ()).rows(twin, q) for link, X in self.wanted]
         return np.concatenate([error for error, _ in parts]), np.vstack([rows for _, rows in parts])
 
@@ -191,7 +193,7 @@ def _turned_as(X: Array, wanted: Array) -> bool:
     return float(np.trace(X[:3, :3].T @ wanted[:3, :3])) > 1.0
 
 
-def _starts(twin: Twin, known: Closures = UNDECIDED) -> Iterator[Array]:
+def _starts(twin: PinocchioModel, known: Closures = UNDECIDED) -> Iterator[Array]:
     """Configurations with the joints' values that are known, other joints as at zero, then at random, always the same;
     last without values."""
     rng = np.random.default_rng(0)
@@ -207,7 +209,7 @@ def _starts(twin: Twin, known: Closures = UNDECIDED) -> Iterator[Array]:
             yield twin.moved(twin.q0, step)
 
 
-def outside(twin: Twin, q: Array, joints: Sequence[str]) -> list[str]:
+def outside(twin: PinocchioModel, q: Array, joints: Sequence[str]) -> list[str]:
     """Those joints, turning or sliding about one axis, whose coordinates are outside their limits (turns count
     modulo 2π), and the wrists beyond their intervals."""
     moved = twin.difference(twin.q0, q)

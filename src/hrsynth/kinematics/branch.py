@@ -10,10 +10,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..mechanism.vectors import Array
+from ..geometry.ranks import largest_angle
+from ..geometry.vectors import Array
 from ..tolerances import NUDGE
 from .configuration import ClosedConfiguration
-from .ranks import largest_angle
 
 TURNED = 0.3
 """Largest principal angle (radians) between the tangent spaces at both ends of a step."""

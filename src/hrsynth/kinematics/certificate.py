@@ -9,15 +9,15 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadMechanism
+from ..geometry.ranks import CLEAN, kernel_basis, largest_angle
+from ..geometry.vectors import Array
 from ..mechanism import Mechanism
-from ..mechanism.vectors import Array
 from ..results import Result
 from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
 from .configuration import ClosedConfiguration, Target
-from .ranks import CLEAN, kernel_basis, largest_angle
-from .relation import Question, Relation, relation
+from .pinocchio_model import PinocchioModel
+from .relation import Measurement, Relation, relation
 from .sampling import Samples, followed
-from .twin import Twin
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         return Certificate(len(members), samples.discarded, angle, gap, worst, not reason, reason, mismatch)
 
     try:
-        twin = Twin(hidden, samples.twin.length)
+        twin = PinocchioModel(hidden, samples.twin.length)
     except BadMechanism as error:
         angle = np.pi / 2
         return verdict(str(error))
@@ -121,7 +121,7 @@ def _difference(ours: Relation, theirs: Relation, angle: float) -> str:
     return f"ρ turns by {angle:.2g} rad"
 
 
-def _parametrise(at: ClosedConfiguration, question: Question, active: list[int], blind: frozenset[str],
+def _parametrise(at: ClosedConfiguration, question: Measurement, active: list[int], blind: frozenset[str],
                  complete: bool) -> bool:
     """Whether each actuator's rate follows from the rate of one observation alone, and (``complete``) each
     observation's rate from those of its own actuators."""

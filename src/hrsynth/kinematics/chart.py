@@ -12,12 +12,12 @@ import numpy as np
 import pinocchio as pin
 
 from ..errors import LoopsNotClosed
-from ..mechanism.vectors import Array
+from ..geometry.ranks import range_basis
+from ..geometry.vectors import Array
 from ..tolerances import CLOSED, SOLVED
 from .configuration import ClosedConfiguration, closed
-from .ranks import range_basis
-from .relation import Question
-from .twin import Twin
+from .pinocchio_model import PinocchioModel
+from .relation import Measurement
 
 WIDE = 0.5
 """Length of y (characteristic lengths, radians) beyond which another chart should take over."""
@@ -30,7 +30,7 @@ class _Coordinates:
     chart: Chart
     y: Array
 
-    def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
         basis = self.chart.basis
         return basis.T @ twin.difference(self.chart.centre.q, q) - self.y, self.chart.slope(q)
@@ -44,7 +44,7 @@ class Chart:
     basis: Array
 
     @classmethod
-    def around(cls, centre: ClosedConfiguration, question: Question) -> Chart:
+    def around(cls, centre: ClosedConfiguration, question: Measurement) -> Chart:
         """The chart whose directions are those that move the platform or anything that is observed."""
         kernel, _ = centre.kernel()
         image = question.rows(centre) @ kernel

@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from ..mechanism.so3 import logarithm
-from ..mechanism.vectors import Array, inverse, perpendicular
+from ..geometry.balls import Field, around, cross
+from ..geometry.so3 import logarithm
+from ..geometry.vectors import Array, inverse, perpendicular
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY
-from .balls import Field, around, cross
 from .ways import Part
 
 

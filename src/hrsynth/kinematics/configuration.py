@@ -15,24 +15,24 @@ from typing import Protocol
 import numpy as np
 
 from ..errors import LoopsNotClosed
+from ..geometry.ranks import Rank, Spectrum, spectrum
+from ..geometry.so3 import logarithm
+from ..geometry.vectors import Array, frozen, hat
 from ..mechanism.observation import Observation
-from ..mechanism.so3 import logarithm
-from ..mechanism.vectors import Array, frozen, hat
 from ..tolerances import CLOSED
-from .ranks import Rank, Spectrum, spectrum
-from .twin import Twin
+from .pinocchio_model import PinocchioModel
 
 
 @dataclass(frozen=True, eq=False)
 class ClosedConfiguration:
     """A configuration of a twin whose loops are closed to ``tolerances.CLOSED``; ``q`` is read-only."""
 
-    twin: Twin
+    twin: PinocchioModel
     q: Array
     residual: float
 
     @classmethod
-    def of(cls, twin: Twin, q: Array, tolerance: float = CLOSED) -> ClosedConfiguration:
+    def of(cls, twin: PinocchioModel, q: Array, tolerance: float = CLOSED) -> ClosedConfiguration:
         """``q`` itself, if it is closed; raises ``LoopsNotClosed`` with the loop that misses most."""
         q = frozen(q)
         residual = float(np.linalg.norm(twin.residual(q)))
@@ -45,7 +45,7 @@ class ClosedConfiguration:
         return self.twin.pose(self.q, link)
 
     def velocity(self, link: str) -> Array:
-        """V (6, nv) of a link's frame, see :meth:`Twin.velocity`."""
+        """V (6, nv) of a link's frame, see :meth:`PinocchioModel.velocity`."""
         return self.twin.velocity(self.q, link)
 
     @cached_property
@@ -66,7 +66,7 @@ class ClosedConfiguration:
 class Wanted(Protocol):
     """What a configuration is to reach besides closed loops."""
 
-    def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
 
 
@@ -88,7 +88,7 @@ class Target:
     reference: str
     measured: tuple[tuple[Observation, Array], ...]
 
-    def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) and its Jacobian."""
         observations = tuple(o for o, _ in self.measured)
         frames, velocities, values, rates = measure(twin, q, self.reference, observations, (self.link,))
@@ -104,8 +104,8 @@ class Target:
         return np.concatenate(errors), np.concatenate([*blocks, *rates])
 
 
-def measure(twin: Twin, q: Array, reference: str, observations: Sequence[Observation], links: Sequence[str] = ()
-            ) -> tuple[Array, Array, list[Array], list[Array]]:
+def measure(twin: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation],
+            links: Sequence[str] = ()) -> tuple[Array, Array, list[Array], list[Array]]:
     """Poses (k, 4, 4) and velocities (k, 6, nv) of ``links``; the value (size,) and the rates (size, nv) of each
     observation, seen from ``reference`` where it names no link of its own, lengths in characteristic lengths."""
     names, groups = _grouped(reference, tuple(observations), tuple(links))
@@ -157,7 +157,7 @@ def point_velocity(V: Array, X: Array, point: Array, length: float) -> Array:
     return V[:3] - hat(X[:3, :3] @ point / length) @ V[3:]
 
 
-def closed(twin: Twin, q: Array, target: Wanted | None = None, *, tolerance: float = CLOSED,
+def closed(twin: PinocchioModel, q: Array, target: Wanted | None = None, *, tolerance: float = CLOSED,
            iterations: int = 30) -> tuple[Array, float]:
     """Damped Gauss-Newton from ``q``: the configuration reached and the residual left (loops and target).
 
@@ -190,7 +190,7 @@ def limited(step: Array, longest: float) -> Array:
     return step * (longest / largest) if largest > longest else step
 
 
-def system(twin: Twin, q: Array, target: Wanted | None) -> tuple[Array, Array]:
+def system(twin: PinocchioModel, q: Array, target: Wanted | None) -> tuple[Array, Array]:
     """Error and Jacobian of the loops and, below them, of the target."""
     error, J = twin.residual(q), twin.jacobian(q)
     if target is None:

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..mechanism.so3 import logarithm, logarithm_rate, turn_about, wrapped
-from ..mechanism.vectors import Array
+from ..geometry.so3 import logarithm, logarithm_rate, turn_about, wrapped
+from ..geometry.vectors import Array
 from ..tolerances import SAME_DIRECTION
 from .configuration import ClosedConfiguration, point_velocity
-from .parts import PlatformMotion
-from .relation import Question, relation
+from .pinocchio_model import PinocchioModel
+from .platform_motion import PlatformMotion
+from .relation import Measurement, relation
 from .steps import led
-from .twin import Twin
 
 NAMES = ("x", "y", "z", "turn about x", "turn about y", "turn about z")
 INDEPENDENT = 0.1
@@ -40,7 +40,7 @@ class Coordinates:
     values: Array
 
     @classmethod
-    def of(cls, start: ClosedConfiguration, question: Question, motion: PlatformMotion) -> Coordinates:
+    def of(cls, start: ClosedConfiguration, question: Measurement, motion: PlatformMotion) -> Coordinates:
         """Those of a configuration that tell its neighbours apart, positions before turns; where it has other freedoms
         than the platform generically has, those of the generic motion."""
         twists = relation(start, replace(question, observations=(), bodies=())).twists
@@ -88,7 +88,7 @@ class Coordinates:
         turn = logarithm(R)
         return turn, logarithm_rate(turn)
 
-    def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
         """Error (reached − wanted) in characteristic lengths and radians, and its Jacobian."""
         frames, velocities = twin.frames(q, (self.motion.link,))
         X, V = frames[0], velocities[0]

@@ -11,14 +11,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..geometry.ranks import kernel_basis, range_basis
+from ..geometry.vectors import Array, hat, inverse
 from ..mechanism import Joint, Mechanism, Observation
 from ..mechanism.legs import Leg
 from ..mechanism.screws import constraints
-from ..mechanism.vectors import Array, hat, inverse
 from ..tolerances import INVERTED
 from .configuration import ClosedConfiguration, point_velocity
-from .ranks import kernel_basis, range_basis
-from .relation import Question
+from .relation import Measurement
 
 
 class _Bodies:
@@ -66,7 +66,7 @@ def leg_twists(at: ClosedConfiguration, leg: Leg, locks: Sequence[Observation], 
     return range_basis(kernel[:6], 1.0)[0]
 
 
-def interaction(at: ClosedConfiguration, question: Question) -> Array:
+def interaction(at: ClosedConfiguration, question: Measurement) -> Array:
     """Mᵀ on an orthonormal basis of the platform's twists, (rows, d), by the screws of all joints: u̇ = Mᵀ x.
 
     Where observed links move while the platform rests, that part of u̇ is left out of it."""

@@ -9,10 +9,10 @@ from itertools import combinations
 
 import numpy as np
 
-from ..mechanism.vectors import Array
+from ..geometry.ranks import range_basis, singular_values
+from ..geometry.vectors import Array
 from ..tolerances import SURELY_SOMETHING, SURELY_ZERO
 from .configuration import ClosedConfiguration
-from .ranks import range_basis, singular_values
 from .relation import Relation
 
 LARGEST_WHOLE = 4

@@ -7,15 +7,15 @@ from functools import cached_property
 
 import numpy as np
 
+from ..geometry.ranks import Rank, kernel_basis, range_basis
+from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
-from ..mechanism.vectors import Array
 from ..tolerances import INVERTED
 from .configuration import ClosedConfiguration, Target, measure, point_velocity
-from .ranks import Rank, kernel_basis, range_basis
 
 
 @dataclass(frozen=True, eq=False)
-class Question:
+class Measurement:
     """What is asked of a mechanism: the twist t of ``platform`` and the rates of ``observations`` seen from
     ``reference``; ``bodies`` are further links whose twists count too.
 
@@ -129,7 +129,7 @@ class Relation:
         return self.dof.value - self.lost.shape[1]
 
 
-def platform_motions(at: ClosedConfiguration, question: Question) -> Array:
+def platform_motions(at: ClosedConfiguration, question: Measurement) -> Array:
     """Joint velocities (nv, dof), without idle motions, that move the platform by an orthonormal basis of its twists
     (characteristic lengths)."""
     kernel, _ = at.kernel()
@@ -138,12 +138,12 @@ def platform_motions(at: ClosedConfiguration, question: Question) -> Array:
     return np.asarray(kernel @ np.linalg.lstsq(image, moves, rcond=INVERTED)[0])
 
 
-def relation(at: ClosedConfiguration, question: Question, *, blind: frozenset[str] = frozenset()) -> Relation:
+def relation(at: ClosedConfiguration, question: Measurement, *, blind: frozenset[str] = frozenset()) -> Relation:
     """ρ at a closed configuration."""
     return _relation(at, question.rows(at, blind=blind), question.twist_rows, question.sizes)
 
 
-def relation_of(at: ClosedConfiguration, question: Question, rows: Array) -> Relation:
+def relation_of(at: ClosedConfiguration, question: Measurement, rows: Array) -> Relation:
     """ρ between the platform's twist and what ``rows`` (measured, nv) make of the joint rates, each a measurement of
     its own: the motors' coordinates, for one."""
     twist = replace(question, observations=(), bodies=()).rows(at)

@@ -14,15 +14,15 @@ from functools import cached_property
 import numpy as np
 
 from ..errors import BadMechanism, BranchPoint, NotSampled
+from ..geometry.ranks import kernel_basis, largest_angle, range_basis
+from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
-from ..mechanism.vectors import Array
 from ..tolerances import CLOSED, EXACT, FOLLOWED, INVERTED, NUDGE, PASSED_BY, RANK_GAP, SHARP, SOLVED
 from .branch import CORRECTED, follows
 from .configuration import ClosedConfiguration, Target, closed, limited
 from .operation import OperationMode, Signature, grouped
-from .ranks import kernel_basis, largest_angle, range_basis
-from .relation import Question, Relation, relation
-from .twin import Twin
+from .pinocchio_model import PinocchioModel
+from .relation import Measurement, Relation, relation
 
 STEP = 0.11
 """Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
@@ -70,8 +70,8 @@ class Samples:
     """Samples of one mechanism for one question; ``discarded`` draws did not stay on the branch or came too near to a
     singularity. ``met`` are other operation modes that steps too long would have led to."""
 
-    question: Question
-    twin: Twin
+    question: Measurement
+    twin: PinocchioModel
     start: ClosedConfiguration
     members: tuple[Sample, ...]
     discarded: int
@@ -90,8 +90,8 @@ class Samples:
         return Signature.of(self.members[0].relation)
 
 
-def draw(twin: Twin, question: Question, count: int, seed: int = 0, *, led_by: Sequence[Observation] | None = None,
-         progress: Callable[[], None] | None = None) -> Samples:
+def draw(twin: PinocchioModel, question: Measurement, count: int, seed: int = 0, *,
+         led_by: Sequence[Observation] | None = None, progress: Callable[[], None] | None = None) -> Samples:
     """``count`` random samples of one operation mode; raises ``NotSampled`` where too few can be reached,
     ``BranchPoint`` where the zero configuration belongs to several.
 
@@ -119,7 +119,7 @@ def draw(twin: Twin, question: Question, count: int, seed: int = 0, *, led_by: S
     return Samples(question, twin, start, tuple(members), discarded, _others(walks.beyond, own, question), led)
 
 
-def _others(beyond: Sequence[ClosedConfiguration], own: Signature, question: Question) -> tuple[OperationMode, ...]:
+def _others(beyond: Sequence[ClosedConfiguration], own: Signature, question: Measurement) -> tuple[OperationMode, ...]:
     """The operation modes other than one's own to which configurations belong, each confirmed by walks from there."""
     some = beyond[:: max(1, len(beyond) // ASKED)]
     strange = [at for at in some if (each := _mode(at, question)) and not each.signature.agrees(own)]
@@ -128,7 +128,7 @@ def _others(beyond: Sequence[ClosedConfiguration], own: Signature, question: Que
     return tuple(group[0] for group in found if not group[0].signature.agrees(own))
 
 
-def _mode(at: ClosedConfiguration, question: Question) -> OperationMode | None:
+def _mode(at: ClosedConfiguration, question: Measurement) -> OperationMode | None:
     """The operation mode that a configuration shows; None where its ranks are not clear, as beside a singularity."""
     if (steady := _steady(at)) is None or steady.kernel()[1].dropped > EXACT:
         return None
@@ -136,7 +136,7 @@ def _mode(at: ClosedConfiguration, question: Question) -> OperationMode | None:
     return OperationMode(Signature.of(found), at) if found.gap >= RANK_GAP else None
 
 
-def _ways_out(start: ClosedConfiguration, question: Question, rng: np.random.Generator) -> list[ClosedConfiguration]:
+def _ways_out(start: ClosedConfiguration, question: Measurement, rng: np.random.Generator) -> list[ClosedConfiguration]:
     """Configurations beside a singular zero configuration; raises ``BranchPoint`` where they are not of one mode."""
     found = [each for _ in range(LEAVING)
              if (beside := _moved(start, _anywhere(start, rng), leaving=True)) is not None
@@ -149,7 +149,7 @@ def _ways_out(start: ClosedConfiguration, question: Question, rng: np.random.Gen
     return [each.at for each in found]
 
 
-def _require_one(groups: Sequence[Sequence[OperationMode]], question: Question, what: str) -> None:
+def _require_one(groups: Sequence[Sequence[OperationMode]], question: Measurement, what: str) -> None:
     if len(groups) > 1:
         first, at = groups[0][0].signature, groups[0][0].at
         others = [groups[1][0].signature, *[first] * (len(groups) - 1)]
@@ -158,7 +158,7 @@ def _require_one(groups: Sequence[Sequence[OperationMode]], question: Question, 
                                                                                            strict=True)])
 
 
-def _velocity(at: ClosedConfiguration, question: Question, wish: Array | None, rng: np.random.Generator | None
+def _velocity(at: ClosedConfiguration, question: Measurement, wish: Array | None, rng: np.random.Generator | None
               ) -> tuple[Array, Array] | None:
     """A joint velocity without idle motion whose (t, u̇) is a unit vector: near ``wish``, or random; without ``rng``
     as ``wish`` as can be."""
@@ -197,7 +197,7 @@ class _Walks:
     """Random walks of one seed, in idle motions too where they go ``freely``; ``beyond`` collects closed configurations
     that too long steps came to."""
 
-    def __init__(self, question: Question, leading: set[tuple[str, ...]], rng: np.random.Generator, freely: bool
+    def __init__(self, question: Measurement, leading: set[tuple[str, ...]], rng: np.random.Generator, freely: bool
                  ) -> None:
         self.question, self.leading, self.rng, self.freely = question, leading, rng, freely
         self.beyond: list[ClosedConfiguration] = []
@@ -346,7 +346,7 @@ def wander(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 4
             raise NotSampled(start.twin.mechanism.name, given, count)
 
 
-def followed(twin: Twin, way: Sequence[Target], iterations: int = 120) -> tuple[Array, float]:
+def followed(twin: PinocchioModel, way: Sequence[Target], iterations: int = 120) -> tuple[Array, float]:
     """The configuration a twin reaches when it is led from its zero configuration along a way, and the residual."""
     q, residual = twin.q0, 0.0
     for target in way:

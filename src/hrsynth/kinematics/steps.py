@@ -6,13 +6,13 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ..mechanism.vectors import Array
+from ..geometry.ranks import kernel_basis, range_basis
+from ..geometry.vectors import Array
 from ..tolerances import AS_PRINTED, CLOSED, FOLLOWED, NEAREST, PASSED_BY, RANK_CUTOFF, SOLVED
 from .branch import follows, nears
 from .configuration import Aim, ClosedConfiguration, closed, limited, system
-from .parts import Goal, PlatformMotion
-from .ranks import kernel_basis, range_basis
-from .twin import Twin
+from .pinocchio_model import PinocchioModel
+from .platform_motion import Goal, PlatformMotion
 from .wrists import beyond
 
 STRIDE = 0.1
@@ -164,7 +164,7 @@ def polished(here: ClosedConfiguration, goal: Aim) -> ClosedConfiguration:
     return ClosedConfiguration.of(twin, _on_fold(twin, q, goal))
 
 
-def _on_fold(twin: Twin, q: Array, goal: Aim) -> Array:
+def _on_fold(twin: PinocchioModel, q: Array, goal: Aim) -> Array:
     """The configuration on a fold of the way (the edge of the workspace) where ``q`` cannot be told from it: where the
     weak singular value of loops and goal vanishes, if the residual stays within ``SOLVED`` there."""
     rows = system(twin, q, goal)[1]

@@ -12,13 +12,13 @@ from itertools import islice
 
 import numpy as np
 
+from ..geometry.balls import Field
+from ..geometry.lines import common_perpendicular, distance
+from ..geometry.vectors import Array
 from ..mechanism import Joint, JointType
-from ..mechanism.legs import Anatomy, Leg
-from ..mechanism.lines import common_perpendicular, distance
-from ..mechanism.vectors import Array
+from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.wrist import Wrist
 from ..tolerances import SAME_GEOMETRY
-from .balls import Field
 
 WAYS = 16
 """Ways of one leg that are looked at, at most."""
@@ -67,7 +67,7 @@ class Part:
         return replace(self, axis=None if self.axis is None else -self.axis, pair=pair, limit=limit)
 
 
-def ways(anatomy: Anatomy, leg: Leg) -> Iterator[tuple[Part, ...]]:
+def ways(anatomy: LegDecomposition, leg: Leg) -> Iterator[tuple[Part, ...]]:
     """The ways from the base to the link on which a leg ends, up to ``WAYS``, without those through a free joint; where
     the platform is a point, any turn about it is their last part."""
     mechanism = anatomy.mechanism

@@ -9,19 +9,19 @@ from typing import Any
 
 import numpy as np
 
-from ..mechanism.vectors import Array
+from ..geometry.balls import Field, around, cross, dot
+from ..geometry.vectors import Array
 from ..mechanism.wrist import Wrist
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY, SAME_POINT
-from .balls import Field, around, cross, dot
 from .configuration import ClosedConfiguration
-from .twin import Twin
+from .pinocchio_model import PinocchioModel
 from .ways import Part
 
 AT_END = 1e-2
 """Angle (rad) from the end of a wrist's interval within which it is named where a way ends."""
 
 
-def margins(twin: Twin, q: Array) -> dict[str, float]:
+def margins(twin: PinocchioModel, q: Array) -> dict[str, float]:
     """How far each wrist is from the nearer end of its interval (rad); negative beyond it."""
     mechanism = twin.mechanism
     found = {}
@@ -32,7 +32,7 @@ def margins(twin: Twin, q: Array) -> dict[str, float]:
     return found
 
 
-def beyond(twin: Twin, q: Array) -> list[str]:
+def beyond(twin: PinocchioModel, q: Array) -> list[str]:
     """The wrists that would have to make a turn that they cannot."""
     return [name for name, margin in margins(twin, q).items() if margin < -SAME_POINT]
 

@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..geometry.vectors import pose
 from .model import Coupling, Joint, JointType, Link, Mechanism, Motor
 from .observation import Direction
-from .vectors import pose
 
 
 class Builder:

@@ -12,12 +12,13 @@ from itertools import combinations
 
 import numpy as np
 
+from ..geometry import lines
+from ..geometry.vectors import Array
 from ..tolerances import SAME_POINT
-from . import graphs, lines
+from . import graphs
 from .model import JointType, Mechanism
 from .normal import centre_pair
 from .notation import Bar, Carrier, Letter, Rods, Word
-from .vectors import Array
 
 
 @dataclass(frozen=True)

@@ -15,14 +15,15 @@ from itertools import combinations, pairwise
 import numpy as np
 
 from ..errors import BadMechanism, BadRequest, BadRobotFile, Defect
+from ..geometry import lines
+from ..geometry.vectors import Array, unit
 from ..tolerances import SAME_POINT
-from . import graphs, lines
+from . import graphs
 from .composites import Edge, WordGraph
 from .model import Joint, JointType, Mechanism
 from .normal import centre_pair
 from .notation import Architecture, Bar, Carrier, Letter, Word
 from .observation import Direction
-from .vectors import Array, unit
 
 
 @dataclass(frozen=True)
@@ -41,7 +42,7 @@ class Leg:
 
 
 @dataclass(frozen=True, eq=False)
-class Anatomy:
+class LegDecomposition:
     """A mechanism taken apart: platform links and legs, in the order of the mechanism's links."""
 
     mechanism: Mechanism
@@ -144,7 +145,7 @@ def _paths_word(graph: WordGraph, start: str, end: str) -> Word:
     return Word((Bar(branches),)) if len(branches) > 1 else branches[0]
 
 
-def dissect(mechanism: Mechanism) -> Anatomy:
+def decompose(mechanism: Mechanism) -> LegDecomposition:
     """Platform and legs of a mechanism in normal form; raises ``BadMechanism`` where there is no leg, ``BadRobotFile``
     where the observations contradict the legs."""
     graph = WordGraph(mechanism, {mechanism.base, mechanism.platform}).recognise().recognise_carriers().adjacency()
@@ -170,7 +171,7 @@ def dissect(mechanism: Mechanism) -> Anatomy:
     legs = _segment_platform(mechanism, platform, legs)
     joint_order = {name: i for i, name in enumerate(mechanism.joints)}
     legs.sort(key=lambda leg: (order[leg.links[0]] if leg.links else order[leg.attach], joint_order[leg.joints[0]]))
-    return _labelled(Anatomy(mechanism, tuple(sorted(platform, key=order.__getitem__)), tuple(legs)))
+    return _labelled(LegDecomposition(mechanism, tuple(sorted(platform, key=order.__getitem__)), tuple(legs)))
 
 
 def _platform(mechanism: Mechanism, graph: graphs.Adjacency) -> set[str]:
@@ -212,7 +213,7 @@ def _segment_platform(mechanism: Mechanism, platform: set[str], legs: list[Leg])
     """In a single loop with one freedom more on one side, the platform is the last segment of the shorter leg."""
     if len(platform) != 1 or len(legs) != 2 or len(mechanism.joints_of(mechanism.platform)) != 2:
         return legs
-    anatomy = Anatomy(mechanism, tuple(platform), tuple(legs))
+    anatomy = LegDecomposition(mechanism, tuple(platform), tuple(legs))
     one, two = (_freedoms(anatomy.word(leg)) for leg in legs)
     if one is None or two is None or abs(one - two) != 1:
         return legs
@@ -238,7 +239,7 @@ def _freedoms(word: Word) -> int | None:
     return total
 
 
-def _labelled(anatomy: Anatomy) -> Anatomy:
+def _labelled(anatomy: LegDecomposition) -> LegDecomposition:
     """Labels of the observations where there are any, numbers elsewhere."""
     given: dict[int, str] = {}
     defects: list[Defect] = []
@@ -274,7 +275,7 @@ def _labelled(anatomy: Anatomy) -> Anatomy:
                                        for leg, label in zip(anatomy.legs, labels, strict=True)))
 
 
-def default_observation(anatomy: Anatomy, leg: Leg) -> Direction:
+def default_observation(anatomy: LegDecomposition, leg: Leg) -> Direction:
     """The default segment of a leg (theory 1): the axis of a P that joins two moving links; else the last segment
     before the platform (of equal parallel rods the first)."""
     mechanism = anatomy.mechanism
@@ -302,7 +303,7 @@ def default_observation(anatomy: Anatomy, leg: Leg) -> Direction:
     return _centres(mechanism, leg, nodes[-2], path[-2], last)
 
 
-def observation_of(anatomy: Anatomy, link: str) -> Direction:
+def observation_of(anatomy: LegDecomposition, link: str) -> Direction:
     """The segment direction of any link of a leg: centre to centre, or along the axis of its P."""
     leg = anatomy.leg_of(link)
     if leg is None:

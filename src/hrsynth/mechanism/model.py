@@ -15,11 +15,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import BadMechanism
+from ..geometry.vectors import Array, frozen, unit
 from ..results import Result
 from ..tolerances import SAME_GEOMETRY
 from .graphs import Adjacency, adjacency
 from .observation import Observation
-from .vectors import Array, frozen, unit
 from .wrist import Wrist
 
 if TYPE_CHECKING:

@@ -16,11 +16,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import BadMechanism
+from ..geometry import lines
+from ..geometry.vectors import Array
 from ..tolerances import SAME_POINT
-from . import graphs, lines
+from . import graphs
 from .model import Joint, JointType, Mechanism
 from .observation import Direction
-from .vectors import Array
 from .wrist import Interval, Wrist, between, chained
 
 

@@ -10,8 +10,8 @@ from typing import ClassVar
 import numpy as np
 
 from ..errors import BadMechanism
-from .so3 import wrapped
-from .vectors import Array, frozen, hat, unit
+from ..geometry.so3 import wrapped
+from ..geometry.vectors import Array, frozen, hat, unit
 
 
 @dataclass(frozen=True, eq=False)

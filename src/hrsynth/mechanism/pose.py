@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadRequest
-from .vectors import Array, rotation_from_rpy
+from ..geometry.vectors import Array, rotation_from_rpy
 
 SCALARS = ("x", "y", "z", "phi")
 PARTS = (*SCALARS, "rpy")

@@ -17,12 +17,13 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..geometry import lines
+from ..geometry.incidences import Incidence, Sieve, choices, incidences, triple
+from ..geometry.vectors import Array, crossed, inverse, unit
 from ..tolerances import RANK_GAP, SAME_DIRECTION, SAME_PLANE, SAME_POINT
-from . import graphs, lines
-from .incidences import Incidence, Sieve, choices, incidences, triple
+from . import graphs
 from .model import Joint, JointType, Mechanism
 from .observation import Direction
-from .vectors import Array, crossed, inverse, unit
 
 AXIAL = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 """Joints whose centre may slide along their axis without consequence."""

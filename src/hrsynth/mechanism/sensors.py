@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from .legs import Anatomy
+from ..geometry.vectors import Array, frozen, perpendicular
+from .legs import LegDecomposition
 from .model import Joint, JointType, Mechanism
 from .normal import centre_pair
 from .observation import Angle, Direction, Encoder, LinePosition, Slide
-from .vectors import Array, frozen, perpendicular
 
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 
@@ -37,7 +37,7 @@ def _slide(mechanism: Mechanism, joint: Joint, leg: str) -> Slide:
                  frozen(before[:3, :3].T @ (joint.point - before[:3, 3])), seen_from=joint.predecessor)
 
 
-def line_position(anatomy: Anatomy, seen: Direction) -> LinePosition:
+def line_position(anatomy: LegDecomposition, seen: Direction) -> LinePosition:
     """The position of the line whose direction is ``seen``: the line through the segment's first centre (that of a
     joint that does not slide, where there is one; theory 1)."""
     mechanism = anatomy.mechanism

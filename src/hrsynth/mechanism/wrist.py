@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..geometry.vectors import Array
 from ..tolerances import SAME_DIRECTION
-from .vectors import Array
 
 Interval = tuple[float, float]
 

@@ -11,10 +11,10 @@ import numpy as np
 
 from ..analysis.accuracy.accuracy import Accuracy
 from ..analysis.accuracy.field import Field
-from ..analysis.accuracy.spots import singular_poses
+from ..analysis.accuracy.singular_search import singular_poses
 from ..description.files import require_folder, write_whole
 from ..errors import BadRequest
-from ..mechanism.vectors import Array
+from ..geometry.vectors import Array
 from .plots import axis_label, cell_edges, panels, png, tick_values
 
 FORMATS = (".png", ".csv")

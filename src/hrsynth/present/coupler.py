@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..analysis.modes.curves import Circle, Curve, Line, Point
-from ..mechanism.vectors import Array, perpendicular, unit
+from ..geometry.vectors import Array, perpendicular, unit
 
 STEPS = 1440
 """Places on the first curve at which the bar is tried, to find where it reaches the second."""

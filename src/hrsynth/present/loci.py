@@ -11,7 +11,7 @@ from ..analysis.singularity.locus import Field, Locus
 from ..analysis.singularity.singular import Singularity
 from ..description.files import require_folder, write_whole
 from ..errors import BadRequest
-from ..mechanism.vectors import Array
+from ..geometry.vectors import Array
 from .plots import axis_label, cell_edges, panels, png, tick_values
 
 COLOURS = {"hidden robot": ("crimson", "solid", "o"), "real robot": ("royalblue", "dashed", "s")}

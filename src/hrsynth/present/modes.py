@@ -13,7 +13,7 @@ import numpy as np
 from ..analysis.modes.modes import AssemblyModes
 from ..description.files import require_folder, write_whole
 from ..errors import BadRequest
-from ..mechanism.vectors import Array
+from ..geometry.vectors import Array
 from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, Placed, Scene, scene
 from .sketch import Box, Sketch
 

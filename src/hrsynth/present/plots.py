@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from ..analysis.check import UNREACHABLE, Check, GridCheck
 from ..analysis.posture import CONSTRAINT, UNDECIDED
 from ..errors import BadRequest
-from ..mechanism.vectors import Array
+from ..geometry.vectors import Array
 
 MARKS = {"type1": ("^", "Type 1"), "type2": ("o", "Type 2"), "type3": ("D", "Type 3"),
          CONSTRAINT: ("s", "constraint singularity"), UNDECIDED: ("X", "not decided")}

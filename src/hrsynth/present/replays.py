@@ -8,8 +8,8 @@ from functools import cache
 from ..description import load, shipped
 from ..families.replays import REPLAYS, Replay
 from ..mechanism.pose import Pose
-from ..servo.result import Servo
-from ..servo.servo import servo
+from ..simulation.result import Servo
+from ..simulation.servo import servo
 
 START = "<!-- generated: replays -->"
 HEADS = ("source", "robot", "legs", "noise", "printed", "computed", "agree?", "word")

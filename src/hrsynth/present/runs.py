@@ -9,10 +9,10 @@ import numpy as np
 
 from ..description.files import require_folder, write_whole
 from ..errors import BadRequest
-from ..mechanism.vectors import Array
-from ..servo.pictures import drawing
-from ..servo.result import Servo
-from .films import film
+from ..geometry.vectors import Array
+from ..simulation.pictures import drawing
+from ..simulation.result import Servo
+from .animations import film
 from .plots import panels, png
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")

@@ -15,7 +15,7 @@ import numpy as np
 from ..analysis.modes.curves import Circle, Curve, Line, Point, Reach, Sphere, shifted
 from ..analysis.modes.modes import AssemblyMode, AssemblyModes
 from ..analysis.modes.tips import Confinement, Tip
-from ..mechanism.vectors import Array, inverse
+from ..geometry.vectors import Array, inverse
 from .coupler import chains, points, swept, traced
 from .skeleton import legs_of, outline
 

@@ -6,9 +6,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..geometry.vectors import Array, inverse
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Mechanism
-from ..mechanism.vectors import Array, inverse
 from ..tolerances import SAME_POINT
 
 

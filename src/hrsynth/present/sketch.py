@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..analysis.freedoms import point_text
-from ..mechanism.vectors import Array, perpendicular
+from ..geometry.vectors import Array, perpendicular
 from ..tolerances import SAME_DIRECTION
 from .plots import axis_label
 

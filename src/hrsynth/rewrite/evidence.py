@@ -8,14 +8,14 @@ from functools import cached_property
 
 import numpy as np
 
+from ..geometry.ranks import kernel_basis
+from ..geometry.vectors import Array, unit
 from ..kinematics.configuration import ClosedConfiguration, closed
-from ..kinematics.ranks import kernel_basis
+from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.sampling import Samples
-from ..kinematics.twin import Twin
 from ..mechanism import Joint, JointType, Mechanism, graphs
-from ..mechanism.legs import Anatomy
+from ..mechanism.legs import LegDecomposition
 from ..mechanism.normal import centre_pair
-from ..mechanism.vectors import Array, unit
 from ..tolerances import LOCUS, SOLVED
 
 
@@ -91,7 +91,7 @@ class Proximal:
 class Evidence:
     """Facts about the real robot, gathered from its samples and from its legs moved on their own."""
 
-    def __init__(self, anatomy: Anatomy, samples: Samples) -> None:
+    def __init__(self, anatomy: LegDecomposition, samples: Samples) -> None:
         self.anatomy = anatomy
         self.samples = samples
         self.mechanism: Mechanism = anatomy.mechanism
@@ -171,7 +171,7 @@ def _moved(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequen
         return np.eye(3)[None], anchor[None]
     part = Mechanism.of("part", [mechanism.links[n] for n in mechanism.links if n in nodes], joints, base=reference,
                         platform=before)
-    twin = Twin(part, mechanism.length)
+    twin = PinocchioModel(part, mechanism.length)
     rng = np.random.default_rng(1)
     home = part.links[before].pose
     local = home[:3, :3].T @ (anchor - home[:3, 3])

@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
+from ..geometry.vectors import Array
 from ..mechanism import Joint, JointType, Mechanism
-from ..mechanism.legs import Anatomy, Leg
+from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.notation import Architecture
-from ..mechanism.vectors import Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -40,7 +40,7 @@ class Chain:
 class State:
     """A mechanism on its way from the real robot to its hidden robot."""
 
-    real: Anatomy
+    real: LegDecomposition
     mechanism: Mechanism
     chains: tuple[Chain, ...] = ()
     removed: tuple[str, ...] = ()
@@ -64,7 +64,7 @@ class State:
         """Labels of the legs that still have a virtual chain, in order."""
         return tuple(dict.fromkeys(chain.leg for chain in self.chains))
 
-    def anatomy(self) -> Anatomy:
+    def anatomy(self) -> LegDecomposition:
         """The legs of the rewritten mechanism: the real ones that are left, with their virtual links."""
         mechanism = self.mechanism
         legs = []
@@ -74,7 +74,7 @@ class State:
             links = [n for n in leg.links if n in mechanism.links]
             links += [n for n in mechanism.links if self.owners.get(n) == leg.label]
             legs.append(replace(leg, links=tuple(links), joints=tuple(self._joints(leg, set(links)))))
-        return Anatomy(mechanism, tuple(n for n in self.real.platform if n in mechanism.links), tuple(legs))
+        return LegDecomposition(mechanism, tuple(n for n in self.real.platform if n in mechanism.links), tuple(legs))
 
     def _joints(self, leg: Leg, links: set[str]) -> list[str]:
         mechanism = self.mechanism

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Protocol
 
 from ..mechanism import Mechanism
-from ..mechanism.legs import Anatomy
+from ..mechanism.legs import LegDecomposition
 from ..mechanism.observation import labels_of
 from .evidence import Evidence
 from .rule import Proposal, Refusal, Rule
@@ -118,13 +118,13 @@ class _Run:
                     self.attempt(rule, leg)
 
 
-def general(anatomy: Anatomy, evidence: Evidence, check: Check,
+def general(anatomy: LegDecomposition, evidence: Evidence, check: Check,
             progress: Callable[[str], None] | None = None) -> Rewriting:
     """The general form: sliders under every virtual actuator, all legs kept."""
     return _finished(_virtual_legs(anatomy, evidence, check, progress))
 
 
-def simplified(anatomy: Anatomy, evidence: Evidence, check: Check,
+def simplified(anatomy: LegDecomposition, evidence: Evidence, check: Check,
                progress: Callable[[str], None] | None = None) -> Rewriting:
     """The form of the paper, as far as the certificate goes along with it."""
     run = _virtual_legs(anatomy, evidence, check, progress)
@@ -134,7 +134,7 @@ def simplified(anatomy: Anatomy, evidence: Evidence, check: Check,
     return _finished(run)
 
 
-def trusting(anatomy: Anatomy, evidence: Evidence, *, change_ends: bool) -> list[Rewriting]:
+def trusting(anatomy: LegDecomposition, evidence: Evidence, *, change_ends: bool) -> list[Rewriting]:
     """The form that the paper's rules alone give, nothing checked: one rewriting for each choice of outer axes."""
     run = _virtual_legs(anatomy, evidence, None, None)
     run.each([pi_form.RULE], run.state.observed())
@@ -153,7 +153,7 @@ def trusting(anatomy: Anatomy, evidence: Evidence, *, change_ends: bool) -> list
     return results
 
 
-def _virtual_legs(anatomy: Anatomy, evidence: Evidence, check: Check | None,
+def _virtual_legs(anatomy: LegDecomposition, evidence: Evidence, check: Check | None,
                   progress: Callable[[str], None] | None) -> _Run:
     start = State(anatomy, replace(anatomy.mechanism, observations=()))
     run = _Run(start, evidence, check, progress=progress)

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.accuracy.gauge import PoseErrors
+from ..analysis.accuracy.pose_errors import PoseErrors
 from ..analysis.modes.modes import AssemblyModes
 from ..analysis.posture import Posture
 

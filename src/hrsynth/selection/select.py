@@ -16,19 +16,19 @@ from ..analysis.aspects.answer import SEPARATED
 from ..analysis.aspects.path import Aspects
 from ..analysis.controllability import CONTROLLABLE, verdict_of
 from ..analysis.modes.modes import modes_at
+from ..analysis.observed import ObservedRobot, prepare, silent
 from ..analysis.posture import Examiner
-from ..analysis.setting import Setting, prepare, silent
+from ..batch.reach import reach
 from ..errors import BadRequest, HrsynthError, PoseNotReached
+from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.reach import reach
 from ..mechanism import Mechanism
 from ..mechanism.observation import Direction
 from ..mechanism.pose import Pose
-from ..mechanism.vectors import Array
 from ..results import Result
-from ..servo.camera import cylinders, placed
-from ..servo.ending import GOAL
-from ..servo.servo import servo
+from ..simulation.camera import cylinders, placed
+from ..simulation.ending import GOAL
+from ..simulation.servo import servo
 from .candidate import Candidate, Decision, Modes, singular_at
 from .sight import ENOUGH, Sight, camera_at, of_focal
 
@@ -51,7 +51,7 @@ class Selection(Result):
     """All sets of legs up to a size for one displacement: the kept ones, those not examined, the most accurate at the
     goal before the others in both, then the discarded ones."""
 
-    setting: Setting
+    setting: ObservedRobot
     start: Pose
     goal: Pose
     candidates: tuple[Candidate, ...]
@@ -139,7 +139,7 @@ def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, go
     return Selection(setting, poses[0], poses[1], tuple(found), half, work.sight, left)
 
 
-def _sight(setting: Setting, ends: Sequence[ClosedConfiguration], text: str | None, focal: float) -> Sight | None:
+def _sight(setting: ObservedRobot, ends: Sequence[ClosedConfiguration], text: str | None, focal: float) -> Sight | None:
     if text is None:
         return None
     rods = cylinders(setting.mechanism, setting.observed)
@@ -153,7 +153,7 @@ def _sight(setting: Setting, ends: Sequence[ClosedConfiguration], text: str | No
 class _Work:
     """What examines sets of legs between two configurations; none is begun after a point in time."""
 
-    setting: Setting
+    setting: ObservedRobot
     start: ClosedConfiguration
     goal: ClosedConfiguration
     cones: Array
@@ -167,7 +167,7 @@ class _Work:
         """Whether the time is over."""
         return time.monotonic() > self.until
 
-    def watching(self, legs: Sequence[str]) -> Setting:
+    def watching(self, legs: Sequence[str]) -> ObservedRobot:
         """The setting with some legs watched."""
         return replace(self.setting, observed=tuple(o for o in self.setting.observed if o.leg in legs))
 
@@ -219,7 +219,7 @@ class _Work:
         return replace(candidate, start_modes=start_modes, goal_modes=goal_modes, aspect=aspect, discarded=why)
 
     @staticmethod
-    def _modes(setting: Setting, at: ClosedConfiguration) -> Modes:
+    def _modes(setting: ObservedRobot, at: ClosedConfiguration) -> Modes:
         try:
             return Modes.of(modes_at(setting, at))
         except HrsynthError as error:

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import BadRequest
+from ..geometry.vectors import Array, pose
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Pose
-from ..mechanism.vectors import Array, pose
-from ..servo.camera import Camera, Rod
+from ..simulation.camera import Camera, Rod
 
 Flags = NDArray[np.bool_]
 PLACES = 101

@@ -12,14 +12,14 @@ from hypothesis import HealthCheck, assume, given, settings
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy, errors_at, sees_all
 from hrsynth.analysis.accuracy.cones import half_angles
 from hrsynth.analysis.accuracy.field import Mapper
-from hrsynth.analysis.accuracy.gauge import _descended, _width, reading
+from hrsynth.analysis.accuracy.pose_errors import _descended, _width, reading
 from hrsynth.analysis.accuracy.sampled import sampled
-from hrsynth.analysis.accuracy.spots import singular_poses
-from hrsynth.analysis.setting import Setting, prepare, silent
+from hrsynth.analysis.accuracy.singular_search import singular_poses
+from hrsynth.analysis.observed import ObservedRobot, prepare, silent
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError, PlaneNotMet, PoseNotReached
+from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.pose import Grid
-from hrsynth.mechanism.vectors import Array
 from kinematics.robots import ROBOTS
 from strategies import parallel_robots
 
@@ -91,7 +91,7 @@ def test_a_map_is_the_closed_form(legs: str) -> None:
     assert field.spots.difference < 1e-8
 
 
-def check_extents(setting: Setting, cones: Array) -> None:
+def check_extents(setting: ObservedRobot, cones: Array) -> None:
     """The extremes are attained by the directions that are told, and no random errors in the cones do worse."""
     for at in setting.configurations[:2]:
         errors = errors_at(setting, cones, at)

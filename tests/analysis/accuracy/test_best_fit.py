@@ -13,16 +13,16 @@ from scipy.optimize import minimize
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy
 from hrsynth.analysis.accuracy.best_fit import ENDS, FIT, Fit, best_fits, seen, weakest
 from hrsynth.analysis.accuracy.sampled import _tangents, tilted
-from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.errors import HrsynthError
+from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration, closed
-from hrsynth.kinematics.reach import reach
 from hrsynth.mechanism.pose import Pose
-from hrsynth.mechanism.vectors import Array
-from hrsynth.servo.desired import Step
-from hrsynth.servo.law import Law
-from hrsynth.servo.run import Loop
+from hrsynth.simulation.desired import Step
+from hrsynth.simulation.law import Law
+from hrsynth.simulation.run import Loop
 from strategies import parallel_robots
 
 ANGLES = np.array([-3, -1, 1, 3]) * math.pi / 4
@@ -77,7 +77,7 @@ def test_what_ends_is_no_singularity() -> None:
     assert true.weakest > 0.11
 
 
-def ways(setting: Setting, at: ClosedConfiguration, cone: float, count: int, seed: int) -> list[Array]:
+def ways(setting: ObservedRobot, at: ClosedConfiguration, cone: float, count: int, seed: int) -> list[Array]:
     rng = np.random.default_rng(seed)
     u = seen(at, setting.samples.question)[0]
     return [cone * _tangents(rng, u) for _ in range(count)]
@@ -102,7 +102,7 @@ def test_best_fits_are_those_of_the_closed_form(legs: str, at: str, chosen: list
             assert np.allclose(found, setting.motion.position(fit.way[-1].pose(setting.motion.link)), atol=2e-5)
 
 
-def check_fit(setting: Setting, at: ClosedConfiguration, way: Array) -> Fit:
+def check_fit(setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fit:
     """A fit is where the loop rests whose desired directions are the wrong ones, and nothing next to it fits better;
     where there is none, that is no claim about the robot."""
     question, link = setting.samples.question, setting.motion.link

@@ -9,7 +9,7 @@ from hrsynth.analysis.aspects.crossing import Crossing
 from hrsynth.analysis.aspects.path import Aspects
 from hrsynth.analysis.singularity.agreement import smallest_of, weakest
 from hrsynth.analysis.singularity.condition import Condition
-from hrsynth.analysis.singularity.features import unit_rows
+from hrsynth.constraints.named_vectors import unit_rows
 from hrsynth.kinematics.configuration import ClosedConfiguration, Target, closed, measure
 from hrsynth.tolerances import CLOSED, RANK_CUTOFF
 

@@ -15,10 +15,10 @@ import numpy as np
 from hrsynth.analysis.modes.curves import Circle
 from hrsynth.analysis.modes.planar import Planar
 from hrsynth.analysis.modes.solve import solve
+from hrsynth.geometry.vectors import Array, inverse, perpendicular, pose, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.twin import Twin
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Mechanism
-from hrsynth.mechanism.vectors import Array, inverse, perpendicular, pose, unit
 from strategies import planar
 
 LEGS = (1, 2, 3)
@@ -35,11 +35,11 @@ class SixModes:
     poses: Array
     ends: Array
 
-    def configurations(self, twin: Twin) -> list[ClosedConfiguration]:
+    def configurations(self, twin: PinocchioModel) -> list[ClosedConfiguration]:
         """The robot at its poses, its joint angles by the turns of its links."""
         return [self._at(twin, X, ends) for X, ends in zip(self.poses, self.ends, strict=True)]
 
-    def _at(self, twin: Twin, X: Array, ends: Array) -> ClosedConfiguration:
+    def _at(self, twin: PinocchioModel, X: Array, ends: Array) -> ClosedConfiguration:
         robot, n = self.robot, normal(self.robot)
         feet = [robot.joints[f"joint_{i}_1"].point for i in LEGS]
         knees = [robot.joints[f"joint_{i}_2"].point for i in LEGS]

@@ -25,7 +25,7 @@ from hrsynth.analysis.aspects.region import Region
 from hrsynth.analysis.singularity.agreement import smallest_of
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
-from hrsynth.kinematics.balls import balls, below, centred, cross, det, dot, jets
+from hrsynth.geometry.balls import balls, below, centred, cross, det, dot, jets
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.sampling import wander
 from strategies import planar

@@ -14,7 +14,7 @@ from hrsynth.analysis.aspects.limbs import Limb
 from hrsynth.analysis.aspects.path import Aspects, leads
 from hrsynth.analysis.aspects.pattern import Pattern
 from hrsynth.description import load
-from hrsynth.kinematics.balls import balls
+from hrsynth.geometry.balls import balls
 from hrsynth.kinematics.sampling import wander
 from strategies import deltas, planar, pods
 

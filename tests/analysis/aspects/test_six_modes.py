@@ -12,8 +12,8 @@ from analysis.aspects.six_modes import LEGS, SixModes, determinants, six_modes, 
 from hrsynth.analysis.aspects.answer import SAME, SEPARATED, UNDECIDED, PathAnswer
 from hrsynth.analysis.aspects.crossing import Crossing
 from hrsynth.analysis.aspects.path import BUDGET, Aspects
+from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import measure
-from hrsynth.mechanism.vectors import Array
 
 PAIRS = list(combinations(range(6), 2))
 

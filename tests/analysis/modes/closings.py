@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrsynth.analysis.modes.modes import AssemblyMode, AssemblyModes
-from hrsynth.analysis.setting import motors
+from hrsynth.analysis.observed import motors
+from hrsynth.geometry.vectors import Array, inverse
 from hrsynth.kinematics.configuration import ClosedConfiguration, closed, measure
-from hrsynth.kinematics.relation import Question
-from hrsynth.kinematics.twin import Twin
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
+from hrsynth.kinematics.relation import Measurement
 from hrsynth.mechanism import Mechanism, Observation
-from hrsynth.mechanism.vectors import Array, inverse
 
 SAME = 1e-6
 """Distance (metres, pure numbers) at which two poses are one."""
@@ -31,13 +31,13 @@ class Held:
     reference: str
     measured: Sequence[tuple[Observation, Array]]
 
-    def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
         _, _, values, rates = measure(twin, q, self.reference, [o for o, _ in self.measured])
         errors = [value - wanted for value, (_, wanted) in zip(values, self.measured, strict=True)]
         return np.concatenate(errors), np.vstack(rates)
 
 
-def asked(listed: AssemblyModes) -> Question:
+def asked(listed: AssemblyModes) -> Measurement:
     """What is held."""
     return motors(listed.setting) if listed.kind == "real" else listed.setting.samples.question
 

@@ -13,7 +13,7 @@ import numpy as np
 from flint import arb, arb_mat, ctx
 from scipy.optimize import least_squares
 
-from hrsynth.mechanism.vectors import Array, pose, rotation_about
+from hrsynth.geometry.vectors import Array, pose, rotation_about
 
 BITS = 220
 STEP = 1e-25

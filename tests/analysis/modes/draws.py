@@ -13,7 +13,7 @@ from hrsynth.analysis.modes.planar import Planar
 from hrsynth.analysis.modes.spatial import Spatial
 from hrsynth.analysis.modes.systems import System
 from hrsynth.analysis.modes.translating import Translating
-from hrsynth.mechanism.vectors import Array, pose, rotation_about, unit
+from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
 from strategies import random_rotation
 
 Rng = np.random.Generator

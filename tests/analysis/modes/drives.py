@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hrsynth.geometry.vectors import Array, inverse, rotation_about
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.vectors import Array, inverse, rotation_about
 from oracle import ALL, SQUARE, Oracle, Rows, exponential
 
 

@@ -11,7 +11,7 @@ from hrsynth.analysis.modes.msolve import executable
 from hrsynth.analysis.modes.solve import Modes, solve, solve_by_msolve
 from hrsynth.analysis.modes.systems import System
 from hrsynth.errors import MissingExtra
-from hrsynth.mechanism.vectors import Array
+from hrsynth.geometry.vectors import Array
 
 UNBOUNDED = {"spatial, a line and four spheres", "spatial, two circles and two spheres"}
 """Families whose number of modes nothing but a solver tells: found, never complete."""

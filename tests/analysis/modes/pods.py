@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from hrsynth.geometry.vectors import Array, rotation_about, unit
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.vectors import Array, rotation_about, unit
 
 CLOSED = 1e-12
 """Error (m, pure numbers) at which a start has ended at a solution."""

@@ -10,9 +10,9 @@ import numpy as np
 from analysis.modes.draws import Draw
 from hrsynth.analysis.modes.curves import Circle, Line
 from hrsynth.analysis.modes.solve import solve
+from hrsynth.geometry.vectors import Array, perpendicular, unit
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.vectors import Array, perpendicular, unit
 
 Rng = np.random.Generator
 

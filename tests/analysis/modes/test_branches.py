@@ -13,7 +13,7 @@ from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.reaches import reaches
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
-from hrsynth.mechanism.vectors import Array, unit
+from hrsynth.geometry.vectors import Array, unit
 
 SAME = 1e-6
 """Distance (m, pure numbers) at which two poses are one."""

@@ -12,13 +12,13 @@ from flint import arb, arb_mat, ctx
 from analysis.modes.digits import BITS, File, column, turned
 from hrsynth.analysis.modes.goal import drift
 from hrsynth.analysis.modes.modes import AssemblyModes, modes_with
-from hrsynth.analysis.setting import Setting, prepare
+from hrsynth.analysis.observed import ObservedRobot, prepare
 from hrsynth.description import load, shipped
 from hrsynth.errors import PoseNotReached
+from hrsynth.geometry.vectors import pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.mechanism.observation import Direction
 from hrsynth.mechanism.pose import Pose
-from hrsynth.mechanism.vectors import pose
 
 OUTSIDE_BEFORE = "x=-0.058,y=0.031,z=0.301,rpy=0/0/0"
 QUICK = [("gough_stewart", ("1", "4", "6"), OUTSIDE_BEFORE),
@@ -36,7 +36,7 @@ def decimals(at: str) -> Decimals:
     return {name: tuple(value.split("/")) for name, _, value in (part.partition("=") for part in at.split(","))}
 
 
-def wanted(setting: Setting, at: Decimals) -> Callable[[Any], list[Any]]:
+def wanted(setting: ObservedRobot, at: Decimals) -> Callable[[Any], list[Any]]:
     """What a platform's pose misses of the numbers given."""
     def rows(poses: Any) -> list[Any]:
         R, p = poses[setting.motion.link]
@@ -51,7 +51,7 @@ def wanted(setting: Setting, at: Decimals) -> Callable[[Any], list[Any]]:
     return rows
 
 
-def missed(name: str, setting: Setting, at: Decimals, found: AssemblyModes) -> list[tuple[float, float]]:
+def missed(name: str, setting: ObservedRobot, at: Decimals, found: AssemblyModes) -> list[tuple[float, float]]:
     """For each proved mode at which the robot closes the part of its radius (of the shift, of the turn) at which the
     exact pose is."""
     file = File(str(shipped()[name]))
@@ -112,7 +112,7 @@ def test_the_exact_pose_is_within_the_radius_at_many_goals(name: str, observe: t
     assert seen > 0
 
 
-def goal_near_home(setting: Setting, rng: np.random.Generator) -> str:
+def goal_near_home(setting: ObservedRobot, rng: np.random.Generator) -> str:
     """A pose with a few digits, of as many parts as there are freedoms."""
     motion = setting.motion
     home, length = motion.position(motion.home), setting.mechanism.length

@@ -16,7 +16,7 @@ from hrsynth.analysis.modes.solve import Modes, solve
 from hrsynth.analysis.modes.spatial import Spatial
 from hrsynth.analysis.modes.translating import Translating
 from hrsynth.description import load, shipped
-from hrsynth.mechanism.vectors import Array, unit
+from hrsynth.geometry.vectors import Array, unit
 from hrsynth.present.text.modes import modes as text
 from strategies import random_rotation
 

@@ -14,7 +14,7 @@ from hrsynth.analysis.modes.meant import as_meant
 from hrsynth.analysis.modes.solve import solve
 from hrsynth.analysis.modes.spatial import Spatial
 from hrsynth.errors import MeaningUndecided
-from hrsynth.mechanism.vectors import Array
+from hrsynth.geometry.vectors import Array
 from strategies import random_rotation
 
 needs_msolve = pytest.mark.skipif(not installed(), reason="msolve is not installed (extra `solve`)")

@@ -16,7 +16,7 @@ from hrsynth.analysis.modes.solve import Modes, solve
 from hrsynth.analysis.modes.spatial import Spatial
 from hrsynth.analysis.modes.systems import System
 from hrsynth.analysis.modes.translating import Translating
-from hrsynth.mechanism.vectors import Array, pose, rotation_about, unit
+from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
 from strategies import random_rotation
 
 ALL = sorted(FAMILIES)

@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.description import load, shipped
 from hrsynth.families.printed import CLAIMS, GOAL, Claim, PrintedMode, printed
-from hrsynth.mechanism.vectors import Array
+from hrsynth.geometry.vectors import Array
 from hrsynth.present import printed as table
 from hrsynth.present import readme
 

@@ -19,7 +19,7 @@ from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.cli import execute
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest
-from hrsynth.mechanism.vectors import rotation_about
+from hrsynth.geometry.vectors import rotation_about
 from hrsynth.present.coupler import chains, points, swept, traced
 from hrsynth.present.modes import MARKS, described, figure, picture, shown, writable
 from hrsynth.present.scenes import CLOSES, GOAL, NEAR, OPEN, Scene, scene

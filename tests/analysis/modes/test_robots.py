@@ -12,10 +12,10 @@ from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest, HrsynthError, MissingExtra, NotConfined, PoseNotReached
+from hrsynth.geometry.vectors import Array, pose
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.pose import Pose
-from hrsynth.mechanism.vectors import Array, pose
 from kinematics.robots import state_of
 from oracle import Oracle
 from strategies import PLANAR_WORDS, POD_WORDS, deltas, planar, pods, random_rotation, reordered, transformed

@@ -24,7 +24,7 @@ from hrsynth.analysis.modes.systems import System
 from hrsynth.analysis.modes.translating import Translating
 from hrsynth.analysis.modes.whole import wholes
 from hrsynth.errors import BadRequest, MissingExtra, Unsolved
-from hrsynth.mechanism.vectors import rotation_about, unit
+from hrsynth.geometry.vectors import rotation_about, unit
 from strategies import random_rotation
 
 needs_msolve = pytest.mark.skipif(not installed(), reason="msolve is not installed (extra `solve`)")

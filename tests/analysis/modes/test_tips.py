@@ -10,12 +10,12 @@ from hrsynth.analysis.modes.build import model
 from hrsynth.analysis.modes.curves import Circle, Line, Plane, Point, Sphere
 from hrsynth.analysis.modes.solve import solve
 from hrsynth.analysis.modes.tips import confinement
-from hrsynth.analysis.setting import motors, prepare
-from hrsynth.analysis.singularity.structure import recognise
+from hrsynth.analysis.observed import motors, prepare
+from hrsynth.constraints.pattern import recognise
 from hrsynth.description import load, shipped
 from hrsynth.errors import NotConfined
 from hrsynth.kinematics.locked import moved
-from hrsynth.mechanism.legs import dissect
+from hrsynth.mechanism.legs import decompose
 
 HIDDEN = {"3rrr_m1": Circle, "3rpr_m2": Line, "3prr_m1": Line, "gough_stewart": Line, "hexa": Circle, "6pus": Line,
           "delta": Circle, "orthoglide": Line, "quattro": Circle, "quattro_rigid": Circle, "3rps": Line, "3upu": Line,
@@ -67,7 +67,7 @@ def test_circles_have_the_length_of_the_cranks():
 def test_spheres_have_the_length_of_the_rods():
     """With its motor held the tip of a leg U-P-S keeps its distance from the U."""
     found = confined("gough_stewart", real=True)
-    ends = {leg.label: leg.joints for leg in dissect(found.goal.twin.mechanism).legs}
+    ends = {leg.label: leg.joints for leg in decompose(found.goal.twin.mechanism).legs}
     poses = {body: found.goal.pose(body) for body in found.bodies}
     for tip in found.tips:
         centres = [moved(found.goal, found.goal.twin.mechanism.joints[name])[0] for name in ends[tip.leg]]

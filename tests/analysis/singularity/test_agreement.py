@@ -17,7 +17,7 @@ from analysis.singularity.test_conditions import CASES, HEAVY
 from hrsynth.analysis.singularity.agreement import Agreement, agreement
 from hrsynth.analysis.singularity.condition import Condition, condition
 from hrsynth.analysis.singularity.singular import Singularity, singular
-from hrsynth.analysis.singularity.structure import HeldLeg, Structure
+from hrsynth.constraints.pattern import LockedLeg, Structure
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest, Disagreement
 from hrsynth.mechanism import Mechanism
@@ -114,17 +114,17 @@ def again(answer: Singularity, structure: Structure, wrong: Condition, points: i
     return agreement(answer.setting.samples.start, answer.question, structure, wrong, points)
 
 
-def with_leg(structure: Structure, leg: HeldLeg) -> Structure:
+def with_leg(structure: Structure, leg: LockedLeg) -> Structure:
     return replace(structure, legs=(leg, *structure.legs[1:]))
 
 
-def elsewhere(answer: Singularity) -> HeldLeg:
+def elsewhere(answer: Singularity) -> LockedLeg:
     """The first leg with its tip a hand's breadth off."""
     leg = answer.structure.legs[0]
     return replace(leg, tip=replace(leg.tip, place=leg.tip.place + [0.1, 0.2, 0.0]))
 
 
-def of_another(answer: Singularity) -> HeldLeg:
+def of_another(answer: Singularity) -> LockedLeg:
     """The first leg with the line of the second."""
     first, second = answer.structure.legs[:2]
     return replace(first, line=replace(second.line, symbol=first.line.symbol))

@@ -8,7 +8,7 @@ import pytest
 from analysis.singularity.found import found
 from hrsynth.analysis.singularity.algebra import products, vector
 from hrsynth.description import load, shipped
-from hrsynth.mechanism.vectors import inverse
+from hrsynth.geometry.vectors import inverse
 
 
 def planar(kind: str) -> tuple[str, str, str]:

@@ -12,7 +12,7 @@ import sympy
 from analysis.singularity.found import found
 from hrsynth.analysis.singularity.algebra import components, evaluate, products, vector
 from hrsynth.analysis.singularity.condition import Named
-from hrsynth.analysis.singularity.features import Tangent
+from hrsynth.constraints.named_vectors import Tangent
 from hrsynth.mechanism.screws import force
 
 SEEDS = range(4)

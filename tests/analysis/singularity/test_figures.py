@@ -9,8 +9,8 @@ import pytest
 
 from analysis.singularity.found import found
 from hrsynth.analysis.singularity.singular import Example, Singularity
+from hrsynth.geometry.vectors import Array, inverse, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.mechanism.vectors import Array, inverse, unit
 from kinematics.robots import state_of
 from oracle import Oracle
 

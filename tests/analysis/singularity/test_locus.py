@@ -12,13 +12,13 @@ from analysis.singularity.found import found
 from analysis.singularity.test_figures import centre
 from hrsynth.analysis.singularity.locus import Locus
 from hrsynth.analysis.singularity.singular import drawn
+from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet
+from hrsynth.geometry.vectors import unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.parts import PlatformMotion
-from hrsynth.kinematics.reach import reach
+from hrsynth.kinematics.platform_motion import PlatformMotion
 from hrsynth.mechanism.pose import Pose
-from hrsynth.mechanism.vectors import unit
 from hrsynth.present.loci import locus_map
 
 STEPS = 15

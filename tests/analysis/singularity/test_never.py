@@ -10,9 +10,9 @@ import pytest
 from analysis.singularity.found import found
 from hrsynth.analysis.singularity.agreement import weakest
 from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.geometry.vectors import Array, frozen, inverse
 from hrsynth.kinematics.sampling import wander
 from hrsynth.mechanism.model import Mechanism
-from hrsynth.mechanism.vectors import Array, frozen, inverse
 from hrsynth.present.text.singularity import singularity
 from strategies import deltas
 

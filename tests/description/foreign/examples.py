@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hrsynth.mechanism.vectors import Array, inverse, pose, rotation_from_rpy
+from hrsynth.geometry.vectors import Array, inverse, pose, rotation_from_rpy
 
 A, B, C, D = (np.array(p) for p in ((0.0, 0.0, 0.0), (0.0, 0.0, 1.0), (2.0, 0.0, 1.5), (2.2, 0.0, 0.0)))
 Y = np.array([0.0, 1.0, 0.0])

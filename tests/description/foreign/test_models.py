@@ -10,7 +10,7 @@ import pytest
 
 from hrsynth.analysis.check import check
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.setting import Mobility, prepare
+from hrsynth.analysis.observed import Mobility, prepare
 from hrsynth.description import load, save
 from hrsynth.mechanism import Mechanism
 

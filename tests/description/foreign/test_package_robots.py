@@ -13,7 +13,7 @@ from hrsynth.description.foreign.graph import Graph
 from hrsynth.description.foreign.reading import said
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.twin import Twin
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import JointType
 
 
@@ -80,7 +80,7 @@ def test_every_tree_is_a_mechanism(path: Path):
             load(path)
         return
     robot = load(path, platform=tips[-1])
-    twin = Twin(robot)
+    twin = PinocchioModel(robot)
     free = sum(joint.type.freedoms for joint in robot.joints.values())
     assert ClosedConfiguration.of(twin, twin.q0).kernel()[0].shape[1] == free - len(robot.couplings)
 
@@ -98,7 +98,7 @@ def test_its_robot_with_closed_loops_has_its_mobility(name: str):
     whole, leg = LEGS[name]
     for freedoms, robot in ((whole, load(path, platform="left-foot")),
                             (leg, load(path, base="pelvis", platform="left-foot"))):
-        twin = Twin(robot)
+        twin = PinocchioModel(robot)
         kernel, rank = ClosedConfiguration.of(twin, twin.q0).kernel()
         assert kernel.shape[1] == freedoms
         assert rank.gap > 1e3

@@ -14,10 +14,10 @@ from description.foreign.test_dialects import lines, mobility, written
 from description.foreign.test_traps import full_mobility
 from hrsynth.description import load, save
 from hrsynth.errors import BadRobotFile
+from hrsynth.geometry.vectors import rotation_from_rpy
 from hrsynth.mechanism import Joint, JointType, Link, Mechanism, Motor
-from hrsynth.mechanism.legs import dissect
+from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.vectors import rotation_from_rpy
 
 
 def moving(robot: Mechanism) -> list[str]:
@@ -105,7 +105,7 @@ def foreign(robot: Mechanism, path: Path) -> Path:
 def words(robot: Mechanism) -> list[str]:
     normal = normal_form(robot).mechanism
     return sorted("".join(sorted(str(normal.joints[name].type) for name in leg.joints))
-                  for leg in dissect(normal).legs)
+                  for leg in decompose(normal).legs)
 
 
 @pytest.mark.parametrize("ending", [".xml", ".sdf"])

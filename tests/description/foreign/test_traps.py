@@ -12,7 +12,7 @@ from description.foreign.test_dialects import lines, mobility
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError, LoopsNotClosed, RankUndecided
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.twin import Twin
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.normal import normal_form
 
@@ -43,7 +43,7 @@ def revolute(pred: str, x: float, succ: str, y: float, rpy: str = "") -> str:
 
 def full_mobility(mechanism: Mechanism) -> int:
     """With gears, by the engine."""
-    twin = Twin(mechanism)
+    twin = PinocchioModel(mechanism)
     return ClosedConfiguration.of(twin, twin.q0).kernel()[0].shape[1]
 
 
@@ -109,7 +109,7 @@ def test_rods_and_axes_of_six_digits_are_equal_and_parallel(tmp_path: Path):
     from dataclasses import replace
 
     from description.samples import with_rods
-    from hrsynth.analysis.setting import prepare
+    from hrsynth.analysis.observed import prepare
     from hrsynth.description.writers import sdf
 
     rng, robot = np.random.default_rng(3), replace(with_rods(), observations=())
@@ -145,7 +145,7 @@ def test_a_screw_of_either_convention_couples_turn_and_travel(tmp_path: Path):
                                                                                 2 * np.pi / 4)):
         robot = read(tmp_path, text.format(pitch), "sdf", platform="nut")
         assert full_mobility(robot) == 1
-        twin = Twin(robot)
+        twin = PinocchioModel(robot)
         at_zero = ClosedConfiguration.of(twin, twin.q0)
         V = at_zero.velocity("nut") @ at_zero.kernel()[0]
         assert V[2] * twin.length / V[5] == pytest.approx(lead / (2 * np.pi))
@@ -202,7 +202,7 @@ def test_efforts_of_zero_tell_the_motors_and_others_tell_nothing(tmp_path: Path)
 
 @pytest.mark.parametrize("R", ["xyz", "XYZ", "zyx"])
 def test_euler_angles_follow_their_sequence(R: str, tmp_path: Path):
-    from hrsynth.mechanism.vectors import rotation_about
+    from hrsynth.geometry.vectors import rotation_about
 
     angles = np.radians([30, 40, 50])
     expected = np.eye(3)

@@ -13,7 +13,7 @@ from description.samples import every_joint
 from hrsynth.description import load, save, shipped, spanning
 from hrsynth.description.writers import mjcf
 from hrsynth.errors import BadRequest
-from hrsynth.kinematics.ranks import rank_of
+from hrsynth.geometry.ranks import rank_of
 from hrsynth.mechanism import JointType, Mechanism
 
 ENDINGS = (".xml", ".sdf", ".yaml")

@@ -8,19 +8,19 @@ from typing import Any
 
 import numpy as np
 
+from ...batch.reach import reach
 from ...errors import BadRequest
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.reach import reach
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
 from ...mechanism.pose import Grid, Pose
-from ...mechanism.vectors import Array
 from ...results import Result
 from ..controllability import verdict_of
-from ..setting import Setting, prepare, silent
+from ..observed import ObservedRobot, prepare, silent
 from .cones import Cones, half_angles
 from .field import Field, Mapper
-from .gauge import PoseErrors, measured
+from .pose_errors import PoseErrors, measured
 from .sampled import Sampled, sampled
 
 LARGEST_FIELD = 10_000_000
@@ -34,7 +34,7 @@ class Accuracy(Result):
     """The error maxima for cones about the observed directions: at single poses, over a grid, and where asked for what
     samples of true errors give (None otherwise)."""
 
-    setting: Setting
+    setting: ObservedRobot
     cones: Array
     """Half-angles (k,) of the observed directions (rad)."""
     poses: tuple[PoseErrors, ...]
@@ -108,13 +108,13 @@ def accuracy(robot: Mechanism, observe: Sequence[str] | str | None = None, camer
     return Accuracy(setting, half, poses, true, field)
 
 
-def errors_at(setting: Setting, cones: Array, at: ClosedConfiguration) -> PoseErrors:
+def errors_at(setting: ObservedRobot, cones: Array, at: ClosedConfiguration) -> PoseErrors:
     """The error maxima at a closed configuration for half-angles (k,)."""
     motion = setting.motion
     return measured(at, setting.samples.question, cones, motion.pose(at.pose(motion.link)))
 
 
-def sees_all(setting: Setting) -> None:
+def sees_all(setting: ObservedRobot) -> None:
     """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms."""
     verdict = verdict_of(setting, setting.labels, setting.samples)
     if verdict.lost:

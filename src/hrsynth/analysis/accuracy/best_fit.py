@@ -16,10 +16,10 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import LoopsNotClosed
+from ...geometry.vectors import Array, hat
 from ...kinematics.chart import Chart
 from ...kinematics.configuration import ClosedConfiguration, measure
-from ...kinematics.relation import Question, relation
-from ...mechanism.vectors import Array, hat
+from ...kinematics.relation import Measurement, relation
 from ...tolerances import FOLLOWED, INVERTED
 from ..classes import interaction_matrix
 
@@ -62,7 +62,7 @@ class _Bowl:
     """F around a configuration, in the coordinates y (n,) of a chart there."""
 
     at: ClosedConfiguration
-    question: Question
+    question: Measurement
 
     @cached_property
     def chart(self) -> Chart:
@@ -101,19 +101,19 @@ class _Bowl:
         return None
 
 
-def seen(at: ClosedConfiguration, question: Question) -> tuple[Array, list[Array]]:
+def seen(at: ClosedConfiguration, question: Measurement) -> tuple[Array, list[Array]]:
     """The observed directions (k, 3) and the rates (3, nv) of each."""
     _, _, values, rates = measure(at.twin, at.q, question.reference, question.observations)
     return np.array(values), rates
 
 
-def weakest(at: ClosedConfiguration, question: Question) -> float:
+def weakest(at: ClosedConfiguration, question: Measurement) -> float:
     """The smallest singular value of Mᵀ (characteristic lengths), infinite where Mᵀ does not exist."""
     M = interaction_matrix(relation(at, question))
     return np.inf if M is None else float(np.linalg.svd(M, compute_uv=False)[-1])
 
 
-def best_fits(at: ClosedConfiguration, question: Question, wanted: Wanted) -> Fit:
+def best_fits(at: ClosedConfiguration, question: Measurement, wanted: Wanted) -> Fit:
     """The curve of best fits from a configuration whose directions are ``wanted(0)``, led to ``wanted(1)``."""
     way, done, step = [at], 0.0, LONGEST
     bowl = _Bowl(at, question)

@@ -8,8 +8,8 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...errors import BadRequest
+from ...geometry.vectors import Array
 from ...mechanism import Observation
-from ...mechanism.vectors import Array
 
 EXAMPLE = "0.1deg, 0.002 (radians), or one a leg such as 1=0.1deg,2=0.2deg"
 ALLOWED = "more than 0 and less than 90deg"

@@ -11,18 +11,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...batch.engine import Batch, Evaluation
+from ...batch.grids import poses_over
+from ...batch.reach import reach, sweep
 from ...errors import BadRequest, Disagreement, HrsynthError, PlaneNotMet
-from ...kinematics.batch.engine import Batch, Evaluation
-from ...kinematics.batch.grids import poses_over
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.reach import reach, sweep
-from ...kinematics.relation import Question
+from ...kinematics.relation import Measurement
 from ...mechanism.pose import LARGEST_GRID, SCALARS, Grid, Pose
-from ...mechanism.vectors import Array
 from ...tolerances import SAME_RELATION
-from ..setting import Setting
+from ..observed import ObservedRobot
 from ..singularity.locus import framed
-from .gauge import maxima, reading
+from .pose_errors import maxima, reading
 
 Flags = NDArray[np.bool_]
 PART = 25_000
@@ -118,12 +118,12 @@ def nested(values: Array) -> list[Any]:
 class Mapper:
     """What evaluates grids for observed legs and half-angles (k,)."""
 
-    setting: Setting
+    setting: ObservedRobot
     cones: Array
     progress: Callable[[str], None]
 
     @property
-    def question(self) -> Question:
+    def question(self) -> Measurement:
         """What is asked at each pose."""
         return self.setting.samples.question
 

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from ...geometry.so3 import angle_of
+from ...geometry.vectors import Array, rotation_about
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.parts import PlatformMotion
-from ...kinematics.relation import Question
-from ...mechanism.so3 import angle_of
-from ...mechanism.vectors import Array, rotation_about
+from ...kinematics.platform_motion import PlatformMotion
+from ...kinematics.relation import Measurement
 from .best_fit import ENDS, NOT_FOUND, best_fits, seen, weakest
-from .gauge import PoseErrors, finite
+from .pose_errors import PoseErrors, finite
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +49,7 @@ class Sampled:
                 "singular_value_at_pose": finite(self.usual)}
 
 
-def sampled(at: ClosedConfiguration, question: Question, motion: PlatformMotion, cones: Array, linear: PoseErrors,
+def sampled(at: ClosedConfiguration, question: Measurement, motion: PlatformMotion, cones: Array, linear: PoseErrors,
             count: int, seed: int = 0, progress: Callable[[], None] | None = None) -> Sampled:
     """The true errors at a configuration for ``count`` samples, seeded."""
     u = seen(at, question)[0]

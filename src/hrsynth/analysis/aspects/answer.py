@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.steps import led
 from ...mechanism.pose import Pose
-from ...mechanism.vectors import Array
 from ...results import Result
-from ..setting import Setting
+from ..observed import ObservedRobot
 from .carriage import Carriage
 from .crossing import Crossing
 from .proof import Way
@@ -44,7 +44,7 @@ class PathAnswer(Result):
     they are separated; ``boxes`` are the intervals of all proofs tried.
     """
 
-    setting: Setting
+    setting: ObservedRobot
     verdict: str
     certified: bool
     poses: tuple[Pose, ...]

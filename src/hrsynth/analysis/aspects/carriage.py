@@ -11,13 +11,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...kinematics.balls import Field, widened
+from ...geometry.balls import Field, widened
+from ...geometry.so3 import exponential, logarithm
+from ...geometry.vectors import Array, hats, inverse
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.parts import PlatformMotion
-from ...kinematics.relation import Question, relation
-from ...mechanism.legs import Anatomy
-from ...mechanism.so3 import exponential, logarithm
-from ...mechanism.vectors import Array, hats, inverse
+from ...kinematics.platform_motion import PlatformMotion
+from ...kinematics.relation import Measurement, relation
+from ...mechanism.legs import LegDecomposition
 from ...tolerances import FOLLOWED, RANK_CUTOFF
 
 Place = tuple[Array, Array]
@@ -47,7 +47,7 @@ class Carriage:
         return X
 
 
-def carriages(anatomy: Anatomy, question: Question, dof: int, configurations: Sequence[ClosedConfiguration]
+def carriages(anatomy: LegDecomposition, question: Measurement, dof: int, configurations: Sequence[ClosedConfiguration]
               ) -> Iterator[Carriage]:
     """The whole pose of the platform where its parts are independent, then the positions of joint centres on it that
     have all of the robot's freedoms."""

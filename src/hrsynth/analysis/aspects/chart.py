@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...kinematics.balls import Field
-from ...mechanism.vectors import Array
+from ...geometry.balls import Field
+from ...geometry.vectors import Array
 from .limbs import Limb
 from .limits import Bound
 from .sources import Source, traced

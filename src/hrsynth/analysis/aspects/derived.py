@@ -12,13 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...constraints.named_vectors import Carried, Feature, Spot
+from ...geometry.lines import distance
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Joint, JointType, Mechanism
-from ...mechanism.legs import Anatomy
-from ...mechanism.lines import distance
-from ...mechanism.vectors import Array
+from ...mechanism.legs import LegDecomposition
 from ...tolerances import EXACT, FOLLOWED
-from ..singularity.features import Carried, Feature, Spot
 from .carriage import Carriage, Rigid
 
 
@@ -41,7 +41,7 @@ class Derived:
     bodies: Mapping[str, Body]
 
     @classmethod
-    def of(cls, anatomy: Anatomy, carriage: Carriage, configurations: Sequence[ClosedConfiguration]
+    def of(cls, anatomy: LegDecomposition, carriage: Carriage, configurations: Sequence[ClosedConfiguration]
            ) -> Derived:
         """The base, and the platform's links from joint to joint. Which of these turn is seen at configurations; that
         the joints between them allow it follows from the joints."""

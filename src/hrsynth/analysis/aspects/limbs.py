@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ...kinematics.balls import Field, cross, dot, normed, widened
-from ...mechanism.vectors import Array
+from ...geometry.balls import Field, cross, dot, normed, widened
+from ...geometry.vectors import Array
 from ...tolerances import FOLLOWED
 from .carriage import Rigid
 

@@ -9,12 +9,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...kinematics.balls import Field, cross, dot
+from ...constraints.named_vectors import axis_of
+from ...geometry.balls import Field, cross, dot
+from ...geometry.so3 import wrapped
+from ...geometry.vectors import Array
 from ...mechanism import Joint, JointType, Limits, Mechanism
-from ...mechanism.so3 import wrapped
-from ...mechanism.vectors import Array
 from ...tolerances import FOLLOWED, SAME_RELATION
-from ..singularity.features import axis_of
 from .sources import NoChart, Source
 
 if TYPE_CHECKING:

@@ -8,17 +8,17 @@ from functools import cached_property
 
 import numpy as np
 
+from ...batch.reach import reach
+from ...constraints.pattern import Structure
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.parts import PlatformMotion
-from ...kinematics.reach import reach
+from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
-from ..setting import Setting, prepare
+from ..observed import ObservedRobot, prepare
 from ..singularity.agreement import smallest_of
 from ..singularity.condition import Condition, Named
-from ..singularity.measured import Measured
-from ..singularity.structure import Structure
+from ..singularity.measured import MeasuredRobot
 from .answer import SAME, SEPARATED, UNDECIDED, End, PathAnswer, between
 from .carriage import Place, carriages
 from .crossing import Crossing
@@ -39,7 +39,7 @@ CLEAR = RANK_CUTOFF * RANK_GAP
 class Aspects:
     """A robot with its Type 2 condition, ready to be asked for paths between configurations."""
 
-    setting: Setting
+    setting: ObservedRobot
     motion: PlatformMotion
     structure: Structure
     condition: Condition
@@ -53,9 +53,9 @@ class Aspects:
         return cls.about(prepare(robot, observe, camera, seed=seed))
 
     @classmethod
-    def about(cls, setting: Setting) -> Aspects:
+    def about(cls, setting: ObservedRobot) -> Aspects:
         """The condition of a robot from the samples of a setting."""
-        seen = Measured.watched(setting)
+        seen = MeasuredRobot.watched(setting)
         return cls(setting, setting.motion, seen.structure, seen.condition,
                    tuple(freedom.name for freedom in seen.verdict.lost))
 

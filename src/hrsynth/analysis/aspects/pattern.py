@@ -8,12 +8,12 @@ from typing import cast
 
 import numpy as np
 
+from ...constraints.named_vectors import Feature, Segment, Spot, Tangent, axis_of, centre_of, poses_at
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Joint, JointType, Mechanism
-from ...mechanism.legs import Anatomy, Leg
-from ...mechanism.vectors import Array
+from ...mechanism.legs import Leg, LegDecomposition
 from ...tolerances import EXACT, FOLLOWED, SAME_RELATION
-from ..singularity.features import Feature, Segment, Spot, Tangent, axis_of, centre_of, poses_at
 from .carriage import Carriage, Rigid, rigid
 from .chart import Chart
 from .derived import Derived
@@ -54,7 +54,7 @@ class Pattern:
         return Chart(tuple(limbs), self.vectors, self.points, self.bounds)
 
 
-def pattern(anatomy: Anatomy, features: Sequence[Feature], carriage: Carriage,
+def pattern(anatomy: LegDecomposition, features: Sequence[Feature], carriage: Carriage,
             configurations: Sequence[ClosedConfiguration]) -> Pattern:
     """The forms of all legs and of the wanted features; raises ``NoChart`` where one fits none."""
     sight = Sight(anatomy.mechanism, carriage, configurations, Derived.of(anatomy, carriage, configurations))

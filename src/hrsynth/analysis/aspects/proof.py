@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...kinematics.balls import Field, above_zero, balls, below, centred, cross, det, dot, finite, jets
-from ...mechanism.vectors import Array
+from ...geometry.balls import Field, above_zero, balls, below, centred, cross, det, dot, finite, jets
+from ...geometry.vectors import Array
 from ..singularity.condition import Named, rows
 from .carriage import Stretch
 from .chart import Chart

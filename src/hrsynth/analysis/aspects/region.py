@@ -6,8 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...mechanism.so3 import exponential, logarithm
-from ...mechanism.vectors import Array
+from ...geometry.so3 import exponential, logarithm
+from ...geometry.vectors import Array
 from .carriage import Carriage, Place
 
 WIDER = 1.5

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from ...mechanism.vectors import Array
+from ...geometry.vectors import Array
 from .carriage import Place, Stretch, stretched
 from .crossing import Crossing, crossing
 from .proof import FIRST, Proof, Reading, Way, prove

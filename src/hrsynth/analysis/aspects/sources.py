@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...kinematics.balls import Field, cross, normed
-from ...mechanism.vectors import Array
+from ...geometry.balls import Field, cross, normed
+from ...geometry.vectors import Array
 from .carriage import Rigid
 
 

@@ -10,7 +10,7 @@ from functools import cached_property
 import numpy as np
 
 from ...errors import BadRequest
-from ...mechanism.vectors import Array
+from ...geometry.vectors import Array
 from ...tolerances import PARALLEL
 from .certify import Equation
 from .conics import Conic, Numbers, direction, spatial_frame, spokes

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...mechanism.vectors import Array, inverse, perpendicular, pose
+from ...geometry.vectors import Array, inverse, perpendicular, pose
 from .articulated import Articulated
 from .curves import Reach
 from .planar import Planar

@@ -14,15 +14,16 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...geometry import lines
+from ...geometry.vectors import Array, unit
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.locked import carried
-from ...mechanism import Joint, JointType, Observation, lines
+from ...mechanism import Joint, JointType, Observation
 from ...mechanism.composites import Edge
-from ...mechanism.legs import Anatomy, Leg
+from ...mechanism.legs import Leg, LegDecomposition
 from ...mechanism.notation import Rods
 from ...mechanism.observation import Direction, Encoder
 from ...mechanism.screws import normals
-from ...mechanism.vectors import Array, unit
 from ...tolerances import RANK_GAP, SAME_DIRECTION, SAME_POINT
 
 
@@ -76,7 +77,7 @@ class Chain:
     length: float
 
 
-def chain(anatomy: Anatomy, leg: Leg, held: Sequence[Observation], goal: ClosedConfiguration, tip: Array,
+def chain(anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal: ClosedConfiguration, tip: Array,
           end: Array | str) -> Chain:
     """The chain of a leg to its ``tip`` (3,); ``end`` is ``free``, ``kept`` (its body's orientation) or the normal of
     the plane in which that turns. Raises :class:`Underived`."""
@@ -94,7 +95,8 @@ def chain(anatomy: Anatomy, leg: Leg, held: Sequence[Observation], goal: ClosedC
 class _Walk:
     """The path from the base to a leg's end, step by step."""
 
-    def __init__(self, anatomy: Anatomy, leg: Leg, held: Sequence[Observation], goal: ClosedConfiguration) -> None:
+    def __init__(self, anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation],
+                 goal: ClosedConfiguration) -> None:
         self.anatomy, self.leg, self.goal = anatomy, leg, goal
         self.watched: dict[str, list[Array]] = {}
         self.coordinates: dict[str, int] = {}

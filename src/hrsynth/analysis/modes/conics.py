@@ -18,7 +18,7 @@ from typing import Any
 
 import numpy as np
 
-from ...mechanism.vectors import Array, perpendicular
+from ...geometry.vectors import Array, perpendicular
 from ...tolerances import PARALLEL
 from .curves import Circle, Curve, Line, Plane, Reach, cross, length
 

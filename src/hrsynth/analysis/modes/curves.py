@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import BadRequest
-from ...mechanism.vectors import Array, frozen, perpendicular
+from ...geometry.vectors import Array, frozen, perpendicular
 from ...tolerances import EXACT
 
 

@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ...mechanism.vectors import Array
+from ...geometry.vectors import Array
 from .conics import UNIT, Conic
 from .curves import length
 from .quadrics import conditions

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...geometry.ranks import range_basis
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration, Wanted, system
-from ...kinematics.ranks import range_basis
-from ...mechanism.vectors import Array
 
 ROUNDINGS = 16 * 2.0 ** -52
 """What thirty-two roundings, those of a chain of joints from the file's decimals on, make of lengths and angles."""

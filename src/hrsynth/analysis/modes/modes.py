@@ -8,20 +8,20 @@ from typing import Any
 
 import numpy as np
 
+from ...batch.reach import reach
 from ...errors import BadRequest
+from ...geometry.vectors import Array
 from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, outside
 from ...kinematics.closures import Miss
 from ...kinematics.configuration import ClosedConfiguration, Wanted, measure
-from ...kinematics.reach import reach
-from ...kinematics.relation import Question
+from ...kinematics.relation import Measurement
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
-from ...mechanism.vectors import Array
 from ...results import Result
 from ...tolerances import SAME_RELATION
-from ..setting import Setting, prepare, silent
+from ..observed import ObservedRobot, prepare, silent
 from ..singularity.agreement import weakest
-from ..singularity.measured import Measured
+from ..singularity.measured import MeasuredRobot
 from .branches import solve_all
 from .build import Model
 from .goal import drift
@@ -104,7 +104,7 @@ class AssemblyModes(Result):
     or ``real``; ``confined`` holds the curves of the tips (None where the measurements never decide the pose).
     """
 
-    setting: Setting
+    setting: ObservedRobot
     kind: str
     goal: ClosedConfiguration
     pose: Pose
@@ -163,7 +163,7 @@ def modes(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
                       progress=progress)
 
 
-def modes_with(setting: Setting, at: Pose | str | None = None, *, real: bool = False, as_written: bool = False,
+def modes_with(setting: ObservedRobot, at: Pose | str | None = None, *, real: bool = False, as_written: bool = False,
                progress: Callable[[str], None] = silent) -> AssemblyModes:
     """All assembly modes with the measurements at a pose of a setting, as :func:`modes`."""
     goal, wanted = setting.everything.start, None
@@ -174,11 +174,11 @@ def modes_with(setting: Setting, at: Pose | str | None = None, *, real: bool = F
     return modes_at(setting, goal, wanted, real=real, as_written=as_written, progress=progress)
 
 
-def modes_at(setting: Setting, goal: ClosedConfiguration, wanted: Wanted | None = None, *, real: bool = False,
+def modes_at(setting: ObservedRobot, goal: ClosedConfiguration, wanted: Wanted | None = None, *, real: bool = False,
              as_written: bool = False, progress: Callable[[str], None] = silent) -> AssemblyModes:
     """All assembly modes with the measurements of a configuration of a setting, as :func:`modes`; ``wanted`` is the
     pose that the configuration was asked for."""
-    measured = Measured.driven(setting) if real else Measured.watched(setting)
+    measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)
     motion = setting.motion
     pose = motion.pose(goal.pose(motion.link))
     kind = "real" if real else "hidden"
@@ -201,7 +201,7 @@ def modes_at(setting: Setting, goal: ClosedConfiguration, wanted: Wanted | None 
                          tuple(reader.read(mode, False) for mode in found.near), confined, made)
 
 
-def counted(measured: Measured, at: ClosedConfiguration) -> Modes:
+def counted(measured: MeasuredRobot, at: ClosedConfiguration) -> Modes:
     """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
     as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
     confined = confinement(measured.setting.anatomy, measured.question, measured.structure, at)
@@ -211,7 +211,7 @@ def counted(measured: Measured, at: ClosedConfiguration) -> Modes:
 class _Reader:
     """Poses of a system read as poses of the robot."""
 
-    def __init__(self, setting: Setting, question: Question, goal: ClosedConfiguration, made: Model) -> None:
+    def __init__(self, setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, made: Model) -> None:
         self.question, self.motion, self.made, self.goal = question, setting.motion, made, goal
         self.assembler = Assembler(setting.anatomy, goal.twin.length, question.reference)
         values = measure(goal.twin, goal.q, question.reference, question.observations)[2]

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...mechanism.vectors import Array
+from ...geometry.vectors import Array
 from ...tolerances import LOCUS, NEAR_MODE, VANISHES
 from .systems import System
 

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRequest
-from ...mechanism.vectors import Array
+from ...geometry.vectors import Array
 from ...tolerances import SAME_DIRECTION, SAME_POINT
 from .certify import Equation
 from .conics import Conic, Frame, Numbers, direction, planar_frame

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ...mechanism.vectors import Array, perpendicular
+from ...geometry.vectors import Array, perpendicular
 from .certify import Quadric
 from .conics import UNIT, Conic, Frame, Numbers, Rounded, direction
 from .curves import Circle, Line, Plane, Point, Reach, Sphere, cross

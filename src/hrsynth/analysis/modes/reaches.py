@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...mechanism import lines
-from ...mechanism.vectors import Array
+from ...geometry import lines
+from ...geometry.vectors import Array
 from ...tolerances import RANK_GAP, SAME_POINT
 from .chain import Body, Chain, Underived
 from .curves import Circle, Line, Plane, Point, Reach, Sphere

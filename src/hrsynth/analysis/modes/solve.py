@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...mechanism.vectors import Array, frozen
+from ...geometry.vectors import Array, frozen
 from ...tolerances import FARTHEST, NEARLY_DOUBLE, VANISHES
 from .curves import Point
 from .fits import excluded, meets, torn, words

@@ -9,8 +9,8 @@ from itertools import combinations
 
 import numpy as np
 
-from ...mechanism.so3 import exponential, logarithm
-from ...mechanism.vectors import Array, pose
+from ...geometry.so3 import exponential, logarithm
+from ...geometry.vectors import Array, pose
 from ...tolerances import SAME_POINT
 from .certify import Equation
 from .conics import Conic, Numbers, spatial_frame

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...mechanism.vectors import Array
+from ...geometry.vectors import Array
 from .certify import Equation
 from .conics import Conic, Frame, Numbers, Rounded, conic
 from .curves import Circle, Curve

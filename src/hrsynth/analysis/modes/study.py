@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from ...mechanism.so3 import logarithm
-from ...mechanism.vectors import Array
+from ...geometry.so3 import logarithm
+from ...geometry.vectors import Array
 from .certify import Quadric
 from .conics import UNIT, Numbers, spatial_frame
 from .curves import Reach, cross

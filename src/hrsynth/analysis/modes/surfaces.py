@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...mechanism.vectors import Array, unit
+from ...geometry.vectors import Array, unit
 from .certify import Equation
 from .conics import UNIT, Conic, Numbers, Rounded, direction, spatial_frame
 from .curves import Line, Plane, Sphere, Surface, cross, extent, length

@@ -16,7 +16,7 @@ from typing import ClassVar
 import numpy as np
 
 from ...errors import BadRequest
-from ...mechanism.vectors import Array, frozen, pose
+from ...geometry.vectors import Array, frozen, pose
 from ...tolerances import FARTHEST
 from .conics import SLACK, UNIT, Balls, Frame, Within, spatial_frame
 from .curves import Point, Reach, curves_of, extent, length, shifted

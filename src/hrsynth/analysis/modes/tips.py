@@ -14,20 +14,20 @@ from itertools import combinations
 
 import numpy as np
 
+from ...constraints.named_vectors import Carried, Feature, Spot, Tangent, poses_at
+from ...constraints.pattern import LockedLeg, Structure
 from ...errors import NotConfined
+from ...geometry.ranks import kernel_basis
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration, closed, measure
+from ...kinematics.leg_reach import alone
 from ...kinematics.locked import moved, rezeroed
-from ...kinematics.misses import alone
-from ...kinematics.ranks import kernel_basis
-from ...kinematics.relation import Question
-from ...kinematics.twin import Twin
+from ...kinematics.pinocchio_model import PinocchioModel
+from ...kinematics.relation import Measurement
 from ...mechanism import Observation
 from ...mechanism.composites import WordGraph
-from ...mechanism.legs import Anatomy, dissect
-from ...mechanism.vectors import Array
+from ...mechanism.legs import LegDecomposition, decompose
 from ...tolerances import CLOSED, FOLLOWED, SAME_POINT, SAME_RELATION, SOLVED
-from ..singularity.features import Carried, Feature, Spot, Tangent, poses_at
-from ..singularity.structure import HeldLeg, Structure
 from .chain import Underived, chain
 from .curves import Circle, Line, Plane, Point, Reach, Sphere
 from .reaches import reaches
@@ -77,7 +77,8 @@ class Confinement:
     """Whether the numbers count as they are, and no special geometry is meant."""
 
 
-def confinement(anatomy: Anatomy, question: Question, structure: Structure, goal: ClosedConfiguration) -> Confinement:
+def confinement(anatomy: LegDecomposition, question: Measurement, structure: Structure,
+                goal: ClosedConfiguration) -> Confinement:
     """Where all watched legs' tips can be with the directions held at their values at ``goal``.
 
     Raises ``NotConfined`` where that is no point, line, circle, sphere or plane, or the platform's motion none of those
@@ -94,7 +95,8 @@ def confinement(anatomy: Anatomy, question: Question, structure: Structure, goal
     return Confinement(goal, structure.motion, tips, structure.bodies, plane, slide, doubt=doubt)
 
 
-def _tip(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfiguration, end: Array | str) -> Tip:
+def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration,
+         end: Array | str) -> Tip:
     B = _value(leg.tip, goal) * goal.twin.length
     X = goal.pose(leg.body)
     place = X[:3, :3].T @ (B - X[:3, 3])
@@ -113,7 +115,7 @@ def _tip(anatomy: Anatomy, question: Question, leg: HeldLeg, goal: ClosedConfigu
     return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=doubt), leg, goal)
 
 
-def _fitted(anatomy: Anatomy, own: Sequence[Observation], reference: str, tip: Tip, leg: HeldLeg,
+def _fitted(anatomy: LegDecomposition, own: Sequence[Observation], reference: str, tip: Tip, leg: LockedLeg,
             goal: ClosedConfiguration) -> Tip:
     """A tip's curve or surface as the pattern names it, to which the leg's moves keep."""
     B = _value(leg.tip, goal) * goal.twin.length
@@ -131,7 +133,7 @@ def _fitted(anatomy: Anatomy, own: Sequence[Observation], reference: str, tip: T
     raise NotConfined(anatomy.mechanism.name, f"the tip of leg {leg.label} {what}")
 
 
-def _candidates(anatomy: Anatomy, leg: HeldLeg, tip: Array, goal: ClosedConfiguration) -> Iterator[Reach]:
+def _candidates(anatomy: LegDecomposition, leg: LockedLeg, tip: Array, goal: ClosedConfiguration) -> Iterator[Reach]:
     """Curves with the tangent that the pattern names: a circle about the axis with the tip on it, or with the tip
     carried along by the end of the link that turns, whichever of the two bodies its axis is fixed in. Surfaces with
     the normal that it names: a plane, or a sphere with the radius of a link that lies along the normal."""
@@ -153,7 +155,7 @@ def _candidates(anatomy: Anatomy, leg: HeldLeg, tip: Array, goal: ClosedConfigur
         yield Plane(tip, n)
 
 
-def _rods(anatomy: Anatomy, leg: HeldLeg, along: Array, goal: ClosedConfiguration) -> list[Array]:
+def _rods(anatomy: LegDecomposition, leg: LockedLeg, along: Array, goal: ClosedConfiguration) -> list[Array]:
     """From joint centre to joint centre (m) of a leg, where that is parallel to a direction."""
     joints = [anatomy.mechanism.joints[name] for name in anatomy.leg(leg.label).joints]
     centres = [moved(goal, joint)[0] * goal.twin.length for joint in joints]
@@ -177,7 +179,7 @@ def _opposite(circle: Circle, tip: Array) -> Circle:
     return Circle(2 * tip - circle.centre, circle.axis, circle.radius, circle.centre - tip)
 
 
-def _slide(anatomy: Anatomy, structure: Structure, goal: ClosedConfiguration) -> tuple[Circle, str | None]:
+def _slide(anatomy: LegDecomposition, structure: Structure, goal: ClosedConfiguration) -> tuple[Circle, str | None]:
     """The circle of the second body's origin relative to the first's, and why it may not be all.
 
     Where a parallelogram joins the bodies it is that of a crank; else of the two with the tangent that the pattern
@@ -216,7 +218,7 @@ class _Held:
     reference: str
     measured: Sequence[tuple[Observation, Array]]
 
-    def rows(self, twin: Twin, q: Array) -> tuple[Array, Array]:
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
         if not self.measured:
             return np.zeros(0), np.zeros((0, twin.nv))
         _, _, values, rates = measure(twin, q, self.reference, [o for o, _ in self.measured])
@@ -224,12 +226,12 @@ class _Held:
         return np.concatenate(errors), np.vstack(rates)
 
 
-def _held_paths(anatomy: Anatomy, own: Sequence[Observation], reference: str, leg: HeldLeg, goal: ClosedConfiguration,
-                place: Array) -> list[Array]:
+def _held_paths(anatomy: LegDecomposition, own: Sequence[Observation], reference: str, leg: LockedLeg,
+                goal: ClosedConfiguration, place: Array) -> list[Array]:
     """Positions of a tip when its leg alone, with what is measured held, is moved along each of its freedoms, and along
     some random combinations of them."""
-    rest = dissect(rezeroed(goal))
-    twin = Twin(alone(rest, rest.leg(leg.label)), goal.twin.length)
+    rest = decompose(rezeroed(goal))
+    twin = PinocchioModel(alone(rest, rest.leg(leg.label)), goal.twin.length)
     values = measure(twin, twin.q0, reference, own)[2] if own else []
     held = _Held(reference, tuple(zip(own, values, strict=True)))
     start = ClosedConfiguration.of(twin, twin.q0, SAME_RELATION)

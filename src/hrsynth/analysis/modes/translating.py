@@ -8,7 +8,7 @@ from itertools import combinations
 
 import numpy as np
 
-from ...mechanism.vectors import Array
+from ...geometry.vectors import Array
 from ...tolerances import VANISHES
 from .certify import Equation
 from .conics import Conic, Numbers, direction, spatial_frame

@@ -17,8 +17,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...mechanism import lines
-from ...mechanism.vectors import Array, rotation_about
+from ...geometry import lines
+from ...geometry.vectors import Array, rotation_about
 from ...tolerances import EXACT, SAME_RELATION
 from .chain import Chain, Underived
 

@@ -12,17 +12,17 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...batch.placing import Placer
+from ...constraints.pattern import Scene, Structure
 from ...errors import Disagreement
-from ...kinematics.batch.placing import Placer
+from ...geometry.ranks import kernel_basis, range_basis
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration, closed
-from ...kinematics.ranks import kernel_basis, range_basis
-from ...kinematics.relation import Question, platform_motions, relation
+from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.sampling import WEAKEST, wander
-from ...mechanism.vectors import Array
 from ...tolerances import CLOSED, FOLLOWED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT, SHARP
+from .batch_spectrum import SPOTS, Quick
 from .condition import Condition, Named
-from .quick import SPOTS, Quick
-from .structure import Scene, Structure
 
 CHUNK = 250
 ON_LOCUS = 10
@@ -59,7 +59,7 @@ class Agreement:
                 "on_locus": len(self.on_locus), "searches": self.searches}
 
 
-def agreement(start: ClosedConfiguration, question: Question, structure: Structure, condition: Condition,
+def agreement(start: ClosedConfiguration, question: Measurement, structure: Structure, condition: Condition,
               count: int, *, seed: int = 0, progress: Callable[[], None] | None = None,
               placer: Placer | None = None) -> Agreement:
     """Compare at ``count`` random reachable poses and at poses on the locus.
@@ -128,12 +128,12 @@ def agreement(start: ClosedConfiguration, question: Question, structure: Structu
     return found
 
 
-def weakest(at: ClosedConfiguration, question: Question) -> float:
+def weakest(at: ClosedConfiguration, question: Measurement) -> float:
     """The smallest singular value of Mᵀ on an orthonormal basis of the platform's twists (characteristic lengths)."""
     return float(_relations([at], question)[0][0])
 
 
-def spectrum(configurations: Sequence[ClosedConfiguration], question: Question) -> tuple[Array, Array]:
+def spectrum(configurations: Sequence[ClosedConfiguration], question: Measurement) -> tuple[Array, Array]:
     """The smallest and the largest singular value of Mᵀ at each configuration, (n,) each (characteristic lengths)."""
     smallest, parts = _relations(configurations, question)
     return smallest, np.array([part[2] for part in parts])
@@ -176,7 +176,7 @@ def _differ(*measures: Array) -> Array:
     return (table.min(axis=0) < RANK_CUTOFF) & (table.max(axis=0) > RANK_CUTOFF * RANK_GAP)
 
 
-def _relations(chunk: Sequence[ClosedConfiguration], question: Question, bodies: tuple[str, ...] = ()
+def _relations(chunk: Sequence[ClosedConfiguration], question: Measurement, bodies: tuple[str, ...] = ()
                ) -> tuple[Array, list[tuple[Array, Array, float]]]:
     """Smallest singular value of Mᵀ at each configuration; for each the measured rates and the twists of ``bodies`` for
     a basis of the platform's motions, (m, k) and (6 bodies, k), and the largest singular value."""
@@ -198,7 +198,7 @@ def _relations(chunk: Sequence[ClosedConfiguration], question: Question, bodies:
     return np.array(sigma), parts
 
 
-def _weakest(scene: Scene, question: Question, condition: Condition) -> tuple[Array, float]:
+def _weakest(scene: Scene, question: Measurement, condition: Condition) -> tuple[Array, float]:
     """Smallest singular values by Pinocchio, and the largest angle by which a watched leg's named vectors miss what
     Pinocchio says it lets the platform do."""
     named = isinstance(condition, Named)
@@ -264,7 +264,7 @@ def _sharpened(at: ClosedConfiguration, step: Array, structure: Structure, condi
     return ClosedConfiguration.of(at.twin, at.twin.moved(at.q, -here / slope * motion))
 
 
-def _descents(low: Sequence[tuple[float, ClosedConfiguration]], question: Question, structure: Structure,
+def _descents(low: Sequence[tuple[float, ClosedConfiguration]], question: Measurement, structure: Structure,
               condition: Condition) -> Iterator[ClosedConfiguration | None]:
     """Zeros of the rows sought from weak poses: rows(q) x = 0 with |x| = 1; None where one is not found."""
     for _, start in low:
@@ -275,13 +275,13 @@ def _size(pair: tuple[float, ClosedConfiguration]) -> float:
     return pair[0]
 
 
-def _known(at: ClosedConfiguration, others: Sequence[ClosedConfiguration], question: Question) -> bool:
+def _known(at: ClosedConfiguration, others: Sequence[ClosedConfiguration], question: Measurement) -> bool:
     """Whether a configuration's platform pose is one of others'."""
     X = at.pose(question.platform)
     return any(np.linalg.norm(X - other.pose(question.platform)) <= SAME_SPOT for other in others)
 
 
-def descend(start: ClosedConfiguration, question: Question, structure: Structure,
+def descend(start: ClosedConfiguration, question: Measurement, structure: Structure,
             condition: Condition) -> ClosedConfiguration | None:
     """A pose on the locus near ``start``: least squares in the platform's motions and the lost one; None where there is
     none near."""

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...mechanism.vectors import Array
+from ...geometry.vectors import Array
 
 
 class Products(NamedTuple):

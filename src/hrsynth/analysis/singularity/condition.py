@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from ...constraints.named_vectors import Carried, Feature, Tangent
+from ...constraints.pattern import LockedLeg, Scene, Structure, forbidden, projectors
+from ...geometry.vectors import Array, hats
 from ...kinematics.locked import interaction
-from ...kinematics.relation import Question
-from ...mechanism.vectors import Array, hats
+from ...kinematics.relation import Measurement
 from ...tolerances import SAME_RELATION
 from .algebra import evaluate, products, vector
-from .features import Carried, Feature, Tangent
-from .structure import HeldLeg, Scene, Structure, forbidden, projectors
 
 Values = Mapping[str, Array]
 
@@ -74,7 +74,7 @@ class Named(Condition):
 class General(Condition):
     """The condition of any mechanism: the interaction matrix by the screws of all joints loses rank."""
 
-    question: Question = field(kw_only=True)
+    question: Measurement = field(kw_only=True)
 
     def rows(self, scene: Scene) -> Array:
         return np.array([interaction(at, self.question) for at in scene.configurations])
@@ -109,7 +109,7 @@ def plucker(structure: Structure, values: Values) -> Array:
     return np.stack([np.concatenate([n, np.cross(B, n)], axis=-1) for n, B in pairs], axis=1)
 
 
-def condition(structure: Structure, question: Question) -> Condition:
+def condition(structure: Structure, question: Measurement) -> Condition:
     """The condition of a structure: by name where its pattern is a known one, else by the screws of all joints."""
     if structure.motion == "other":
         return _general(question)
@@ -134,7 +134,7 @@ def condition(structure: Structure, question: Question) -> Condition:
     return _gram(structure)
 
 
-def _translations(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:
+def _translations(structure: Structure, lines: Sequence[LockedLeg]) -> Condition:
     dot, cross, det = products()
     symbols = [vector(_symbol(leg.line)) for leg in lines]
     normals = [vector(_symbol(leg.normal)) for leg in structure.legs if leg.normal is not None]
@@ -184,7 +184,7 @@ def _apart(structure: Structure) -> str | None:
     return f"a translation that all legs leave would be {_and(reasons)}, which are constant, and there is none"
 
 
-def _planar(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:
+def _planar(structure: Structure, lines: Sequence[LockedLeg]) -> Condition:
     """det of the tips' normals s_i = (n × τ_i; B_i·τ_i) as lines of the plane: s1·(s2 × s3)."""
     dot, _, det = products()
     n = vector(_symbol(structure.plane))
@@ -197,7 +197,7 @@ def _planar(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:
     return _named(structure, words, expression, True)
 
 
-def _spatial(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:
+def _spatial(structure: Structure, lines: Sequence[LockedLeg]) -> Condition:
     """The tips' speeds along their lines that keep |B_i B_j|: a 3 × 3 determinant."""
     dot, _, _ = products()
     line = [vector(_symbol(leg.line)) for leg in lines]
@@ -213,7 +213,7 @@ def _spatial(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:
     return _named(structure, words, forth - back, True)
 
 
-def _pivot(structure: Structure, line: HeldLeg, fixed: HeldLeg) -> Condition:
+def _pivot(structure: Structure, line: LockedLeg, fixed: LockedLeg) -> Condition:
     """One tip rests: the platform turns about it where the other tip's line is the path of that turn."""
     dot, _, _ = products()
     one, other, along = fixed.tip.symbol, line.tip.symbol, _symbol(line.line)
@@ -221,7 +221,7 @@ def _pivot(structure: Structure, line: HeldLeg, fixed: HeldLeg) -> Condition:
     return _named(structure, words, dot(vector(other) - vector(one), vector(along)), True)
 
 
-def _complex(structure: Structure, legs: Sequence[HeldLeg]) -> Condition:
+def _complex(structure: Structure, legs: Sequence[LockedLeg]) -> Condition:
     """Six forces along lines through the tips: their Plücker coordinates are dependent."""
     import sympy
 
@@ -232,7 +232,7 @@ def _complex(structure: Structure, legs: Sequence[HeldLeg]) -> Condition:
     return _named(structure, words, expression, True, matrices={"L": "rows " + ", ".join(lines)})
 
 
-def _bodies(structure: Structure, lines: Sequence[HeldLeg]) -> Condition:
+def _bodies(structure: Structure, lines: Sequence[LockedLeg]) -> Condition:
     _, _, det = products()
     slide = vector(_symbol(structure.slide))
     expression = det(*(vector(_symbol(leg.line)) for leg in lines), slide)
@@ -277,7 +277,7 @@ def _named(structure: Structure, words: str, expression: Any, signed: bool, *, n
                  {**(matrices or {}), **dict(sorted(named.items()))}, structure=structure)
 
 
-def _general(question: Question) -> General:
+def _general(question: Measurement) -> General:
     import sympy
 
     size = sympy.Symbol("d", integer=True, positive=True)
@@ -318,7 +318,7 @@ def _listed(features: Iterable[Feature | None]) -> str:
 _KINDS = {"u": "watched directions", "p": "P axes", "t": "tangents", "a": "axes", "r": "directions"}
 
 
-def _moves(legs: Sequence[HeldLeg]) -> str:
+def _moves(legs: Sequence[LockedLeg]) -> str:
     """What all tips do: ``every tip Bi along ui (i = 1, 2, 3)`` where they are alike."""
     alike = {(leg.tip.symbol[0], _allowed(leg).replace(leg.tip.symbol[1:], "i")) for leg in legs}
     if len(alike) > 1:
@@ -327,7 +327,7 @@ def _moves(legs: Sequence[HeldLeg]) -> str:
     return f"every tip {tip}i {allowed} (i = {', '.join(leg.tip.symbol[1:] for leg in legs)})"
 
 
-def _allowed(leg: HeldLeg) -> str:
+def _allowed(leg: LockedLeg) -> str:
     if leg.fixed:
         return "at rest"
     return f"along {_symbol(leg.line)}" if leg.line is not None else f"normal to {_symbol(leg.normal)}"
@@ -337,11 +337,11 @@ def _and(parts: Sequence[str]) -> str:
     return parts[0] if len(parts) == 1 else f"{', '.join(parts[:-1])} and {parts[-1]}"
 
 
-def _kinds(lines: Sequence[HeldLeg], relation: str) -> str:
+def _kinds(lines: Sequence[LockedLeg], relation: str) -> str:
     return f"{relation} {', '.join(_symbol(leg.line) for leg in lines)}"
 
 
-def _lengths(lines: Sequence[HeldLeg]) -> list[str]:
+def _lengths(lines: Sequence[LockedLeg]) -> list[str]:
     """Factors that vanish only where a crank has no length: none for unit vectors that are fixed in a link."""
     return [f"|{leg.line.meaning.removeprefix('tangent ')}|" for leg in lines
             if leg.line is not None and not isinstance(leg.line, Carried)]

@@ -10,18 +10,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...batch.reach import reach, sweep
 from ...errors import BadRequest, PlaneNotMet, PoseNotReached
+from ...geometry.so3 import turn_about
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.parts import PlatformMotion
-from ...kinematics.reach import reach, sweep
-from ...kinematics.relation import Question
+from ...kinematics.platform_motion import PlatformMotion
+from ...kinematics.relation import Measurement
 from ...mechanism.pose import Grid, Pose
-from ...mechanism.so3 import turn_about
-from ...mechanism.vectors import Array
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from .agreement import descend, spectrum, weakest
-from .measured import Measured
-from .quick import Quick
+from .batch_spectrum import Quick
+from .measured import MeasuredRobot
 
 COARSE = 25
 """Poses a side of the grid that finds how far a plane is reached."""
@@ -71,7 +71,7 @@ def _table(values: Array) -> list[list[float | None]]:
     return [[float(value) if np.isfinite(value) else None for value in row] for row in values]
 
 
-def locus(hidden: Measured, real: Measured | None, plane: Pose | None, steps: int,
+def locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None, steps: int,
           progress: Callable[[], None] | None = None) -> Locus:
     """Both robots over the plane that ``plane`` fixes (default: of three parts the third as at the zero configuration).
 
@@ -88,7 +88,7 @@ def locus(hidden: Measured, real: Measured | None, plane: Pose | None, steps: in
     if not any(configurations):
         raise PlaneNotMet(start.twin.mechanism.name, f"the plane {grid.fixed}", "none of its poses is reached")
 
-    def field(measured: Measured) -> Field:
+    def field(measured: MeasuredRobot) -> Field:
         condition = measured.condition
         reached = [(i, at) for i, at in enumerate(configurations) if at is not None]
         places, here = [i for i, _ in reached], [at for _, at in reached]
@@ -107,7 +107,7 @@ def locus(hidden: Measured, real: Measured | None, plane: Pose | None, steps: in
     return Locus(grid, field(hidden), None if real is None else field(real))
 
 
-def framed(start: ClosedConfiguration, question: Question, motion: PlatformMotion, plane: Pose | None, steps: int,
+def framed(start: ClosedConfiguration, question: Measurement, motion: PlatformMotion, plane: Pose | None, steps: int,
            met: Callable[[ClosedConfiguration, Grid], NDArray[np.bool_]]) -> Grid:
     """The grid that just holds what is reached of a plane; ``met`` says which cells of a coarse one are, (n,).
 
@@ -181,7 +181,7 @@ def _valleys(table: Array) -> list[int]:
     return sorted(map(int, cells), key=lambda cell: float(filled.flat[cell]))[:STARTS]
 
 
-def _same_mode(start: ClosedConfiguration, at: ClosedConfiguration, question: Question,
+def _same_mode(start: ClosedConfiguration, at: ClosedConfiguration, question: Measurement,
                motion: PlatformMotion) -> bool:
     """Whether the pose of ``at`` is singular in the working mode of ``start``, too."""
     try:
@@ -191,7 +191,7 @@ def _same_mode(start: ClosedConfiguration, at: ClosedConfiguration, question: Qu
     return weakest(there, question) < SAME_RELATION
 
 
-def _spots(grid: Grid, starts: Sequence[ClosedConfiguration], measured: Measured) -> Array:
+def _spots(grid: Grid, starts: Sequence[ClosedConfiguration], measured: MeasuredRobot) -> Array:
     """Singular poses that lie in the plane, sought from its weakest poses."""
     motion, question = measured.setting.motion, measured.question
     found: list[list[float]] = []

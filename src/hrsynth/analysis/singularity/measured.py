@@ -5,34 +5,34 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from ...kinematics.relation import Question
+from ...constraints.pattern import Structure, recognise
+from ...kinematics.relation import Measurement
 from ...kinematics.sampling import Samples
 from ...mechanism.observation import labels_of
 from ..controllability import Verdict, verdict_of
-from ..setting import Setting, motors
+from ..observed import ObservedRobot, motors
 from .condition import Condition, condition
-from .structure import Structure, recognise
 
 
 @dataclass(frozen=True, eq=False)
-class Measured:
+class MeasuredRobot:
     """A robot with samples for what is measured; verdict, pattern and condition are found when they are asked for."""
 
-    setting: Setting
+    setting: ObservedRobot
     samples: Samples
 
     @classmethod
-    def watched(cls, setting: Setting) -> Measured:
+    def watched(cls, setting: ObservedRobot) -> MeasuredRobot:
         """The observed directions: the hidden robot."""
         return cls(setting, setting.samples)
 
     @classmethod
-    def driven(cls, setting: Setting) -> Measured:
+    def driven(cls, setting: ObservedRobot) -> MeasuredRobot:
         """The motors' coordinates: the real robot. Raises ``BadRequest`` where it has no motor."""
         return cls(setting, setting.measuring(motors(setting).observations))
 
     @property
-    def question(self) -> Question:
+    def question(self) -> Measurement:
         """What is asked at each configuration."""
         return self.samples.question
 

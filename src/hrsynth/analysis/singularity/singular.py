@@ -6,21 +6,21 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...constraints.pattern import Structure
 from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration, closed
-from ...kinematics.relation import Question, platform_motions, relation
+from ...kinematics.relation import Measurement, platform_motions, relation
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...results import Result
 from ...tolerances import SOLVED
 from ..controllability import Verdict
 from ..freedoms import Freedom, name_freedoms
-from ..setting import Setting, prepare, silent
+from ..observed import ObservedRobot, prepare, silent
 from .agreement import Agreement, agreement, weakest
 from .condition import Condition, always
 from .locus import Locus, locus
-from .measured import Measured
-from .structure import Structure
+from .measured import MeasuredRobot
 
 POINTS = 10_000
 """Random poses at which words, expression and rank are compared."""
@@ -52,8 +52,8 @@ class Example:
 class Singularity(Result):
     """Where a robot loses a freedom of its platform to what is measured: the watched directions, or its own motors."""
 
-    setting: Setting
-    question: Question
+    setting: ObservedRobot
+    question: Measurement
     real: bool
     verdict: Verdict
     structure: Structure
@@ -103,7 +103,7 @@ def singular(robot: Mechanism, observe: Sequence[str] | str | None = None, camer
     tell = progress or silent
     tell("sampling")
     setting = prepare(robot, observe, camera, seed=seed)
-    measured = Measured.driven(setting) if real else Measured.watched(setting)
+    measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)
     question, verdict = measured.question, measured.verdict
     tell("pattern of the legs' wrenches")
     structure = measured.structure
@@ -129,30 +129,30 @@ def drawn(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
     return locus_of(prepare(robot, observe, camera, seed=seed), plane=plane, steps=steps, progress=progress)
 
 
-def locus_of(setting: Setting, *, plane: Pose | str | None = None, steps: int = STEPS,
+def locus_of(setting: ObservedRobot, *, plane: Pose | str | None = None, steps: int = STEPS,
              progress: Callable[[str], None] | None = None) -> Locus:
     """Where the hidden and the real robot of a setting lose a freedom over a plane of poses, as :func:`drawn`."""
     tell = progress or silent
-    hidden = Measured.watched(setting)
+    hidden = MeasuredRobot.watched(setting)
     if hidden.verdict.rank < setting.dof:
         raise BadRequest(f"{setting.robot.name} has no locus: a freedom is lost at every pose", None,
                          "legs that make it controllable")
     real = None
     if any(joint.actuated for joint in setting.mechanism.joints.values()):
-        driven = Measured.driven(setting)
+        driven = MeasuredRobot.driven(setting)
         real = driven if driven.rank == setting.dof else None
     wanted = Pose.parse(plane) if isinstance(plane, str) else plane
     return locus(hidden, real, wanted, steps, lambda: tell("poses of the plane"))
 
 
-def _example(setting: Setting, question: Question, at: ClosedConfiguration) -> Example:
+def _example(setting: ObservedRobot, question: Measurement, at: ClosedConfiguration) -> Example:
     X = at.pose(question.platform)
     lost = name_freedoms(relation(at, question).lost, setting.anatomy, position=X[:3, 3])
     nearby = max((weakest(other, question) for other in neighbours(at, question, NEARBY)), default=0.0)
     return Example(at, setting.motion.pose(X), lost, weakest(at, question), nearby)
 
 
-def neighbours(at: ClosedConfiguration, question: Question, distance: float) -> list[ClosedConfiguration]:
+def neighbours(at: ClosedConfiguration, question: Measurement, distance: float) -> list[ClosedConfiguration]:
     """Configurations whose platform is ``distance`` (m; of its turn, times the characteristic length) away, to both
     sides in each of its freedoms."""
     motion = platform_motions(at, question)

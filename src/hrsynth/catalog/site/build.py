@@ -13,8 +13,8 @@ from typing import Any
 from ... import __version__
 from ...errors import BadRequest, BuildStopped
 from ..build import Tell
-from ..crews import Crew, crew
-from ..lines import line
+from ..executors import Crew, crew
+from ..jsonl import line
 from ..query import Catalog
 from ..source import Made, Stopped
 from . import index

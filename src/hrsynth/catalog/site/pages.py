@@ -14,7 +14,7 @@ from ...mechanism.model import Mechanism
 from ...present.drawings.schematic import robot_svg
 from ...present.text.catalog import facts, motors
 from ...rewrite.strategy import Step
-from ..lines import Record
+from ..jsonl import Record
 from ..source import Made, Stopped
 from .folder import FOLDERS
 from .render import rendered

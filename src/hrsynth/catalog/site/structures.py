@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from hashlib import sha256
 from typing import Any
 
-from ..lines import Record, line
+from ..jsonl import Record, line
 from ..words import Leg, Word, parse
 
 LENGTH = 12

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ...analysis.derive import Derivation, derived
-from ...analysis.setting import prepare
+from ...analysis.observed import prepare
 from ...errors import HrsynthError
 from ...mechanism.model import Mechanism
 from ..entry import SAMPLES, model
 from ..geometry import mechanism
-from ..lines import Record
+from ..jsonl import Record
 from ..words import parse
 
 

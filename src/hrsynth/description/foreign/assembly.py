@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...geometry.vectors import Array, inverse, pose
 from ...mechanism.model import JointType, Mechanism
-from ...mechanism.vectors import Array, inverse, pose
 from ...tolerances import FAINT, NOISE, RANK_CUTOFF, SOLVED
 from ..draft import Edge, End
 from .graph import Gear, spanning_tree

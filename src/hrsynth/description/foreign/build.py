@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import replace
 
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed, RankUndecided
+from ...geometry.vectors import Array, inverse, unit
 from ...mechanism.model import Coupling, Joint, JointType, Limits, Mechanism, Note
-from ...mechanism.vectors import Array, inverse, unit
 from ...tolerances import FAINT, NOISE, RANK_CUTOFF, RANK_GAP, SAME_GEOMETRY
 from ..draft import Edge
 from ..tree import spanning

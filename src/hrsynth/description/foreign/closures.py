@@ -8,9 +8,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...mechanism import graphs, lines
+from ...geometry import lines
+from ...geometry.vectors import Array, frozen, inverse, perpendicular, pose, unit
+from ...mechanism import graphs
 from ...mechanism.model import Joint, JointType, Mechanism, Motor, Note
-from ...mechanism.vectors import Array, frozen, inverse, perpendicular, pose, unit
 from ...tolerances import NOISE
 from ..draft import Edge, End
 from .graph import Graph

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...mechanism.vectors import inverse
+from ...geometry.vectors import inverse
 from .. import xml
 from . import sdf_joint
 from .assembly import Assembly

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRobotFile, Defect
+from ...geometry.vectors import Array
 from ...mechanism.model import JointType, Motor
-from ...mechanism.vectors import Array
 from .. import xml
 from ..draft import ORIGIN, Edge, End
 from . import urdf

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import BadRequest
-from ...mechanism.legs import dissect, observation_of
+from ...mechanism.legs import decompose, observation_of
 from ...mechanism.model import JointType, Mechanism, Motor
 from ...mechanism.normal import normal_form
 from ..draft import ORIGIN, Edge, End
@@ -88,7 +88,7 @@ def frozen(edges: dict[str, Edge], wanted: Iterable[str]) -> dict[str, Edge]:
 def observing(mechanism: Mechanism, links: Iterable[str]) -> Mechanism:
     """The mechanism with the default segments of the named links as its observed directions."""
     normal = normal_form(mechanism)
-    anatomy = dissect(normal.mechanism)
+    anatomy = decompose(normal.mechanism)
     found = []
     for link in links:
         if normal.into.get(link) not in normal.mechanism.links:

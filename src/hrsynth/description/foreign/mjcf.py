@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...errors import BadRobotFile
+from ...geometry.vectors import Array, frozen, inverse, pose
 from ...mechanism.model import JointType, Limits, Link, Motor
-from ...mechanism.vectors import Array, frozen, inverse, pose
 from .. import numerals, xml
 from ..draft import ORIGIN, Edge, End
 from ..elements import Elements
-from . import own
+from . import annotations as own
 from .graph import Gear, Graph
 from .mjcf_defaults import Defaults
 from .mjcf_pose import Compiler

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...mechanism.vectors import Array, pose, rotation_about, unit
+from ...geometry.vectors import Array, pose, rotation_about, unit
 from .. import xml
 from ..elements import Elements
 from .sdf_joint import rotation_of

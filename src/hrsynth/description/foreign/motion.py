@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...geometry.so3 import exponential, logarithm
+from ...geometry.vectors import Array, hat, perpendicular, pose, rotation_about
 from ...mechanism.model import JointType
 from ...mechanism.screws import rotation, translation
-from ...mechanism.so3 import exponential, logarithm
-from ...mechanism.vectors import Array, hat, perpendicular, pose, rotation_about
 from ..draft import Edge
 
 _MATRIX = (JointType.SPHERICAL, JointType.FREE)

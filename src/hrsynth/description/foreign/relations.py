@@ -14,9 +14,9 @@ from itertools import combinations
 
 import numpy as np
 
+from ...geometry.vectors import Array
 from ...mechanism import graphs
 from ...mechanism.model import Joint, JointType, Mechanism
-from ...mechanism.vectors import Array
 from ...tolerances import EXACT, NOISE
 
 _LINES = (JointType.REVOLUTE, JointType.CYLINDRICAL)

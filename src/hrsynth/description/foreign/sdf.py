@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ...errors import BadRobotFile
+from ...geometry.vectors import Array, inverse
 from ...mechanism.model import Link
-from ...mechanism.vectors import Array, inverse
 from ...tolerances import SAME_GEOMETRY
 from .. import xml
 from ..elements import Elements
-from . import own, sdf_joint
+from . import annotations as own
+from . import sdf_joint
 from .graph import Graph
 
 MODEL, WORLD = "__model__", "world"

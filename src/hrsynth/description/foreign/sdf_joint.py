@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...geometry.vectors import Array, pose, rotation_from_rpy, unit
 from ...mechanism.model import JointType, Limits, Link, Motor
-from ...mechanism.vectors import Array, pose, rotation_from_rpy, unit
 from ...tolerances import NOISE
 from .. import numerals, xml
 from ..draft import Edge, End

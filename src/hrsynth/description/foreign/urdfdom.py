@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...geometry.vectors import Array, frozen, perpendicular, pose
 from ...mechanism.model import JointType
-from ...mechanism.vectors import Array, frozen, perpendicular, pose
 from .. import numerals, xml
 from ..draft import Edge, End
 from ..urdf import LOOP_TYPES

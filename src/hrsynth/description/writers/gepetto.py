@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from dataclasses import replace
 
+from ...geometry.vectors import pose
 from ...mechanism.model import Joint, JointType, Link, Mechanism, Note
-from ...mechanism.vectors import pose
 from .. import chains
 from ..foreign.closures import CUT, END, WELD
 from ..writer import write as write_urdf

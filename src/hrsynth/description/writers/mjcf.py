@@ -8,10 +8,10 @@ import numpy as np
 from lxml import etree
 
 from ...errors import BadRequest
+from ...geometry.vectors import Array, inverse
 from ...mechanism.model import Joint, JointType, Mechanism, Note
-from ...mechanism.vectors import Array, inverse
 from .. import numerals, xml
-from ..foreign import own
+from ..foreign import annotations as own
 from ..foreign.closures import SECOND
 from ..foreign.graph import listed
 from ..tree import outward

@@ -13,9 +13,9 @@ import networkx as nx
 import numpy as np
 
 from ...errors import BadRequest
+from ...geometry.vectors import pose
 from ...mechanism.model import Joint, JointType, Link, Mechanism, Motor, Note
 from ...mechanism.observation import Direction
-from ...mechanism.vectors import pose
 from .. import chains
 from ..foreign.closures import CUT, WELD
 from ..numerals import axis

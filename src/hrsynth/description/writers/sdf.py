@@ -6,10 +6,10 @@ import numpy as np
 from lxml import etree
 
 from ...errors import BadRequest
+from ...geometry.vectors import Array, inverse
 from ...mechanism.model import Joint, JointType, Mechanism, Note
-from ...mechanism.vectors import Array, inverse
 from .. import numerals, xml
-from ..foreign import own
+from ..foreign import annotations as own
 from .plain import observed, plain, rotation_quaternion
 
 _SAID = {JointType.REVOLUTE: "revolute", JointType.PRISMATIC: "prismatic", JointType.SPHERICAL: "ball",

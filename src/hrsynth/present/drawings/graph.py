@@ -9,7 +9,7 @@ from collections.abc import Collection
 from dataclasses import dataclass
 
 from ...mechanism import Mechanism
-from ...mechanism.legs import Anatomy
+from ...mechanism.legs import LegDecomposition
 from . import svg
 from .plan import Net, Plan, Row, Spot, plan
 
@@ -43,7 +43,7 @@ class Scale:
         return self.y(row.first) - self.lane / 2, self.y(row.last) + self.lane / 2
 
 
-def graph_svg(mechanism: Mechanism | Anatomy, *, observed: Collection[str] | None = None,
+def graph_svg(mechanism: Mechanism | LegDecomposition, *, observed: Collection[str] | None = None,
               virtual: Collection[str] = (), title: str | None = None) -> str:
     """The joint graph of a mechanism, base on the left, platform on the right.
 

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 from ...errors import HrsynthError
 from ...mechanism import Mechanism
-from ...mechanism.legs import Anatomy, dissect
+from ...mechanism.legs import LegDecomposition, decompose
 from ...mechanism.observation import Direction
 from .boxes import Box, Ear, boxes_of, ears
 
@@ -83,21 +83,21 @@ class _Group:
     ears: tuple[Ear, ...]
 
 
-def plan(mechanism: Mechanism | Anatomy, *, observed: Collection[str] | None = None, virtual: Collection[str] = (),
-         leg: str | None = None) -> Plan:
+def plan(mechanism: Mechanism | LegDecomposition, *, observed: Collection[str] | None = None,
+         virtual: Collection[str] = (), leg: str | None = None) -> Plan:
     """The plan of a mechanism, or of one that is already taken apart; of one ``leg`` by its label.
 
     ``observed`` are names of links (default: those of the mechanism's observations), ``virtual`` names of joints.
     Raises ``BadRequest`` for a leg that is not there.
     """
-    anatomy = mechanism if isinstance(mechanism, Anatomy) else _anatomy(mechanism)
-    whole = mechanism.mechanism if isinstance(mechanism, Anatomy) else mechanism
+    anatomy = mechanism if isinstance(mechanism, LegDecomposition) else _anatomy(mechanism)
+    whole = mechanism.mechanism if isinstance(mechanism, LegDecomposition) else mechanism
     seen = (o.link for o in whole.observations if isinstance(o, Direction)) if observed is None else observed
     links = frozenset(seen)
     boxes = sorted(boxes_of(whole, links, virtual), key=lambda box: links.isdisjoint((box.tail, box.head)))
     groups, platform = _groups(whole, anatomy, boxes)
     if leg is not None:
-        chosen = (anatomy or dissect(whole)).leg(leg)
+        chosen = (anatomy or decompose(whole)).leg(leg)
         own = [box for box in boxes if set(box.joints) <= set(chosen.joints)]
         groups, platform = [_Group(leg, tuple(ears(own, (whole.base, chosen.attach))))], (chosen.attach,)
     columns = _columns(groups, whole.base)
@@ -106,14 +106,15 @@ def plan(mechanism: Mechanism | Anatomy, *, observed: Collection[str] | None = N
     return Plan(whole, tuple(spots), tuple(_nets(whole, ends, ways, columns)), tuple(rows), links, platform)
 
 
-def _anatomy(mechanism: Mechanism) -> Anatomy | None:
+def _anatomy(mechanism: Mechanism) -> LegDecomposition | None:
     try:
-        return dissect(mechanism)
+        return decompose(mechanism)
     except HrsynthError:
         return None
 
 
-def _groups(mechanism: Mechanism, anatomy: Anatomy | None, boxes: list[Box]) -> tuple[list[_Group], tuple[str, ...]]:
+def _groups(mechanism: Mechanism, anatomy: LegDecomposition | None,
+            boxes: list[Box]) -> tuple[list[_Group], tuple[str, ...]]:
     """The legs in the order of what they end on, the platform's own joints after those of the first end."""
     ends = (mechanism.base, mechanism.platform)
     everything = [_Group(None, tuple(ears(boxes, ends)))]

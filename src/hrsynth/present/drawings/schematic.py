@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 from ...mechanism import Mechanism
-from ...mechanism.legs import Anatomy
+from ...mechanism.legs import LegDecomposition
 from . import svg
 from .graph import Scale, bands, described, named
 from .plan import Net, Plan, Spot, plan
@@ -24,7 +24,7 @@ STRAIGHT = "PCEF"
 """What does not bend a leg."""
 
 
-def robot_svg(mechanism: Mechanism | Anatomy, *, observed: Collection[str] | None = None,
+def robot_svg(mechanism: Mechanism | LegDecomposition, *, observed: Collection[str] | None = None,
               virtual: Collection[str] = (), title: str | None = None) -> str:
     """All legs of a mechanism as chains of symbols, base on the left, platform on the right.
 
@@ -34,7 +34,7 @@ def robot_svg(mechanism: Mechanism | Anatomy, *, observed: Collection[str] | Non
     return _drawing(drawn, title or f"Kinematic scheme of {drawn.mechanism.name}")
 
 
-def leg_svg(mechanism: Mechanism | Anatomy, leg: str, *, observed: Collection[str] | None = None,
+def leg_svg(mechanism: Mechanism | LegDecomposition, leg: str, *, observed: Collection[str] | None = None,
             virtual: Collection[str] = (), title: str | None = None) -> str:
     """One leg as a chain of symbols; raises ``BadRequest`` where there is no such leg."""
     drawn = plan(mechanism, observed=observed, virtual=virtual, leg=leg)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 from ...analysis.derive import Derivation
-from ...mechanism.legs import Anatomy
+from ...mechanism.legs import LegDecomposition
 from ..drawings.schematic import leg_svg
 
 
@@ -51,7 +51,7 @@ def pairs(found: Derivation) -> list[Pair]:
     return list(kinds.values())
 
 
-def _hidden(found: Derivation) -> Anatomy | None:
+def _hidden(found: Derivation) -> LegDecomposition | None:
     """The hidden robot taken apart, with the labels of the real one."""
     if found.hidden is None:
         return None

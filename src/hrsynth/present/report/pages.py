@@ -15,7 +15,7 @@ from ...analysis.accuracy.accuracy import Accuracy
 from ...analysis.controllability import Legs
 from ...analysis.derive import Derivation
 from ...analysis.modes.modes import AssemblyModes
-from ...analysis.setting import silent
+from ...analysis.observed import silent
 from ...analysis.singularity.singular import Singularity
 from ...description.files import require_folder, write_whole
 from ...errors import BadRequest

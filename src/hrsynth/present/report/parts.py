@@ -15,7 +15,7 @@ from ...analysis.accuracy.field import Mapper
 from ...analysis.controllability import Legs, legs
 from ...analysis.derive import Derivation
 from ...analysis.modes.modes import AssemblyModes, modes_at
-from ...analysis.setting import Setting
+from ...analysis.observed import ObservedRobot
 from ...analysis.singularity.singular import Singularity, singular
 from ...errors import BadRequest, HrsynthError
 from ...mechanism.observation import Direction
@@ -72,7 +72,7 @@ def reason(error: HrsynthError, robot: str) -> str:
     return (error.what if isinstance(error, BadRequest) else str(error)).removeprefix(f"{robot}: ")
 
 
-def mapped(setting: Setting, seed: int, tell: Callable[[str], None]) -> Accuracy:
+def mapped(setting: ObservedRobot, seed: int, tell: Callable[[str], None]) -> Accuracy:
     """The error maxima over a plane of poses through the zero configuration."""
     if not all(isinstance(o, Direction) for o in setting.observed):
         raise BadRequest("cones are about directions, and something else is observed")

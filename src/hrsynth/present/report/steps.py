@@ -6,7 +6,7 @@ import re
 from dataclasses import dataclass, replace
 
 from ...analysis.derive import Derivation
-from ...mechanism.legs import Anatomy
+from ...mechanism.legs import LegDecomposition
 from ...rewrite.state import State
 from ...rewrite.strategy import RULES, Step
 from ..drawings.graph import graph_svg
@@ -52,7 +52,7 @@ def scenes(found: Derivation) -> list[Scene]:
     return drawn
 
 
-def _scene(number: int, step: Step, before: Anatomy, earlier: State | None, seen: set[str]) -> Scene:
+def _scene(number: int, step: Step, before: LegDecomposition, earlier: State | None, seen: set[str]) -> Scene:
     assert step.state is not None
     after = step.state.anatomy()
     leg = step.leg if step.leg in before.labels and step.leg in after.labels else None
@@ -67,7 +67,7 @@ def _actuators(state: State | None) -> set[str]:
     return set() if state is None else {chain.actuator for chain in state.chains}
 
 
-def _picture(anatomy: Anatomy, leg: str | None, seen: set[str], virtual: set[str], title: str) -> str:
+def _picture(anatomy: LegDecomposition, leg: str | None, seen: set[str], virtual: set[str], title: str) -> str:
     if leg is None:
         return graph_svg(anatomy, observed=seen, virtual=virtual, title=title)
     return leg_svg(anatomy, leg, observed=seen, virtual=virtual, title=title)

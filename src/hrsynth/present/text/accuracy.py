@@ -6,9 +6,9 @@ import numpy as np
 
 from ...analysis.accuracy.accuracy import Accuracy
 from ...analysis.accuracy.field import Field
-from ...analysis.accuracy.gauge import Extent, PoseErrors
+from ...analysis.accuracy.pose_errors import Extent, PoseErrors
 from ...analysis.accuracy.sampled import Sampled
-from ...mechanism.vectors import Array
+from ...geometry.vectors import Array
 from ...tolerances import DAMPED
 from .tables import listing
 

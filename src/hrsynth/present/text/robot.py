@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from ...analysis.setting import defaults_of
+from ...analysis.observed import defaults_of
 from ...errors import HrsynthError
 from ...mechanism import Mechanism
-from ...mechanism.legs import dissect
+from ...mechanism.legs import decompose
 from ...mechanism.normal import normal_form
 from .tables import listing
 
@@ -18,7 +18,7 @@ def robot(found: Mechanism) -> str:
     if found.reference != found.base:
         rows.append(("camera on", found.reference))
     try:
-        anatomy = dissect(normal_form(found).mechanism)
+        anatomy = decompose(normal_form(found).mechanism)
         rows.insert(0, ("robot", f"{found.name}   {anatomy.architecture()}"))
         watched = defaults_of(anatomy)
         rows += [(f"leg {leg.label}", _watched(watched[leg.label].link if leg.label in watched else None))

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ...servo.result import Servo
-from ...servo.track import CONSTRAINT, LIMIT, TYPE_1, TYPE_2
+from ...simulation.result import Servo
+from ...simulation.track import CONSTRAINT, LIMIT, TYPE_1, TYPE_2
 from ...tolerances import DAMPED
 from .tables import listing
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ...analysis.controllability import Legs, Verdict
 from ...analysis.derive import Derivation
 from ...analysis.exact import ExactVerdict, power_above
-from ...analysis.setting import Setting
+from ...analysis.observed import ObservedRobot
 from ...kinematics.certificate import Certificate
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
 from .tables import listing, table
@@ -53,7 +53,7 @@ def derivation(found: Derivation, hidden_file: str | None = None, report: str | 
     return "\n".join([listing(rows), "", table(steps, ("rule", "leg", "taken", "angle", "why"))])
 
 
-def _modes(setting: Setting) -> list[str]:
+def _modes(setting: ObservedRobot) -> list[str]:
     """For which operation mode a verdict holds, where others were met."""
     found = setting.beside()
     own = setting.everything.signature

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.setting import Setting
-from ...mechanism.vectors import Array
+from ...analysis.observed import ObservedRobot
+from ...geometry.vectors import Array
 from .shapes import BASE, LEG, PLATFORM, Shape
 
 HEAVY = 200_000
 """Triangles of all meshes together beyond which they are left out: the page holds them as text."""
 
 
-def meshes(setting: Setting) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
+def meshes(setting: ObservedRobot) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
     """The shapes of the file's visuals, on the links of the normal form, and a note where meshes are missing."""
     file = setting.robot.file
     if file is None or Path(file).suffix != ".urdf" or b"<visual" not in Path(file).read_bytes():

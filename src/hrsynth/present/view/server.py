@@ -19,7 +19,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRequest
-from .ghosts import ghosts
+from .mode_outlines import ghosts
 from .page import page
 from .states import Posed
 from .view import View

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from ...geometry.vectors import Array
 from ...mechanism import Joint, JointType, Mechanism
-from ...mechanism.vectors import Array
 from ...tolerances import SAME_POINT
 from ..skeleton import outline
 

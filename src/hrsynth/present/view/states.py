@@ -11,14 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis.observed import ObservedRobot
 from ...analysis.posture import Examiner
-from ...analysis.setting import Setting
+from ...geometry.vectors import Array, inverse
 from ...kinematics.configuration import ClosedConfiguration, Target, closed
 from ...kinematics.coordinates import Coordinates
+from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.steps import led
-from ...kinematics.twin import Twin
 from ...mechanism import Mechanism
-from ...mechanism.vectors import Array, inverse
 from ...tolerances import FOLLOWED, SOLVED
 from .shapes import FINE
 
@@ -81,16 +81,16 @@ class Posed:
 class Mover:
     """The real robot with its platform's coordinates, and the twin of the hidden robot that follows it."""
 
-    setting: Setting
+    setting: ObservedRobot
     coordinates: Coordinates
     examiner: Examiner
-    hidden: Twin | None = None
+    hidden: PinocchioModel | None = None
 
     @classmethod
-    def of(cls, setting: Setting, hidden: Mechanism | None) -> Mover:
+    def of(cls, setting: ObservedRobot, hidden: Mechanism | None) -> Mover:
         """At the zero configuration."""
         start = setting.everything.start
-        twin = None if hidden is None else Twin(hidden, start.twin.length)
+        twin = None if hidden is None else PinocchioModel(hidden, start.twin.length)
         return cls(setting, Coordinates.of(start, setting.everything.question, setting.motion), Examiner(setting), twin)
 
     @property

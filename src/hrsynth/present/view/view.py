@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 
 from ...analysis.derive import Derivation, derive
-from ...analysis.setting import Setting, prepare, silent
+from ...analysis.observed import ObservedRobot, prepare, silent
+from ...geometry.vectors import Array
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
-from ...mechanism.vectors import Array
-from .ghosts import Ghost, ghosts
 from .meshes import meshes
+from .mode_outlines import Ghost, ghosts
 from .shapes import FINE, RADIUS, Drawer, Shape
 from .states import HIDDEN, REAL, Mover, Slider, State, listed, place
 
@@ -59,7 +59,7 @@ class Arrow:
 class View:
     """All that the page needs. ``normal`` (3,) is that of the plane in which everything moves, None in space."""
 
-    setting: Setting
+    setting: ObservedRobot
     derivation: Derivation | None
     mover: Mover
     machines: tuple[Machine, ...]
@@ -132,7 +132,7 @@ def view(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: s
                 _normal(setting), (*notes, *missing))
 
 
-def _machine(key: str, setting: Setting, mechanism: Mechanism, words: str, states: Sequence[State],
+def _machine(key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, states: Sequence[State],
              meshes: Sequence[Shape]) -> Machine:
     real = setting.mechanism
     kept = tuple(shape for shape in meshes if shape.link in mechanism.links)
@@ -161,7 +161,7 @@ def _travels(drawer: Drawer, key: str, states: Sequence[State]) -> dict[str, tup
     return found
 
 
-def _arrows(setting: Setting) -> Iterator[Arrow]:
+def _arrows(setting: ObservedRobot) -> Iterator[Arrow]:
     """An arrow on the middle of each observed link, along what is observed."""
     mechanism = setting.mechanism
     for seen in setting.observed:
@@ -175,7 +175,7 @@ def _arrows(setting: Setting) -> Iterator[Arrow]:
         yield Arrow(seen.leg, seen.link, np.array([middle - half * direction, middle + half * direction]))
 
 
-def _normal(setting: Setting) -> Array | None:
+def _normal(setting: ObservedRobot) -> Array | None:
     """The normal of the plane in which the platform moves, None where it leaves every plane."""
     motion = setting.motion
     if motion.shifts.shape[1] != 2:

@@ -12,8 +12,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...geometry.vectors import Array, perpendicular, unit
 from ...mechanism import Joint, JointType
-from ...mechanism.vectors import Array, perpendicular, unit
 from ..evidence import Evidence
 from ..rule import Proposal, Refusal, Rule
 from ..state import Chain, State, ball_to_universal

@@ -11,9 +11,9 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...geometry.vectors import pose, unit
 from ...mechanism import Joint, JointType, Link, Motor
 from ...mechanism.observation import Direction
-from ...mechanism.vectors import pose, unit
 from ..evidence import Evidence, far_from
 from ..rule import Proposal, Refusal, Rule
 from ..state import Chain, State

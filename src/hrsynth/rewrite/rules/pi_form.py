@@ -12,9 +12,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...geometry.lines import foot
+from ...geometry.vectors import pose
 from ...mechanism import Joint, JointType, Link
-from ...mechanism.lines import foot
-from ...mechanism.vectors import pose
 from ..evidence import Evidence
 from ..rule import Proposal, Refusal, Rule
 from ..state import State

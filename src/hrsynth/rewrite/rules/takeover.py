@@ -14,8 +14,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from ...geometry.lines import parallel
 from ...mechanism import Joint, JointType
-from ...mechanism.lines import parallel
 from ..evidence import Evidence, Proximal
 from ..rule import Proposal, Refusal, Rule
 from ..state import Chain, State, towards

@@ -1,0 +1,166 @@
+"""The error maxima at a closed configuration, from Pinocchio's relation there, with the directions that attain them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...batch.spread import spreads
+from ...geometry.vectors import Array
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.relation import Measurement, relation
+from ...mechanism.pose import Pose
+from ...tolerances import INVERTED, RANK_CUTOFF
+
+VIEWS = 2000
+"""Directions on the half-sphere from which the largest and the least error are sought."""
+CLIMBS = 200
+"""Steps of the ascent to the largest error, and of the descent to the least."""
+DESCENTS = 60
+"""Views from which the least error is sought."""
+
+
+@dataclass(frozen=True, eq=False)
+class Extent:
+    """The largest error in each direction of space, its extremes: ``largest`` with its unit direction (3,), ``least``
+    with its own, among the directions in which there are errors at all.
+
+    ``errors`` (k, 3) are the errors of the observed directions (rad) that give the largest one; ``gap`` bounds how much
+    larger, relative, the true maximum may be. Where a freedom is lost ``largest`` is infinite and ``errors`` is None;
+    where there are no errors both are zero and the directions are None.
+    """
+
+    largest: float
+    direction: Array | None
+    least: float
+    least_direction: Array | None
+    errors: Array | None
+    gap: float = 0.0
+    single: bool = False
+    """Whether there are errors in one direction only."""
+
+    @property
+    def anisotropy(self) -> float | None:
+        """The largest error as multiple of the least; None where there is one direction only, or no finite error."""
+        if self.direction is None or self.single or not np.isfinite(self.largest):
+            return None
+        return self.largest / self.least
+
+    def to_dict(self, unit: float) -> dict[str, Any]:
+        """The record of the command line, lengths or angles in another unit; null where infinite."""
+        return {"largest": finite(unit * self.largest), "direction": _listed(self.direction),
+                "least": finite(unit * self.least), "least_direction": _listed(self.least_direction),
+                "anisotropy": self.anisotropy}
+
+
+@dataclass(frozen=True, eq=False)
+class PoseErrors:
+    """The error maxima at a pose: position (m) and orientation (rad)."""
+
+    pose: Pose
+    position: Extent
+    orientation: Extent
+
+
+def reading(at: ClosedConfiguration, question: Measurement) -> tuple[Array, Array]:
+    """ρ as rates (3 k, r) of the directions and twists (6, r; m, rad) on the same basis: Mᵀ and its twists, where Mᵀ
+    exists, and the least squares law of the measurements where it does not."""
+    found = relation(at, question)
+    twists = np.zeros((6, found.dimension))
+    twists[: found.twist_rows] = found.twist_part
+    twists[:3] *= at.twin.length
+    return found.rates, twists
+
+
+def maxima(at: ClosedConfiguration, question: Measurement, cones: Array) -> tuple[float, float]:
+    """The largest position (m) and orientation error (rad) at a configuration; infinite where a freedom is lost."""
+    rates, twists = reading(at, question)
+    position, orientation = spreads(rates[:, :, None], twists, cones)
+    return float(position.largest[0]), float(orientation.largest[0])
+
+
+def measured(at: ClosedConfiguration, question: Measurement, cones: Array, pose: Pose) -> PoseErrors:
+    """The error maxima at a configuration with their directions, for half-angles (k,)."""
+    rates, twists = reading(at, question)
+    found = spreads(rates[:, :, None], twists, cones)
+    inverse = np.linalg.pinv(rates, rcond=RANK_CUTOFF)
+    position, orientation = (
+        _extent(part @ inverse, cones, float(spread.largest[0]), float(spread.lower[0]))
+        for part, spread in zip((twists[:3], twists[3:]), found, strict=True))
+    return PoseErrors(pose, position, orientation)
+
+
+def _extent(J: Array, cones: Array, largest: float, lower: float) -> Extent:
+    """The extremes of Σ ψ_i ‖J_iᵀ w‖ over unit w in the range of J (3, 3 k)."""
+    if not np.isfinite(largest):
+        return Extent(np.inf, None, 0.0, None, None)
+    blocks = (J.reshape(3, -1, 3) * cones[:, None]).transpose(1, 2, 0)
+    left, values, _ = np.linalg.svd(J)
+    span = left[:, : int(np.sum(values > INVERTED * values[0]))] if values[0] > INVERTED else np.zeros((3, 0))
+    if not span.shape[1]:
+        return Extent(0.0, None, 0.0, None, None)
+    inside = blocks @ span
+    w = span @ _ascended(inside)
+    low = span @ _descended(inside)
+    pulls = blocks @ w
+    sizes = np.linalg.norm(pulls, axis=1)
+    errors = cones[:, None] * pulls / np.where(sizes > 0, sizes, 1.0)[:, None]
+    return Extent(largest, w, float(_width(blocks, low[:, None])[0]), low, errors,
+                  (largest - lower) / largest if largest else 0.0, span.shape[1] == 1)
+
+
+def _width(blocks: Array, w: Array) -> Array:
+    """Σ ‖A_i w‖ (n,) for blocks (k, 3, d) and directions (d, n)."""
+    return np.asarray(np.linalg.norm(blocks @ w, axis=1).sum(axis=0))
+
+
+def _views(dimension: int) -> Array:
+    """Unit vectors (d, n) of the half-sphere, evenly spread."""
+    if dimension == 1:
+        return np.ones((1, 1))
+    if dimension == 2:
+        turn = np.pi * np.arange(VIEWS) / VIEWS
+        return np.stack([np.cos(turn), np.sin(turn)])
+    height = (np.arange(VIEWS) + 0.5) / VIEWS
+    turn = np.pi * (1 + np.sqrt(5)) * np.arange(VIEWS)
+    level = np.sqrt(1 - height**2)
+    return np.stack([level * np.cos(turn), level * np.sin(turn), height])
+
+
+def _ascended(blocks: Array) -> Array:
+    """The direction (d,) of the largest error: ascent from the best view (a convex function on the sphere)."""
+    views = _views(blocks.shape[2])
+    w = np.asarray(views[:, np.argmax(_width(blocks, views))])
+    for _ in range(CLIMBS):
+        pulls = blocks @ w
+        sizes = np.linalg.norm(pulls, axis=1)
+        step = np.einsum("kcd,kc->d", blocks, pulls / np.where(sizes > 0, sizes, 1.0)[:, None])
+        w = step / np.linalg.norm(step)
+    return w
+
+
+def _descended(blocks: Array) -> Array:
+    """The direction (d,) of the least error that was found: from views spread evenly and from the axes of each block,
+    w ← the least eigenvector of Σ A_iᵀ A_i / ‖A_i w‖, which never makes Σ ‖A_i w‖ larger (Weiszfeld)."""
+    d = blocks.shape[2]
+    views = _views(d)
+    axes = np.linalg.svd(blocks)[2].reshape(-1, d)
+    w = np.concatenate([views[:, :: max(1, views.shape[1] // DESCENTS)].T, axes])
+    squares = np.einsum("kcd,kce->kde", blocks, blocks)
+    floor = np.finfo(float).eps * float(np.linalg.norm(blocks))
+    for _ in range(CLIMBS):
+        sizes = np.linalg.norm(np.einsum("kcd,nd->nkc", blocks, w), axis=2)
+        w = np.linalg.eigh(np.einsum("nk,kde->nde", 1 / np.maximum(sizes, floor), squares))[1][:, :, 0]
+    w = np.concatenate([w, axes, views.T])
+    return np.asarray(w[np.argmin(_width(blocks, w.T))])
+
+
+def finite(value: float) -> float | None:
+    """A number of the record: null where infinite."""
+    return float(value) if np.isfinite(value) else None
+
+
+def _listed(vector: Array | None) -> list[float] | None:
+    return None if vector is None else vector.tolist()

@@ -1,0 +1,294 @@
+"""What every question starts from: the robot in normal form, its legs, what is observed, and samples of its motion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled, PoseNotReached
+from ..geometry.ranks import range_basis
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.locked import rezeroed
+from ..kinematics.pinocchio_model import PinocchioModel
+from ..kinematics.platform_motion import PlatformMotion
+from ..kinematics.relation import Measurement, Relation, relation
+from ..kinematics.sampling import Sample, Samples, draw
+from ..mechanism import Mechanism, Observation
+from ..mechanism.legs import LegDecomposition, decompose, default_observation, observation_of
+from ..mechanism.normal import NormalForm, normal_form
+from ..mechanism.observation import Direction, labels_of
+from ..mechanism.pose import Pose
+from ..mechanism.sensors import encoders
+
+if TYPE_CHECKING:
+    from ..batch.engine import Batch
+    from ..batch.placing import Placer
+
+SAMPLES = 20
+"""Configurations of a certificate and of a generic verdict."""
+
+
+@dataclass(frozen=True)
+class Mobility:
+    """Freedoms of a mechanism: all of them, and those that move neither the platform nor any default segment."""
+
+    total: int
+    idle: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ObservedRobot:
+    """A robot as read, its normal form and legs, the observations asked for, and samples in which all legs count."""
+
+    robot: Mechanism
+    normal: NormalForm
+    anatomy: LegDecomposition
+    observed: tuple[Observation, ...]
+    everything: Samples
+    """Samples for the question of all default segments, and of the observed ones besides."""
+    defaults: int
+    """How many of the observations of ``everything`` are default segments; they come first."""
+
+    def headline(self) -> str:
+        """The robot and the observed legs."""
+        return f"{self.robot.name}, watching {', '.join(self.labels)}"
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.headline()}>"
+
+    @property
+    def mechanism(self) -> Mechanism:
+        """The mechanism in normal form."""
+        return self.anatomy.mechanism
+
+    @property
+    def labels(self) -> tuple[str, ...]:
+        """The observed legs."""
+        return labels_of(self.observed)
+
+    @property
+    def segments(self) -> tuple[Observation, ...]:
+        """The default segments of all legs."""
+        return self.everything.question.observations[: self.defaults]
+
+    @property
+    def configurations(self) -> tuple[ClosedConfiguration, ...]:
+        """The configurations of the samples, without the zero configuration."""
+        return tuple(member.configuration for member in self.everything.members)
+
+    @cached_property
+    def motion(self) -> PlatformMotion:
+        """What the platform generically does."""
+        return PlatformMotion.of(self.configurations, self.everything.question)
+
+    @cached_property
+    def samples(self) -> Samples:
+        """The samples, for the observed segments alone."""
+        return restricted(self.everything, self.observed)
+
+    def beside(self) -> tuple[str, ...]:
+        """The other operation modes that were met: what the platform does in each, what legs see there, and where."""
+        drawn = self.everything
+        labels = [o.leg for o in drawn.question.observations]
+        return tuple(f"{mode.beside(drawn.signature, labels)}, at {Pose.of(mode.at.pose(drawn.question.platform))}"
+                     for mode in drawn.met)
+
+    @property
+    def dof(self) -> int:
+        """The robot's dof: the dimension of its platform's twists."""
+        return self.everything.members[0].relation.dof.decided("the robot's dof")
+
+    @cached_property
+    def batch(self) -> Batch | None:
+        """The robot compiled for many poses, with the default segment of each leg; None where it cannot be."""
+        from ..batch.engine import Batch
+
+        return Batch.of(self.anatomy, self.segments, self.motion, (self.everything.start, *self.configurations))
+
+    @cached_property
+    def placer(self) -> Placer | None:
+        """What makes closed configurations of many platform poses; None where a leg is no known subproblem."""
+        from ..batch.placing import Placer
+
+        defaults = [o for o in self.segments if isinstance(o, Direction)]
+        return None if self.batch is None else Placer.of(self.batch, self.everything.twin, self.anatomy, defaults)
+
+    @cached_property
+    def mobility(self) -> Mobility:
+        """Mobility of the normal form, with its idle motions."""
+        first = self.everything.members[0].relation
+        rows = first.basis[: first.twist_rows + sum(first.sizes[: self.defaults])]
+        return Mobility(first.mobility, first.mobility - range_basis(rows, 1.0)[1].value)
+
+    @cached_property
+    def mobility_as_written(self) -> Mobility:
+        """Mobility of the file's own links and joints."""
+        if (len(self.robot.links), len(self.robot.joints)) == (len(self.mechanism.links), len(self.mechanism.joints)):
+            return self.mobility
+        question = replace(self.everything.question, observations=tuple(
+            o for o in self.segments if o.link in self.robot.links))
+        written = draw(PinocchioModel(self.robot, self.mechanism.length), question, 3, seed=1)
+        total = written.mobility
+        return Mobility(total, total - (self.mobility.total - self.mobility.idle))
+
+    def measuring(self, observations: tuple[Observation, ...]) -> Samples:
+        """The samples' configurations again, with ρ for other observations (and no ways)."""
+        drawn = self.everything
+        question = replace(drawn.question, observations=observations)
+        members = tuple(Sample(at, (), relation(at, question)) for at in self.configurations)
+        return replace(drawn, question=question, members=members)
+
+    def to_dict(self) -> dict[str, Any]:
+        """What is observed, and from which link, as the records of the command line begin."""
+        return {"observed": [{"leg": o.leg, "link": o.link} for o in self.observed],
+                "camera": self.mechanism.reference}
+
+    def modes_dict(self) -> dict[str, Any]:
+        """The samples' operation mode and the others that were met, as the records of the command line have them."""
+        drawn = self.everything
+        own, labels = drawn.signature, [o.leg for o in drawn.question.observations]
+        return {"operation_mode": {"dof": own.dof, "motion": own.motion, "mobility": own.mobility},
+                "other_modes": [
+                    {"dof": mode.signature.dof, "motion": mode.signature.motion, "mobility": mode.signature.mobility,
+                     "words": mode.beside(own, labels),
+                     "pose": Pose.of(mode.at.pose(drawn.question.platform)).to_dict()} for mode in drawn.met]}
+
+
+def started(robot: Mechanism, at: Pose | str, seed: int = 0) -> Mechanism:
+    """The robot in normal form whose zero configuration is the one at a pose: on the branch of the file's zero
+    configuration where that reaches it, else in another operation mode that was met.
+
+    Raises ``BadRequest`` and ``PoseNotReached`` for poses of neither.
+    """
+    from ..batch.reach import reach
+
+    setting = prepare(robot, seed=seed)
+    drawn, wanted = setting.everything, Pose.parse(at) if isinstance(at, str) else at
+    refused: HrsynthError | None = None
+    for start in (drawn.start, *(mode.at for mode in drawn.met)):
+        try:
+            return replace(rezeroed(reach(start, drawn.question, wanted)), file=robot.file)
+        except (BadRequest, PoseNotReached) as error:
+            refused = refused or error
+    assert refused is not None
+    raise refused
+
+
+def silent(text: str) -> None:
+    """The progress of a question that nobody follows."""
+
+
+def prepare(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+            samples: int = SAMPLES, seed: int = 0, progress: Callable[[], None] | None = None) -> ObservedRobot:
+    """Normal form, legs, observations and samples of a robot.
+
+    ``observe`` holds leg labels or link names (a string sets them apart by commas); None or ``["all"]`` means all legs
+    at their default segments. ``camera`` names the link that carries the camera.
+
+    Raises ``BadRequest`` for labels and links that there are not.
+    """
+    try:
+        return _prepared(robot, observe, camera, samples, seed, progress)
+    except (BadMechanism, NotSampled) as error:
+        error.file = robot.file
+        raise
+
+
+def _prepared(robot: Mechanism, observe: Sequence[str] | str | None, camera: str | None, samples: int, seed: int,
+              progress: Callable[[], None] | None) -> ObservedRobot:
+    if isinstance(observe, str):
+        observe = [name.strip() for name in observe.split(",")]
+    if camera is not None:
+        if camera not in robot.links:
+            raise BadRequest(f"{robot.name} has no link for the camera", camera, sorted(robot.links))
+        robot = replace(robot, camera=camera)
+    normal = normal_form(robot)
+    anatomy = decompose(normal.mechanism)
+    defaults = defaults_of(anatomy)
+    observed = _observed(anatomy, normal, defaults, observe)
+    known = {o.key for o in defaults.values()}
+    extra = tuple(o for o in observed if o.key not in known)
+    question = Measurement(normal.mechanism.platform, anatomy.point, normal.mechanism.reference,
+                        (*defaults.values(), *extra))
+    drawn = draw(PinocchioModel(normal.mechanism), question, samples, seed, led_by=observed, progress=progress)
+    return ObservedRobot(robot, normal, anatomy, observed, drawn, len(defaults))
+
+
+def defaults_of(anatomy: LegDecomposition) -> dict[str, Observation]:
+    """The segment of each leg that has one: the file's choice, else the theory's."""
+    table: dict[str, Observation] = {}
+    given = {o.leg: o for o in reversed(anatomy.mechanism.observations)}
+    for leg in anatomy.legs:
+        if leg.label in given:
+            table[leg.label] = given[leg.label]
+            continue
+        try:
+            table[leg.label] = default_observation(anatomy, leg)
+        except HrsynthError:
+            continue
+    return table
+
+
+def _observed(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str, Observation],
+              observe: Sequence[str] | None) -> tuple[Observation, ...]:
+    if observe is not None and not observe:
+        raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
+    if observe is None or list(observe) == ["all"]:
+        for leg in anatomy.legs:
+            if leg.label not in defaults and (leg.links or not defaults):
+                default_observation(anatomy, leg)
+        return tuple(defaults.values())
+    chosen: dict[tuple[str, ...], Observation] = {}
+    for name in observe:
+        if name in anatomy.labels:
+            observation = defaults.get(name) or default_observation(anatomy, anatomy.leg(name))
+        elif name in normal.into:
+            link = normal.into[name]
+            if link not in anatomy.mechanism.links:
+                raise BadRequest(f"link {name!r} acts inside a joint and has no direction of its own")
+            given = next((o for o in anatomy.mechanism.observations if o.link == link), None)
+            observation = given or observation_of(anatomy, link)
+        else:
+            raise BadRequest(f"{anatomy.mechanism.name} has no leg or link", name,
+                             "legs " + ", ".join(anatomy.labels) + "; links "
+                             + ", ".join(n for leg in anatomy.legs for n in leg.links))
+        chosen[observation.key] = observation
+    return tuple(chosen.values())
+
+
+def motors(setting: ObservedRobot) -> Measurement:
+    """The question that a robot's own motors answer: their coordinates, as encoders would give them."""
+    mechanism, anatomy = setting.mechanism, setting.anatomy
+    of = {name: leg.label for leg in anatomy.legs for name in leg.joints}
+    driven = [joint for joint in mechanism.joints.values() if joint.actuated]
+    if not driven:
+        raise BadRequest(f"{mechanism.name} has no motor", None, "a transmission on a joint")
+    found = tuple(each for joint in driven for each in encoders(mechanism, joint, of.get(joint.name, "")))
+    return replace(setting.everything.question, observations=found)
+
+
+def restricted(samples: Samples, observations: Iterable[Observation]) -> Samples:
+    """The same samples for fewer observations (all of them among the samples' own)."""
+    wanted = tuple(observations)
+    all_of = samples.question.observations
+    keys = [o.key for o in all_of]
+    places = [keys.index(o.key) for o in wanted]
+    question = replace(samples.question, observations=tuple(all_of[i] for i in places))
+    members = tuple(
+        Sample(m.configuration,
+               tuple(replace(t, measured=tuple(t.measured[i] for i in places)) for t in m.way),
+               selected(m.relation, places))
+        for m in samples.members)
+    return replace(samples, question=question, members=members)
+
+
+def selected(relation: Relation, places: Sequence[int]) -> Relation:
+    """ρ for some of the observations: the projection of ρ for all."""
+    blocks = [relation.twist_part, *(relation.basis[relation.rows_of(place)] for place in places)]
+    basis, rank = range_basis(np.vstack(blocks), 1.0)
+    sizes = tuple(relation.sizes[i] for i in places)
+    return Relation(basis, relation.twist_rows, sizes, relation.mobility, min(relation.gap, rank.gap))

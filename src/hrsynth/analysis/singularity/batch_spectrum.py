@@ -1,0 +1,74 @@
+"""Mᵀ of many configurations by the batch, with the relation of Pinocchio at random ones of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...batch.placing import Placer
+from ...errors import Disagreement
+from ...geometry.vectors import Array
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.relation import Measurement, relation
+from ...mechanism.observation import Direction
+from ...tolerances import SAME_RELATION
+from ..classes import interaction_matrix
+
+Spectrum = Callable[[Sequence[ClosedConfiguration], Measurement], tuple[Array, Array]]
+SPOTS = 10
+"""Configurations of each sweep at which the batch is held against Pinocchio."""
+
+
+@dataclass(frozen=True, eq=False)
+class Quick:
+    """A batch that answers a question about directions, one a leg."""
+
+    placer: Placer
+    question: Measurement
+
+    @classmethod
+    def of(cls, placer: Placer | None, question: Measurement) -> Quick | None:
+        """None where there is no batch, or it is not asked for its own directions."""
+        if placer is None or not all(isinstance(o, Direction) and o is placer.seen.get(o.leg)
+                                     for o in question.observations):
+            return None
+        return cls(placer, question)
+
+    def spectrum(self, configurations: Sequence[ClosedConfiguration], others: Spectrum, seed: int = 0
+                 ) -> tuple[Array, Array]:
+        """The smallest and the largest singular value of Mᵀ at each configuration, (n,) each; by ``others`` where one
+        is in another working mode than the batch's, or on the edge between two.
+
+        Raises ``Disagreement`` where Pinocchio differs."""
+        seen = [o for o in self.question.observations if isinstance(o, Direction)]
+        links = (self.question.platform, *(o.link for o in seen))
+        X = np.array([at.twin.poses(at.q, links) for at in configurations])
+        found = self.placer.batch.evaluate(X[:, 0], [o.leg for o in self.question.observations])
+        u = np.stack([X[:, i, :3, :3] @ o.direction for i, o in enumerate(seen, 1)], axis=1)
+        away = np.where(found.reached, np.max(np.abs(u - found.directions), axis=(1, 2)), np.inf)
+        same = away <= SAME_RELATION
+        d = found.matrix.shape[2]
+        values = np.zeros((len(X), d))
+        values[:, : found.singular_values.shape[1]] = found.singular_values
+        here = np.flatnonzero(same)
+        for i in np.random.default_rng(seed).choice(here, min(SPOTS, len(here)), replace=False):
+            self._checked(configurations[int(i)], values[i])
+        smallest, largest = values[:, -1].copy(), values[:, 0].copy()
+        if not same.all():
+            elsewhere = [configurations[int(i)] for i in np.flatnonzero(~same)]
+            smallest[~same], largest[~same] = others(elsewhere, self.question)
+        return smallest, largest
+
+    def _checked(self, at: ClosedConfiguration, values: Array) -> None:
+        theirs = relation(at, self.question)
+        M = interaction_matrix(theirs)
+        if M is None or theirs.dof.value != len(values):
+            return
+        expected = np.zeros(len(values))
+        found = np.linalg.svd(M, compute_uv=False)
+        expected[: len(found)] = found
+        apart = float(np.max(np.abs(expected - values)))
+        if apart > SAME_RELATION * max(1.0, float(values[0])):
+            raise Disagreement(self.placer.twin.mechanism.name, 1, apart)

@@ -1,0 +1,91 @@
+"""The poses of a sweep by closed forms: which of its goals are reached, and which cannot be."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..geometry.so3 import exponential
+from ..geometry.vectors import Array
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.platform_motion import Goal, PlatformMotion
+from ..mechanism.pose import Grid
+from ..tolerances import FOLLOWED, RANK_CUTOFF
+from .placing import Placer
+from .plain import Flags
+
+TURNS = 180
+"""Values of a free turn that are tried before a pose counts as out of reach."""
+
+
+def ready(placer: Placer, motion: PlatformMotion, goals: Sequence[Goal]
+          ) -> tuple[dict[int, ClosedConfiguration], set[int]]:
+    """The configurations at goals whose free parts are as at home, by their place; and the places of goals that no pose
+    of the platform reaches in the working mode of the zero configuration."""
+    X = np.array([pose_of(motion, goal) for goal in goals])
+    found = {i: at for i, at in enumerate(placer.configurations(X))
+             if at is not None and np.linalg.norm(goals[i].rows(placer.twin, at.q)[0]) <= RANK_CUTOFF}
+    missed = [i for i in range(len(goals)) if i not in found]
+    closed = [i for i in missed if _freedoms_left(motion, goals[i]) == 0]
+    turning = [i for i in missed if _freedoms_left(motion, goals[i]) == 1]
+    hopeless = {i for i, some in zip(turning, _some_turn(placer, motion, X[turning]), strict=True) if not some}
+    return found, {*closed, *hopeless}
+
+
+def pose_of(motion: PlatformMotion, goal: Goal) -> Array:
+    """The platform pose (4, 4) that a goal asks for, its free parts as near to home as they can be."""
+    X = motion.home.copy()
+    if goal.rotation is not None:
+        X[:3, :3] = goal.rotation
+    elif goal.phi is not None:
+        X[:3, :3] = exponential(goal.phi * goal.normal) @ motion.home[:3, :3]
+    home = motion.position(motion.home)
+    way = motion.shifts @ np.linalg.lstsq(goal.directions @ motion.shifts, goal.values - goal.directions @ home,
+                                          rcond=RANK_CUTOFF)[0]
+    X[:3, 3] = home + way - X[:3, :3] @ motion.point
+    return X
+
+
+def poses_over(motion: PlatformMotion, grid: Grid, robot: str, places: Array) -> tuple[Array, Flags]:
+    """The platform poses (n, 4, 4) where the parts of a grid that vary have the values ``places`` (n, ndim); free parts
+    are as at home. Also which of them the platform can have at all. Raises ``BadRequest`` for parts that it cannot
+    change."""
+    first = motion.goal(grid.poses_at([(0,) * grid.ndim])[0], robot)
+    columns = dict(zip(grid.names, places.T, strict=True))
+    X = np.tile(pose_of(motion, first), (len(places), 1, 1))
+    if "phi" in columns:
+        X[:, :3, :3] = exponential(columns["phi"][:, None] * motion.normal) @ motion.home[:3, :3]
+    values = np.tile(first.values, (len(places), 1))
+    for row, direction in enumerate(first.directions):
+        values[:, row] = columns.get("xyz"[int(np.argmax(direction))], values[:, row])
+    home, rows = motion.position(motion.home), first.directions @ motion.shifts
+    missing = (values - first.directions @ home).T
+    way = np.linalg.lstsq(rows, missing, rcond=RANK_CUTOFF)[0]
+    met = np.linalg.norm(rows @ way - missing, axis=0) <= FOLLOWED
+    X[:, :3, 3] = home + (motion.shifts @ way).T - X[:, :3, :3] @ motion.point
+    return X, met
+
+
+def _freedoms_left(motion: PlatformMotion, goal: Goal) -> int:
+    """How many of the platform's turns a goal leaves free; more than there are where it leaves a translation free."""
+    spins = motion.spins.shape[1]
+    placed = np.linalg.matrix_rank(goal.directions @ motion.shifts, tol=RANK_CUTOFF) if len(goal.values) else 0
+    if placed < motion.shifts.shape[1]:
+        return spins + 2
+    if goal.rotation is not None:
+        return 0
+    return spins - (goal.phi is not None)
+
+
+def _some_turn(placer: Placer, motion: PlatformMotion, X: Array) -> Flags:
+    """Whether some turn about the platform's one axis makes each of the poses X (n, 4, 4) one that is reached, (n,)."""
+    if len(X) == 0:
+        return np.zeros(0, dtype=bool)
+    turns = exponential(np.linspace(-np.pi, np.pi, TURNS)[:, None] * motion.spins[:, 0])
+    p = X[:, :3, 3] + X[:, :3, :3] @ motion.point
+    poses = np.tile(np.eye(4), (len(X), TURNS, 1, 1))
+    poses[..., :3, :3] = turns @ X[:, None, :3, :3]
+    poses[..., :3, 3] = p[:, None] - poses[..., :3, :3] @ motion.point
+    reached = placer.batch.reached(poses.reshape(-1, 4, 4)).reshape(len(X), TURNS)
+    return np.asarray(reached.any(axis=1))

@@ -1,0 +1,254 @@
+"""From platform poses to closed configurations: the poses of all links by leg, then the joints' coordinates.
+
+Each leg's links start where its subproblem puts them and are closed by a few Gauss-Newton steps, all poses abreast;
+what comes out counts only where Pinocchio's own loops are closed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import takewhile
+
+import numpy as np
+
+from ..errors import NotSampled
+from ..geometry.so3 import between, exponential, quaternions
+from ..geometry.vectors import Array, frozen, inverse
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.pinocchio_model import PinocchioModel
+from ..mechanism import Joint, JointType, Mechanism
+from ..mechanism.legs import Leg, LegDecomposition
+from ..mechanism.observation import Direction
+from ..tolerances import CLOSED
+from .chain import Chain
+from .engine import CHUNK, Batch
+from .limb import Kind, Limb
+from .plain import Flags, Poses, rod, turning
+
+STEP = 0.15
+"""Length of a step of a walk (characteristic lengths, radians)."""
+FAR = 20.0
+"""How much larger than at home the rates of the directions may become on a walk."""
+CLOSING = 12
+"""Gauss-Newton steps from where the subproblem puts a leg's links."""
+
+
+@dataclass(frozen=True, eq=False)
+class Placer:
+    """A batch whose platform poses can be made closed configurations of ``twin``."""
+
+    batch: Batch
+    twin: PinocchioModel
+    anatomy: LegDecomposition
+    seen: Mapping[str, Direction]
+    chains: Mapping[str, Chain]
+
+    @classmethod
+    def of(cls, batch: Batch, twin: PinocchioModel, anatomy: LegDecomposition,
+           observations: Sequence[Direction]) -> Placer | None:
+        """None where a leg is no known subproblem, or a link belongs neither to a leg nor to the platform."""
+        mechanism = anatomy.mechanism
+        placed = {mechanism.base, *batch.stage.bodies, *(name for leg in anatomy.legs for name in leg.links)}
+        known = all(isinstance(leg, Limb) for leg in batch.legs.values())
+        if not (known and batch.stage.constant and placed == set(mechanism.links)) or any(
+                joint.type is JointType.FREE for joint in mechanism.joints.values()):
+            return None
+        seen = {o.leg: o for o in observations}
+        chains = {leg.label: Chain.of(mechanism, leg, seen[leg.label], None) for leg in anatomy.legs}
+        return cls(batch, twin, anatomy, seen, chains)
+
+    def configurations(self, X: Array) -> list[ClosedConfiguration | None]:
+        """The closed configurations at platform poses X (n, 4, 4), None where there is none in the working mode of the
+        zero configuration."""
+        found: list[ClosedConfiguration | None] = []
+        for start in range(0, len(X), CHUNK):
+            frames, reached = self.frames(X[start : start + CHUNK])
+            q = frozen(coordinates(self.twin, frames))
+            for here, there in zip(q, reached, strict=True):
+                residual = float(np.linalg.norm(self.twin.residual(here))) if there else np.inf
+                found.append(ClosedConfiguration(self.twin, here, residual) if residual <= CLOSED else None)
+        return found
+
+    def wander(self, count: int, seed: int = 0, steps: int = 40) -> Iterator[ClosedConfiguration]:
+        """``count`` random configurations: walks of up to ``steps`` small steps of the platform from its home, side by
+        side; a walk ends where the robot does not reach on, or comes near to a Type 1 singularity."""
+        rng, batch = np.random.default_rng(seed), self.batch
+        limit = FAR * float(batch.evaluate(batch.home[None]).singular_values[0, 0])
+        given = failed = 0
+        walks = -(-count // steps)
+        while given < count:
+            walks *= 2
+            ways = self._walks(rng, walks, steps, limit)
+            failed += sum(len(way) < steps for way in ways)
+            met = self.configurations(np.concatenate(ways)) if any(map(len, ways)) else []
+            for way in np.split(np.arange(len(met)), np.cumsum([len(way) for way in ways])[:-1]):
+                for at in takewhile(lambda at: at is not None, (met[i] for i in way)):
+                    assert at is not None
+                    yield at
+                    given += 1
+                    if given == count:
+                        return
+            if failed > 10 * (given + walks + 10):
+                raise NotSampled(self.twin.mechanism.name, given, count)
+
+    def _walks(self, rng: np.random.Generator, walks: int, steps: int, limit: float) -> list[Array]:
+        """The platform poses (k, 4, 4) of each walk."""
+        stage, length = self.batch.stage, self.batch.length
+        ways: list[list[Array]] = [[] for _ in range(walks)]
+        X = np.repeat(self.batch.home[None], walks, axis=0)
+        velocity = np.zeros((walks, stage.dof))
+        live = np.arange(walks)
+        for _ in range(steps):
+            velocity += rng.normal(size=velocity.shape) / 2
+            velocity /= np.linalg.norm(velocity, axis=1, keepdims=True)
+            shift, spin = np.split(STEP * velocity, [stage.shifts.shape[1]], axis=1)
+            p, R = stage.place(X)
+            X = X.copy()
+            X[:, :3, :3] = exponential(spin @ stage.spins.T) @ R
+            X[:, :3, 3] = p + length * (shift @ stage.shifts.T) - X[:, :3, :3] @ stage.point
+            found = self.batch.evaluate(X, compiled=False)
+            kept = np.flatnonzero(found.reached & ~(found.singular_values[:, 0] > limit))
+            X, velocity, live = X[kept], velocity[kept], live[kept]
+            for walk, pose in zip(live, X, strict=True):
+                ways[walk].append(pose)
+        return [np.array(way).reshape(-1, 4, 4) for way in ways]
+
+    def frames(self, X: Array) -> tuple[dict[str, Array], Flags]:
+        """Poses (n, 4, 4) of all links, metres, and where the legs are closed (n,)."""
+        batch, mechanism = self.batch, self.anatomy.mechanism
+        p, R = batch.stage.place(X)
+        frames = {mechanism.base: np.broadcast_to(mechanism.links[mechanism.base].pose, (len(X), 4, 4))}
+        for name, body in batch.stage.bodies.items():
+            frames[name] = np.tile(np.eye(4), (len(X), 1, 1))
+            frames[name][:, :3, 3] = p + R @ body.b + body.c
+            frames[name][:, :3, :3] = R @ body.Q if body.turns else body.Q
+        reached = np.ones(len(X), dtype=bool)
+        poses = Poses.of(p, R)
+        for leg in self.anatomy.legs:
+            chain, limb = self.chains[leg.label], batch.legs[leg.label]
+            assert isinstance(limb, Limb)
+            guess, there = self._guess(leg, limb, poses, frames, p, R)
+            state = np.stack([guess[name] for name in chain.links], axis=1)
+            state[:, :, :3, 3] /= batch.length
+            state[~there] = chain.zero
+            end = state[:, 1].copy()
+            state, residual = chain.led(state, end, CLOSING)
+            reached &= there & (residual <= CLOSED)
+            state[:, :, :3, 3] *= batch.length
+            frames.update({name: state[:, i] for i, name in enumerate(chain.links) if name in leg.links})
+        return frames, reached
+
+    def _guess(self, leg: Leg, limb: Limb, poses: Poses, frames: Mapping[str, Array], p: Array, R: Array
+               ) -> tuple[dict[str, Array], Flags]:
+        """Where the leg's links start: its first link on its circle or line, the others turned as the observed one."""
+        mechanism, seen = self.anatomy.mechanism, self.seen[leg.label]
+        n = len(p)
+        first = np.tile(np.eye(4), (n, 1, 1))
+        there = np.ones(n, dtype=bool)
+        zero = mechanism.links[seen.link].pose[:3, :3] @ seen.direction
+        u = np.broadcast_to(limb.axis, (n, 3))
+        if limb.kind is Kind.TURNING:
+            columns, there, B = turning(limb, poses)
+            u, first = columns.T, _first(limb, B.T, there)
+        elif limb.kind is not Kind.CONSTANT:
+            found = rod(limb, poses)
+            there, u = found.reached, np.where(found.reached, found.u, zero[:, None]).T
+            first = _first(limb, limb.tip(p, R) - u * (limb.sense * limb.rod), there)
+        turn = exponential(between(zero, u))
+        guess = {name: frames[name] for name in (mechanism.base, leg.attach)}
+        for name in _outwards(mechanism, leg, limb.crank):
+            pose = mechanism.links[name].pose
+            if name == limb.crank:
+                guess[name] = first @ pose
+                continue
+            joint, held = _hold(mechanism, leg, name, guess)
+            moved = guess[held] @ inverse(mechanism.links[held].pose)
+            centre = moved[:, :3, :3] @ joint.point + moved[:, :3, 3]
+            guess[name] = np.tile(np.eye(4), (n, 1, 1))
+            guess[name][:, :3, :3] = turn @ pose[:3, :3]
+            guess[name][:, :3, 3] = centre + turn @ (pose[:3, 3] - joint.point)
+        return guess, there
+
+
+def _first(limb: Limb, B: Array, there: Flags) -> Array:
+    """The displacement (n, 4, 4) that brings the point of the leg's first link to B."""
+    X = np.tile(np.eye(4), (len(B), 1, 1))
+    if limb.kind is Kind.LINE:
+        X[:, :3, 3] = B - limb.place
+    elif limb.radius:
+        a, start, arm = limb.pivot, limb.place - limb.centre, B - limb.centre
+        angle = np.arctan2(arm @ np.cross(a, start), arm @ start)
+        X[:, :3, :3] = exponential(angle[:, None] * a)
+        X[:, :3, 3] = limb.centre - X[:, :3, :3] @ limb.centre
+    X[~there] = np.eye(4)
+    return X
+
+
+def _outwards(mechanism: Mechanism, leg: Leg, crank: str) -> list[str]:
+    """The leg's links, each after one that it hangs on."""
+    order: list[str] = [crank] if crank in leg.links else []
+    rest = [name for name in leg.links if name not in order]
+    while rest:
+        known = {mechanism.base, leg.attach, *order}
+        chosen = next(name for name in rest
+                      if any(joint.other(name) in known for joint in mechanism.joints_of(name)))
+        order.append(chosen)
+        rest.remove(chosen)
+    return order
+
+
+def _hold(mechanism: Mechanism, leg: Leg, name: str, placed: Mapping[str, Array]) -> tuple[Joint, str]:
+    """The joint by which a link is placed, and the link beyond it: the platform's before others, turning ones first."""
+    joints = [joint for joint in mechanism.joints_of(name) if joint.other(name) in placed]
+    best = min(joints, key=lambda joint: (joint.type.slides, joint.other(name) != leg.attach))
+    return best, best.other(name)
+
+
+def coordinates(twin: PinocchioModel, frames: Mapping[str, Array]) -> Array:
+    """The twin's q (n, nq) for poses of all links (n, 4, 4), metres."""
+    mechanism = twin.mechanism
+    moved = {name: X @ inverse(mechanism.links[name].pose) for name, X in frames.items()}
+    n = len(next(iter(frames.values())))
+    q = np.repeat(twin.q0[None], n, axis=0)
+    for joint, parent, names in twin.parts():
+        turned = joint if joint.predecessor == parent else joint.turned()
+        A, B = moved[turned.predecessor], moved[turned.successor]
+        R = A[:, :3, :3].transpose(0, 2, 1) @ B[:, :3, :3]
+        centre = B[:, :3, :3] @ joint.point + B[:, :3, 3] - A[:, :3, 3]
+        shift = np.einsum("nji,nj->ni", A[:, :3, :3], centre) - joint.point
+        values = _coordinates(turned, R, shift / twin.length)
+        for start, value in zip((twin.start(name) for name in names), values, strict=True):
+            q[:, start : start + value.shape[1]] = value
+    return q
+
+
+def _coordinates(joint: Joint, R: Array, shift: Array) -> list[Array]:
+    """The coordinates of each of a joint's parts, (n, 1) or (n, 4), in the order of the twin's."""
+    match joint.type:
+        case JointType.REVOLUTE:
+            return [_angle(R, joint.axis)]
+        case JointType.PRISMATIC:
+            return [shift @ joint.axis[:, None]]
+        case JointType.CYLINDRICAL:
+            return [shift @ joint.axis[:, None], _angle(R, joint.axis)]
+        case JointType.UNIVERSAL:
+            first, second = joint.axes
+            normal = np.cross(first, second)
+            carried = R @ second
+            one = np.arctan2(carried @ normal, carried @ np.cross(normal, first))[:, None]
+            rest = exponential(-one * first) @ R
+            return [one, _angle(rest, second)]
+        case JointType.SPHERICAL:
+            return [quaternions(R)[:, [1, 2, 3, 0]]]
+        case JointType.PLANAR:
+            x = np.linalg.svd(joint.axis[None, :])[2][1]
+            return [shift @ x[:, None], shift @ np.cross(joint.axis, x)[:, None], _angle(R, joint.axis)]
+        case _:
+            return []
+
+
+def _angle(R: Array, axis: Array) -> Array:
+    """The angle (n, 1) of rotations about an axis."""
+    sine = 0.5 * np.stack([R[:, 2, 1] - R[:, 1, 2], R[:, 0, 2] - R[:, 2, 0], R[:, 1, 0] - R[:, 0, 1]], 1) @ axis
+    return np.arctan2(sine, 0.5 * (np.trace(R, axis1=1, axis2=2) - 1))[:, None]

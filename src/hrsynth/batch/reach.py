@@ -1,0 +1,107 @@
+"""Closed configurations at wanted poses, reached from the zero configuration by small steps in its working mode."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ..errors import PoseNotReached
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.leg_reach import worst_leg
+from ..kinematics.platform_motion import Goal, PlatformMotion
+from ..kinematics.relation import Measurement
+from ..kinematics.sampling import wander
+from ..kinematics.steps import HALVINGS, led, nearest
+from ..kinematics.wrists import at_end, beyond
+from ..mechanism.pose import Grid, Pose
+from ..tolerances import AS_PRINTED
+from .grids import ready
+from .placing import Placer
+
+FIRST = 40
+"""Cells of a grid, nearest first, that are tried from the zero configuration before the grid counts as unreachable."""
+FINER = 4
+"""How often in a sweep, where a pose can be reached from several neighbours."""
+
+
+def generic_motion(start: ClosedConfiguration, question: Measurement) -> PlatformMotion:
+    """What the platform generically does, from a few random configurations."""
+    return PlatformMotion.of(wander(start, 4, steps=2), question)
+
+
+def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
+          motion: PlatformMotion | None = None) -> ClosedConfiguration:
+    """The configuration at ``pose`` that small steps lead to from ``start``; free parts are nearest to their values at
+    the zero configuration (characteristic lengths, radians).
+
+    ``motion`` is what the platform generically does (default: found by a random walk). Raises ``BadRequest`` for parts
+    that it cannot change, ``PoseNotReached`` where the way ends before the pose.
+    """
+    motion = motion or generic_motion(start, question)
+    robot = start.twin.mechanism.name
+    goal = motion.goal(pose, robot)
+    here, came = led(start, motion, goal)
+    found = nearest(here, goal, motion.at_home()) if came == 1 else here
+    if came < 1 or not _arrived(found, goal):
+        leg, lengths, angles = worst_leg(start.twin, motion, goal)
+        last = str(motion.pose(here.pose(motion.link)))
+        raise PoseNotReached(robot, str(pose), came, last, leg, 1e3 * lengths, float(np.degrees(angles)),
+                             wrist=at_end(here))
+    return found
+
+
+def _arrived(at: ClosedConfiguration, goal: Goal) -> bool:
+    """Whether a configuration is at the wanted pose, by its matrix, and no wrist is beyond its interval."""
+    return goal.met(at.pose(goal.link), AS_PRINTED * max(1.0, at.twin.length)) and not beyond(at.twin, at.q)
+
+
+def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion: PlatformMotion | None = None,
+          progress: Callable[[], None] | None = None, placer: Placer | None = None
+          ) -> tuple[ClosedConfiguration | None, ...]:
+    """Configurations at the poses of a grid, in its order, each reached from a neighbour; None where that fails from
+    every neighbour. The first is the reachable one nearest to ``start``.
+
+    A ``placer`` gives them at once where the legs are known subproblems and free parts can stay as they are at zero;
+    only the others are led there step by step."""
+    motion = motion or generic_motion(start, question)
+    goals = [motion.goal(pose, start.twin.mechanism.name) for pose in grid.poses()]
+    home = motion.at_home()
+    found: dict[int, ClosedConfiguration] = {}
+    queue: deque[tuple[int, int]] = deque()
+    at_once, hopeless = ({}, set()) if placer is None else ready(placer, motion, goals)
+
+    def settle(cell: int, origin: ClosedConfiguration, halvings: int) -> None:
+        if cell in hopeless:
+            return
+        there, came = (at_once[cell], 1.0) if cell in at_once else led(origin, motion, goals[cell], halvings)
+        if came == 1:
+            there = there if cell in at_once else nearest(there, goals[cell], home)
+        if came == 1 and _arrived(there, goals[cell]):
+            found[cell] = there
+            queue.extend((other, cell) for other in _neighbours(cell, grid.shape) if other not in found)
+            if progress is not None:
+                progress()
+
+    distance = [float(np.linalg.norm(goal.rows(start.twin, start.q)[0])) for goal in goals]
+    for cell in sorted(range(len(goals)), key=lambda i: (round(distance[i], 9), i))[:FIRST]:
+        settle(cell, start, HALVINGS)
+        if found:
+            break
+    while queue:
+        cell, origin = queue.popleft()
+        if cell not in found:
+            settle(cell, found[origin], FINER)
+    return tuple(found.get(cell) for cell in range(len(goals)))
+
+
+def _neighbours(cell: int, shape: tuple[int, ...]) -> Iterator[int]:
+    """The cells next to one, along each axis."""
+    place = np.unravel_index(cell, shape)
+    for axis, size in enumerate(shape):
+        for side in (-1, 1):
+            if 0 <= place[axis] + side < size:
+                beside = [*place]
+                beside[axis] += side
+                yield int(np.ravel_multi_index(beside, shape))

@@ -1,0 +1,107 @@
+"""How the links of a platform go with its pose: what is fixed in each as a function of position and rotation alone.
+
+Poses are given as the platform's reference point p and its rotation R. A point of a link that turns with the platform
+is p + R b; one of a link that only translates (a half of an articulated platform) is p + R b + c: the law is fitted to
+closed configurations and holds at all of them, or the link is not placed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.vectors import Array
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.platform_motion import PlatformMotion
+from ..tolerances import SAME_DIRECTION, SAME_GEOMETRY
+
+Frames = Mapping[str, Array]
+"""Poses X_BL (m, 4, 4) of links at m closed configurations, metres."""
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """A link that goes with the platform: its origin is p + R b + c, its rotation R Q (``turns``) or Q."""
+
+    turns: bool
+    Q: Array
+    b: Array
+    c: Array
+
+    def point(self, place: Array) -> tuple[Array, Array]:
+        """b and c of a point that the link's frame has at ``place`` (3,)."""
+        moved = self.Q @ place
+        return (self.b + moved, self.c) if self.turns else (self.b, self.c + moved)
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """The platform: its reference point, a basis of its twists, the links that go with it.
+
+    ``shifts`` (3, k) and ``spins`` (3, m) are orthonormal: the twist with coordinates (x, y) is the velocity
+    ``shifts`` x of the point and the angular velocity ``spins`` y. Where not every one of these twists is one of the
+    platform's (``constant`` is false), the legs say at each pose which are.
+    """
+
+    link: str
+    point: Array
+    shifts: Array
+    spins: Array
+    bodies: Mapping[str, Body]
+    dof: int
+
+    @property
+    def constant(self) -> bool:
+        """Whether the platform has the same twists at every pose."""
+        return int(self.shifts.shape[1] + self.spins.shape[1]) == self.dof
+
+    @property
+    def twists(self) -> Array:
+        """The basis (6, d), along the base frame's axes where these span it: linear rows are the velocity of the
+        point."""
+        shifts, spins, zero = _along_axes(self.shifts), _along_axes(self.spins), np.zeros((3, 3))
+        return np.block([[shifts, zero[:, : spins.shape[1]]], [zero[:, : shifts.shape[1]], spins]])
+
+    def place(self, X: Array) -> tuple[Array, Array]:
+        """p (n, 3) and R (n, 3, 3) of platform poses (n, 4, 4)."""
+        R = X[:, :3, :3]
+        return X[:, :3, 3] + R @ self.point if self.point.any() else X[:, :3, 3], R
+
+    @classmethod
+    def of(cls, motion: PlatformMotion, frames: Frames, names: Sequence[str], length: float) -> Stage:
+        """The stage of a platform and those of the links ``names`` that go with it."""
+        X = frames[motion.link]
+        p = X[:, :3, 3] + X[:, :3, :3] @ motion.point
+        found = {name: body for name in names if motion.body
+                 and (body := _body(p, X[:, :3, :3], frames[name], length)) is not None}
+        return cls(motion.link, motion.point, motion.shifts, motion.spins, found, motion.dof)
+
+
+def _along_axes(basis: Array) -> Array:
+    """The axes that span the same as an orthonormal basis (3, k), if there are such; else the basis."""
+    onto = basis @ basis.T
+    kept = np.diag(onto) > 0.5
+    return np.eye(3)[:, kept] if np.max(np.abs(onto - np.diag(kept)), initial=0.0) < SAME_DIRECTION else basis
+
+
+def _body(p: Array, R: Array, X: Array, length: float) -> Body | None:
+    """The law that a link's frames (m, 4, 4) obey, or None."""
+    eye = np.broadcast_to(np.eye(3), R.shape)
+    for turns, Q in ((True, R[0].T @ X[0, :3, :3]), (False, X[0, :3, :3])):
+        if np.max(np.abs((R @ Q if turns else Q) - X[:, :3, :3])) > SAME_GEOMETRY:
+            continue
+        rows = np.concatenate([R, eye], axis=2).reshape(-1, 6)
+        away = (X[:, :3, 3] - p).ravel()
+        b, c = np.linalg.lstsq(rows, away, rcond=SAME_GEOMETRY)[0].reshape(2, 3)
+        if np.max(np.abs(rows @ np.concatenate([b, c]) - away)) <= SAME_GEOMETRY * length:
+            return Body(turns, Q, b, c)
+    return None
+
+
+def frames_at(configurations: Sequence[ClosedConfiguration]) -> dict[str, Array]:
+    """Poses (m, 4, 4) of all links at closed configurations."""
+    names = tuple(configurations[0].twin.mechanism.links)
+    X = np.array([at.twin.poses(at.q, names) for at in configurations])
+    return {name: X[:, i] for i, name in enumerate(names)}

@@ -1,0 +1,126 @@
+"""Vectors of a robot that an engineer would name: watched directions, axes, tangents, tips; each a function of poses.
+
+Values are in base axes; points in characteristic lengths. ``poses`` maps a link to its X_BL, shape (..., 4, 4), with
+positions in characteristic lengths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.vectors import Array, frozen, inverse
+from ..kinematics.configuration import ClosedConfiguration
+from ..mechanism import Joint, Mechanism
+
+Poses = Mapping[str, Array]
+
+
+@dataclass(frozen=True, eq=False)
+class Feature:
+    """A vector with the symbol it has in expressions and what it means, in words."""
+
+    symbol: str
+    meaning: str
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        """The links whose poses it depends on."""
+        raise NotImplementedError
+
+    def value(self, poses: Poses) -> Array:
+        """The vector at one or many configurations, shape (..., 3)."""
+        raise NotImplementedError
+
+
+@dataclass(frozen=True, eq=False)
+class Carried(Feature):
+    """A unit vector fixed in a link, given in the link's frame."""
+
+    link: str
+    direction: Array
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        return (self.link,)
+
+    def value(self, poses: Poses) -> Array:
+        return np.einsum("...ij,j->...i", poses[self.link][..., :3, :3], self.direction)
+
+
+@dataclass(frozen=True, eq=False)
+class Spot(Feature):
+    """A point fixed in a link, given in the link's frame (characteristic lengths)."""
+
+    link: str
+    place: Array
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        return (self.link,)
+
+    def value(self, poses: Poses) -> Array:
+        X = poses[self.link]
+        turned: Array = np.einsum("...ij,j->...i", X[..., :3, :3], self.place)
+        return turned + X[..., :3, 3]
+
+
+@dataclass(frozen=True, eq=False)
+class Tangent(Feature):
+    """The unit tangent a × (Q − P) of the path of Q when the link that carries it turns about the axis (P, a)."""
+
+    axis: Carried
+    start: Spot
+    end: Spot
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        return (*self.axis.links, *self.start.links, *self.end.links)
+
+    def value(self, poses: Poses) -> Array:
+        return unit_rows(np.cross(self.axis.value(poses), self.end.value(poses) - self.start.value(poses)))
+
+
+@dataclass(frozen=True, eq=False)
+class Segment(Feature):
+    """The unit vector from a point to another."""
+
+    start: Spot
+    end: Spot
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        return (*self.start.links, *self.end.links)
+
+    def value(self, poses: Poses) -> Array:
+        return unit_rows(self.end.value(poses) - self.start.value(poses))
+
+
+def unit_rows(vectors: Array) -> Array:
+    """Vectors (..., 3) divided by their lengths; a zero vector stays zero."""
+    size = np.linalg.norm(vectors, axis=-1, keepdims=True)
+    return np.asarray(vectors / np.where(size > 0, size, 1.0))
+
+
+def axis_of(mechanism: Mechanism, joint: Joint, symbol: str, which: int = 0) -> Carried:
+    """The (first or second) axis of a joint, as fixed in the link that carries it."""
+    link = joint.links[which]
+    direction = mechanism.links[link].pose[:3, :3].T @ joint.axes[which]
+    words = f"axis of {joint.name}" if len(joint.axes) == 1 else f"{('first', 'second')[which]} axis of {joint.name}"
+    return Carried(symbol, words, link, frozen(direction))
+
+
+def centre_of(mechanism: Mechanism, joint: Joint, link: str, symbol: str, length: float) -> Spot:
+    """The centre of a joint, as fixed in one of its links."""
+    place = inverse(mechanism.links[link].pose) @ np.append(joint.point, 1.0)
+    return Spot(symbol, f"centre of {joint.name}", link, frozen(place[:3] / length))
+
+
+def poses_at(configurations: Sequence[ClosedConfiguration], links: Sequence[str]) -> dict[str, Array]:
+    """Poses (n, 4, 4) of links at several configurations, positions in characteristic lengths."""
+    names = tuple(dict.fromkeys(links))
+    X = np.array([at.twin.poses(at.q, names) for at in configurations])
+    X[..., :3, 3] /= configurations[0].twin.length
+    return {name: X[:, i] for i, name in enumerate(names)}

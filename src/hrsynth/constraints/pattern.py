@@ -1,0 +1,352 @@
+"""The pattern of a robot's wrench systems with its measurements held, recognised over samples, never at one pose.
+
+With what is measured held, leg i lets its end translate along V_i and turn about axes through a point B_i; what the
+whole platform can still do must be in all of them (theory 4). This module finds V_i, B_i and their names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+
+import numpy as np
+
+from ..geometry.ranks import range_basis
+from ..geometry.vectors import Array, frozen, hats
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.locked import leg_twists, split
+from ..kinematics.relation import Measurement, relation
+from ..mechanism import JointType, Mechanism, Observation
+from ..mechanism.legs import Leg, LegDecomposition
+from ..mechanism.observation import Direction
+from ..tolerances import SAME_RELATION
+from .named_vectors import Carried, Feature, Segment, Spot, Tangent, axis_of, centre_of, poses_at
+
+TURNING = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.CYLINDRICAL)
+
+
+@dataclass(frozen=True, eq=False)
+class LockedLeg:
+    """A leg with its measurements held.
+
+    Its end ``tip`` on ``body`` may move along ``line``, or in the plane with this ``normal``, or not at all where
+    ``fixed``; ``turns`` is the number of independent rotations about axes through the tip.
+    """
+
+    label: str
+    body: str
+    tip: Spot
+    line: Feature | None
+    normal: Feature | None
+    fixed: bool
+    turns: int
+
+    @property
+    def free(self) -> bool:
+        """Whether the tip may move anywhere."""
+        return self.line is None and self.normal is None and not self.fixed
+
+    @property
+    def features(self) -> tuple[Feature, ...]:
+        """All named vectors of the leg."""
+        return tuple(f for f in (self.tip, self.line, self.normal) if f is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class Structure:
+    """How the platform can move and what the held legs leave of it.
+
+    ``motion`` is ``translations`` (held legs leave translations alone), ``planar``, ``spatial``, ``bodies`` (an
+    articulated platform whose bodies translate, one along ``slide`` relative to the other) or ``other``.
+    """
+
+    motion: str
+    base: str
+    bodies: tuple[str, ...]
+    """The links of the platform on which legs end."""
+    legs: tuple[LockedLeg, ...] = ()
+    plane: Feature | None = None
+    """The normal of the plane in which everything moves, of ``translations`` that in which all tips move, or None."""
+    slide: Feature | None = None
+
+    @property
+    def features(self) -> tuple[Feature, ...]:
+        """All named vectors."""
+        extra = tuple(f for f in (self.plane, self.slide) if f is not None)
+        return tuple(f for leg in self.legs for f in leg.features) + extra
+
+    def scene(self, configurations: Sequence[ClosedConfiguration]) -> Scene:
+        """The named vectors at several configurations."""
+        return Scene(self, tuple(configurations))
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """A structure at n configurations: its named vectors, (n, 3) each, and where its bodies are."""
+
+    structure: Structure
+    configurations: tuple[ClosedConfiguration, ...]
+
+    @cached_property
+    def _poses(self) -> dict[str, Array]:
+        links = [link for feature in self.structure.features for link in feature.links]
+        return poses_at(self.configurations, [*links, *self.structure.bodies])
+
+    @cached_property
+    def values(self) -> dict[str, Array]:
+        """The vectors by their symbols; points are measured from the first leg's tip."""
+        features = self.structure.features
+        found = {feature.symbol: feature.value(self._poses) for feature in features}
+        if self.structure.legs:
+            origin = found[self.structure.legs[0].tip.symbol]
+            found.update({f.symbol: found[f.symbol] - origin for f in features if isinstance(f, Spot)})
+        return found
+
+    def allowances(self, leg: LockedLeg) -> Array:
+        """What a held leg forbids the bodies of the platform, (n, rows, 6 bodies), on the twists of their frames'
+        origins: its tip's velocity across V_i, and a turn where it allows none."""
+        arms = leg.tip.value(self._poses) - self._poses[leg.body][:, :3, 3]
+        across = forbidden(leg, self.values)
+        blocks = np.concatenate([across, -across @ hats(arms)], axis=2)
+        if leg.turns == 0:
+            turns = np.broadcast_to(np.eye(3, 6, 3), (len(arms), 3, 6))
+            blocks = np.concatenate([blocks, turns], axis=1)
+        bodies = self.structure.bodies
+        found = np.zeros((len(arms), blocks.shape[1], 6 * len(bodies)))
+        start = 6 * bodies.index(leg.body)
+        found[:, :, start : start + 6] = blocks
+        return found
+
+
+def forbidden(leg: LockedLeg, values: Mapping[str, Array]) -> Array:
+    """N_i: the projector (n, 3, 3) on what the tip's velocity must not have."""
+    if leg.line is not None:
+        return projectors(values[leg.line.symbol])
+    if leg.normal is not None:
+        n = values[leg.normal.symbol]
+        return np.asarray(n[:, :, None] * n[:, None, :])
+    return np.broadcast_to(np.eye(3), (len(values[leg.tip.symbol]), 3, 3))
+
+
+def projectors(vectors: Array) -> Array:
+    """I − v vᵀ for unit vectors (n, 3)."""
+    projector: Array = np.eye(3) - vectors[:, :, None] * vectors[:, None, :]
+    return projector
+
+
+def attached(anatomy: LegDecomposition) -> tuple[str, ...]:
+    """The links of the platform on which legs end."""
+    return tuple(dict.fromkeys(leg.attach for leg in anatomy.legs))
+
+
+def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]) -> Structure:
+    """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones."""
+    other = Structure("other", anatomy.mechanism.base, attached(anatomy))
+    if anatomy.mechanism.couplings:
+        return other
+    held = {leg.label: _held(anatomy, leg, question, samples) for leg in anatomy.legs}
+    watched = {o.leg for o in question.observations}
+    seen = [leg for label, leg in held.items() if label in watched]
+    if any(leg is None for leg in seen) or not seen:
+        return other
+    legs = tuple(leg for leg in seen if leg is not None)
+    other = replace(other, legs=legs)
+    motions = _motions(anatomy, question, samples)
+    if anatomy.point is not None:
+        found: Structure | None = _translating(anatomy, legs, samples)
+    elif len(other.bodies) == 1:
+        found = _one_body(anatomy, held, legs, motions, samples)
+    else:
+        found = _two_bodies(anatomy, legs, motions, samples)
+    # where the turns of all legs are alike, a leg whose tip may move anywhere holds nothing
+    binding = () if found is None else tuple(leg for leg in found.legs if not leg.free)
+    return replace(found, legs=binding) if found is not None and binding else other
+
+
+def _one_body(anatomy: LegDecomposition, held: dict[str, LockedLeg | None], legs: tuple[LockedLeg, ...], motions: Array,
+              samples: Sequence[ClosedConfiguration]) -> Structure | None:
+    base, bodies = anatomy.mechanism.base, attached(anatomy)
+    every = tuple(leg for leg in held.values() if leg is not None)
+    if _vanishes(motions[:, 3:]):
+        return _translating(anatomy, legs, samples)
+    if any(leg.turns == 0 for leg in legs):
+        return _translating(anatomy, every, samples) if len(every) == len(held) else None
+    normal = _plane_of(motions)
+    if normal is not None and all(leg.line is not None for leg in legs):
+        return Structure("planar", base, bodies, legs, plane=_normal(anatomy.mechanism, normal))
+    if len(every) == len(held) and all(leg.turns == 1 and leg.normal is None for leg in every):
+        plane = _common_plane(anatomy.mechanism, every, samples)
+        return None if plane is None else Structure("planar", base, bodies, every, plane=plane)
+    if motions.shape[2] == 6 and all(leg.turns == 3 for leg in legs):
+        return Structure("spatial", base, bodies, legs)
+    if len(every) == len(held) and all(leg.turns == 3 for leg in every):
+        return Structure("spatial", base, bodies, every)
+    return None
+
+
+def _translating(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...],
+                 samples: Sequence[ClosedConfiguration]) -> Structure:
+    lines = [leg.line for leg in legs if leg.line is not None]
+    plane = None
+    if lines and len(lines) == sum(not leg.free for leg in legs):
+        poses = poses_at(samples, [link for line in lines for link in line.links])
+        _, s, Vt = np.linalg.svd(np.concatenate([line.value(poses) for line in lines]))
+        if s[1] > SAME_RELATION * s[0] > s[2]:
+            plane = _normal(anatomy.mechanism, Vt[2], "direction normal to the lines along which the tips move")
+    return Structure("translations", anatomy.mechanism.base, attached(anatomy), legs, plane=plane)
+
+
+def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions: Array,
+                samples: Sequence[ClosedConfiguration]) -> Structure | None:
+    """Two bodies that only translate, the second along one direction relative to the first."""
+    bodies = attached(anatomy)
+    if len(bodies) != 2 or motions.shape[2] != 4 or not _vanishes(motions[:, [3, 4, 5, 9, 10, 11]]):
+        return None
+    relative = [range_basis(F[6:9] - F[:3], 1.0)[0] for F in motions]
+    if any(each.shape[1] != 1 for each in relative):
+        return None
+    directions = np.array([each[:, 0] for each in relative])
+    inner = [j.name for j in anatomy.mechanism.joints.values() if set(j.links) <= set(anatomy.platform)]
+    slide = next((f for f in _tangents(anatomy, inner, "e") if _along(f, directions, samples)), None)
+    if slide is None:
+        return None
+    return Structure("bodies", anatomy.mechanism.base, attached(anatomy), legs, slide=slide)
+
+
+def _motions(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]) -> Array:
+    """Bases (n, 6 bodies, d) of what the platform's bodies can do with nothing held; they differ in number where the
+    samples are not alike, then the largest are kept."""
+    asked = replace(question, bodies=attached(anatomy), observations=())
+    found = [relation(at, asked).basis[asked.twist_rows :] for at in samples]
+    bases = [range_basis(each, 1.0)[0] for each in found]
+    most = max(basis.shape[1] for basis in bases)
+    return np.array([basis for basis in bases if basis.shape[1] == most])
+
+
+def _common_plane(mechanism: Mechanism, legs: Sequence[LockedLeg], samples: Sequence[ClosedConfiguration]
+                  ) -> Feature | None:
+    """The constant direction about which all legs turn and across which all tips move."""
+    joints = [j for j in mechanism.joints.values() if j.type is JointType.REVOLUTE]
+    axes = [axis_of(mechanism, joint, "n") for joint in joints]
+    values = np.concatenate([axis.value(poses_at(samples, axis.links)) for axis in axes])
+    lines = [leg.line for leg in legs if leg.line is not None]
+    paths = [line.value(poses_at(samples, line.links)) for line in lines]
+    if not _vanishes(np.cross(values, values[0])) or any(not _vanishes(path @ values[0]) for path in paths):
+        return None
+    return _normal(mechanism, values[0])
+
+
+def _vanishes(block: Array) -> bool:
+    return bool(np.max(np.abs(block), initial=0.0) < SAME_RELATION)
+
+
+def _plane_of(motions: Array) -> Array | None:
+    """The constant normal of planar motions (n, 6, 3): two translations normal to it, one rotation about it."""
+    if motions.shape[2] != 3:
+        return None
+    turns = np.concatenate([F[3:].T for F in motions])
+    _, s, Vt = np.linalg.svd(turns)
+    normal: Array = Vt[0]
+    flat = max(float(np.max(np.abs(normal @ F[:3]))) for F in motions)
+    return normal if s[1] < SAME_RELATION and flat < SAME_RELATION else None
+
+
+def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the plane of motion") -> Carried:
+    """A constant direction, of the sense in which its largest component is positive."""
+    sense = np.sign(normal[np.argmax(np.abs(normal))])
+    direction = mechanism.links[mechanism.base].pose[:3, :3].T @ (normal * sense)
+    return Carried("n", meaning, mechanism.base, frozen(direction))
+
+
+def _held(anatomy: LegDecomposition, leg: Leg, question: Measurement,
+          samples: Sequence[ClosedConfiguration]) -> LockedLeg | None:
+    """The leg's pattern, the same at all samples, or None."""
+    locks = [o for o in question.observations if o.leg == leg.label]
+    try:
+        systems = [leg_twists(at, leg, locks, question.reference) for at in samples]
+    except ValueError:
+        return None
+    symbol = leg.label if leg.label.isalnum() else str(anatomy.labels.index(leg.label) + 1)
+    for spot in _tips(anatomy, leg, symbol, samples[0].twin.length):
+        points = spot.value(poses_at(samples, spot.links))
+        parts = [split(T, B) for T, B in zip(systems, points, strict=True)]
+        first = parts[0]
+        shape = (first.translations.shape[1], first.rotations.shape[1])
+        if not all(p.whole and (p.translations.shape[1], p.rotations.shape[1]) == shape for p in parts):
+            continue
+        line = normal = None
+        if shape[0] == 1:
+            line = _named(anatomy, leg, locks, symbol, np.array([p.translations[:, 0] for p in parts]), samples)
+        elif shape[0] == 2:
+            across = np.array([np.cross(p.translations[:, 0], p.translations[:, 1]) for p in parts])
+            normal = _named(anatomy, leg, locks, symbol, across, samples)
+        if shape[0] in (1, 2) and line is None and normal is None:
+            return None
+        return LockedLeg(leg.label, leg.attach, spot, line, normal, shape[0] == 0, shape[1])
+    return None
+
+
+def _tips(anatomy: LegDecomposition, leg: Leg, symbol: str, length: float) -> Iterator[Spot]:
+    """Points at which the leg may come apart: its joints on the platform first, then the others, inwards."""
+    mechanism = anatomy.mechanism
+    joints = [mechanism.joints[name] for name in leg.joints]
+    if anatomy.point is not None:
+        yield Spot(f"B{symbol}", "the platform's point", mechanism.platform, frozen(anatomy.point / length))
+    for joint in joints:
+        if leg.attach in joint.links:
+            yield centre_of(mechanism, joint, leg.attach, f"B{symbol}", length)
+    for joint in reversed(joints):
+        if leg.attach not in joint.links:
+            yield centre_of(mechanism, joint, joint.predecessor, f"A{symbol}", length)
+
+
+def _named(anatomy: LegDecomposition, leg: Leg, locks: Sequence[Observation], symbol: str, values: Array,
+           samples: Sequence[ClosedConfiguration]) -> Feature | None:
+    """The first vector with a name that is parallel to ``values`` (n, 3) at all samples."""
+    mechanism = anatomy.mechanism
+    candidates: list[Feature] = []
+    for lock in locks:
+        if isinstance(lock, Direction):
+            candidates.append(Carried(f"u{symbol}", f"direction watched in leg {leg.label} ({lock.link})", lock.link,
+                                      lock.direction))
+    joints = [mechanism.joints[name] for name in leg.joints]
+    candidates += [axis_of(mechanism, j, f"p{symbol}") for j in joints if j.type.slides]
+    candidates += _segments(anatomy, leg.joints, f"r{symbol}")
+    candidates += _tangents(anatomy, leg.joints, f"tau{symbol}")
+    candidates += [axis_of(mechanism, j, f"a{symbol}", which) for j in joints if not j.type.slides
+                   for which in range(len(j.axes))]
+    return next((f for f in candidates if _along(f, values, samples)), None)
+
+
+def _tangents(anatomy: LegDecomposition, names: Sequence[str], symbol: str) -> Iterator[Tangent]:
+    """Tangents of the paths of joint centres about R axes, for some joints; those on one link first."""
+    mechanism, length = anatomy.mechanism, anatomy.mechanism.length
+    joints = [mechanism.joints[name] for name in names]
+    pairs = [(axis, which, end) for axis in joints if axis.type in TURNING for which in range(len(axis.axes))
+             for end in joints if end is not axis]
+    pairs.sort(key=lambda pair: not set(pair[0].links) & set(pair[2].links))
+    for axis, which, end in pairs:
+        link = next((link for link in axis.links if link in end.links), end.predecessor)
+        yield Tangent(symbol, f"tangent {axis.name} × ({end.name} − {axis.name})",
+                      axis_of(mechanism, axis, "a", which), centre_of(mechanism, axis, axis.links[which], "P", length),
+                      centre_of(mechanism, end, link, "Q", length))
+
+
+def _segments(anatomy: LegDecomposition, names: Sequence[str], symbol: str) -> Iterator[Segment]:
+    """Directions from joint centre to joint centre of the links of a leg."""
+    mechanism, length = anatomy.mechanism, anatomy.mechanism.length
+    joints = [mechanism.joints[name] for name in names]
+    for one, two in combinations(joints, 2):
+        for link in sorted(set(one.links) & set(two.links) - {mechanism.base}):
+            yield Segment(symbol, f"direction from {one.name} to {two.name}",
+                          centre_of(mechanism, one, link, "P", length), centre_of(mechanism, two, link, "Q", length))
+
+
+def _along(feature: Feature, values: Array, samples: Sequence[ClosedConfiguration]) -> bool:
+    """Whether a feature is parallel to vectors (n, 3) at all samples."""
+    found = feature.value(poses_at(samples, feature.links))
+    if np.min(np.linalg.norm(found, axis=1)) < SAME_RELATION:
+        return False
+    return bool(np.max(np.linalg.norm(np.cross(found, values), axis=1)) < SAME_RELATION)

@@ -1,0 +1,105 @@
+"""Ranks with their evidence: the gap between the last kept and the first dropped singular value."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..errors import RankUndecided
+from ..tolerances import RANK_CUTOFF, RANK_GAP
+from .vectors import Array
+
+CLEAN = float(1 / np.finfo(float).eps)
+"""The gap of a rank that nothing contradicts: no singular value is dropped, or all are exactly zero."""
+
+
+@dataclass(frozen=True)
+class Rank:
+    """A rank, the ratio of the last kept to the first dropped singular value (a clean zero counts as ε), and the last
+    kept singular value as a fraction of the largest."""
+
+    value: int
+    gap: float
+    weakest: float = 1.0
+
+    @property
+    def dropped(self) -> float:
+        """The first dropped singular value, at least ε, as a fraction of the largest."""
+        return self.weakest / self.gap
+
+    def decided(self, what: str) -> int:
+        """The rank, if the gap is large enough for a verdict; raises ``RankUndecided`` otherwise."""
+        if self.gap < RANK_GAP:
+            raise RankUndecided(what, self.gap, RANK_GAP)
+        return self.value
+
+
+def rank_of(singular_values: Array, scale: float | None = None) -> Rank:
+    """The rank that descending singular values show; ``scale`` (default: the largest) is what zero is relative to."""
+    values = np.asarray(singular_values, dtype=float)
+    if values.size == 0:
+        return Rank(0, CLEAN)
+    largest = float(values[0]) if scale is None else max(scale, float(values[0]))
+    if largest <= np.finfo(float).tiny:
+        return Rank(0, CLEAN)
+    floor = np.finfo(float).eps * largest
+    kept = int(np.sum(values > RANK_CUTOFF * largest))
+    last = float(values[kept - 1]) if kept else largest
+    dropped = max(float(values[kept]), floor) if kept < values.size else floor
+    return Rank(kept, float(last / dropped), last / largest)
+
+
+def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
+    """An orthonormal basis (rows of ``matrix`` long) of the column space, with the rank."""
+    if 0 in matrix.shape:
+        return np.zeros((matrix.shape[0], 0)), Rank(0, CLEAN)
+    U, s, _ = np.linalg.svd(matrix, full_matrices=False)
+    rank = rank_of(s, scale)
+    return U[:, : rank.value], rank
+
+
+def kernel_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:
+    """An orthonormal basis of the kernel, shape (columns, nullity), with the rank of the matrix."""
+    found = spectrum(matrix, scale)
+    return found.kernel, found.rank
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """A matrix taken apart: a basis of its kernel (columns, nullity), its rank, the singular values that count,
+    descending (rank,), and their left (rows, rank) and right (columns, rank) vectors."""
+
+    kernel: Array
+    rank: Rank
+    values: Array
+    left: Array
+    right: Array
+
+
+def spectrum(matrix: Array, scale: float | None = None) -> Spectrum:
+    """The spectrum of a matrix; ``scale`` as in :func:`rank_of`."""
+    rows, columns = matrix.shape
+    if 0 in matrix.shape:
+        return Spectrum(np.eye(columns), Rank(0, CLEAN), np.zeros(0), np.zeros((rows, 0)), np.zeros((columns, 0)))
+    U, s, Vt = np.linalg.svd(matrix, full_matrices=rows < columns)
+    rank = rank_of(s, scale)
+    r = rank.value
+    return Spectrum(Vt[r:].T, rank, s[:r], U[:, :r], Vt[:r].T)
+
+
+def singular_values(matrices: Array) -> Array:
+    """The singular values of each matrix (k, rows, columns), divided by the largest where that is above one; (k, n)."""
+    values = np.linalg.svd(matrices, compute_uv=False)
+    return np.asarray(values / np.maximum(values.max(axis=1, initial=1.0), 1.0)[:, None])
+
+
+def largest_angle(A: Array, B: Array) -> float:
+    """The largest principal angle (radians) between two column spaces given by orthonormal bases; π/2 where their
+    dimensions differ."""
+    if A.shape[1] != B.shape[1]:
+        return float(np.pi / 2)
+    if A.shape[1] == 0:
+        return 0.0
+    outside = B - A @ (A.T @ B)
+    return float(np.arcsin(min(1.0, float(np.linalg.norm(outside, 2)))))

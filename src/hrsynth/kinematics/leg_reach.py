@@ -1,0 +1,79 @@
+"""Which leg alone cannot bring the platform to a pose, and by how much it misses."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..errors import HrsynthError
+from ..geometry.ranks import kernel_basis
+from ..geometry.vectors import Array
+from ..mechanism import Mechanism
+from ..mechanism.legs import Leg, LegDecomposition, decompose
+from ..tolerances import CLOSED, FOLLOWED, RANK_CUTOFF, SOLVED
+from .configuration import ClosedConfiguration, closed
+from .pinocchio_model import PinocchioModel
+from .platform_motion import Goal, PlatformMotion
+
+WAY = 10
+"""Points of the way at which a leg alone is led towards a pose, so that it keeps its working mode."""
+
+
+def worst_leg(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> tuple[str | None, float, float]:
+    """The leg that alone misses a goal most, with the miss in metres and in radians; None where each leg reaches it.
+
+    Each leg is taken with base and platform alone; the platform keeps to what it generically does.
+    """
+    try:
+        anatomy = decompose(twin.mechanism)
+    except HrsynthError:
+        return None, 0.0, 0.0
+    misses = []
+    for leg in anatomy.legs:
+        error = _miss(PinocchioModel(alone(anatomy, leg), twin.length), motion, goal)
+        lengths, angles = np.split(error, [goal.lengths])
+        misses.append((float(np.linalg.norm(error)), leg.label, twin.length * float(np.linalg.norm(lengths)),
+                       float(np.linalg.norm(angles))))
+    size, label, lengths_missed, angle = max(misses, key=lambda miss: miss[0])
+    return (label, lengths_missed, angle) if size > FOLLOWED else (None, 0.0, 0.0)
+
+
+def alone(anatomy: LegDecomposition, leg: Leg) -> Mechanism:
+    """One leg with base and platform, the other legs taken away."""
+    mechanism = anatomy.mechanism
+    kept = {mechanism.base, *anatomy.platform, *leg.links}
+    others = [name for other in anatomy.legs if other is not leg for name in other.joints]
+    return mechanism.changed(remove_links=set(mechanism.links) - kept, remove_joints=others, observations=(),
+                             camera=None)
+
+
+def _miss(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> Array:
+    """The error of a goal that is left when the leg comes as near as its loops and the platform's manner allow."""
+    at = ClosedConfiguration.of(twin, twin.q0, FOLLOWED)
+    X = at.pose(motion.link)
+    for number in range(1, WAY + 1):
+        at = _approached(at, goal.towards(X, number / WAY), motion.manner(), 200 if number == WAY else 10)
+    return goal.rows(twin, at.q)[0]
+
+
+def _approached(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int) -> ClosedConfiguration:
+    """Minimise a goal's error with the loops closed and ``manner`` kept: damped Gauss-Newton in the tangent space."""
+    twin = at.twin
+    damping = 1e-3
+    error, rows = goal.rows(twin, at.q)
+    for _ in range(iterations):
+        kernel, _ = kernel_basis(np.vstack([twin.jacobian(at.q), manner.rows(twin, at.q)[1]]), 1.0)
+        free = rows @ kernel
+        gradient = free.T @ error
+        if np.linalg.norm(error) <= SOLVED or np.linalg.norm(gradient) <= RANK_CUTOFF * np.linalg.norm(error):
+            break
+        step = kernel @ np.linalg.solve(free.T @ free + damping * np.eye(free.shape[1]), -gradient)
+        q, residual = closed(twin, twin.moved(at.q, step), manner, tolerance=SOLVED)
+        trial, trial_rows = goal.rows(twin, q)
+        if residual <= CLOSED and np.linalg.norm(trial) < np.linalg.norm(error):
+            at, error, rows = ClosedConfiguration.of(twin, q), trial, trial_rows
+            damping = max(0.2 * damping, 1e-12)
+        elif damping > 1e6:
+            break
+        else:
+            damping *= 10
+    return at

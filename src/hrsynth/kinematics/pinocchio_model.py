@@ -1,0 +1,262 @@
+"""The Pinocchio twin of a mechanism: a spanning tree and exact loop constraints for every joint type.
+
+The twin measures lengths in characteristic lengths of the mechanism it was given (``length``), so that its Jacobians
+mix no metres with radians. Every tree joint's frame has the base's orientation at the zero configuration. A spherical
+loop is Pinocchio's point constraint; any other loop is cut through the joint: the joint is added as a leaf and the leaf
+welded to the other link.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pinocchio as pin
+
+from ..errors import BadMechanism, BadRequest
+from ..geometry.vectors import Array
+from ..mechanism import Joint, JointType, Mechanism, graphs
+
+_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
+_WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
+LARGEST = 256
+"""Coordinates above which a mechanism is refused: Pinocchio's data hold several cubes of their number."""
+
+
+class PinocchioModel:
+    """A Pinocchio model of a mechanism; ``at(q)`` brings its kinematics up to date."""
+
+    def __init__(self, mechanism: Mechanism, length: float | None = None) -> None:
+        self.mechanism = mechanism
+        self.length = mechanism.length if length is None else length
+        self.model = pin.Model()
+        self._body: dict[str, int] = {mechanism.base: 0}
+        self._centre: dict[int, Array] = {0: np.zeros(3)}
+        self.coordinates: dict[str, tuple[int, ...]] = {}
+        """Velocity indices of each joint, in the order of its axes."""
+        self._parts: list[tuple[Joint, str, tuple[str, ...]]] = []
+        tree, loops = self._span()
+        for joint, parent in tree:
+            self._add_tree(joint, parent)
+        constraints = [self._loop(joint) for joint in loops]
+        self.loops = tuple(joint.name for joint in loops)
+        self._gears = self._gear_rows()
+        if self.model.nv > LARGEST:
+            raise BadRequest(f"{mechanism.name}: joints with {self.model.nv} coordinates", None, f"up to {LARGEST}")
+        self.data = self.model.createData()
+        self._models = pin.StdVec_ConstraintModel()
+        self._datas = pin.StdVec_ConstraintData()
+        for constraint in constraints:
+            self._models.append(constraint)
+        for constraint in self._models:
+            self._datas.append(constraint.createData())
+        self._pairs = list(zip(self._models, self._datas, strict=True))
+        self._views = [data.extract() for data in self._datas]
+        self.nv: int = self.model.nv
+        self.q0: Array = pin.neutral(self.model)
+        self._links = {name: (self._body[name], self._seen_from_body(name)) for name in mechanism.links}
+        self._placements = self.data.oMi
+        self._several: dict[tuple[str, ...], tuple[list[int], Array, Array]] = {}
+        self._q: Array | None = None
+
+    def _seen_from_body(self, link: str) -> Array:
+        X = self.mechanism.links[link].pose.copy()
+        X[:3, 3] -= self._centre[self._body[link]] * self.length
+        return X
+
+    def _span(self) -> tuple[list[tuple[Joint, str]], list[Joint]]:
+        mechanism = self.mechanism
+        geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
+        joints = list(mechanism.joints.values())
+        weights = [_WEIGHT[joint.type.value] - (0.5 if joint.successor in geared else 0) for joint in joints]
+        tree = graphs.spanning_forest(mechanism.links, joints, weights)
+        ordered = [(joint, parent) for joint, parent, _ in graphs.outward(mechanism.base, tree)]
+        if len(ordered) != len(mechanism.links) - 1:
+            reached = {mechanism.base, *(child.other(parent) for child, parent in ordered)}
+            missing = sorted(set(mechanism.links) - reached)
+            raise BadMechanism(f"{mechanism.name}: links that no joint connects to the base", ", ".join(missing))
+        used = {joint.name for joint, _ in ordered}
+        loops = [j for j in mechanism.joints.values() if j.name not in used and j.type is not JointType.FREE]
+        return ordered, loops
+
+    def _chain(self, joint: Joint, parent: str) -> list[object]:
+        """Pinocchio's joint models for a joint seen from ``parent``."""
+        turned = joint if joint.predecessor == parent else joint.turned()
+        match joint.type:
+            case JointType.REVOLUTE:
+                return [pin.JointModelRevoluteUnaligned(turned.axis)]
+            case JointType.PRISMATIC:
+                return [pin.JointModelPrismaticUnaligned(turned.axis)]
+            case JointType.UNIVERSAL:
+                return [pin.JointModelRevoluteUnaligned(axis) for axis in turned.axes]
+            case JointType.CYLINDRICAL:
+                return [pin.JointModelPrismaticUnaligned(turned.axis), pin.JointModelRevoluteUnaligned(turned.axis)]
+            case JointType.SPHERICAL:
+                return [pin.JointModelSpherical()]
+            case JointType.PLANAR:
+                x = np.linalg.svd(turned.axis[None, :])[2][1]
+                return [pin.JointModelPrismaticUnaligned(x),
+                        pin.JointModelPrismaticUnaligned(np.cross(turned.axis, x)),
+                        pin.JointModelRevoluteUnaligned(turned.axis)]
+            case JointType.FREE:
+                return [pin.JointModelFreeFlyer()]
+            case _:
+                return []
+
+    def _add(self, joint: Joint, parent: str, suffix: str) -> int:
+        """Add the joint models on ``parent``; the last one's index. Its frame sits at the joint's centre."""
+        index = self._body[parent]
+        turned = joint.predecessor != parent
+        point = joint.point / self.length
+        placement = pin.SE3(np.eye(3), point - self._centre[index])
+        start = self.model.nv
+        names = []
+        for number, model in enumerate(self._chain(joint, parent)):
+            names.append(f"{joint.name}{suffix}{number or ''}")
+            index = self.model.addJoint(index, model, placement, names[-1])
+            placement = pin.SE3.Identity()
+        self._parts.append((joint, parent, tuple(names)))
+        self._centre[index] = point
+        span = range(start, self.model.nv)
+        swapped = turned and joint.type is JointType.UNIVERSAL
+        self.coordinates[joint.name] = tuple(reversed(span)) if swapped else tuple(span)
+        return index
+
+    def _add_tree(self, joint: Joint, parent: str) -> None:
+        child = joint.other(parent)
+        self._body[child] = self._body[parent] if joint.type is JointType.FIXED else self._add(joint, parent, "")
+
+    def _loop(self, joint: Joint) -> object:
+        a, b = (self._body[link] for link in joint.links)
+        point = joint.point / self.length
+        if joint.type is JointType.SPHERICAL:
+            return pin.ConstraintModel(pin.PointAnchorConstraintModel(
+                self.model, a, pin.SE3(np.eye(3), point - self._centre[a]),
+                b, pin.SE3(np.eye(3), point - self._centre[b])))
+        if joint.type is JointType.FIXED:
+            half, offset = a, pin.SE3(np.eye(3), point - self._centre[a])
+        else:
+            half, offset = self._add(joint, joint.predecessor, "__cut"), pin.SE3.Identity()
+        return pin.ConstraintModel(pin.FrameAnchorConstraintModel(
+            self.model, half, offset, b, pin.SE3(np.eye(3), point - self._centre[b])))
+
+    def _gear_rows(self) -> Array:
+        """One row a coupling: successor's rate − ratio × predecessor's rate (metres, radians)."""
+        rows = np.zeros((len(self.mechanism.couplings), self.model.nv))
+        for row, coupling in zip(rows, self.mechanism.couplings, strict=True):
+            for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
+                carriers = [j for j in self.mechanism.joints.values()
+                            if j.successor == link and j.in_tree and j.type.freedoms == 1]
+                if not carriers:
+                    raise BadMechanism(f"coupling {coupling.name!r}: no single joint carries the link", link)
+                unit = self.length if carriers[0].type is JointType.PRISMATIC else 1.0
+                row[self.coordinates[carriers[0].name][0]] += factor * unit
+        return rows
+
+    def parts(self) -> list[tuple[Joint, str, tuple[str, ...]]]:
+        """The joints of the tree and the cut ones: each with the link it is seen from and the names of its parts."""
+        return list(self._parts)
+
+    def start(self, part: str) -> int:
+        """Where the coordinates of a joint's part start in q."""
+        return int(self.model.joints[self.model.getJointId(part)].idx_q)
+
+    def at(self, q: Array) -> None:
+        """Bring poses, Jacobians and loop constraints up to date with ``q``."""
+        if self._q is q:
+            return
+        pin.computeJointJacobians(self.model, self.data, q)
+        for model, data in self._pairs:
+            model.calc(self.model, self.data, data)
+        self._q = q
+
+    def residual(self, q: Array) -> Array:
+        """Loop residuals, stacked in the order of ``loops`` (characteristic lengths, radians)."""
+        self.at(q)
+        parts = [view.constraint_position_error for view in self._views]
+        if len(self._gears):
+            parts.append(self._gears @ pin.difference(self.model, self.q0, q))
+        return np.concatenate(parts) if parts else np.zeros(0)
+
+    def jacobian(self, q: Array) -> Array:
+        """The derivative of :meth:`residual` at closure, shape (rows, nv)."""
+        self.at(q)
+        J = (pin.getConstraintsJacobian(self.model, self.data, self._models, self._datas)
+             if self._pairs else np.zeros((0, self.nv)))
+        return np.vstack([J, self._gears]) if len(self._gears) else J
+
+    @property
+    def blocks(self) -> tuple[tuple[str, ...], tuple[int, ...]]:
+        """What the rows of :meth:`jacobian` belong to: names of loops, then of couplings, and rows of each."""
+        gears = tuple(coupling.name for coupling in self.mechanism.couplings)
+        return (*self.loops, *gears), (*(model.residualSize() for model in self._models), *[1] * len(gears))
+
+    def worst_loop(self, q: Array) -> tuple[str, float]:
+        """The loop that misses most, and by how much."""
+        self.at(q)
+        misses = [(float(np.linalg.norm(view.constraint_position_error)), name)
+                  for view, name in zip(self._views, self.loops, strict=True)]
+        miss, name = max(misses, default=(0.0, "none"))
+        return name, miss
+
+    def pose(self, q: Array, link: str) -> Array:
+        """X_BL of a link in the base frame (4, 4), metres."""
+        self.at(q)
+        body, offset = self._links[link]
+        if body == 0:
+            return offset
+        placement: Array = self.data.oMi[body].homogeneous
+        placement[:3, 3] *= self.length
+        return placement @ offset
+
+    def velocity(self, q: Array, link: str) -> Array:
+        """V (6, nv): joint rates to the (linear, angular) velocity of the link frame's origin, base axes; linear part
+        in characteristic lengths a second."""
+        self.at(q)
+        return self.frames(q, (link,))[1][0]
+
+    def frames(self, q: Array, links: tuple[str, ...]) -> tuple[Array, Array]:
+        """Poses (k, 4, 4) and velocities (k, 6, nv) of several links at once."""
+        X = self.poses(q, links)
+        V = self.data.J * self._several[links][2]
+        V[:, :3] += _cross_rows(V[:, 3:], X[:, :3, 3] / self.length)
+        return X, V
+
+    def poses(self, q: Array, links: tuple[str, ...]) -> Array:
+        """X_BL (k, 4, 4) of several links at once, metres."""
+        self.at(q)
+        bodies, offsets, _ = self._several.get(links) or self._together(links)
+        X = np.array([self._placements[body].homogeneous for body in bodies])
+        X[:, :3, 3] *= self.length
+        return np.asarray(X @ offsets)
+
+    def _together(self, links: tuple[str, ...]) -> tuple[list[int], Array, Array]:
+        """Of several links: the bodies that carry them, where (k, 4, 4), and what moves them (k, 1, nv)."""
+        bodies = [self._links[link][0] for link in links]
+        offsets = np.array([self._links[link][1] for link in links])
+        masks = np.array([self._supports(body) for body in bodies])[:, None, :]
+        self._several[links] = bodies, offsets, masks
+        return self._several[links]
+
+    def _supports(self, body: int) -> Array:
+        """1 for the velocity indices that move a body, 0 for the others, (nv,)."""
+        mask = np.zeros(self.nv)
+        for joint in self.model.supports[body]:
+            start = self.model.joints[joint].idx_v
+            mask[start : start + self.model.joints[joint].nv] = 1.0
+        return mask
+
+    def moved(self, q: Array, step: Array) -> Array:
+        """The configuration that ``step`` (nv) leads to from ``q``."""
+        return pin.integrate(self.model, q, step)
+
+    def difference(self, q: Array, other: Array) -> Array:
+        """The step (nv) that leads from ``q`` to ``other``."""
+        return pin.difference(self.model, q, other)
+
+    def actuated(self) -> list[int]:
+        """Velocity indices of the actuated joints' coordinates."""
+        return [i for joint in self.mechanism.joints.values() if joint.actuated for i in self.coordinates[joint.name]]
+
+
+def _cross_rows(omega: Array, arms: Array) -> Array:
+    """ω × r for each column of ω (k, 3, n) and each arm r (k, 3)."""
+    return omega[:, _NEXT] * arms[:, _LAST, None] - omega[:, _LAST] * arms[:, _NEXT, None]

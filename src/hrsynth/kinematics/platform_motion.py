@@ -1,0 +1,201 @@
+"""What a platform generically does, and goals for it: parts of its pose, each with its error and Jacobian.
+
+Lengths in characteristic lengths, so that positions and turns mix; base axes throughout.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import BadRequest
+from ..geometry.ranks import range_basis
+from ..geometry.so3 import between, exponential, logarithm, turn_about, wrapped
+from ..geometry.vectors import Array
+from ..mechanism.pose import Pose
+from ..tolerances import AS_PRINTED, RANK_CUTOFF
+from .configuration import ClosedConfiguration, point_velocity
+from .pinocchio_model import PinocchioModel
+from .relation import Measurement, relation
+
+
+@dataclass(frozen=True, eq=False)
+class Goal:
+    """Parts of the pose of ``link`` that are wanted: ``directions`` (k, 3) · position of ``point`` = ``values`` (k,)
+    metres, the turn ``phi`` about ``normal`` since the orientation ``zero``, the whole orientation ``rotation``, or
+    (``axis``) no turn but about that base direction. The point is given in the link's frame."""
+
+    link: str
+    point: Array
+    zero: Array
+    directions: Array
+    values: Array
+    normal: Array
+    phi: float | None = None
+    rotation: Array | None = None
+    axis: Array | None = None
+
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+        """Error (reached − wanted) and its Jacobian, (rows,) and (rows, nv)."""
+        frames, velocities = twin.frames(q, (self.link,))
+        X, V = frames[0], velocities[0]
+        R = X[:3, :3]
+        errors = [(self.directions @ (R @ self.point + X[:3, 3]) - self.values) / twin.length]
+        blocks = [self.directions @ point_velocity(V, X, self.point, twin.length)]
+        if self.phi is not None:
+            angle, row = turn_about(self.normal, R @ self.zero.T)
+            errors.append(np.array([wrapped(angle - self.phi)]))
+            blocks.append(row[None] @ V[3:])
+        if self.rotation is not None:
+            errors.append(logarithm(R @ self.rotation.T))
+            blocks.append(V[3:])
+        if self.axis is not None:
+            moved = R @ self.zero.T @ self.axis
+            across = np.linalg.svd(self.axis[None])[2][1:]
+            errors.append(across @ between(self.axis, moved))
+            blocks.append(across @ V[3:])
+        return np.concatenate(errors), np.vstack(blocks)
+
+    def met(self, X: Array, tolerance: float) -> bool:
+        """Whether the pose X (4, 4) of the link is one that is wanted, to a difference of positions (m) and of rotation
+        matrices: no error vanishes at another pose unseen."""
+        R = X[:3, :3]
+        apart = [self.directions @ (R @ self.point + X[:3, 3]) - self.values]
+        if self.phi is not None:
+            swing = logarithm(R @ self.zero.T @ exponential(-self.phi * self.normal))
+            apart.append(np.array([self.normal @ swing if np.linalg.norm(swing) < np.pi - tolerance else np.inf]))
+        if self.rotation is not None:
+            apart.append((R - self.rotation).ravel())
+        if self.axis is not None:
+            apart.append(R @ self.zero.T @ self.axis - self.axis)
+        return all(float(np.max(np.abs(each), initial=0.0)) <= tolerance for each in apart)
+
+    @property
+    def lengths(self) -> int:
+        """How many of the rows are lengths; they come first."""
+        return len(self.values)
+
+    def towards(self, X: Array, fraction: float) -> Goal:
+        """The goal that lies ``fraction`` of the way from the pose X (4, 4) to this one."""
+        if fraction >= 1:
+            return self
+        R, here = X[:3, :3], X[:3, :3] @ self.point + X[:3, 3]
+        start = self.directions @ here
+        phi, rotation = self.phi, self.rotation
+        if phi is not None:
+            angle = turn_about(self.normal, R @ self.zero.T)[0]
+            phi = angle + fraction * (phi - angle)
+        if rotation is not None:
+            way = logarithm(rotation @ R.T)
+            rotation = exponential(fraction * way) @ R
+        return replace(self, values=start + fraction * (self.values - start), phi=phi, rotation=rotation)
+
+
+@dataclass(frozen=True, eq=False)
+class PlatformMotion:
+    """What a platform does at generic configurations, relative to its pose ``home`` (4, 4) at the zero configuration.
+
+    ``shifts`` (3, k) spans the velocities of ``point`` (in the platform's frame), ``spins`` (3, m) the angular
+    velocities that count (none of a point body), ``twists`` (6, n) both together.
+    """
+
+    link: str
+    point: Array
+    body: bool
+    """Whether the platform's turn counts: not that of a point body."""
+    home: Array
+    shifts: Array
+    spins: Array
+    twists: Array
+    dof: int
+    """Freedoms at a generic configuration; ``twists`` spans more where they change from pose to pose."""
+
+    @classmethod
+    def of(cls, configurations: Iterable[ClosedConfiguration], question: Measurement) -> PlatformMotion:
+        """The motion that generic configurations show."""
+        asked = replace(question, observations=(), bodies=())
+        point = np.zeros(3) if question.point is None else question.point
+        columns = []
+        for at in configurations:
+            found = np.zeros((6, (basis := relation(at, asked).twists).shape[1]))
+            found[: len(basis)] = basis
+            columns.append(found)
+            twin = at.twin
+        together = np.hstack(columns)
+        shifts, spins, twists = (range_basis(part, 1.0)[0] for part in (together[:3], together[3:], together))
+        home, dof = twin.pose(twin.q0, question.platform), max(column.shape[1] for column in columns)
+        return cls(question.platform, point, question.point is None, home, shifts, spins, twists, dof)
+
+    @property
+    def normal(self) -> Array:
+        """The axis of phi: the normal of a planar robot's plane (its largest component positive), else z."""
+        if self.spins.shape[1] != 1:
+            return np.array([0.0, 0.0, 1.0])
+        normal = self.spins[:, 0]
+        if np.linalg.norm(normal @ self.shifts) > RANK_CUTOFF:
+            return np.array([0.0, 0.0, 1.0])
+        return normal * np.sign(normal[np.argmax(np.abs(normal))])
+
+    @property
+    def planar(self) -> bool:
+        """Whether it is free in a plane: two translations and the turn about their normal."""
+        return (self.shifts.shape[1], self.spins.shape[1], self.dof) == (2, 1, 3)
+
+    @property
+    def parts(self) -> tuple[str, ...]:
+        """The parts of a pose that the platform can change."""
+        found = [name for name, row in zip("xyz", self.shifts, strict=True) if np.linalg.norm(row) > RANK_CUTOFF]
+        if np.linalg.norm(self.normal @ self.spins) > RANK_CUTOFF:
+            found.append("phi")
+        return (*found, "rpy") if self.spins.shape[1] else tuple(found)
+
+    def position(self, X: Array) -> Array:
+        """The position of the point at a platform pose X (4, 4), (3,)."""
+        return np.asarray(X[:3, :3] @ self.point + X[:3, 3])
+
+    def pose(self, X: Array) -> Pose:
+        """A platform pose X (4, 4) as a user writes it; of a point body the position alone."""
+        return Pose.of(X, None if self.body else self.point)
+
+    def goal(self, pose: Pose, robot: str = "the robot") -> Goal:
+        """The goal that a pose asks for; raises ``BadRequest`` for parts that the platform cannot change."""
+        constant = [name for name in pose.given if name not in self.parts]
+        for name in constant:
+            if not self._as_at_home(pose, name):
+                raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts or "no part")
+        pose = replace(pose, **dict.fromkeys(constant))
+        normal, phi, rotation = self.normal, pose.phi, pose.rotation
+        if rotation is not None and self.spins.shape[1] == 1:
+            turn, normal = rotation @ self.home[:3, :3].T, self.spins[:, 0]
+            phi, rotation = turn_about(normal, turn)[0], None
+            if np.linalg.norm(turn @ normal - normal) > AS_PRINTED:
+                raise BadRequest(f"{robot}: the platform turns about one axis only, rpy is no such turn", str(pose),
+                                 "phi, or a turn about " + " ".join(f"{x:.4g}" for x in self.spins[:, 0]))
+        placed = [i for i, name in enumerate("xyz") if name in pose.given]
+        values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)
+        return Goal(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, normal, phi, rotation)
+
+    def _as_at_home(self, pose: Pose, name: str) -> bool:
+        """Whether a part that never changes is given as it is at the zero configuration, to the digits printed."""
+        if name in "xyz":
+            here = self.position(self.home)["xyz".index(name)]
+            return abs(float(getattr(pose, name)) - float(here)) <= AS_PRINTED
+        return pose.rotation is not None and float(np.linalg.norm(pose.rotation - self.home[:3, :3])) <= AS_PRINTED
+
+    def at_home(self) -> Goal:
+        """The goal of the whole pose at the zero configuration: what free parts are nearest to."""
+        R = self.home[:3, :3]
+        return Goal(self.link, self.point, R, np.eye(3), self.position(self.home), self.normal,
+                    rotation=R if self.body else None)
+
+    def manner(self) -> Goal:
+        """What the platform never changes: where its point does not move, turns that it does not make (or makes about
+        one axis only)."""
+        fixed = np.linalg.svd(self.shifts.T)[2][self.shifts.shape[1] :] if self.shifts.shape[1] else np.eye(3)
+        R = self.home[:3, :3]
+        goal = Goal(self.link, self.point, R, fixed, fixed @ self.position(self.home), self.normal)
+        if not self.body or self.spins.shape[1] > 1:
+            return goal
+        return replace(goal, axis=self.spins[:, 0]) if self.spins.shape[1] else replace(goal, rotation=R)

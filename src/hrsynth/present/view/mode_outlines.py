@@ -1,0 +1,71 @@
+"""The other assembly modes: where else the robot is with the directions of the zero configuration."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...analysis.modes.modes import AssemblyMode, modes_at
+from ...analysis.observed import ObservedRobot
+from ...errors import HrsynthError
+from ...geometry.vectors import Array, inverse
+from ...kinematics.configuration import ClosedConfiguration
+from ...mechanism.pose import Pose
+from .states import listed, place
+
+
+@dataclass(frozen=True, eq=False)
+class Ghost:
+    """An assembly mode that is not the pose itself: its number as in ``modes``, its pose, whether the robot can be
+    assembled there, as ``AssemblyMode`` says it twice, and the displacement (7,) of each link, None of those whose
+    place is not known."""
+
+    label: str
+    pose: Pose
+    reachable: bool | None
+    assembly: str
+    places: tuple[Array | None, ...]
+
+    @property
+    def words(self) -> str:
+        """The pose, short."""
+        x, y, z = (round(value or 0.0, 3) + 0.0 for value in (self.pose.x, self.pose.y, self.pose.z))
+        turn = np.round(np.degrees(self.pose.rpy or np.zeros(3)), 1) + 0.0
+        turned = ", rpy " + "/".join(f"{angle:g}" for angle in turn) + "°" if turn.any() else ""
+        return f"x {x:g}, y {y:g}, z {z:g} m{turned}"
+
+    def scene(self) -> dict[str, Any]:
+        """What the page is given."""
+        places = [None if each is None else listed(each[None])[0] for each in self.places]
+        return {"label": self.label, "words": self.words, "reachable": self.reachable,
+                "assembly": self.assembly, "places": places}
+
+
+def ghosts(setting: ObservedRobot,
+           goal: ClosedConfiguration | None = None) -> tuple[tuple[Ghost, ...], tuple[str, ...]]:
+    """All modes but the pose itself (default: the zero configuration's), and why there are none or not all."""
+    try:
+        found = modes_at(setting, goal or setting.everything.start)
+    except HrsynthError as error:
+        return (), (f"assembly modes are not shown: {error}",)
+    if found.found.continuum is not None:
+        return (), (f"assembly modes are not shown: {found.found.degenerate}",)
+    notes = () if found.found.complete else ("perhaps not all assembly modes are shown",)
+    return tuple(_ghost(setting, str(number), mode) for number, mode in enumerate(found.modes, 1)
+                 if not mode.goal), notes
+
+
+def _ghost(setting: ObservedRobot, label: str, mode: AssemblyMode) -> Ghost:
+    def where(link: str) -> Array | None:
+        if mode.configuration is not None:
+            X = mode.configuration.pose(link)
+        elif mode.bodies is not None and link in mode.bodies:
+            X = mode.bodies[link]
+        else:
+            return None
+        return place(X @ inverse(setting.mechanism.links[link].pose))
+
+    places = tuple(where(link) for link in setting.mechanism.links)
+    return Ghost(label, mode.pose, mode.reachable, mode.assembly, places)

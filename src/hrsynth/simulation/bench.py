@@ -1,0 +1,171 @@
+"""The physics bench: the same controller drives a mock-up in MuJoCo (the papers' virtual mock-up, MMT 5.1.1).
+
+The directions are read from the simulated bodies, the motors' coordinates from their encoders. At each sample the
+model of the robot takes the motors' coordinates, and the speeds that the law commands are held until the next.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..analysis.observed import ObservedRobot, motors
+from ..errors import BadRequest, LoopsNotClosed, MissingExtra
+from ..geometry.ranks import range_basis
+from ..geometry.vectors import Array
+from ..kinematics.configuration import ClosedConfiguration, closed
+from ..kinematics.locked import rezeroed
+from ..kinematics.pinocchio_model import PinocchioModel
+from ..kinematics.relation import relation
+from ..mechanism import Mechanism
+from ..tolerances import CLOSED, SOLVED
+from .law import Command, Poses
+from .mockup import STEP, coordinates, mockup
+from .run import OPEN, SERVED_AT, TIME, Loop, Run
+
+SAMPLE = 0.01
+"""Seconds between two commands."""
+STILL = 1e-6
+"""‖e‖ at which the bench has settled."""
+STEADY = 1e-3
+"""Part by which an error may still change in a time constant when the bench has settled."""
+
+
+def simulator(what: str) -> Any:
+    """The module mujoco; raises ``MissingExtra`` where it is not installed."""
+    try:
+        import mujoco
+    except ImportError:
+        raise MissingExtra(what, "bench") from None
+    return mujoco
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """A mock-up that starts at a configuration of a robot."""
+
+    setting: ObservedRobot
+    start: ClosedConfiguration
+
+    @classmethod
+    def of(cls, setting: ObservedRobot, start: ClosedConfiguration) -> Bench:
+        """The bench; raises ``MissingExtra``, and ``BadRequest`` where the robot's motors do not move all of it."""
+        simulator("the physics bench")
+        question = motors(setting)
+        if relation(start, question).lost.shape[1]:
+            raise BadRequest(f"{setting.robot.name}: its motors do not determine the platform's motion",
+                             str(setting.motion.pose(start.pose(setting.motion.link))), "a robot whose motors do")
+        return cls(setting, start)
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """The robot with the start as its zero configuration."""
+        return rezeroed(self.start)
+
+    @cached_property
+    def _model(self) -> Any:
+        return simulator("the physics bench").MjModel.from_xml_string(mockup(self.mechanism))
+
+    @cached_property
+    def _names(self) -> list[str]:
+        return [name for joint in self.mechanism.joints.values() if joint.actuated
+                for name, _, _ in coordinates(joint)]
+
+    def run(self, loop: Loop, horizon: float) -> tuple[Run, Array]:
+        """Run until the error is below ``STILL`` or ``horizon`` (s); also the displacement of the platform since the
+        start, as simulated, (4, 4)."""
+        mujoco = simulator("the physics bench")
+        model, data = self._model, mujoco.MjData(self._model)
+        motors = [model.actuator(name).id for name in self._names]
+        places = [int(model.joint(name).qposadr[0]) for name in self._names]
+        mujoco.mj_kinematics(model, data)
+        twin = self.start.twin
+        driven = twin.actuated()
+        first = twin.difference(twin.q0, self.start.q)[driven]
+        scale = np.array([twin.length if model.joint(name).type[0] == mujoco.mjtJoint.mjJNT_SLIDE else 1.0
+                          for name in self._names])
+        at, time, stopped = self.start, 0.0, TIME
+        times: list[float] = []
+        states: list[tuple[ClosedConfiguration, Command]] = []
+        while time < horizon:
+            at_now = encoded(at, driven, first + data.qpos[places] / scale)
+            if at_now is None:
+                stopped = OPEN
+                break
+            at = at_now
+            command = self._command(loop, time, at, data)
+            times.append(time)
+            states.append((at, command))
+            if loop.sensed is None and time >= loop.steady and self._settled(loop, [c for _, c in states]):
+                stopped = SERVED_AT
+                break
+            data.ctrl[motors] = command.velocity[driven] * scale
+            mujoco.mj_step(model, data, nstep=round(SAMPLE / STEP))
+            mujoco.mj_kinematics(model, data)
+            time += SAMPLE
+        run = Run(np.array(times), tuple(c for c, _ in states), tuple(c for _, c in states), stopped)
+        return run, displacement(data, self.setting.motion.link)
+
+    def _settled(self, loop: Loop, commands: list[Command]) -> bool:
+        """Whether the error vanishes, or has stayed as it is for a time constant 1 / λ."""
+        now, back = commands[-1].size, round(1 / (loop.law.gain * SAMPLE))
+        if now < STILL:
+            return True
+        return len(commands) > back and abs(now - commands[-1 - back].size) < STEADY * now
+
+    def _command(self, loop: Loop, time: float, at: ClosedConfiguration, data: Any) -> Command:
+        """The law's command for the directions of the simulated bodies."""
+        question, start = loop.law.question, self.start
+        reference = question.reference
+
+        def pose(link: str) -> Array:
+            moved = np.eye(4) if link == self.mechanism.base else displacement(data, link)
+            return moved @ start.pose(link)
+
+        seen = np.array([each.value(pose(reference), pose(each.link)) for each in question.observations])
+
+        def sensed(time: float, poses: Poses, directions: Array) -> Array:
+            return seen if loop.sensed is None else loop.sensed(time, pose, seen)
+
+        command = loop.law.at(at, loop.desired(time), sensed, time)
+        return replace(command, error=np.cross(seen, loop.desired(time)[0]), directions=seen)
+
+
+@dataclass(frozen=True, eq=False)
+class _Coordinates:
+    """Coordinates of motors that are wanted."""
+
+    places: list[int]
+    values: Array
+    free: Array
+    """How the motors can move together, (motors, n), orthonormal: what more motors say than that is left out."""
+
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+        """Error (reached − wanted) and its Jacobian."""
+        return self.free.T @ (twin.difference(twin.q0, q)[self.places] - self.values), self.free.T @ np.eye(
+            twin.nv)[self.places]
+
+
+def encoded(at: ClosedConfiguration, places: list[int], values: Array) -> ClosedConfiguration | None:
+    """The configuration next to another with these coordinates of the motors; None where there is none."""
+    twin = at.twin
+    free, _ = range_basis(at.kernel()[0][places], 1.0)
+    found, residual = closed(twin, at.q, _Coordinates(places, values, free), tolerance=SOLVED)
+    if residual > CLOSED:
+        return None
+    try:
+        return ClosedConfiguration.of(twin, found)
+    except LoopsNotClosed:
+        return None
+
+
+def displacement(data: Any, link: str) -> Array:
+    """The displacement (4, 4) of a simulated body since the start."""
+    body = data.body(link)
+    X = np.eye(4)
+    X[:3, :3] = body.xmat.reshape(3, 3)
+    X[:3, 3] = body.xpos
+    return X

@@ -1,0 +1,188 @@
+"""A pinhole camera that sees legs as cylinders: their edges, and the directions rebuilt from them (MMT 2.1-2.2).
+
+In the camera's frame x points right, y down and z ahead. An axis through P with direction u has the unit normal h of
+its interpretation plane and the distance h from the camera: h h = P × u.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from ..errors import BadRequest
+from ..geometry.vectors import Array, inverse, perpendicular, pose, unit
+from ..mechanism import Mechanism
+from ..mechanism.observation import Direction, Observation
+from ..tolerances import NUDGE
+from .law import Poses
+from .mockup import RADIUS
+from .noise import Shocks
+
+VIEWS = 200
+"""Places around the legs that are tried for a camera."""
+MARGIN = 0.85
+"""Part of the picture, from its middle, in which all legs are to lie."""
+SHORTEST, HALF = 0.05, 0.25
+"""Rods shorter than this part of the robot's length are drawn with this half-length instead."""
+
+
+@dataclass(frozen=True, eq=False)
+class Rod:
+    """The cylinder of an observed direction: ends in its link's frame (2, 3), the second ahead along it, radius (m)."""
+
+    link: str
+    ends: Array
+    radius: float
+
+
+@dataclass(frozen=True, eq=False)
+class Camera:
+    """Intrinsics (focal length, width and height in pixels, the centre in the middle) and the pose (4, 4) of the
+    camera in the frame of the link that carries it."""
+
+    place: Array
+    focal: float = 800.0
+    width: int = 640
+    height: int = 480
+
+    def seen(self, X_reference: Array, poses: Poses, rod: Rod) -> Array:
+        """The ends of a rod in the camera's frame, (2, 3)."""
+        X = inverse(X_reference @ self.place) @ poses(rod.link)
+        return np.asarray(rod.ends @ X[:3, :3].T + X[:3, 3])
+
+    def pixels(self, points: Array) -> Array:
+        """Where points (n, 3) of the camera's frame are in the picture, (n, 2)."""
+        return self.focal * points[:, :2] / points[:, 2:] + np.array([self.width, self.height]) / 2
+
+    def ray(self, pixel: Array) -> Array:
+        """The ray (3,), z = 1, through a place (2,) in the picture."""
+        return np.array([*(pixel - np.array([self.width, self.height]) / 2) / self.focal, 1.0])
+
+
+def edges(ends: Array, radius: float) -> tuple[Array, Array]:
+    """The unit normals (3,) of the two planes through the camera that touch a cylinder whose axis has the ends (2, 3)
+    (eqs. 3-4); raises ``BadRequest`` where the camera is inside of it."""
+    u = unit(ends[1] - ends[0])
+    moment = np.cross(ends[0], u)
+    distance = float(np.linalg.norm(moment))
+    if distance <= radius:
+        raise BadRequest("the camera is inside a leg or looks along it, distance from its axis (m)", distance,
+                         f"more than its radius {radius:.4g}")
+    h = moment / distance
+    sine = radius / distance
+    cosine = np.sqrt(1 - sine**2)
+    across = np.cross(u, h)
+    return -cosine * h - sine * across, cosine * h - sine * across
+
+
+def rebuilt(first: Array, second: Array) -> Array:
+    """The direction (3,) of a cylinder from the normals of its two edges (eq. 5); singular where they coincide."""
+    return unit(np.cross(first, second))
+
+
+def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tuple[Rod, ...]:
+    """The rods of observed directions: as long as their joints are apart."""
+    found = []
+    for observation in observations:
+        assert isinstance(observation, Direction)
+        X = inverse(mechanism.links[observation.link].pose)
+        centres = np.array([X[:3, :3] @ joint.point + X[:3, 3] for joint in mechanism.joints_of(observation.link)])
+        along = (centres - centres[0]) @ observation.direction
+        low, high = float(along.min()), float(along.max())
+        if high - low < SHORTEST * mechanism.length:
+            low, high = -HALF * mechanism.length, HALF * mechanism.length
+        ends = centres[0] + np.outer([low, high], observation.direction)
+        found.append(Rod(observation.link, ends, RADIUS * mechanism.length))
+    return tuple(found)
+
+
+@dataclass(frozen=True, eq=False)
+class Edges:
+    """Directions rebuilt from the edges of the legs in the picture, each edge known by two points in it that are wrong
+    by up to ``pixels`` across the edge."""
+
+    camera: Camera
+    reference: str
+    rods: tuple[Rod, ...]
+    pixels: float
+    shocks: Shocks
+
+    def __call__(self, time: float, poses: Poses, directions: Array) -> Array:
+        """The measured directions (k, 3) in the reference link's frame."""
+        shock = self.shocks.at(time) * self.pixels / self.camera.focal
+        found = []
+        for number, rod in enumerate(self.rods):
+            ends = self.camera.seen(poses(self.reference), poses, rod)
+            normals = [_moved(normal, ends, shock[2 * number + side])
+                       for side, normal in enumerate(edges(ends, rod.radius))]
+            found.append(self.camera.place[:3, :3] @ rebuilt(*normals))
+        return np.array(found)
+
+
+def _moved(normal: Array, ends: Array, shift: Array) -> Array:
+    """The normal of an edge whose image is moved across itself by ``shift`` (two numbers) at the rod's ends."""
+    across = unit(np.array([normal[0], normal[1], 0.0]))
+    points = []
+    for end, by in zip(ends, shift, strict=False):
+        image = end / end[2]
+        level = image - (normal @ image) / (normal @ across) * across
+        points.append(level + by * across)
+    found = unit(np.cross(points[0], points[1]))
+    return found if found @ normal > 0 else -found
+
+
+def placed(rods: Sequence[Rod], reference: str, poses: Sequence[Poses], blank: Camera | None = None) -> Camera:
+    """A camera on the reference link from which all rods lie in the picture at all given poses, where the rebuilt
+    directions suffer least from errors of pixels: among places on a sphere of directions around them."""
+    ends = np.array([seen(rods, reference, X) for X in poses])
+    best, found = np.inf, Camera(np.eye(4))
+    for ahead in _sphere(VIEWS):
+        camera = facing(ends, ahead, perpendicular(ahead), blank)
+        local = (ends - camera.place[:3, 3]) @ camera.place[:3, :3]
+        score = max(sensitivity(segment, rod.radius) for each in local for segment, rod in zip(each, rods, strict=True))
+        if score < best:
+            best, found = score, camera
+    return found
+
+
+def seen(rods: Sequence[Rod], reference: str, poses: Poses) -> Array:
+    """The ends of rods (rods, 2, 3) in the frame of the reference link."""
+    frames = [inverse(poses(reference)) @ poses(rod.link) for rod in rods]
+    return np.array([rod.ends @ X[:3, :3].T + X[:3, 3] for rod, X in zip(rods, frames, strict=True)])
+
+
+def facing(points: Array, ahead: Array, right: Array, blank: Camera | None = None) -> Camera:
+    """The camera that looks along ``ahead``, so far back that all points (…, 3) lie in its picture."""
+    blank = Camera(np.eye(4)) if blank is None else blank
+    middle = points.reshape(-1, 3).mean(axis=0)
+    R = np.column_stack([right, np.cross(ahead, right), ahead])
+    local = (points - middle) @ R
+    half = MARGIN * np.array([blank.width, blank.height]) / 2 / blank.focal
+    back = float(np.max(np.abs(local[..., :2]) / half - local[..., 2:]))
+    return Camera(pose(middle - back * ahead, R), blank.focal, blank.width, blank.height)
+
+
+def sensitivity(ends: Array, radius: float) -> float:
+    """How far (rad) the rebuilt direction of a rod turns for each radian by which the ends of its two edges are wrong,
+    all at their worst; infinite where the camera is inside the rod."""
+    try:
+        normals = edges(ends, radius)
+    except BadRequest:
+        return float("inf")
+    u, total = rebuilt(*normals), 0.0
+    for side, end in product(range(2), repeat=2):
+        wrong = list(normals)
+        wrong[side] = _moved(normals[side], ends, NUDGE * np.eye(2)[end])
+        total += float(np.linalg.norm(rebuilt(*wrong) - u)) / NUDGE
+    return total
+
+
+def _sphere(count: int) -> Array:
+    """Directions spread evenly over the sphere, (count, 3)."""
+    steps = np.arange(count) + 0.5
+    z, turn = 1 - 2 * steps / count, np.pi * (1 + np.sqrt(5)) * steps
+    level = np.sqrt(1 - z**2)
+    return np.column_stack([level * np.cos(turn), level * np.sin(turn), z])

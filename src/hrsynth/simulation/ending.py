@@ -1,0 +1,116 @@
+"""Where a run ended, in the words of theory 6: goal, mode, antipodal, local minimum, boundary, time; or undecided."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..analysis.modes.modes import AssemblyModes
+from ..analysis.posture import Posture
+from ..errors import HrsynthError
+from ..geometry.vectors import Array
+from ..kinematics.configuration import ClosedConfiguration
+from ..tolerances import DAMPED, SAME_RELATION
+from .law import Command
+from .run import AWAY, EFFORT, LIMIT, LOST, MOST, OPEN, POISED, REST, SERVED_AT, Run, margins
+
+GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME = "goal", "mode", "antipodal", "local minimum", "boundary", "time"
+UNDECIDED = "undecided"
+ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME, UNDECIDED)
+
+
+@dataclass(frozen=True, eq=False)
+class Ending:
+    """How a run ended and why that is its name; ``matched`` is the number of the assembly mode, counted from 1 in the
+    list of all modes of the goal's directions (None where it is none of them, or where they cannot be listed)."""
+
+    name: str
+    reason: str
+    matched: int | None = None
+    modes: AssemblyModes | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Referee:
+    """Decides endings: the goal's configuration and directions (k, 3), what lists its assembly modes, and what examines
+    a single configuration."""
+
+    goal: ClosedConfiguration
+    directions: Array
+    platform: str
+    point: Array | None
+    modes: Callable[[], AssemblyModes]
+    glance: Callable[[ClosedConfiguration], Posture]
+
+    def judge(self, run: Run, directions: Array) -> Ending:
+        """The ending of a run whose last directions are (k, 3)."""
+        last = run.commands[-1]
+        if run.stopped == SERVED_AT:
+            return self._served(run.last, directions)
+        if run.stopped in (REST, POISED):
+            ending = self._rest(run.last, last)
+            loose = "" if run.stopped == REST else "; that this rest draws the state to itself was not found"
+            return replace(ending, reason=ending.reason + loose)
+        if run.stopped == LIMIT:
+            joint, _ = min(margins(run.last).items(), key=lambda item: item[1])
+            return Ending(BOUNDARY, f"joint {joint} is at its limit")
+        if run.stopped == OPEN:
+            return Ending(BOUNDARY, "the loops lose their rank here, and the integrator found no way on")
+        if run.stopped == LOST:
+            return Ending(UNDECIDED, "the integrator found no way on, which says nothing of the robot")
+        if run.stopped == AWAY:
+            return Ending(BOUNDARY, "the platform runs away, nothing limits its slides")
+        over = f"more than {MOST:,} configurations would be needed" if run.stopped == EFFORT else "the time was over"
+        return Ending(TIME, f"{over}, with ‖e‖ = {last.size:.3g}")
+
+    def _served(self, at: ClosedConfiguration, directions: Array) -> Ending:
+        opposite = np.sum(directions * self.directions, axis=1) < 0
+        if opposite.any():
+            there = "; the pose is the goal's" if self.same_pose(at, self.goal.pose(self.platform)) else ""
+            return Ending(ANTIPODAL, f"{int(opposite.sum())} of {len(opposite)} directions end opposite to the desired "
+                                     f"ones, where the error vanishes as well{there}")
+        if self.same_pose(at, self.goal.pose(self.platform)):
+            return Ending(GOAL, "the directions and the pose are those of the goal")
+        try:
+            listed = self.modes()
+        except HrsynthError as error:
+            return Ending(MODE, f"the directions are the goal's, the pose is not; modes not listed: {error}")
+        for number, mode in enumerate(listed.modes, 1):
+            bodies = mode.bodies or {}
+            if bodies and all(self._alike(at.pose(body), X, None) for body, X in bodies.items()):
+                return Ending(MODE, f"the directions are the goal's, the pose is its assembly mode {number} of "
+                                    f"{len(listed.modes)}", number, listed)
+        return Ending(MODE, "the directions are the goal's, the pose is none of the assembly modes that were listed",
+                      None, listed)
+
+    def _rest(self, at: ClosedConfiguration, last: Command) -> Ending:
+        posture = self.glance(at)
+        where = f"‖e‖ = {last.size:.3g} and the command vanishes"
+        weak = float(last.values[-1]) < DAMPED
+        shifted = at.velocity(self.platform) @ last.weak
+        if weak and float(np.linalg.norm(shifted)) < DAMPED:
+            return Ending(BOUNDARY, f"{where}: a leg that is not watched is stretched to its limit")
+        far = posture.distances
+        if weak and far.type2 is not None and far.type2 < DAMPED:
+            return Ending(MINIMUM, f"{where} at a Type 2 singularity of the hidden robot")
+        if (far.type1 is not None and far.type1 < DAMPED) or far.type2 is None:
+            return Ending(MINIMUM, f"{where} at a Type 1 singularity of the hidden robot")
+        if weak:
+            return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: a direction is perpendicular "
+                                   "to the desired one")
+        return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: more is watched than the robot "
+                               "has freedoms")
+
+    def same_pose(self, at: ClosedConfiguration, X: Array) -> bool:
+        """Whether the platform of a configuration is at X (4, 4), to ``SAME_RELATION``."""
+        return self._alike(at.pose(self.platform), X, self.point)
+
+    def _alike(self, X: Array, other: Array, point: Array | None) -> bool:
+        near = SAME_RELATION * self.goal.twin.length
+        if point is not None:
+            return bool(np.max(np.abs((X - other)[:3] @ np.append(point, 1.0))) <= near)
+        return bool(np.max(np.abs(X[:3, 3] - other[:3, 3])) <= near
+                    and np.max(np.abs(X[:3, :3] - other[:3, :3])) <= SAME_RELATION)
+

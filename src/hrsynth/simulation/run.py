@@ -1,0 +1,226 @@
+"""A servo loop in time, on closed configurations: SciPy's adaptive integrator in charts of the closed loops."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..errors import LoopsNotClosed
+from ..geometry.vectors import Array
+from ..kinematics import wrists
+from ..kinematics.chart import WIDE, Chart
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.relation import Measurement
+from ..mechanism import JointType, Mechanism
+from ..tolerances import ARRIVED, AT_REST, SERVED
+from .law import Command, Desired, Law, Sense
+from .noise import PERIOD
+from .rest import NEUTRAL, Patience, rest_near
+
+State = tuple[ClosedConfiguration, Command]
+
+SERVED_AT, REST, POISED, LIMIT, OPEN = "served", "rest", "poised", "limit", "open"
+AWAY, TIME, EFFORT, LOST = "away", "time", "effort", "lost"
+TOLERANCE = 1e-6
+"""Relative tolerance of the integrator, for coordinates of a chart as for errors at the start of a stretch."""
+CLOSER = 1e-2
+"""Part of its first error at which a stretch ends, so that the tolerance follows the error."""
+FAR = 20.0
+"""Characteristic lengths from its start at which a platform has run away."""
+MOST = 20_000
+"""Configurations that the integrator may ask for in a run."""
+LOOSE = 1e-3
+"""Part of its value at the start to which the loops' weakest singular value has fallen where a run cannot go on."""
+SHORTEST = 1e-9
+"""Longest step (time constants) with which a run that cannot go on has been tried."""
+HALVINGS = 40
+"""Bisections that find the moment at which a joint meets its limit."""
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """What happened: times (n,), the configurations and commands at them, and why it stopped: the error vanished
+    (``served``), a stable rest was reached (``rest``), the command vanished where none was found (``poised``), a joint
+    met its limit (``limit``), the loops' rank falls (``open``), the platform ran away (``away``), the time was over
+    (``time``), the integrator's ``MOST`` configurations were (``effort``), or it could not go on (``lost``)."""
+
+    times: Array
+    configurations: tuple[ClosedConfiguration, ...]
+    commands: tuple[Command, ...]
+    stopped: str
+
+    @property
+    def last(self) -> ClosedConfiguration:
+        """Where it ended."""
+        return self.configurations[-1]
+
+
+@dataclass(frozen=True, eq=False)
+class Loop:
+    """The closed loop of a law and a robot: desired directions, steady from ``steady`` (s) on; what is sensed (None:
+    the true directions) and whether that changes smoothly with the pose (``smooth``); ``moving`` is the question whose
+    motions are all that counts."""
+
+    law: Law
+    moving: Measurement
+    desired: Desired
+    steady: float = 0.0
+    sensed: Sense | None = None
+    smooth: bool = True
+
+    def simulate(self, start: ClosedConfiguration, horizon: float) -> Run:
+        """Run until it ends by itself, or ``horizon`` (s)."""
+        times, found = [0.0], [(start, self._command(0.0, start))]
+        stopped, left, longest = None, MOST, np.inf
+        patience = Patience(1 / self.law.gain, 0.0, found[0][1].size)
+        while stopped is None:
+            stretch = _Stretch(self, Chart.around(found[-1][0], self.moving), found[-1][0], left, patience)
+            reached, states, stopped = stretch.integrate(times[-1], horizon, longest)
+            left = stretch.left
+            times += reached
+            found += states
+            if stopped == LOST and longest * self.law.gain > SHORTEST:
+                # the step was too long for the loops to follow, or for the chart: another chart, shorter steps
+                longest, stopped = min(longest, 1 / self.law.gain) / 8, None
+            elif stopped == LOST and _loose(found[-1][0], start):
+                stopped = OPEN
+            elif stopped is None:
+                longest *= 2
+                if self._shift(start, found[-1][0]) > FAR:
+                    stopped = AWAY
+        return Run(np.array(times), tuple(c for c, _ in found), tuple(c for _, c in found), stopped)
+
+    def _shift(self, start: ClosedConfiguration, at: ClosedConfiguration) -> float:
+        """How far the platform has moved (characteristic lengths)."""
+        link = self.law.question.platform
+        return float(np.linalg.norm(at.pose(link)[:3, 3] - start.pose(link)[:3, 3])) / at.twin.length
+
+    def _command(self, time: float, at: ClosedConfiguration) -> Command:
+        return self.law.at(at, self.desired(time), self.sensed, time)
+
+
+class _Stretch:
+    """One stretch of a run, in one chart; configurations are remembered while the integrator works around them."""
+
+    def __init__(self, loop: Loop, chart: Chart, start: ClosedConfiguration, left: int, patience: Patience) -> None:
+        self.loop, self.chart, self.near, self.left, self.patience = loop, chart, start.q, left, patience
+        self.margin = clearance(start)
+        self._memory: dict[tuple[float, bytes], State] = {}
+
+    def state(self, time: float, y: Array) -> State:
+        """Configuration and command at coordinates y."""
+        key = (time, y.tobytes())
+        if key not in self._memory:
+            at = self.chart.at(y, self.near)
+            self.near, self.left = at.q, self.left - 1
+            self._memory[key] = at, self.loop._command(time, at)
+        return self._memory[key]
+
+    def rate(self, time: float, y: Array) -> Array:
+        """ẏ."""
+        at, command = self.state(time, y)
+        return self.chart.slope(at.q) @ command.velocity
+
+    def integrate(self, start: float, horizon: float, longest: float
+                  ) -> tuple[list[float], list[State], str | None]:
+        """Times and states after ``start``, in steps of up to ``longest`` (s), and why the run stopped (None: only the
+        stretch is at its end)."""
+        from scipy.integrate import LSODA, RK23
+
+        loop = self.loop
+        first = self.state(start, np.zeros(self.chart.basis.shape[1]))
+        settling = loop.sensed is None and start >= loop.steady
+        scale = min(1.0, first[1].size) if settling else 1.0
+        if settling and (end := self._end(start, np.zeros(self.chart.basis.shape[1]), first)):
+            return ([], [], end[0]) if end[1] is first else ([start], [end[1]], end[0])
+        until = horizon if start >= loop.steady else min(horizon, loop.steady)
+        tolerances = {"rtol": TOLERANCE, "atol": TOLERANCE * scale}
+        times: list[float] = []
+        states: list[State] = []
+        try:
+            y = np.zeros(self.chart.basis.shape[1])
+            solver = (LSODA(self.rate, start, y, until, max_step=longest, **tolerances) if loop.smooth
+                      else RK23(self.rate, start, y, until, max_step=min(PERIOD, longest), **tolerances))
+            while solver.status == "running":
+                solver.step()
+                if solver.status == "failed":
+                    return times, states, LOST
+                time, state = float(solver.t), self.state(float(solver.t), solver.y)
+                if clearance(state[0]) < min(0.0, self.margin):
+                    time, state = self._at_limit(solver)
+                times.append(time)
+                states.append(state)
+                if time < solver.t:
+                    return times, states, LIMIT
+                if settling and (end := self._end(time, solver.y, state)):
+                    states[-1] = end[1]
+                    return times, states, end[0]
+                if self.left <= 0:
+                    return times, states, EFFORT
+                if np.linalg.norm(solver.y) > WIDE or (settling and state[1].size < CLOSER * scale):
+                    return times, states, None
+        except LoopsNotClosed:
+            return times, states, LOST
+        return times, states, TIME if until == horizon else None
+
+    def _end(self, time: float, y: Array, state: State) -> tuple[str, State] | None:
+        """Why a run with steady, exact directions ends at y (n,), if it does, and the state in which it ends."""
+        command = state[1]
+        if command.size <= SERVED:
+            return SERVED_AT, state
+        poised = command.speed <= AT_REST * self.loop.law.gain * command.size
+        if (poised or self.patience.over(time, command.size)) and (rest := self._rest(time, y)):
+            return SERVED_AT if rest[1].size <= SERVED else REST, rest
+        return (POISED, state) if poised else None
+
+    def _rest(self, time: float, y: Array) -> State | None:
+        """The stable rest at which a run has arrived that is at y (n,); None where it is still on its way."""
+        found = rest_near(lambda y: self.rate(time, y), y)
+        if found is None or np.linalg.norm(found.y - y) > ARRIVED or found.growth > NEUTRAL * self.loop.law.gain:
+            return None
+        return self.state(time, found.y)
+
+    def _at_limit(self, solver: Any) -> tuple[float, State]:
+        """Time and state in the solver's last step at which a joint meets its limit."""
+        inside, outside, curve = float(solver.t_old), float(solver.t), solver.dense_output()
+        for _ in range(HALVINGS):
+            middle = (inside + outside) / 2
+            met = clearance(self.state(middle, curve(middle))[0]) < 0
+            inside, outside = (inside, middle) if met else (middle, outside)
+        return inside, self.state(inside, curve(inside))
+
+
+def _loose(at: ClosedConfiguration, start: ClosedConfiguration) -> bool:
+    """Whether the loops lose their rank at a configuration."""
+    return at.kernel()[1].weakest < LOOSE * start.kernel()[1].weakest
+
+
+def limited(mechanism: Mechanism) -> list[tuple[str, float, float]]:
+    """The joints about or along one axis that have limits: name, lower and upper (m, rad)."""
+    found = []
+    for joint in mechanism.joints.values():
+        if joint.limits is None or joint.type not in (JointType.REVOLUTE, JointType.PRISMATIC):
+            continue
+        lower, upper = joint.limits.lower, joint.limits.upper
+        if lower is not None or upper is not None:
+            found.append((joint.name, -np.inf if lower is None else lower, np.inf if upper is None else upper))
+    return found
+
+
+def margins(at: ClosedConfiguration) -> dict[str, float]:
+    """How far each joint that has limits, or is a wrist, is from the nearer one (m, rad); negative beyond it."""
+    twin = at.twin
+    moved = twin.difference(twin.q0, at.q)
+    found = {}
+    for name, lower, upper in limited(twin.mechanism):
+        slides = twin.mechanism.joints[name].type is JointType.PRISMATIC
+        value = float(moved[twin.coordinates[name][0]]) * (twin.length if slides else 1.0)
+        found[name] = min(value - lower, upper - value)
+    return found | wrists.margins(twin, at.q)
+
+
+def clearance(at: ClosedConfiguration) -> float:
+    """The smallest of :func:`margins`, infinite where no joint has limits."""
+    return min(margins(at).values(), default=np.inf)

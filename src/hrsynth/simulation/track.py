@@ -1,0 +1,119 @@
+"""What a run passed: how near it came to Type 2 singularities, and which kinds of singular poses it crossed.
+
+Side by side along the run, the rates of the directions and the twists of the platform are determinants on one tangent
+space. Where the first alone changes its sign the run crossed a Type 2 singularity of the hidden robot, where the second
+alone does a watched leg passed its limit (Type 1) into another working mode, where both do a leg that is not watched
+did. Where the loops' own constraints change their sign the run crossed a constraint singularity.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..geometry.ranks import range_basis
+from ..geometry.vectors import Array
+from ..kinematics.chart import Chart
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.relation import Measurement
+from ..tolerances import DAMPED, INVERTED
+
+TYPE_2, TYPE_1, LIMIT, CONSTRAINT = "type2", "type1", "limit", "constraint"
+
+
+@dataclass(frozen=True)
+class Passage:
+    """A crossing: its kind and the place along the run before which it happened."""
+
+    kind: str
+    place: int
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Smallest singular value of Mᵀ at each configuration (n,), NaN where Mᵀ does not exist, and the passages; None
+    where the robot has motions that its platform and watched legs do not show, so that no sign is defined."""
+
+    smallest: Array
+    passages: tuple[Passage, ...] | None
+
+    def crossings(self, kind: str) -> tuple[Passage, ...]:
+        """The passages of one kind."""
+        return tuple(each for each in self.passages or () if each.kind == kind)
+
+    def to_dict(self, times: Sequence[float]) -> dict[str, Any]:
+        """The record of the command line."""
+        seen = np.isfinite(self.smallest)
+        least = int(np.nanargmin(self.smallest)) if seen.any() else None
+        return {"smallest": None if least is None else float(self.smallest[least]),
+                "at": None if least is None else times[least],
+                "crossings": None if self.passages is None else [
+                    {"kind": each.kind, "time": times[each.place]} for each in self.passages]}
+
+
+@dataclass(frozen=True, eq=False)
+class _Mark:
+    """A tangent space (nv, n), and on it the rates of directions (rows, n) and the twists (rows, n); the rows of the
+    loops (rows, nv) with a basis of their range, and their weakest singular value as part of the largest."""
+
+    basis: Array
+    rates: Array
+    twists: Array
+    loops: Array
+    span: Array
+    weakest: float
+
+    @property
+    def clear(self) -> bool:
+        """Whether no map is singular, so that sides can be told."""
+        parts = (self.rates, self.twists)
+        return self.weakest > DAMPED and all(np.linalg.svd(each, compute_uv=False)[-1] > DAMPED for each in parts)
+
+    def smallest(self, dof: int) -> float:
+        """The smallest singular value of Mᵀ."""
+        left, values, _ = np.linalg.svd(self.twists, full_matrices=False)
+        if values[dof - 1] <= INVERTED * values[0]:
+            return np.nan
+        inverse = np.linalg.pinv(self.twists, rcond=INVERTED) @ left[:, :dof]
+        return float(np.linalg.svd(self.rates @ inverse, compute_uv=False)[dof - 1])
+
+
+def tracked(configurations: Sequence[ClosedConfiguration], question: Measurement, moving: Measurement,
+            dof: int) -> Track:
+    """The track of a run; ``question`` holds what is observed, ``moving`` everything that counts as motion."""
+    marks = [_mark(at, question, moving) for at in configurations]
+    smallest = np.array([mark.smallest(dof) for mark in marks])
+    if any(mark.basis.shape[1] != dof for mark in marks):
+        return Track(smallest, None)
+    passages: list[Passage] = []
+    before = np.ones(3)
+    here = before.copy()
+    for place in range(1, len(marks)):
+        here = here * _turned(marks[place - 1], marks[place])
+        if marks[place].clear and np.any(here != before):
+            rates, twists, loops = here != before
+            if loops:
+                passages.append(Passage(CONSTRAINT, place))
+            if rates or twists:
+                passages.append(Passage(LIMIT if rates and twists else TYPE_2 if rates else TYPE_1, place))
+            before = here.copy()
+    return Track(smallest, tuple(passages))
+
+
+def _mark(at: ClosedConfiguration, question: Measurement, moving: Measurement) -> _Mark:
+    basis = Chart.around(at, moving).basis
+    rows = question.rows(at) @ basis
+    loops = at.twin.jacobian(at.q)
+    return _Mark(basis, rows[question.twist_rows :], rows[: question.twist_rows], loops, range_basis(loops)[0],
+                 at.kernel()[1].weakest)
+
+
+def _turned(a: _Mark, b: _Mark) -> Array:
+    """−1 for each of the three maps whose orientation changes between two configurations, else 1."""
+    between = b.basis.T @ a.basis
+    overlaps = [a.rates.T @ b.rates @ between, a.twists.T @ b.twists @ between,
+                a.span.T @ a.loops @ b.loops.T @ a.span]
+    return np.array([np.linalg.slogdet(each)[0] or 1.0 for each in overlaps])

@@ -1,0 +1,109 @@
+"""Configurations of many poses: closed for Pinocchio, at the pose asked for, in the working mode of zero."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from batch.test_batch import SOLVED, poses_near, shipped_batch
+from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.singularity.agreement import spectrum
+from hrsynth.analysis.singularity.batch_spectrum import Quick
+from hrsynth.batch.placing import Placer, coordinates
+from hrsynth.batch.reach import reach, sweep
+from hrsynth.description import load
+from hrsynth.errors import Disagreement
+from hrsynth.mechanism.pose import Grid
+from hrsynth.tolerances import CLOSED
+from kinematics.robots import ROBOTS
+
+WITHOUT = SOLVED | {"i4l", "prrrp_parallel_point"}
+"""Robots whose legs are solved by iteration, or that have a link that goes with no pose of the platform."""
+
+
+def placer_of(robot: str) -> tuple[ObservedRobot, Placer]:
+    setting, _ = shipped_batch(robot)
+    assert setting.placer is not None
+    return setting, setting.placer
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_every_pose_that_is_reached_becomes_a_closed_configuration(robot: str) -> None:
+    setting, batch = shipped_batch(robot)
+    assert (setting.placer is None) == (robot in WITHOUT)
+    if setting.placer is None:
+        return
+    X = np.concatenate([batch.home[None], poses_near(batch, 30, 0.3)])
+    found = batch.evaluate(X)
+    met = setting.placer.configurations(X)
+    assert [at is not None for at in met] == found.reached.tolist()
+    assert found.reached.sum() >= 3
+    for i, at in enumerate(met):
+        if at is None:
+            continue
+        assert at.residual <= CLOSED
+        assert np.max(np.abs(at.pose(batch.stage.link) - X[i])) < 1e-9
+        u = [at.pose(o.link)[:3, :3] @ o.direction for o in setting.placer.seen.values()]
+        assert np.max(np.abs(np.array(u) - found.directions[i])) < 1e-9
+
+
+@pytest.mark.parametrize("robot", ["quattro", "6pus", "3upu", "3rrp", "gough_stewart"])
+def test_coordinates_are_those_of_the_poses_of_all_links(robot: str) -> None:
+    setting, _ = shipped_batch(robot)
+    twin = setting.everything.twin
+    for member in setting.everything.members:
+        at = member.configuration
+        q = coordinates(twin, {name: at.pose(name)[None] for name in twin.mechanism.links})[0]
+        assert np.max(np.abs(twin.residual(q))) < 1e-9
+        for name in twin.mechanism.links:
+            assert np.max(np.abs(twin.pose(q, name) - at.pose(name))) < 1e-9
+
+
+@pytest.mark.parametrize("robot", ["orthoglide", "3prr_m1", "hexa"])
+def test_walks_give_as_many_different_configurations_as_asked_for(robot: str) -> None:
+    setting, placer = placer_of(robot)
+    walk = list(placer.wander(60, seed=2))
+    assert len(walk) == 60
+    assert all(at.residual <= CLOSED for at in walk)
+    places = [at.pose(setting.mechanism.platform)[:3, 3] for at in walk]
+    assert np.std(places, axis=0).max() > 0.02 * placer.batch.length
+    again = list(placer.wander(60, seed=2))
+    assert all(np.array_equal(one.q, two.q) for one, two in zip(walk, again, strict=True))
+
+
+@pytest.mark.parametrize(("robot", "grid"), [("orthoglide", "x=-0.35:0.35:5,y=-0.3:0.3:5,z=0.04"),
+                                             ("quattro", "x=-0.7:0.7:6,y=-0.1:0.4:4,z=-0.7"),
+                                             ("3rrr_m1", "x=-0.2:0.2:4,y=-0.2:0.2:4,phi=0.3")])
+def test_a_grid_is_the_same_with_and_without_closed_forms(robot: str, grid: str) -> None:
+    setting, placer = placer_of(robot)
+    everything, cells = setting.everything, Grid.parse(grid)
+    slow = sweep(everything.start, everything.question, cells, setting.motion)
+    fast = sweep(everything.start, everything.question, cells, setting.motion, None, placer)
+    assert [at is None for at in slow] == [at is None for at in fast]
+    assert any(at is not None for at in slow)
+    for one, two in zip(slow, fast, strict=True):
+        if one is not None and two is not None:
+            for name in setting.anatomy.platform:
+                assert np.max(np.abs(one.pose(name) - two.pose(name))) < 1e-6
+
+
+def test_singular_values_are_pinocchios_also_where_another_working_mode_is_met() -> None:
+    setting, placer = placer_of("3rrr_m1")
+    everything, question = setting.everything, setting.samples.question
+    walk = [reach(everything.start, everything.question, setting.motion.pose(at.pose(setting.mechanism.platform)),
+                  setting.motion) for at in placer.wander(6, seed=1)]
+    other = prepare(load("3rrr_m1"), samples=3, seed=7).everything.members[0].configuration
+    quick = Quick.of(placer, question)
+    assert quick is not None
+    for ours, theirs in zip(quick.spectrum([*walk, other], spectrum), spectrum([*walk, other], question), strict=True):
+        assert ours == pytest.approx(theirs, rel=1e-9)
+
+
+def test_a_batch_that_disagrees_with_pinocchio_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+    setting, placer = placer_of("orthoglide")
+    quick = Quick.of(placer, setting.samples.question)
+    assert quick is not None
+    monkeypatch.setattr("hrsynth.analysis.singularity.batch_spectrum.interaction_matrix",
+                        lambda found: 1.01 * found.rates)
+    with pytest.raises(Disagreement):
+        quick.spectrum([member.configuration for member in setting.everything.members], spectrum)

@@ -1,0 +1,327 @@
+"""Reaching poses: the pose is the one asked for, the branch is kept, free parts are nearest, misses are named."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.batch.reach import generic_motion, reach, sweep
+from hrsynth.description import load
+from hrsynth.errors import BadRequest, PoseNotReached
+from hrsynth.geometry.so3 import logarithm, turn_about
+from hrsynth.geometry.vectors import Array
+from hrsynth.kinematics.configuration import ClosedConfiguration, closed
+from hrsynth.kinematics.platform_motion import PlatformMotion
+from hrsynth.mechanism.pose import Grid, Pose
+from hrsynth.tolerances import CLOSED
+from kinematics.robots import ROBOTS, setting_of, state_of
+from oracle import Oracle, exponential
+from strategies import parallel_robots, planar, random_rotation, transformed
+
+quick = settings(max_examples=8, deadline=None, derandomize=True,
+                 suppress_health_check=[HealthCheck.too_slow, HealthCheck.data_too_large])
+
+
+def motion_of(setting: ObservedRobot) -> PlatformMotion:
+    return PlatformMotion.of((m.configuration for m in setting.everything.members), setting.everything.question)
+
+
+def had(motion: PlatformMotion, X: Array) -> Pose:
+    """The parts of a platform pose that the platform can change."""
+    full = motion.pose(X)
+    return replace(full, **{name: None for name in full.given if name not in motion.parts})
+
+
+def check_reached(setting: ObservedRobot, motion: PlatformMotion, X: Array) -> ClosedConfiguration:
+    everything = setting.everything
+    at = reach(everything.start, everything.question, had(motion, X), motion)
+    assert at.residual <= CLOSED
+    found = at.pose(motion.link)
+    assert np.linalg.norm(motion.position(found) - motion.position(X)) < 1e-9
+    if motion.body:
+        assert np.linalg.norm(found[:3, :3] - X[:3, :3]) < 1e-9
+    oracle = Oracle(everything.twin.mechanism)
+    assert oracle.error(state_of(at.twin, at.q)) < 1e-9
+    return at
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_poses_of_samples_are_reached_again(robot: str) -> None:
+    """The pose is that of the sample; one step away from zero, where no other working mode is near, so are the
+    directions."""
+    setting = setting_of(robot)
+    motion = motion_of(setting)
+    for member in setting.everything.members:
+        check_reached(setting, motion, member.way[-1].pose)
+        first = member.way[0]
+        at = check_reached(setting, motion, first.pose)
+        if member.relation.unexplained:
+            continue  # observed links move while the platform rests: the pose does not tell their directions
+        found = setting.everything.question.target(at)
+        for (_, value), (_, wanted) in zip(found.measured, first.measured, strict=True):
+            np.testing.assert_allclose(value, wanted, atol=1e-8)
+
+
+def check_printed(setting: ObservedRobot) -> None:
+    motion, everything = motion_of(setting), setting.everything
+    for member in setting.everything.members[:3]:
+        printed = Pose.parse(str(motion.pose(member.way[0].pose)))
+        at = reach(everything.start, everything.question, printed, motion)
+        apart = motion.position(at.pose(motion.link)) - motion.position(member.way[0].pose)
+        assert np.linalg.norm(apart) < 1e-5 * max(1.0, float(np.abs(motion.position(motion.home)).max()))
+        assert at.residual <= CLOSED
+
+
+@pytest.mark.parametrize("robot", ROBOTS)
+def test_a_pose_can_be_typed_as_it_is_printed(robot: str) -> None:
+    check_printed(setting_of(robot))
+
+
+@pytest.mark.parametrize("robot", ["3rrr_m1", "rrrrr_m1", "delta", "3rps", "quattro"])
+def test_a_pose_of_a_robot_that_stands_aslant_can_be_typed_as_it_is_printed(robot: str) -> None:
+    rng = np.random.default_rng(7)
+    check_printed(prepare(transformed(load(robot), random_rotation(rng), rng.normal(size=3)), samples=4))
+
+
+@pytest.mark.parametrize(("robot", "parts"), [
+    ("delta", ("x", "y", "z")), ("quattro", ("x", "y", "z", "phi", "rpy")), ("3rrr_m1", ("x", "y", "phi", "rpy")),
+    ("prrrp_parallel_point", ("x", "y")), ("gough_stewart", ("x", "y", "z", "phi", "rpy")), ("3upu", ("x", "y", "z")),
+])
+def test_what_a_platform_can_change(robot: str, parts: tuple[str, ...]) -> None:
+    setting = setting_of(robot)
+    everything = setting.everything
+    assert motion_of(setting).parts == generic_motion(everything.start, everything.question).parts == parts
+    for name in {"x", "y", "z", "phi", "rpy"} - set(parts):
+        pose = Pose(rpy=(0.1, 0, 0)) if name == "rpy" else Pose(**{name: 0.123})
+        with pytest.raises(BadRequest, match=f"cannot change {name}") as caught:
+            reach(everything.start, everything.question, pose)
+        assert caught.value.allowed == ", ".join(parts)
+
+
+def test_a_part_that_never_changes_may_be_given_as_it_is() -> None:
+    """What is printed can be given back: z of a planar robot, the orientation of one that only translates."""
+    for robot, text in (("3rrr_m1", "x=0.01,y=0.02,z=0,rpy=0/0/0.05"), ("delta", "x=0.05,y=0,z=-0.6,rpy=0/0/0")):
+        everything = setting_of(robot).everything
+        wanted = Pose.parse(text)
+        at = reach(everything.start, everything.question, wanted)
+        X = at.pose(everything.question.platform)
+        assert np.allclose(X[:3, 3], [wanted.x, wanted.y, wanted.z], atol=1e-9)
+        assert np.allclose(X[:3, :3], wanted.rotation, atol=1e-9)
+    everything = setting_of("3rrr_m1").everything
+    with pytest.raises(BadRequest, match="one axis only"):
+        reach(everything.start, everything.question, Pose.parse("rpy=0.1/0/0"))
+
+
+@pytest.mark.parametrize(("robot", "text"), [
+    ("gough_stewart", "x=0.05"), ("gough_stewart", "phi=20deg"), ("quattro", "x=0.2,y=-0.1"), ("delta", "z=-0.65"),
+    ("3rrr_m1", "x=0.02"), ("rrrrr_m1", "y=0.27"), ("hexa", "rpy=0.1/0.05/0"),
+])
+def test_free_parts_are_nearest_to_zero(robot: str, text: str) -> None:
+    """No configuration nearby with the same given parts lies nearer to the zero pose."""
+    setting = setting_of(robot)
+    everything, motion, pose = setting.everything, motion_of(setting), Pose.parse(text)
+    at = reach(everything.start, everything.question, pose, motion)
+    goal, twin = motion.goal(pose), at.twin
+    assert np.linalg.norm(goal.rows(twin, at.q)[0]) < CLOSED
+
+    def distance(q: Array) -> float:
+        X = twin.pose(q, motion.link)
+        shift = (motion.position(X) - motion.position(motion.home)) / twin.length
+        turn = logarithm(X[:3, :3] @ motion.home[:3, :3].T) if motion.body else np.zeros(3)
+        return float(np.linalg.norm([*shift, *turn]))
+
+    rng = np.random.default_rng(1)
+    least, compared = distance(at.q), 0
+    for _ in range(20):
+        kernel, _ = at.kernel()
+        q, residual = closed(twin, twin.moved(at.q, 1e-2 * kernel @ rng.normal(size=kernel.shape[1])), goal)
+        if residual <= CLOSED:
+            compared += 1
+            assert distance(q) >= least - 1e-9
+    assert compared > 10
+
+
+def test_the_empty_pose_is_the_zero_configuration() -> None:
+    everything = setting_of("3rrr_m1").everything
+    at = reach(everything.start, everything.question, Pose())
+    np.testing.assert_allclose(at.q, everything.start.q, atol=1e-12)
+
+
+@given(st.integers(0, 2**32 - 1), st.sampled_from([0.1, -0.15]))
+@quick
+def test_phi_of_a_planar_robot_is_about_its_normal(seed: int, angle: float) -> None:
+    mechanism = planar(["RRR", "RPR", "RRR"], np.random.default_rng(seed), [{0}, {0}, {0}])
+    normal = next(joint.axis for joint in mechanism.joints.values() if joint.type.value == "R")
+    setting = prepare(mechanism, samples=3)
+    motion = motion_of(setting)
+    assert abs(abs(normal @ motion.normal) - 1) < 1e-9
+    assert motion.normal[np.argmax(np.abs(motion.normal))] > 0
+    at = reach(setting.everything.start, setting.everything.question, Pose(phi=angle), motion)
+    turn = at.pose("platform")[:3, :3] @ motion.home[:3, :3].T
+    np.testing.assert_allclose(turn, exponential(angle * motion.normal), atol=1e-9)
+
+
+def test_the_manner_of_a_platform_is_what_it_never_changes() -> None:
+    """A planar robot keeps to its plane and its normal; a shift or a tilt out of it is an error."""
+    mechanism = planar(["RRR", "RPR", "RRR"], np.random.default_rng(5), [{0}, {0}, {0}])
+    setting = prepare(mechanism, samples=3)
+    motion, twin = motion_of(setting), setting.everything.twin
+    manner = motion.manner()
+    normal = next(joint.axis for joint in mechanism.joints.values() if joint.type.value == "R")
+    np.testing.assert_allclose(np.abs(manner.directions @ normal), [1], atol=1e-9)
+    for member in setting.everything.members:
+        assert np.linalg.norm(manner.rows(twin, member.configuration.q)[0]) < 1e-9
+    shifted = replace(manner, values=manner.values + 0.1)
+    assert np.linalg.norm(shifted.rows(twin, twin.q0)[0]) == pytest.approx(0.1 / twin.length)
+    tilted = replace(manner, zero=manner.zero @ exponential(np.array([0.1, -0.2, 0.15])))
+    assert np.linalg.norm(tilted.rows(twin, twin.q0)[0]) > 0.05
+    assert motion_of(setting_of("delta")).manner().rotation is not None
+    assert len(motion_of(setting_of("gough_stewart")).manner().values) == 0
+
+
+@given(parallel_robots())
+@quick
+def test_random_robots_reach_the_poses_of_their_samples(mechanism) -> None:
+    setting = prepare(mechanism, samples=3)
+    motion = motion_of(setting)
+    for member in setting.everything.members:
+        check_reached(setting, motion, member.way[0].pose)
+
+
+def test_the_turn_about_an_axis() -> None:
+    """A turn about the axis itself is found whole, and its rate is the row times the angular velocity."""
+    rng, h = np.random.default_rng(0), 1e-6
+    for _ in range(30):
+        axis = rng.normal(size=3)
+        axis /= np.linalg.norm(axis)
+        angle = rng.uniform(-3.1, 3.1)
+        assert turn_about(axis, exponential(angle * axis))[0] == pytest.approx(angle, abs=1e-9)
+        R, omega = exponential(rng.normal(size=3)), rng.normal(size=3)
+        ahead, behind = (turn_about(axis, exponential(step * omega) @ R)[0] for step in (h, -h))
+        assert turn_about(axis, R)[1] @ omega == pytest.approx((ahead - behind) / (2 * h), abs=1e-6)
+
+
+FEET, CRANK, ROD = (np.array([-0.1, 0.0]), np.array([0.1, 0.0])), 0.16, 0.2
+"""The dimensions of the five-bar robot: feet of its legs, lengths of cranks and rods."""
+
+
+@pytest.mark.parametrize(("x", "y", "leg"), [(-0.2, 0.28, "2"), (0.2, 0.28, "1"), (0.02, 0.5, "1"), (-0.03, 0.6, "2")])
+def test_the_leg_that_misses_is_named(x: float, y: float, leg: str) -> None:
+    everything = setting_of("rrrrr_m1").everything
+    misses = {label: np.linalg.norm([x, y] - foot) - (CRANK + ROD) for label, foot in zip("12", FEET, strict=True)}
+    assert max(misses, key=misses.__getitem__) == leg
+    with pytest.raises(PoseNotReached) as caught:
+        reach(everything.start, everything.question, Pose(x, y))
+    error = caught.value
+    assert error.leg == leg
+    assert error.millimetres == pytest.approx(1e3 * misses[leg], rel=1e-4)
+    assert error.degrees < 1e-6
+    assert 0 < error.came < 1
+    assert error.exit_status == 3
+    last = Pose.parse(error.last)
+    assert max(np.linalg.norm([last.x, last.y] - foot) for foot in FEET) == pytest.approx(CRANK + ROD, abs=1e-3)
+
+
+@pytest.mark.parametrize(("x", "y", "z"), [(0.6, 0.1, -0.7), (0.02, 0.03, -0.3), (0, 0, -0.95), (-0.5, 0.3, -0.6)])
+def test_the_miss_of_a_leg_whose_platform_only_translates(x: float, y: float, z: float) -> None:
+    """The rod's two ends: the elbow somewhere on its circle, the tip carried along without a turn."""
+    setting = setting_of("delta")
+    mechanism, misses = setting.mechanism, {}
+    for leg in setting.anatomy.legs:
+        joints = [mechanism.joints[name] for name in leg.joints]
+        (shoulder,) = (joint for joint in joints if mechanism.base in joint.links)
+        elbow = np.mean([joint.point for joint in joints if shoulder.successor == joint.predecessor], axis=0)
+        tip = np.mean([joint.point for joint in joints if mechanism.platform in joint.links], axis=0)
+        wanted = tip + [x, y, z] - mechanism.links[mechanism.platform].pose[:3, 3]
+        circle = [shoulder.point + exponential(a * shoulder.axis) @ (elbow - shoulder.point)
+                  for a in np.linspace(0, 2 * np.pi, 4001)]
+        distances, rod = np.linalg.norm(np.array(circle) - wanted, axis=1), np.linalg.norm(tip - elbow)
+        misses[leg.label] = max(distances.min() - rod, rod - distances.max(), 0.0)
+    with pytest.raises(PoseNotReached) as caught:
+        reach(setting.everything.start, setting.everything.question, Pose(x, y, z))
+    assert caught.value.degrees < 1e-6
+    assert caught.value.millimetres == pytest.approx(1e3 * max(misses.values()), rel=1e-4)
+    assert misses[caught.value.leg] == pytest.approx(max(misses.values()), rel=1e-4)
+
+
+def test_a_pose_that_each_leg_alone_can_take() -> None:
+    """The planes of the three legs together keep a level platform from turning about z; one plane alone does not."""
+    everything = setting_of("3rps").everything
+    with pytest.raises(PoseNotReached) as caught:
+        reach(everything.start, everything.question, Pose(z=0.4, phi=0.02))
+    assert caught.value.leg is None
+    assert "each leg alone can close there" in str(caught.value)
+    assert 0 <= caught.value.came < 1
+
+
+def bend(at: ClosedConfiguration, leg: str) -> float:
+    """The sine of the angle from crank to rod: its sign is the working mode of a leg."""
+    joints = at.twin.mechanism.joints
+    foot, elbow = joints[f"shoulder_{leg}"].point, at.pose(f"dist_{leg}")[:2, 3]
+    tip = at.pose("dist_1")[:2, 3]
+    elbow = (at.pose(f"prox_{leg}") @ np.linalg.inv(at.twin.mechanism.links[f"prox_{leg}"].pose)
+             @ np.append(joints[f"elbow_{leg}"].point, 1))[:2]
+    a, b = elbow - foot[:2], tip - elbow
+    return float((a[0] * b[1] - a[1] * b[0]) / (CRANK * ROD))
+
+
+def test_a_sweep_covers_the_workspace_in_one_working_mode() -> None:
+    """What is reached lies within both rings; what is not has a neighbour out of them or lies on the rings' edge; no
+    leg passes its stretched or folded position."""
+    everything = setting_of("rrrrr_m1").everything
+    start = everything.start
+    np.testing.assert_allclose(motion_of(setting_of("rrrrr_m1")).position(start.pose("dist_1"))[:2], [0.02, 0.24])
+    grid = Grid.parse("x=-0.3:0.3:17,y=0.06:0.4:11")
+    found = sweep(start, everything.question, grid)
+    assert len(found) == 17 * 11
+    signs = [np.sign(bend(start, leg)) for leg in "12"]
+    reached = 0
+    for pose, at in zip(grid.poses(), found, strict=True):
+        radii = [np.linalg.norm([pose.x, pose.y] - foot) for foot in FEET]
+        assert (at is not None) == all(ROD - CRANK < radius < CRANK + ROD for radius in radii), pose
+        if at is not None:
+            reached += 1
+            np.testing.assert_allclose(at.pose("dist_1")[:2, 3], [pose.x, pose.y], atol=1e-9)
+            assert [np.sign(bend(at, leg)) for leg in "12"] == signs
+    assert 60 < reached < 120
+
+
+def test_a_way_that_touches_a_fold_does_not_pass_it() -> None:
+    """The column x = -0.06 touches the circle on which the first leg is folded; smooth motion would unfold it."""
+    everything = setting_of("rrrrr_m1").everything
+    signs = [np.sign(bend(everything.start, leg)) for leg in "12"]
+    found = sweep(everything.start, everything.question, Grid.parse("x=-0.08:-0.04:3,y=-0.05:0.2:15"))
+    assert sum(at is not None for at in found) > 25
+    for at in found:
+        assert at is None or [np.sign(bend(at, leg)) for leg in "12"] == signs
+
+
+def test_a_sweep_finds_what_single_poses_find() -> None:
+    everything = setting_of("delta").everything
+    grid = Grid.parse("x=-0.2:0.2:5,y=-0.2:0.2:4,z=-0.6")
+    found = sweep(everything.start, everything.question, grid)
+    for pose, at in zip(grid.poses(), found, strict=True):
+        alone = reach(everything.start, everything.question, pose)
+        assert at is not None
+        for link in at.twin.mechanism.links:
+            if link.startswith("arm"):
+                np.testing.assert_allclose(at.pose(link), alone.pose(link), atol=1e-8)
+
+
+def test_a_grid_out_of_reach_is_empty() -> None:
+    everything = setting_of("rrrrr_m1").everything
+    assert set(sweep(everything.start, everything.question, Grid.parse("x=2:3:3,y=2:3:3"))) == {None}
+
+
+@pytest.mark.parametrize("degrees", [108, 110, 115])
+def test_on_the_edge_of_the_workspace_a_leg_is_stretched(degrees: float) -> None:
+    everything = setting_of("rrrrr_m1").everything
+    x, y = FEET[1] + (CRANK + ROD) * np.array([np.cos(np.radians(degrees)), np.sin(np.radians(degrees))])
+    at = reach(everything.start, everything.question, Pose(float(x), float(y)))
+    assert abs(bend(at, "2")) < 1e-9
+    assert abs(bend(at, "1")) > 0.1

@@ -1,0 +1,155 @@
+"""Far pairs: how runs between random poses end, and which endings are not what their names say.
+
+``python -m simulation.far 100 3rpr_m1 delta`` (from ``tests/``) runs so many pairs of each robot and prints a
+table, without names of all controllable robots; ``-o FILE`` writes it between the marks of a page. Two robots at a
+time.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+from collections import Counter
+from collections.abc import Iterator
+from concurrent.futures import ProcessPoolExecutor
+from pathlib import Path
+
+import numpy as np
+
+from hrsynth.analysis.aspects.answer import SEPARATED
+from hrsynth.analysis.aspects.path import Aspects
+from hrsynth.analysis.modes.modes import modes
+from hrsynth.description import load
+from hrsynth.geometry.vectors import hat, rotation_from_rpy
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.locked import interaction
+from hrsynth.kinematics.relation import relation
+from hrsynth.present.readme import replaced
+from hrsynth.simulation.desired import Step
+from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
+from hrsynth.simulation.law import Law, directions
+from hrsynth.simulation.result import Servo
+from hrsynth.simulation.run import FAR
+from hrsynth.simulation.scene import EXACT, Scene
+from simulation.scenes import CONTROLLABLE, far_pairs, setting
+
+START = "<!-- generated: endings -->"
+VANISHED, THERE = 1e-9, 1e-6
+"""‖e‖ that counts as zero; how far (m, rotation matrices) the pose may be from the mode it is said to be."""
+
+
+def run_between(name: str, start: ClosedConfiguration, goal: ClosedConfiguration, gain: float = 0.8) -> Servo:
+    """A run between two configurations of a shipped robot, all legs watched."""
+    found = setting(name)
+    law = Law(found.samples.question, found.dof, gain)
+    pose = found.motion.pose(goal.pose(found.motion.link))
+    scene = Scene(found, start, goal, law, Step(directions(goal, law.question)[0]), lambda: modes(load(name), at=pose))
+    return scene.told(scene.loop().simulate(start, scene.horizon(None, noisy=False)), EXACT, None)
+
+
+def untrue(found: Servo) -> Iterator[str]:
+    """What is not as the ending's name says, by what the engine under test did not compute."""
+    last, at, question = found.run.commands[-1], found.run.last, found.setting.samples.question
+    u = np.array([o.value(at.pose(question.reference), at.pose(o.link)) for o in question.observations])
+    e = np.cross(u, found.desired)
+    size, alike = float(np.linalg.norm(e)), np.sum(u * found.desired, axis=1)
+    if abs(size - last.size) > 1e-12:
+        yield f"‖e‖ is {size}, told {last.size}"
+    if found.ended not in ENDINGS:
+        yield f"{found.ended} is no ending"
+    if (size < VANISHED) != (found.ended in (GOAL, MODE, ANTIPODAL)):
+        yield f"{found.ended} with ‖e‖ = {size}"
+    if found.ended in (GOAL, MODE) and np.any(alike < 0):
+        yield f"{found.ended} with a direction turned over"
+    if found.ended == ANTIPODAL and np.all(alike > 0):
+        yield "antipodal with all directions alike"
+    if found.ended != ANTIPODAL and (max(found.from_goal) < THERE) != (found.ended == GOAL):
+        yield f"{found.ended} at {found.from_goal} from the goal"
+    if found.ended == MODE:
+        yield from _no_mode(found)
+    if found.ended == MINIMUM:
+        M = interaction(at, question)
+        L = np.vstack([-hat(w) @ M[3 * i : 3 * i + 3] for i, w in enumerate(found.desired)])
+        if np.linalg.norm(np.linalg.pinv(L, rcond=1e-4) @ e.ravel()) > 1e-5:
+            yield "the command does not vanish"
+    if found.ended == BOUNDARY:
+        moved = np.linalg.norm(found.way[-1] - found.way[0]) / at.twin.length
+        if moved < FAR and relation(at, question).dof.weakest > 1e-2:
+            yield "no boundary is near"
+
+
+def _no_mode(found: Servo) -> Iterator[str]:
+    """What is wrong where a run is said to end at another mode: all robots here have their modes listed."""
+    listed = found.ending.modes
+    if listed is None or found.ending.matched is None:
+        yield f"mode: {found.ending.reason}"
+        return
+    mode, motion = listed.modes[found.ending.matched - 1], found.setting.motion
+    X = found.settled.pose(motion.link)
+    if mode.goal or not (mode.proved or mode.fits is not None):
+        yield f"mode {found.ending.matched} is the goal, or neither proved nor known to fit"
+    p = [value or 0.0 for value in (mode.pose.x, mode.pose.y, mode.pose.z)]
+    apart = float(np.linalg.norm(motion.position(X) - p))
+    turned = 0.0 if mode.pose.rpy is None else float(np.abs(X[:3, :3] - rotation_from_rpy(*mode.pose.rpy)).max())
+    if max(apart, turned) > THERE:
+        yield f"{apart} m, {turned} from mode {found.ending.matched}"
+
+
+def untold(found: Servo, aspects: Aspects) -> Iterator[str]:
+    """Crossings that are not reported. Where the condition is an expression with a sign, the sign at the end is that
+    of the start times −1 for each crossing of a Type 2 or constraint singularity (its wrenches are those of constraints
+    as well); said of runs in which no leg passes its limit. A goal in another aspect is not reached without one."""
+    track, ends = found.track, (found.run.configurations[0], found.run.last)
+    if not aspects.condition.signed or track.passages is None:
+        return
+    answer = aspects.join(*ends, budget=1)
+    crossed = track.crossings("type2") + track.crossings("constraint")
+    if found.ended == GOAL and answer.verdict == SEPARATED and not track.passages:
+        yield "the goal is in another aspect, no crossing is told"
+    values = answer.start.value, answer.goal.value
+    if track.crossings("type1") or track.crossings("limit") or not answer.signed:
+        return
+    if min(map(abs, values)) > 1e-3 * max(map(abs, values)) and np.sign(values[0] * values[1]) != (-1) ** len(crossed):
+        yield f"{len(crossed)} crossings, the condition goes from {values[0]:.3g} to {values[1]:.3g}"
+
+
+def line(name: str, count: int, seed: int = 4) -> tuple[str, list[str]]:
+    """A robot's line of the table, and what is untrue in it."""
+    aspects, endings, wrong, pairs = Aspects.of(load(name)), Counter[str](), [], 0
+    for pairs, (start, goal) in enumerate(far_pairs(name, seed, count), 1):
+        found = run_between(name, start, goal)
+        endings[found.ended] += 1
+        wrong += [f"{name}, pair {pairs}, {found.start} to {found.goal}: {each}"
+                  for each in [*untrue(found), *untold(found, aspects)]]
+        if pairs % 10 == 0:
+            print(f"{name}: {pairs} of {count}, {dict(endings)}, untrue {len(wrong)}", file=sys.stderr, flush=True)
+    return row(f"`{name}`", pairs, *(endings[ended] or "–" for ended in ENDINGS), len(wrong)), wrong
+
+
+def row(*cells: object) -> str:
+    return f"| {' | '.join(map(str, cells))} |\n"
+
+
+def main() -> None:
+    """Print or write the table; the exit status is 1 where something is untrue."""
+    parser = argparse.ArgumentParser(prog="python -m simulation.far", description=__doc__)
+    parser.add_argument("count", type=int, help="pairs of each robot")
+    parser.add_argument("names", nargs="*", help="robots (default: all that are controllable)")
+    parser.add_argument("-o", dest="page", type=Path, help="the page whose table is written")
+    asked = parser.parse_args()
+    names = asked.names or CONTROLLABLE
+    text = None if asked.page is None else asked.page.read_text(encoding="utf-8")
+    with ProcessPoolExecutor(2) as pool:
+        found = list(pool.map(line, names, [asked.count] * len(names)))
+    heads = ("robot", "pairs", *ENDINGS, "untrue")
+    table = row(*heads) + row("---", *["---:"] * (len(heads) - 1)) + "".join(told for told, _ in found)
+    if text is None:
+        print(table)
+    else:
+        asked.page.write_text(replaced(text, table, START), encoding="utf-8", newline="\n")
+    wrong = [each for _, some in found for each in some]
+    sys.exit("\n".join(wrong) or None)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,74 @@
+"""Shipped robots ready to be servoed, and random pairs of poses for them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from itertools import islice
+
+import numpy as np
+import pytest
+from _pytest.mark import ParameterSet
+
+from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.posture import REGULAR, Examiner
+from hrsynth.batch.reach import reach
+from hrsynth.description import load, shipped
+from hrsynth.errors import PoseNotReached
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.sampling import wander
+from hrsynth.simulation.scene import Scene
+
+CONTROLLABLE = [
+    "3prr_m1", "3prr_m2", "3puu", "3rpr_m1", "3rpr_m2", "3rps", "3rrr_m1", "3rrr_m2", "3ruu", "3upu", "6pus", "delta",
+    "gough_stewart", "hexa", "linear_delta", "orthoglide", "prrrp_m1", "prrrp_m2", "quattro", "quattro_rigid",
+    "rprpr_m1", "rprpr_m2", "rrrrr_m1", "rrrrr_m2"]
+"""With all legs watched."""
+FEW = ["3rpr_m1", "3rps", "delta", "gough_stewart", "quattro", "quattro_rigid", "rrrrr_m1"]
+"""Of all kinds: the others are left to the slow tests."""
+BLIND = sorted(set(shipped()) - set(CONTROLLABLE))
+
+
+def few_first(names: list[str]) -> list[ParameterSet]:
+    """The names as parameters of a test, all but a few of them slow."""
+    return [pytest.param(name, marks=[] if name in FEW else pytest.mark.slow) for name in names]
+
+
+@cache
+def setting(name: str) -> ObservedRobot:
+    return prepare(load(name))
+
+
+@cache
+def home(name: str) -> Scene:
+    """A scene that starts and ends at the first regular pose: parts of it are put to use."""
+    found = setting(name)
+    pose = next(str(found.motion.pose(at.pose(found.motion.link))) for at in regular(name, 0, 0.4))
+    return Scene.of(load(name), None, None, start=pose, goal=pose, gain=0.8)
+
+
+def regular(name: str, seed: int, distance: float, steps: int = 12, apart: int = 1,
+            tried: int = 600) -> Iterator[ClosedConfiguration]:
+    """Random configurations, in the working mode of the zero configuration, whose hidden robot is at least ``distance``
+    from Type 2 singularities (part of the usual distance), ``apart`` steps of a random walk from each other; at most
+    ``tried`` steps are made."""
+    found = setting(name)
+    examiner = Examiner(found)
+    question, start = found.everything.question, found.everything.start
+    usual = np.median([examiner.glance(at).distances.type2 or 0.0 for at in found.configurations])
+    for at in islice(wander(start, tried, seed=seed, steps=steps), apart - 1, None, apart):
+        posture = examiner.glance(at)
+        if posture.hidden.state != REGULAR or (posture.distances.type2 or 0.0) < distance * usual:
+            continue
+        try:
+            there = reach(start, question, posture.pose, found.motion)
+        except PoseNotReached:
+            continue
+        yield there
+
+
+def far_pairs(name: str, seed: int, count: int) -> Iterator[tuple[ClosedConfiguration, ClosedConfiguration]]:
+    """Pairs of random configurations that are regular, ever so slightly."""
+    found = list(islice(regular(name, seed, 0.05, steps=40, apart=15, tried=300 * count + 300),
+                        2 * count))
+    return zip(found[::2], found[1::2], strict=False)

@@ -1,0 +1,153 @@
+"""The camera: edges are tangent planes, directions come back from them, noise is what was asked for."""
+
+from __future__ import annotations
+
+import math
+from importlib.util import find_spec
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from hrsynth.description import load
+from hrsynth.errors import BadRequest, MissingExtra, NotRendered
+from hrsynth.geometry.vectors import Array, unit
+from hrsynth.simulation import pictures
+from hrsynth.simulation.camera import Camera, Edges, cylinders, edges, placed, rebuilt, sensitivity
+from hrsynth.simulation.law import directions
+from hrsynth.simulation.noise import PERIOD, Amount, Cones, Shocks
+from hrsynth.simulation.servo import servo
+from simulation.scenes import home
+
+NUMBERS = st.floats(-1, 1, allow_nan=False)
+POINTS = st.tuples(NUMBERS, NUMBERS, st.floats(1, 3)).map(np.array)
+
+
+@given(POINTS, POINTS)
+def test_edges_are_the_two_tangent_planes_and_give_the_direction_back(a: Array, b: Array):
+    radius = 0.01
+    if np.linalg.norm(b - a) < 0.1 or np.linalg.norm(np.cross(a, unit(b - a))) < 2 * radius:
+        return
+    ends, u = np.array([a, b]), unit(b - a)
+    for normal in edges(ends, radius):
+        assert np.linalg.norm(normal) == pytest.approx(1)
+        assert normal @ u == pytest.approx(0, abs=1e-12)
+        assert normal @ a == pytest.approx(-radius, abs=1e-12)
+    assert rebuilt(*edges(ends, radius)) == pytest.approx(u, abs=1e-9)
+
+
+def test_a_camera_inside_a_leg_is_refused():
+    with pytest.raises(BadRequest, match="inside a leg"):
+        edges(np.array([[0.0, 0.001, -1.0], [0.0, 0.001, 1.0]]), 0.01)
+
+
+@given(NUMBERS, NUMBERS)
+def test_a_pixel_and_its_ray_are_one(x: float, y: float):
+    camera = Camera(np.eye(4))
+    point = np.array([x, y, 2.0])
+    assert 2 * camera.ray(camera.pixels(point[None])[0]) == pytest.approx(point, abs=1e-12)
+
+
+@pytest.mark.parametrize("name", ["3rpr_m1", "quattro"])
+def test_the_camera_sees_all_rods_and_exact_edges_give_exact_directions(name: str):
+    scene = home(name)
+    mechanism, question = scene.setting.mechanism, scene.law.question
+    rods = cylinders(mechanism, question.observations)
+    camera = placed(rods, question.reference, (scene.start.pose,))
+    for rod in rods:
+        pixels = camera.pixels(camera.seen(scene.start.pose(question.reference), scene.start.pose, rod))
+        assert np.all((pixels > 0) & (pixels < [camera.width, camera.height]))
+    sense = Edges(camera, question.reference, rods, 0.0, Shocks.drawn(2 * len(rods), 1, 0))
+    u = directions(scene.start, question)[0]
+    assert sense(0.0, scene.start.pose, u) == pytest.approx(u, abs=1e-9)
+
+
+def test_a_carried_camera_sees_the_same_directions_from_its_link():
+    robot = load("delta")
+    carried = robot.platform
+    found = servo(robot, camera=carried, start="x=0,y=0,z=-0.6", goal="x=0.05,y=0,z=-0.6", sense="edges", gain=8,
+                  time=1.0)
+    assert found.ended == "goal"
+    assert found.spread is not None
+    assert found.spread.metres < 0.01
+    assert found.setting.samples.question.reference == carried
+
+
+def test_the_noise_of_rebuilt_directions_grows_with_that_of_pixels_and_is_bounded_by_the_sensitivity():
+    scene = home("delta")
+    question = scene.law.question
+    rods = cylinders(scene.setting.mechanism, question.observations)
+    camera = placed(rods, question.reference, (scene.start.pose,))
+    u = directions(scene.start, question)[0]
+
+    def wrong(pixels: float) -> Array:
+        sense = Edges(camera, question.reference, rods, pixels, Shocks.drawn(2 * len(rods), 4, 0))
+        return np.array([np.linalg.norm(sense(t, scene.start.pose, u) - u, axis=1) for t in np.arange(0, 4, 0.04)])
+
+    assert wrong(0.02).max() == pytest.approx(2 * wrong(0.01).max(), rel=0.05)
+    for number, rod in enumerate(rods):
+        ends = camera.seen(scene.start.pose(question.reference), scene.start.pose, rod)
+        assert wrong(0.01)[:, number].max() <= 1.1 * sensitivity(ends, rod.radius) * 0.01 / camera.focal
+
+
+@given(st.floats(1e-4, 0.2), st.integers(0, 1000), st.floats(0, 3))
+def test_measured_directions_lie_in_their_cones(half_angle: float, seed: int, time: float):
+    u = np.array([[0.0, 0.0, 1.0], unit([1, 2, 3])])
+    seen = Cones(half_angle, Shocks.drawn(2, 3, seed))(time, lambda link: np.eye(4), u)
+    angles = np.arccos(np.clip(np.sum(seen * u, axis=1), -1, 1))
+    assert np.all(angles <= half_angle + 1e-7)
+    assert np.linalg.norm(seen, axis=1) == pytest.approx([1, 1])
+
+
+def test_cones_are_filled():
+    u = np.array([[0.0, 0.0, 1.0]])
+    sense = Cones(0.1, Shocks.drawn(1, 4000 * PERIOD, 0))
+    angles = [float(np.linalg.norm(np.cross(sense(n * PERIOD, lambda link: np.eye(4), u), u))) for n in range(4000)]
+    assert max(angles) > 0.095
+    assert 0.03 < float(np.mean(angles)) < 0.07
+
+
+@pytest.mark.parametrize(("text", "value", "pixels"), [("0.1deg", math.radians(0.1), False), ("0.002", 0.002, False),
+                                                       ("0.3px", 0.3, True)])
+def test_amounts(text: str, value: float, pixels: bool):
+    assert (Amount.parse(text).value, Amount.parse(text).pixels) == (pytest.approx(value), pixels)
+
+
+@pytest.mark.parametrize("text", ["", "deg", "much", "-1deg", "0px", "90deg", "nan", "inf"])
+def test_amounts_that_are_none(text: str):
+    with pytest.raises(BadRequest):
+        Amount.parse(text)
+
+
+def test_without_opencv_pictures_are_refused_in_one_line(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(__import__("sys").modules, "cv2", None)
+    with pytest.raises(MissingExtra, match=r"hrsynth\[bench\]") as raised:
+        servo(load("delta"), start="x=0,y=0", goal="x=0.05,y=0", sense="pictures")
+    assert raised.value.exit_status == 3
+
+
+@pytest.mark.skipif(find_spec("mujoco") is None, reason="needs the extra bench")
+@pytest.mark.parametrize("name", ["delta", pytest.param("quattro", marks=pytest.mark.slow)])
+def test_directions_from_rendered_pictures(name: str):
+    pytest.importorskip("cv2")
+    pictures.drawing()
+    scene = home(name)
+    mechanism, question = scene.setting.mechanism, scene.law.question
+    rods = cylinders(mechanism, question.observations)
+    camera = placed(rods, question.reference, (scene.start.pose,))
+    stage = pictures.Stage(mechanism, camera, question.reference, rods)
+    try:
+        picture = stage.picture(scene.start.pose)
+    except NotRendered as error:
+        pytest.skip(str(error))
+    assert picture.shape == (camera.height, camera.width, 3)
+    u = directions(scene.start, question)[0]
+    seen = pictures.Pictures(stage)(0.0, scene.start.pose, u)
+    wrong = np.degrees(np.linalg.norm(np.cross(seen, u), axis=1))
+    assert np.all((wrong > 0) & (wrong < 1.0))
+    drawn = [pictures.shade(picture, colour) > 127 for colour in pictures.COLOURS[: len(rods)]]
+    for rod, seen_there in zip(rods, drawn, strict=True):
+        ends = camera.pixels(camera.seen(scene.start.pose(question.reference), scene.start.pose, rod))
+        middle = np.round(ends.mean(axis=0) - 0.5).astype(int)
+        assert seen_there[middle[1], middle[0]]

@@ -1,0 +1,44 @@
+"""The animation of a run: the watched legs come to lie where they are to be; refusals before any work."""
+
+from __future__ import annotations
+
+import io
+from importlib.util import find_spec
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hrsynth
+from hrsynth.errors import BadRequest
+from hrsynth.present import runs
+from hrsynth.present.animations import FRAMES, film
+
+
+def test_unknown_endings_and_folders_are_refused(tmp_path: Path):
+    with pytest.raises(BadRequest, match=r"\.gif"):
+        runs.writable(str(tmp_path / "run.mp4"))
+    with pytest.raises(BadRequest):
+        runs.writable(str(tmp_path / "nowhere" / "run.png"))
+    runs.writable(str(tmp_path / "run.png"))
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(find_spec("mujoco") is None, reason="the extra bench is not installed")
+def test_a_film_ends_with_the_watched_leg_over_its_wanted_place():
+    """At the goal what is seen covers what is to be seen: no pale colour is left, and there was some at the start."""
+    image_of = pytest.importorskip("PIL.Image")
+    found = hrsynth.servo(hrsynth.load("3rpr_m1"), start="x=0,y=0,phi=0", goal="x=0.03,y=0.02,phi=0.1")
+    assert found.ended == "goal"
+    try:
+        image = image_of.open(io.BytesIO(film(found)))
+    except hrsynth.errors.NotRendered:
+        pytest.skip("nothing can be rendered here")
+
+    def pale(number: int) -> int:
+        image.seek(number)
+        colours = np.asarray(image.convert("RGB"), dtype=float)
+        return int(np.sum((np.ptp(colours, axis=2) > 60) & (colours.min(axis=2) > 100)))
+
+    assert 10 < image.n_frames <= FRAMES + 12
+    assert pale(image.n_frames - 1) < 0.5 * pale(0)

@@ -1,0 +1,210 @@
+"""Runs: near starts end at the goal, every ending is what its name says, crossings are reported."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from os import environ
+
+import numpy as np
+import pytest
+
+from hrsynth.analysis.aspects.path import Aspects
+from hrsynth.batch.reach import reach
+from hrsynth.description import load
+from hrsynth.errors import BadRequest, PoseNotReached
+from hrsynth.geometry.ranks import range_basis
+from hrsynth.kinematics.configuration import ClosedConfiguration, closed
+from hrsynth.mechanism.model import Limits
+from hrsynth.simulation.ending import BOUNDARY, GOAL, MODE
+from hrsynth.simulation.servo import servo
+from simulation.far import run_between, untold, untrue
+from simulation.scenes import BLIND, CONTROLLABLE, far_pairs, regular, setting
+
+FEW = ["3rpr_m1", "delta", "quattro"]
+REST = [name for name in CONTROLLABLE if name not in FEW]
+
+
+def near(name: str) -> tuple[ClosedConfiguration, ClosedConfiguration]:
+    """A goal away from singularities, and a start 0.05 characteristic lengths and radians from it."""
+    found = setting(name)
+    goal = next(regular(name, 2, 0.5))
+    kernel, _ = goal.kernel()
+    moves = range_basis((found.everything.question.rows(goal) @ kernel).T, 1.0)[0]
+    step = kernel @ moves @ np.full(moves.shape[1], 0.05 / np.sqrt(moves.shape[1]))
+    q, _ = closed(goal.twin, goal.twin.moved(goal.q, step), tolerance=1e-12)
+    return ClosedConfiguration.of(goal.twin, q), goal
+
+
+def check_near(name: str) -> None:
+    start, goal = near(name)
+    found = run_between(name, start, goal)
+    assert found.ended == GOAL
+    assert found.track.crossings("type2") == ()
+    assert max(found.from_goal) < 1e-6
+    assert np.all(np.diff([command.size for command in found.run.commands]) < 1e-9)
+
+
+@pytest.mark.parametrize("name", FEW)
+def test_starts_near_the_goal_end_there(name: str):
+    check_near(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", REST)
+def test_starts_near_the_goal_end_there_for_the_other_robots(name: str):
+    check_near(name)
+
+
+def check_far(name: str, seed: int, count: int) -> None:
+    aspects = Aspects.of(load(name))
+    for start, goal in far_pairs(name, seed, count):
+        found = run_between(name, start, goal)
+        assert [*untrue(found), *untold(found, aspects)] == []
+
+
+def test_far_runs_end_as_they_are_named():
+    check_far("3rpr_m1", 3, 1)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", CONTROLLABLE)
+def test_more_far_runs_end_as_they_are_named(name: str):
+    """``PAIRS`` of each robot (environment; 5)."""
+    check_far(name, 4, int(environ.get("PAIRS", "5")))
+
+
+# ---- the papers' cases (theory 7: what their geometry gives)
+
+
+@pytest.mark.parametrize(("legs", "ended", "z"), [
+    ("1,4", MODE, -0.9019), pytest.param("2,3", GOAL, -0.56, marks=pytest.mark.slow)])
+def test_two_legs_of_the_robot_with_an_articulated_platform(legs: str, ended: str, z: float):
+    found = servo(load("quattro"), legs, start="x=0,y=0,z=-0.75,phi=0", goal="x=-0.2,y=0,z=-0.56,phi=0")
+    assert (found.ended, found.pose.z) == (ended, pytest.approx(z, abs=1e-4))
+    assert (found.ending.matched is not None) == (ended == MODE)
+    assert list(untrue(found)) == []
+
+
+@pytest.mark.parametrize(("legs", "ended", "z"), [("1,2", MODE, -0.7023), ("1,3", GOAL, -0.7)])
+def test_two_legs_of_the_robot_with_a_rigid_platform(legs: str, ended: str, z: float):
+    found = servo(load("quattro_rigid"), legs, start="x=0.1,y=0.04,z=-0.93", goal="x=0,y=-0.25,z=-0.7", gain=5)
+    assert (found.ended, found.pose.z) == (ended, pytest.approx(z, abs=1e-4))
+    assert list(untrue(found)) == []
+
+
+# ---- noise, trajectories, limits
+
+
+def test_noise_keeps_the_platform_about_the_goal_and_more_of_it_further_away():
+    def far(noise: str, seed: int = 0) -> float:
+        found = servo(load("rrrrr_m1"), start="x=0.02,y=0.2195", goal="x=0.02,y=0.22", gain=4, noise=noise, time=3.0,
+                      seed=seed)
+        assert found.ended == GOAL
+        assert found.spread is not None
+        return found.spread.rms_metres
+
+    small = far("0.01deg")
+    assert small == far("0.01deg")
+    assert small != far("0.01deg", seed=1)
+    assert 5 < far("0.1deg") / small < 20
+
+
+def test_a_trajectory_is_followed_with_a_small_error():
+    robot, ends = load("delta"), {"start": "x=0,y=0,z=-0.6", "goal": "x=0.1,y=0.1,z=-0.65"}
+    led, at_once = servo(robot, duration=4.0, **ends), servo(robot, **ends)
+    assert (led.ended, at_once.ended) == (GOAL, GOAL)
+    assert led.errors.max() < 0.01 * at_once.errors.max()
+    assert led.run.times[-1] > 4
+
+
+@pytest.mark.parametrize(("name", "start", "goal"), [
+    ("rrrrr_m1", "x=0.02,y=0.2195", "x=0.03,y=0.23"), ("3rps", "x=0,y=0,z=0.3", "x=0,y=0,z=0.4")])
+def test_a_trajectory_is_followed_where_parts_of_the_pose_depend_on_each_other(name: str, start: str, goal: str):
+    found = servo(load(name), start=start, goal=goal, duration=2.0)
+    assert found.ended == GOAL
+    assert found.errors.max() < 1e-3
+
+
+def test_a_blocked_trajectory_tells_that_it_began_at_the_start(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr("hrsynth.simulation.desired.led", lambda here, motion, goal: (here, 0.5))
+    with pytest.raises(PoseNotReached, match="from the start the robot comes"):
+        servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", duration=2.0)
+
+
+def test_a_bias_holds_the_platform_where_the_measured_directions_are_the_desired_ones():
+    found = servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65", noise="1deg", bias=True, gain=4,
+                  time=5.0)
+    last = found.run.commands[-1]
+    assert found.ended == GOAL
+    assert found.spread is not None
+    assert found.spread.aside
+    assert found.spread.metres > 1e-3
+    assert last.speed < 1e-4 < last.size
+    assert "the same all along" in str(found.noise)
+
+
+def test_a_joint_limit_is_a_boundary():
+    robot = load("delta")
+    free = servo(robot, start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.1,z=-0.65")
+    joint = next(j for j in robot.joints.values() if j.actuated)
+    twin = free.run.last.twin
+    way = [twin.difference(twin.q0, at.q)[twin.coordinates[joint.name][0]] for at in free.run.configurations]
+    half = (way[0] + way[-1]) / 2
+    limits = Limits(lower=half) if way[-1] < way[0] else Limits(upper=half)
+    kept = robot.changed(joints=[replace(joint, limits=limits)])
+    found = servo(kept, start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.1,z=-0.65")
+    assert found.ended == BOUNDARY
+    assert joint.name in found.ending.reason
+    last, twin = found.run.last, found.run.last.twin
+    assert twin.difference(twin.q0, last.q)[twin.coordinates[joint.name][0]] == pytest.approx(half, abs=1e-8)
+
+
+# ---- what is refused
+
+
+REFUSED: list[tuple[str, Callable[[], object], type[Exception], str]] = [
+    ("goal out of reach", lambda: servo(load("delta"), start="x=0", goal="x=9"), PoseNotReached, "x=9"),
+    ("start out of reach", lambda: servo(load("delta"), start="x=9", goal="x=0"), PoseNotReached, "x=9"),
+    ("too few legs", lambda: servo(load("delta"), "1", start="x=0", goal="x=0.1"), BadRequest, "do not see"),
+    ("unknown leg", lambda: servo(load("delta"), "7", start="x=0", goal="x=0.1"), BadRequest, "'7'"),
+    ("no gain", lambda: servo(load("delta"), start="x=0", goal="x=0.1", gain=0.0), BadRequest, "gain"),
+    ("wide cone", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="90deg"), BadRequest, "90deg"),
+    ("no cone", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="0deg"), BadRequest, "more than zero"),
+    ("pixels of directions", lambda: servo(load("delta"), start="x=0", goal="x=0.1", noise="1px"), BadRequest, "px"),
+    ("edges as wide as pictures", lambda: servo(load("delta"), start="x=0", goal="x=0.1", sense="edges", noise="1e9px"),
+     BadRequest, "50px"),
+    ("a bias of nothing", lambda: servo(load("delta"), start="x=0", goal="x=0.1", bias=True), BadRequest, "bias"),
+    ("endless noise", lambda: servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", noise="1deg",
+                                    time=1e12), BadRequest, "at most 10000"),
+    ("endless physics", lambda: servo(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", physics=True,
+                                      gain=1e-9), BadRequest, "a larger gain"),
+    ("no such sense", lambda: servo(load("delta"), start="x=0", goal="x=0.1", sense="touch"), BadRequest, "touch")]
+
+
+@pytest.mark.parametrize(("call", "error", "words"), [row[1:] for row in REFUSED], ids=[row[0] for row in REFUSED])
+def test_what_does_not_fit_is_refused_in_one_line(call: Callable[[], object], error: type[Exception], words: str):
+    with pytest.raises(error, match=words) as raised:
+        call()
+    assert getattr(raised.value, "exit_status", None) == 2
+    assert len(str(raised.value).splitlines()) == 1
+
+
+def test_a_singular_pose_is_refused():
+    z = -np.sqrt(0.825**2 - (0.296 + 0.38 - 0.102) ** 2)
+    with pytest.raises(BadRequest, match="the start is a Type 2 singularity"):
+        servo(load("quattro_rigid"), start=f"x=0,y=0,z={float(z)!r}", goal="x=0.1,y=0,z=-0.7")
+
+
+@pytest.mark.parametrize("name", BLIND)
+def test_robots_that_are_not_controllable_are_refused(name: str):
+    found = setting(name)
+    pose = found.motion.pose(found.motion.home)
+    with pytest.raises(BadRequest, match="do not see"):
+        servo(load(name), start=pose, goal=pose)
+
+
+def test_every_reached_pose_is_a_start():
+    found = setting("delta")
+    at = reach(found.everything.start, found.everything.question, found.motion.pose(found.motion.home), found.motion)
+    assert run_between("delta", at, at).ended == GOAL
