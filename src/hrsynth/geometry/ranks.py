@@ -35,8 +35,8 @@ class Rank:
         return self.value
 
 
-def rank_of(singular_values: Array, scale: float | None = None) -> Rank:
-    """The rank that descending singular values show; ``scale`` (default: the largest) is what zero is relative to."""
+def rank_of(singular_values: Array, scale: float | None = None, cutoff: float = RANK_CUTOFF) -> Rank:
+    """The rank that descending singular values show: those above ``cutoff`` × ``scale`` (default: the largest)."""
     values = np.asarray(singular_values, dtype=float)
     if values.size == 0:
         return Rank(0, CLEAN)
@@ -44,7 +44,7 @@ def rank_of(singular_values: Array, scale: float | None = None) -> Rank:
     if largest <= np.finfo(float).tiny:
         return Rank(0, CLEAN)
     floor = np.finfo(float).eps * largest
-    kept = int(np.sum(values > RANK_CUTOFF * largest))
+    kept = int(np.sum(values > cutoff * largest))
     last = float(values[kept - 1]) if kept else largest
     dropped = max(float(values[kept]), floor) if kept < values.size else floor
     return Rank(kept, float(last / dropped), last / largest)
