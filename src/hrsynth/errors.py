@@ -68,10 +68,14 @@ class BadMechanism(BadRequest):
     """A mechanism whose parts contradict each other (a joint of an unknown link, a zero axis)."""
 
 
-class LoopsNotClosed(HrsynthError):
-    """The loops cannot be closed: the residual that is left, and the loop that misses most."""
+class Unanswered(HrsynthError):
+    """Base of those where the request is sound and has no answer."""
 
     exit_status = 3
+
+
+class LoopsNotClosed(Unanswered):
+    """The loops cannot be closed: the residual that is left, and the loop that misses most."""
 
     def __init__(self, robot: str, residual: float, tolerance: float, loop: str) -> None:
         self.robot, self.residual, self.tolerance, self.loop = robot, residual, tolerance, loop
@@ -81,20 +85,16 @@ class LoopsNotClosed(HrsynthError):
         )
 
 
-class RankUndecided(HrsynthError):
+class RankUndecided(Unanswered):
     """A rank whose gap is too small for a verdict."""
-
-    exit_status = 3
 
     def __init__(self, what: str, gap: float, needed: float) -> None:
         self.what, self.gap, self.needed = what, gap, needed
         super().__init__(f"{what}: the singular values leave a gap of {gap:.3g}, needed: {needed:.3g}")
 
 
-class NotSampled(HrsynthError):
+class NotSampled(Unanswered):
     """Too few closed configurations could be reached from the zero configuration."""
-
-    exit_status = 3
 
     def __init__(self, robot: str, reached: int, wanted: int) -> None:
         self.robot, self.reached, self.wanted = robot, reached, wanted
@@ -102,11 +102,9 @@ class NotSampled(HrsynthError):
                          f"needed: {wanted}; is the zero configuration singular?")
 
 
-class BranchPoint(HrsynthError):
+class BranchPoint(Unanswered):
     """A zero configuration at which several operation modes meet, or samples of several: what was found of each, and
     a pose in it."""
-
-    exit_status = 3
 
     def __init__(self, robot: str, what: str, modes: Iterable[str]) -> None:
         self.robot, self.what, self.modes = robot, what, tuple(modes)
@@ -114,11 +112,9 @@ class BranchPoint(HrsynthError):
                          + "; no verdict is given; start in one of them")
 
 
-class MeaningUndecided(HrsynthError):
+class MeaningUndecided(Unanswered):
     """Whether a special geometry is meant: the largest defect that would be accepted, the smallest that would not (both
     in sizes of the mechanism), and how far apart they have to be."""
-
-    exit_status = 3
 
     def __init__(self, what: str, largest: float, smallest: float, gap: float) -> None:
         super().__init__(f"{what} are {largest:.2g} sizes of the mechanism apart, others {smallest:.2g}: not "
@@ -126,12 +122,10 @@ class MeaningUndecided(HrsynthError):
                          "numbers as they are")
 
 
-class PoseNotReached(HrsynthError):
+class PoseNotReached(Unanswered):
     """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much
     (mm, degrees), or None where each leg alone reaches it; how far the robot came (0 to 1), and to which pose; the
     ``wrist``, a joint that stands for several R, that is near the end of its turns there."""
-
-    exit_status = 3
 
     def __init__(self, robot: str, pose: str, came: float, last: str, leg: str | None = None,
                  millimetres: float = 0.0, degrees: float = 0.0, origin: str = "its zero configuration",
@@ -151,20 +145,16 @@ class PoseNotReached(HrsynthError):
                          f"{100 * came:.3g} % of the way, to {last}")
 
 
-class PlaneNotMet(HrsynthError):
+class PlaneNotMet(Unanswered):
     """A plane or grid of poses of which the robot reaches none: why."""
-
-    exit_status = 3
 
     def __init__(self, robot: str, plane: str, reason: str) -> None:
         self.robot, self.plane, self.reason = robot, plane, reason
         super().__init__(f"{robot}: no pose of {plane} is reached: {reason}")
 
 
-class Disagreement(HrsynthError):
+class Disagreement(Unanswered):
     """The words, the expression and the rank do not agree about where a robot is singular."""
-
-    exit_status = 3
 
     def __init__(self, robot: str, poses: int, angle: float) -> None:
         self.robot, self.poses, self.angle = robot, poses, angle
@@ -172,30 +162,24 @@ class Disagreement(HrsynthError):
                          f"{angle:.2g} rad); please report this as a defect of hrsynth")
 
 
-class NotConfined(HrsynthError):
+class NotConfined(Unanswered):
     """A robot whose tips, with the directions held, move on something else than points, lines and circles."""
-
-    exit_status = 3
 
     def __init__(self, robot: str, reason: str) -> None:
         self.robot, self.reason = robot, reason
         super().__init__(f"{robot}: its assembly modes cannot be listed, which is not supported here: {reason}")
 
 
-class NotConfirmed(HrsynthError):
+class NotConfirmed(Unanswered):
     """An architecture without a verdict that is exact and that closed configurations confirm: why."""
-
-    exit_status = 3
 
     def __init__(self, robot: str, what: str) -> None:
         self.robot, self.what = robot, what
         super().__init__(f"{robot}: no confirmed verdict: {what}")
 
 
-class NotCertified(HrsynthError):
+class NotCertified(Unanswered):
     """No hidden robot passed the certificate: the best angle seen."""
-
-    exit_status = 3
 
     def __init__(self, robot: str, angle: float, tolerance: float) -> None:
         self.robot, self.angle, self.tolerance = robot, angle, tolerance
@@ -204,40 +188,32 @@ class NotCertified(HrsynthError):
         )
 
 
-class MissingExtra(HrsynthError):
+class MissingExtra(Unanswered):
     """Something that needs an optional package which is not installed: what, and the extra that brings it."""
-
-    exit_status = 3
 
     def __init__(self, what: str, extra: str) -> None:
         self.what, self.extra = what, extra
         super().__init__(f'{what} needs an optional package: pip install "hrsynth[{extra}]"')
 
 
-class Unsolved(HrsynthError):
+class Unsolved(Unanswered):
     """An external solver that gave no answer: which, and why."""
-
-    exit_status = 3
 
     def __init__(self, solver: str, reason: str) -> None:
         self.solver, self.reason = solver, reason
         super().__init__(f"{solver} did not solve the system: {reason}")
 
 
-class NotRendered(HrsynthError):
+class NotRendered(Unanswered):
     """Pictures that cannot be rendered on this machine: why."""
-
-    exit_status = 3
 
     def __init__(self, reason: str) -> None:
         self.reason = reason
         super().__init__(f"pictures cannot be rendered here: {reason} (MUJOCO_GL chooses between egl, osmesa and glfw)")
 
 
-class BuildStopped(HrsynthError):
+class BuildStopped(Unanswered):
     """A build of the catalog that cannot go on: why, and the journal that keeps what was built, if any."""
-
-    exit_status = 3
 
     def __init__(self, reason: str, kept: str | None = None) -> None:
         self.reason, self.kept = reason, kept
@@ -245,10 +221,8 @@ class BuildStopped(HrsynthError):
         super().__init__(f"the build stopped: {reason}{rest}")
 
 
-class CatalogStale(HrsynthError):
+class CatalogStale(Unanswered):
     """A stored catalog that is not what is built today: what differs, a line each."""
-
-    exit_status = 3
 
     def __init__(self, complaints: Iterable[str]) -> None:
         self.complaints = tuple(complaints)
