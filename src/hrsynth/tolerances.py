@@ -131,3 +131,115 @@ RESTED = 1e-10
 
 ARRIVED = 1e-6
 """Distance (characteristic lengths, radians) from a stable rest at which a servo loop has ended there."""
+
+HESSIAN_STEP = 1e-4
+"""Step of the differences of the Hessian of a best fit, whose own error is its square."""
+
+HESSIAN_CHANGE = 0.5
+"""How far the Hessian of a best fit may change over a step, relative to itself: evenly changed, it is definite all
+along below 1."""
+
+FLAT_CURVATURE = 0.05
+"""Curvature, as part of that at the start, below which a best fit that cannot be followed further is called flat."""
+
+NARROWEST_CONE = 1e-15
+"""Half-angle (rad) of a cone below which directions, as numbers, are no longer told apart."""
+
+USUAL_ERROR = 100.0
+"""Multiple of the median error of a field up to which a pose serves for a check by longer numbers: nearer to
+singularities rounding grows."""
+
+VALLEY_DEPTH = 0.5
+"""Part of the median below which a valley of the smallest singular value is looked into."""
+
+VALLEY_ZERO = 1e-5
+"""Part of the median at which the smallest singular value in a valley counts as zero."""
+
+TURNING_ARM = 1e-3
+"""Part of a vector normal to an axis (characteristic lengths) from which a turn about the axis is read."""
+
+CHAIN_ROUNDING = 16 * 2.0 ** -52
+"""What thirty-two roundings, those of a chain of joints from the file's decimals on, make of lengths and angles."""
+
+SAME_NEAR_MODE = 1e-6
+"""Difference of poses and of misses (sizes of the mechanism) below which two stationary poses are one."""
+
+NO_NEAR_MODE = 0.3
+"""Misses (sizes of the mechanism) beyond which a start leads to no near mode."""
+
+SHARP_ROOT = 2.0 ** -60
+"""Radius of a ball, relative to 1 plus its middle, above which a solution is sought with more digits."""
+
+TIP_ROUNDING = 2.0 ** -46
+"""What sixty-four roundings make of a length, relative to the size: poses and tips computed in floats."""
+
+BOXES_APART = 1e-12
+"""What is added to boxes around solutions, relative to their places and radii, before they count as apart."""
+
+BALL_ZERO = 2.0 ** -256
+"""Radius of a ball that holds zero at which the number in it counts as zero."""
+
+PROVED_CHANCE = 1e-9
+"""Largest chance of an error of a record of the catalog that is called proved."""
+
+SQUARE_AXES = 1e-9
+"""Cosine of the angle between two axes of a U below which they are at right angles, where a catalog's robot is
+built."""
+
+NEWTON_REACH = 1e4
+"""Length of a Newton step in a foreign file's loops, as a multiple of the residual that it removes, beyond which it
+follows rounded numbers."""
+
+AT_ORIGIN = 1e-12
+"""Distance (m) below which a joint's centre is the origin of the link that it carries, where a file is written."""
+
+CONES_MET = 1e-14
+"""Gap between the bounds, relative, at which a maximum of two cones is found."""
+
+FLAT_CONE = 1e-20
+"""Part of a cone's largest squared error below which its term has no derivative worth the name."""
+
+CONES_TIGHT = 1e-10
+"""Gap between the bounds of three cones and more, relative, at which the maximum counts as found."""
+
+NO_SLIDER = 1e-3
+"""Part of its span below which the way of a slider of the view counts as none."""
+
+STEADY_TANGENT = 1e-10
+"""Turn (radians) of the tangent space that the residual of a sample may cause."""
+
+EASY_RANK = 1e-3
+"""Singular values below this part of the largest are no directions to go in where the straight way to a goal cannot
+be gone."""
+
+NEAR_FOLD = 1e-5
+"""Singular values of loops and goal below which a fold is looked for."""
+
+BENCH_SETTLED = 1e-6
+"""‖e‖ at which the physics bench has settled."""
+
+BENCH_STEADY = 1e-3
+"""Part by which an error may still change in a time constant when the physics bench has settled."""
+
+REST_SLOPE = 1e-4
+"""Step of the differences of ẏ about a rest: less than the width over which the law is damped."""
+
+NEAR_REST = 0.1
+"""Longest Newton step (characteristic lengths, radians) to a rest: beyond it no rest is near."""
+
+NEUTRAL_GROWTH = 1e-6
+"""Growth (per time constant) up to which a motion about a rest counts as none; speed up to which a drift does."""
+
+INTEGRATED = 1e-6
+"""Relative tolerance of the integrator of a servo run, for coordinates of a chart as for errors at the start of a
+stretch."""
+
+STRETCH_END = 1e-2
+"""Part of its first error at which a stretch of a servo run ends, so that the tolerance follows the error."""
+
+LOOPS_LOST = 1e-3
+"""Part of its value at the start to which the loops' weakest singular value has fallen where a servo run cannot go
+on."""
+
+RUN_SHORTEST_STEP = 1e-9
+"""Longest step (time constants) with which a servo run that cannot go on has been tried."""

@@ -19,6 +19,7 @@ import numpy as np
 from hrsynth.analysis.aspects.answer import SEPARATED
 from hrsynth.analysis.aspects.path import Aspects
 from hrsynth.analysis.modes.modes import modes
+from hrsynth.budgets import RUN_AWAY
 from hrsynth.description import load
 from hrsynth.geometry.vectors import hat, rotation_from_rpy
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -29,7 +30,6 @@ from hrsynth.simulation.desired import Step
 from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
 from hrsynth.simulation.law import Law, directions
 from hrsynth.simulation.result import Servo
-from hrsynth.simulation.run import FAR
 from hrsynth.simulation.scene import EXACT, Scene
 from simulation.scenes import CONTROLLABLE, far_pairs, setting
 
@@ -74,7 +74,7 @@ def untrue(found: Servo) -> Iterator[str]:
             yield "the command does not vanish"
     if found.ended == BOUNDARY:
         moved = np.linalg.norm(found.way[-1] - found.way[0]) / at.twin.length
-        if moved < FAR and relation(at, question).dof.weakest > 1e-2:
+        if moved < RUN_AWAY and relation(at, question).dof.weakest > 1e-2:
             yield "no boundary is near"
 
 

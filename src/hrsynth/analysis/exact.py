@@ -35,6 +35,7 @@ from functools import cached_property
 from typing import Any
 
 from ..batch.stage import frames_at
+from ..budgets import LARGEST_RANDOM
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Measurement, Relation
 from ..mechanism import Mechanism, Observation
@@ -43,7 +44,7 @@ from ..mechanism.model import JointType
 from ..mechanism.observation import Direction, labels_of
 from ..mechanism.relations import Relations, recognise
 from ..tolerances import CLOSED
-from .instances import LARGEST, Instance, NotRecognised, draw, instance, ranks_at
+from .instances import Instance, NotRecognised, draw, instance, ranks_at
 from .kept import degree, kept
 from .observed import ObservedRobot, selected
 from .verdict import word
@@ -205,7 +206,7 @@ class ExactArchitecture:
             found += [self.instance(i) for i in range(1, TESTS)]
             for each in found:
                 _same("dim ρ of these legs", each.ranks(places)[0], found[0].ranks(places)[0])
-        return tested * (degree(self.relations, len(found[0].free)) / (2 * LARGEST)) ** TESTS
+        return tested * (degree(self.relations, len(found[0].free)) / (2 * LARGEST_RANDOM)) ** TESTS
 
     def _spins(self, link: str, places: Sequence[int]) -> bool:
         """Whether a link is a rod between two S joints that can spin unseen."""

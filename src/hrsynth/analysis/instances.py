@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..budgets import LARGEST_RANDOM
 from ..geometry.incidences import Incidence
 from ..geometry.ranks import rank_of
 from ..mechanism import Joint, Mechanism, graphs
@@ -26,9 +27,6 @@ from ..tolerances import RANK_CUTOFF, RANK_GAP
 
 if TYPE_CHECKING:
     from flint import fmpz_mat
-
-LARGEST = 10**9
-"""Range of the random whole numbers, of either sign: the larger, the smaller the chance of an accident."""
 
 
 class NotRecognised(Exception):
@@ -224,7 +222,7 @@ def seen(sight: Sight, drawn: Geometry) -> Numbers:
 def _numbers(count: int, rng: random.Random) -> Numbers:
     from flint import fmpq
 
-    return np.array([fmpq(rng.choice((-1, 1)) * rng.randint(1, LARGEST)) for _ in range(count)], dtype=object)
+    return np.array([fmpq(rng.choice((-1, 1)) * rng.randint(1, LARGEST_RANDOM)) for _ in range(count)], dtype=object)
 
 
 def _whole(vector: Numbers) -> Numbers:

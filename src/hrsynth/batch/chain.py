@@ -13,6 +13,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from ..budgets import CHAIN_STEP, CHAIN_STEPS
 from ..geometry.so3 import exponential, logarithm
 from ..geometry.vectors import Array, hats, inverse, perpendicular
 from ..mechanism import Joint, JointType, Mechanism
@@ -21,12 +22,8 @@ from ..mechanism.observation import Direction
 from ..tolerances import CLOSED, RANK_CUTOFF, SOLVED
 from .stage import Stage
 
-LONGEST = 0.5
-"""Longest step of a link (characteristic lengths, radians)."""
 ITERATIONS = 25
 """Steps at the end of the way to a pose."""
-FEW = 4
-"""Steps at each place on the way."""
 STRIDE = 0.2
 """Length of the way from one place to the next (characteristic lengths, radians)."""
 
@@ -161,7 +158,7 @@ class Chain:
             damping = np.maximum(size[live] ** 2, 1e-14)
             A = J.transpose(0, 2, 1) @ J + damping[:, None, None] * np.eye(J.shape[2])
             step = -np.linalg.solve(A, J.transpose(0, 2, 1) @ residual[:, :, None])[..., 0]
-            step *= np.minimum(1.0, LONGEST / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
+            step *= np.minimum(1.0, CHAIN_STEP / np.maximum(np.abs(step).max(axis=1), 1e-300))[:, None]
             X[live[:, None], self.free] = moved(X[live[:, None], self.free], step.reshape(len(live), -1, 6))
         return X, np.where(self.ties.stand(X), size, np.inf)
 
@@ -195,7 +192,7 @@ class Chain:
         for step in range(1, steps + 1):
             part = step / steps
             there = self.end(stage, p0 + part * (p - p0), exponential(part * turn) @ R0 if step < steps else R)
-            state, residual = self.led(state, there, ITERATIONS if step == steps else FEW)
+            state, residual = self.led(state, there, ITERATIONS if step == steps else CHAIN_STEPS)
         return Ends(self, stage, state, residual, R, span)
 
     def turns(self, stage: Stage) -> bool:

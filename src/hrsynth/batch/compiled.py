@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..tolerances import RANK_CUTOFF
-from .cones import BISECTIONS, CLIMBS, EXACT, HALVINGS, MEETING, NEWTON, NOTHING, ROUNDS, STARTS, TIGHT
+from ..tolerances import CONES_MET, CONES_TIGHT, FLAT_CONE, RANK_CUTOFF
+from .cones import BISECTIONS, CLIMBS, HALVINGS, MEETING, NEWTON, ROUNDS, STARTS
 from .limb import Kind
 
 CONSTANT, TURNING, DISTANCE, CIRCLE, LINE = (int(kind) for kind in list(Kind)[:5])
@@ -115,7 +115,7 @@ def direct(B, C, w, warm):  # type: ignore[no-untyped-def]
     if that is far from here."""
     B0, B1, B2, B3, B4, B5 = B[0], B[1], B[2], B[3], B[4], B[5]
     C0, C1, C2, C3, C4, C5 = C[0], C[1], C[2], C[3], C[4], C[5]
-    least_a, least_b = NOTHING * (B0 + B1 + B2), NOTHING * (C0 + C1 + C2)
+    least_a, least_b = FLAT_CONE * (B0 + B1 + B2), FLAT_CONE * (C0 + C1 + C2)
     x, y, z = w[0], w[1], w[2]
     for _ in range(NEWTON):
         bx, by, bz = B0 * x + B3 * y + B4 * z, B3 * x + B1 * y + B5 * z, B4 * x + B5 * y + B2 * z
@@ -151,7 +151,7 @@ def direct(B, C, w, warm):  # type: ignore[no-untyped-def]
         if det > 0.0 and hee < 0.0:
             short = 1 / det
             along_e, along_f = (hef * gf - hff * ge) * short, (hef * ge - hee * gf) * short
-            if along_e * ge + along_f * gf <= EXACT * total:
+            if along_e * ge + along_f * gf <= CONES_MET * total:
                 w[0], w[1], w[2] = x, y, z
                 proved = (total - see) * (total - sff) >= sef * sef and total >= see
                 return total if proved else -1.0
@@ -199,7 +199,7 @@ def two(B, C, S, w, near):  # type: ignore[no-untyped-def]
             low, below, above = t, off, above / 2
         else:
             high, above, below = t, off, below / 2
-        if off * off <= EXACT * t * (1 - t) * total * total or high - low <= 1e-15:
+        if off * off <= CONES_MET * t * (1 - t) * total * total or high - low <= 1e-15:
             break
         fixed = a / total
         t = fixed if low < fixed < high and step % 3 == 0 else low + (high - low) * below / (below - above)
@@ -260,7 +260,7 @@ def several(B, S, w, here, there, starts):  # type: ignore[no-untyped-def]
             for i in range(k):
                 S[j] += B[i, j] * (total / here[i])
         upper = min(upper, sqrt(max(top(S, w), 0.0)))
-        if upper <= lower * (1 + TIGHT):
+        if upper <= lower * (1 + CONES_TIGHT):
             break
         for i in range(k):
             here[i] *= here[i]

@@ -16,15 +16,12 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..geometry.vectors import Array
+from ..tolerances import CONES_MET, CONES_TIGHT, FLAT_CONE
 
-EXACT = 1e-14
-"""Gap between the bounds, relative, at which a maximum of two cones is found."""
 NEWTON = 12
 """Steps after which the direct way to the maximum of two cones is given up."""
 STARTS = 3
 """Starts of that way: the later ones from the end of the one before, where another maximum is larger."""
-NOTHING = 1e-20
-"""Part of a cone's largest squared error below which its term has no derivative worth the name."""
 HALVINGS = 60
 """Evaluations after which the search of two cones' weights ends."""
 MEETING = -0.9
@@ -35,8 +32,6 @@ BISECTIONS = 10
 """Halvings with which the way of a round is found."""
 CLIMBS = 10
 """Steps of the ascent from each of its starts to the lower bound of three cones and more; four times as many follow."""
-TIGHT = 1e-10
-"""Gap between the bounds of three cones and more, relative, at which the maximum counts as found."""
 
 
 def largest(B: Sequence[Array]) -> tuple[Array, Array]:
@@ -150,7 +145,7 @@ def _direct(B: Array, C: Array, w: Array) -> tuple[Array, Array]:
     for _ in range(NEWTON):
         Bw, Cw = _times(B, w), _times(C, w)
         aa, bb = _dot(w, Bw), _dot(w, Cw)
-        sound = (aa > NOTHING * (B[0] + B[1] + B[2])) & (bb > NOTHING * (C[0] + C[1] + C[2]))
+        sound = (aa > FLAT_CONE * (B[0] + B[1] + B[2])) & (bb > FLAT_CONE * (C[0] + C[1] + C[2]))
         a, b = np.sqrt(aa), np.sqrt(bb)
         total, S, (e, f) = a + b, B / a + C / b, tangents(w)
         be, bf, ce, cf = _dot(Bw, e) / a, _dot(Bw, f) / a, _dot(Cw, e) / b, _dot(Cw, f) / b
@@ -160,7 +155,7 @@ def _direct(B: Array, C: Array, w: Array) -> tuple[Array, Array]:
         ge, gf, det = be + ce, bf + cf, hee * hff - hef * hef
         onto_e, onto_f = (hef * gf - hff * ge) / det, (hef * ge - hee * gf) / det
         rising = sound & (det > 0) & (hee < 0)
-        there = rising & (onto_e * ge + onto_f * gf <= EXACT * total)
+        there = rising & (onto_e * ge + onto_f * gf <= CONES_MET * total)
         proved = there & (ee * ff >= ef * ef) & (ee <= 0)
         value[live[proved]] = total[proved]
         open_ = sound & ~there
@@ -195,7 +190,7 @@ def _weighed(B: Array, C: Array) -> Array:
         rising = off > 0
         low, high = np.where(rising, t, low), np.where(rising, high, t)
         below, above = np.where(rising, off, below / 2), np.where(rising, above / 2, off)
-        open_ = (off * off > EXACT * t * (1 - t) * total * total) & (high - low > 1e-15)
+        open_ = (off * off > CONES_MET * t * (1 - t) * total * total) & (high - low > 1e-15)
         if not open_.any():
             break
         fixed = a / np.where(total > 0, total, 1.0)
@@ -235,7 +230,7 @@ def _several(B: Sequence[Array]) -> tuple[Array, Array]:
         total = roots.sum(axis=0)
         square, w = top(_weighted(stack, total / roots))
         upper[live] = np.minimum(upper[live], np.sqrt(np.maximum(square, 0.0)))
-        open_ = upper[live] > lower[live] * (1 + TIGHT)
+        open_ = upper[live] > lower[live] * (1 + CONES_TIGHT)
         if not open_.any():
             break
         live, stack, roots, w = live[open_], stack[..., open_], roots[:, open_], w[:, open_]

@@ -14,6 +14,7 @@ from importlib.util import find_spec
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..budgets import LARGEST_BATCH
 from ..errors import BadRequest
 from ..geometry.vectors import Array, frozen
 from ..kinematics.configuration import ClosedConfiguration
@@ -32,8 +33,6 @@ CHUNK = 4096
 """Poses that are worked on together: their arrays stay in the cache, and what is not kept is freed."""
 COMPILED_FROM = 20_000
 """Poses from which numba's start (about half a second) is worth its while."""
-LARGEST = 1 << 29
-"""Bytes that the result of one evaluation may take; more poses are asked for in parts (``Batch.sweep``)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,9 +133,9 @@ class Batch:
         watched = self._watched(legs)
         half = None if cones is None else _half_angles(cones, len(watched))
         need = 8 * len(X) * (3 * len(watched) * (self.stage.dof + 1) + 5)
-        if need > LARGEST:
+        if need > LARGEST_BATCH:
             raise BadRequest("the result of a batch takes too much memory (bytes)", need,
-                             f"at most {LARGEST}; sweep goes through any number of poses in parts")
+                             f"at most {LARGEST_BATCH}; sweep goes through any number of poses in parts")
         if self._quick(len(X), compiled):
             return self._compiled(X, watched, half)
         return self._plain(X, watched, half)

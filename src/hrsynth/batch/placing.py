@@ -12,6 +12,7 @@ from itertools import takewhile
 
 import numpy as np
 
+from ..budgets import FAST_DIRECTIONS
 from ..errors import NotSampled
 from ..geometry.so3 import between, exponential, quaternions
 from ..geometry.vectors import Array, frozen, inverse
@@ -28,8 +29,6 @@ from .plain import Flags, Poses, rod, turning
 
 STEP = 0.15
 """Length of a step of a walk (characteristic lengths, radians)."""
-FAR = 20.0
-"""How much larger than at home the rates of the directions may become on a walk."""
 CLOSING = 12
 """Gauss-Newton steps from where the subproblem puts a leg's links."""
 
@@ -74,7 +73,7 @@ class Placer:
         """``count`` random configurations: walks of up to ``steps`` small steps of the platform from its home, side by
         side; a walk ends where the robot does not reach on, or comes near to a Type 1 singularity."""
         rng, batch = np.random.default_rng(seed), self.batch
-        limit = FAR * float(batch.evaluate(batch.home[None]).singular_values[0, 0])
+        limit = FAST_DIRECTIONS * float(batch.evaluate(batch.home[None]).singular_values[0, 0])
         given = failed = 0
         walks = -(-count // steps)
         while given < count:

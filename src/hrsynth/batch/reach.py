@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 
 import numpy as np
 
+from ..budgets import FIRST_CELLS, SWEEP_HALVINGS
 from ..errors import PoseNotReached
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.leg_reach import worst_leg
@@ -19,11 +20,6 @@ from ..mechanism.pose import Grid, Pose
 from ..tolerances import AS_PRINTED
 from .grids import ready
 from .placing import Placer
-
-FIRST = 40
-"""Cells of a grid, nearest first, that are tried from the zero configuration before the grid counts as unreachable."""
-FINER = 4
-"""How often in a sweep, where a pose can be reached from several neighbours."""
 
 
 def generic_motion(start: ClosedConfiguration, question: Measurement) -> PlatformMotion:
@@ -85,14 +81,14 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
                 progress()
 
     distance = [float(np.linalg.norm(goal.rows(start.twin, start.q)[0])) for goal in goals]
-    for cell in sorted(range(len(goals)), key=lambda i: (round(distance[i], 9), i))[:FIRST]:
+    for cell in sorted(range(len(goals)), key=lambda i: (round(distance[i], 9), i))[:FIRST_CELLS]:
         settle(cell, start, HALVINGS)
         if found:
             break
     while queue:
         cell, origin = queue.popleft()
         if cell not in found:
-            settle(cell, found[origin], FINER)
+            settle(cell, found[origin], SWEEP_HALVINGS)
     return tuple(found.get(cell) for cell in range(len(goals)))
 
 

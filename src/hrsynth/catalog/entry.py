@@ -24,6 +24,7 @@ from ..mechanism.legs import decompose
 from ..mechanism.normal import normal_form
 from ..mechanism.sensors import encoders
 from ..rewrite.strategy import Step
+from ..tolerances import PROVED_CHANCE
 from .geometry import mechanism
 from .groups import group
 from .words import Word, parse
@@ -34,8 +35,6 @@ ATTEMPTS = 3
 """Choices of dimensions, of which the first that can be studied is taken."""
 INSTANCES = 5
 """Configurations at which assembly modes are listed."""
-CHANCE = 1e-9
-"""Largest chance of an error of a record that is called proved."""
 
 
 def entry(text: str) -> dict[str, Any]:
@@ -129,7 +128,7 @@ def _study(word: Word, attempt: int) -> _Study:
 def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
     """Raise ``NotConfirmed`` unless the exact verdict is that of the closed configurations."""
     generic = exact.verdict(samples.question.observations)
-    if not generic.exact or (generic.basis and generic.basis.observed) or generic.chance > CHANCE:
+    if not generic.exact or (generic.basis and generic.basis.observed) or generic.chance > PROVED_CHANCE:
         raise NotConfirmed(exact.mechanism.name, generic.reason)
     if generic.rank != found.rank:
         raise NotConfirmed(exact.mechanism.name, f"legs {', '.join(found.legs)} see {generic.rank} of {found.dof} "

@@ -11,6 +11,7 @@ from itertools import islice
 from typing import Any
 
 from .. import __version__
+from ..budgets import PARTS_AHEAD
 from ..errors import BadRequest, MissingExtra
 from .source import Made, Stopped
 
@@ -22,8 +23,6 @@ PATIENCE = 10.0
 """Seconds within which a cluster has to answer."""
 LEASH = 0.5
 """Seconds within which a worker process notices that its parent was killed."""
-AHEAD = 3
-"""Parts that wait for each thread of a cluster."""
 
 
 def crew(workers: int = 1, cluster: str | None = None) -> Crew:
@@ -108,7 +107,7 @@ def _served(client: Any, task: Task, parts: Iterator[list[str]]) -> Iterator[Mad
     from concurrent.futures import CancelledError as FutureCancelled
 
     waiting: set[Any] = set()
-    ahead = AHEAD * max(2, sum(client.nthreads().values()))
+    ahead = PARTS_AHEAD * max(2, sum(client.nthreads().values()))
     try:
         while waiting := waiting | _submitted(client, task, islice(parts, ahead - len(waiting))):
             done, waiting = _finished(client, waiting)

@@ -20,12 +20,11 @@ from ..mechanism.legs import decompose, default_observation, observation_of
 from ..mechanism.model import Mechanism
 from ..mechanism.normal import normal_form
 from ..mechanism.observation import Direction
+from ..tolerances import SQUARE_AXES
 from .words import COMPOSITE, Joint, Leg, Word
 
 Z = np.array([0.0, 0.0, 1.0])
 Rng = np.random.Generator
-SQUARE = 1e-9
-"""Two axes of a U are at right angles if the cosine of their angle is below."""
 
 
 def mechanism(word: Word, attempt: int = 0) -> Mechanism:
@@ -221,7 +220,7 @@ class _Limb:
                 found.append(rotation_about(known[other], self.rng.uniform(0, 2 * np.pi)) @ perpendicular(known[other]))
             else:
                 found.append(known[name])
-        if abs(found[0] @ found[1]) > SQUARE:
+        if abs(found[0] @ found[1]) > SQUARE_AXES:
             raise BadRequest(f"word {str(self.draft.word)!r}: the axes of U{names} are not at right angles",
                              round(float(found[0] @ found[1]), 6), "n or q for one of them")
         return found

@@ -36,6 +36,7 @@ import re
 from collections import Counter
 from dataclasses import dataclass, replace
 
+from ..budgets import LARGEST_WORD
 from ..errors import BadRequest
 
 VERSION = 1
@@ -54,8 +55,6 @@ ALIKE = ("hjm", "abc")
 """Names that stand for the same kind of direction, in the order in which a leg uses them."""
 PLATFORMS = {"": 1, "point": 1, "bar": 2, "slide": 2}
 """Platforms, and the bodies on which legs end."""
-LARGEST = 12
-"""Legs of a word."""
 
 _JOINT = re.compile(r"(?P<letter>2SS|2US|Pi|[RPCUS])(?P<axes>[a-z]*)(?P<motor>\*?)(?P<watched>!?)")
 _LEGS = re.compile(r"(?P<count>[0-9]*)\((?P<leg>[^()]*)\)")
@@ -185,8 +184,8 @@ def parse(text: str) -> Word:
         raise BadRequest(f"word {text!r}: bodies on which legs end", len(bodies),
                          str(PLATFORMS[platform]))
     word = Word.of(*bodies, platform=platform)
-    if not 2 <= len(word.legs) <= LARGEST:
-        raise BadRequest(f"word {text!r}: number of legs", len(word.legs), f"2 to {LARGEST}")
+    if not 2 <= len(word.legs) <= LARGEST_WORD:
+        raise BadRequest(f"word {text!r}: number of legs", len(word.legs), f"2 to {LARGEST_WORD}")
     return word
 
 
@@ -197,8 +196,8 @@ def _legs(text: str, part: str) -> list[Leg]:
         if match is None:
             raise BadRequest(f"word {text!r}: cannot be read", term, "legs such as 3(Rz*-Rz-Rz), joined by +")
         count = int(match["count"] or 1)
-        if not 1 <= count <= LARGEST:
-            raise BadRequest(f"word {text!r}: number of equal legs", count, f"1 to {LARGEST}")
+        if not 1 <= count <= LARGEST_WORD:
+            raise BadRequest(f"word {text!r}: number of equal legs", count, f"1 to {LARGEST_WORD}")
         found += [_leg(text, match["leg"])] * count
     return found
 

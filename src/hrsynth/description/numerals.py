@@ -12,13 +12,12 @@ import re
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..budgets import LARGEST_NUMBER
 from ..geometry.vectors import Array, pose, rotation_about, rotation_from_rpy
 
 ANGLE_DECIMALS = 13
 """Decimals of angles and of the components of axes."""
 
-LARGEST = 1e9
-"""Largest magnitude of a number that a robot file may hold (metres, radians)."""
 
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
@@ -29,8 +28,8 @@ def parsed(text: str, count: int) -> Array:
     for word in words:
         if not _NUMBER.fullmatch(word):
             raise ValueError("finite numbers")
-        if not abs(float(word)) <= LARGEST:
-            raise ValueError(f"numbers up to {LARGEST:g}")
+        if not abs(float(word)) <= LARGEST_NUMBER:
+            raise ValueError(f"numbers up to {LARGEST_NUMBER:g}")
     if len(words) != count:
         raise ValueError("one number" if count == 1 else f"{count} numbers")
     return np.array([float(word) for word in words])

@@ -9,11 +9,12 @@ from dataclasses import dataclass, field
 import numpy as np
 from lxml import etree
 
+from ..budgets import LARGEST_NUMBER
 from ..errors import BadRequest
 from ..geometry.vectors import Array, frozen, inverse, pose, unit
 from ..mechanism.model import Joint, JointType, Limits, Mechanism, Motor
 from ..mechanism.observation import Direction
-from ..tolerances import SAME_DIRECTION
+from ..tolerances import AT_ORIGIN, SAME_DIRECTION
 from . import chains, numerals, xml
 from .tree import outward, spanning
 
@@ -23,10 +24,8 @@ LOOP_TYPES = {
     JointType.FIXED: "fixed",
 }
 _OWN = re.compile(r"<hrsynth[\s/>]")
-_WIDE = {"lower": -1000.0, "upper": 1000.0, "effort": 1000.0, "velocity": 1000.0}
+_NO_LIMIT = {"lower": -1000.0, "upper": 1000.0, "effort": 1000.0, "velocity": 1000.0}
 INTERFACE = "hardware_interface/VelocityJointInterface"
-_AT_ORIGIN = 1e-12
-"""Distance (m) below which a joint's centre is the origin of the link that it carries."""
 
 
 def write(mechanism: Mechanism) -> str:
@@ -57,8 +56,8 @@ class _Writer:
         coordinates = [link.pose[:3, 3] for link in mechanism.links.values()]
         coordinates += [joint.point for joint in mechanism.joints.values()]
         scale = float(np.max(np.abs(coordinates)))
-        if not scale <= numerals.LARGEST:
-            raise BadRequest("coordinates of links and joints", scale, f"finite numbers up to {numerals.LARGEST:g}")
+        if not scale <= LARGEST_NUMBER:
+            raise BadRequest("coordinates of links and joints", scale, f"finite numbers up to {LARGEST_NUMBER:g}")
         self.decimals = numerals.length_decimals(scale)
         self.poses: dict[str, Array] = {mechanism.base: frozen(np.eye(4))}
 
@@ -93,7 +92,7 @@ class _Writer:
     def _tree_joint(self, joint: Joint) -> _Written:
         written = _Written()
         X_P, X_child = self.poses[joint.predecessor], self.mechanism.links[joint.successor].pose
-        tip = bool(np.linalg.norm(X_child[:3, 3] - joint.point) > _AT_ORIGIN)
+        tip = bool(np.linalg.norm(X_child[:3, 3] - joint.point) > AT_ORIGIN)
         X_PJ, attributes = numerals.origin(inverse(X_P) @ pose(joint.point, X_child[:3, :3]), self.decimals)
         X_J = X_P @ X_PJ if attributes else X_P
         local = _local_axes(joint, X_J)
@@ -142,7 +141,7 @@ class _Writer:
         for tag, axis in zip(("axis", "axis2"), axes, strict=False):
             etree.SubElement(element, tag, xyz=numerals.axis(axis))
         if joint.limits is not None:
-            given = {key: getattr(joint.limits, key) for key in _WIDE}
+            given = {key: getattr(joint.limits, key) for key in _NO_LIMIT}
             etree.SubElement(element, "limit", {k: numerals.exact(v) for k, v in given.items() if v is not None})
         xml.restore(element, joint.xml)
         return _Written([element], [joint.name])
@@ -206,17 +205,17 @@ def _tree_type(kind: JointType, limits: Limits | None) -> str:
 
 def _limit(element: xml.Element, kind: JointType, limits: Limits | None) -> None:
     """Append a ``<limit>`` with all that URDF demands; ``free`` names the values that stand for no limit."""
-    given = {} if limits is None else {key: getattr(limits, key) for key in _WIDE}
+    given = {} if limits is None else {key: getattr(limits, key) for key in _NO_LIMIT}
     known = {key: value for key, value in given.items() if value is not None}
     if kind is JointType.PRISMATIC or (kind is JointType.REVOLUTE and {"lower", "upper"} & set(known)):
-        needed = list(_WIDE)
+        needed = list(_NO_LIMIT)
     elif known:
         needed = ["effort", "velocity"]
     else:
         return
     free = [key for key in needed if key not in known]
-    values = known | {key: _WIDE[key] for key in free}
-    attributes = {key: numerals.exact(values[key]) for key in _WIDE if key in values}
+    values = known | {key: _NO_LIMIT[key] for key in free}
+    attributes = {key: numerals.exact(values[key]) for key in _NO_LIMIT if key in values}
     if free:
         attributes["free"] = " ".join(free)
     etree.SubElement(element, "limit", attributes)

@@ -12,12 +12,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from ..budgets import SURELY_MEANT
 from ..tolerances import RANK_GAP, SAME_POINT
 from .vectors import Array, crossed
 
 Indices = NDArray[np.intp]
-OFTEN = 2
-"""Configurations beside the first at which a relation must hold before that is no accident."""
 
 
 @dataclass(frozen=True)
@@ -51,7 +50,7 @@ class Sieve:
         close, far = ~kept & (defects < RANK_GAP * tolerance), defects >= RANK_GAP * tolerance
         self.rejected = min(self.rejected, float(np.min(defects, where=close, initial=np.inf)))
         here = sizes < tolerance
-        for row in here[here[:, 0] & (here[:, 1:].sum(axis=1) >= OFTEN) & far]:
+        for row in here[here[:, 0] & (here[:, 1:].sum(axis=1) >= SURELY_MEANT) & far]:
             self.mixed = int(row[1:].sum()), len(row) - 1
         return near[kept]
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ..budgets import LEG_ITERATIONS
 from ..errors import LoopsNotClosed
 from ..geometry.vectors import Array, inverse
 from ..mechanism import Joint, JointType, Mechanism, Observation
@@ -30,8 +31,6 @@ from .ways import Part, ways
 STARTS = 24
 """Configurations of a leg, the zero configuration first, from which it is closed at a pose: for each of its listed
 closures, and as many without a list."""
-FAR = 400
-"""Iterations in which a leg is closed, at most: each moves a joint by half a characteristic length or less."""
 
 ASSEMBLED, BEYOND, IMPOSSIBLE, NOT_FOUND = "yes", "beyond limits", "no", "not found"
 """Whether a robot can be assembled: a configuration is at hand; only beyond joints' limits, and it cannot, both proved;
@@ -162,7 +161,7 @@ class Assembler:
 
     def _closed(self, twin: PinocchioModel, start: Array, target: Target) -> Array | None:
         """The closed configuration that a start leads to."""
-        q, residual = closed(twin, start, target, tolerance=SOLVED, iterations=FAR)
+        q, residual = closed(twin, start, target, tolerance=SOLVED, iterations=LEG_ITERATIONS)
         turned = target.point is not None or _turned_as(twin.pose(q, target.link), target.pose)
         return q if residual <= CLOSED and turned else None
 

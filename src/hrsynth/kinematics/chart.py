@@ -19,9 +19,6 @@ from .configuration import ClosedConfiguration, closed
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement
 
-WIDE = 0.5
-"""Length of y (characteristic lengths, radians) beyond which another chart should take over."""
-
 
 @dataclass(frozen=True, eq=False)
 class _Coordinates:

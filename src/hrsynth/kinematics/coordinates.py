@@ -11,9 +11,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..budgets import SLIDER_PART
 from ..geometry.so3 import logarithm, logarithm_rate, turn_about, wrapped
 from ..geometry.vectors import Array
-from ..tolerances import SAME_DIRECTION
+from ..tolerances import NO_SLIDER, SAME_DIRECTION
 from .configuration import ClosedConfiguration, point_velocity
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion
@@ -23,10 +24,6 @@ from .steps import led
 NAMES = ("x", "y", "z", "turn about x", "turn about y", "turn about z")
 INDEPENDENT = 0.1
 """Part of a coordinate's rate that those before it must leave free."""
-SHORT = 0.98
-"""Part of the way to where a slider stops that is used: the edge of the workspace is left out."""
-NOTHING = 1e-3
-"""Ways shorter than this part of the span count as none."""
 HALVINGS = 4
 """How often a step is halved before a slider stops."""
 
@@ -113,9 +110,9 @@ class Coordinates:
         end = self._changed(index, self.values[index] + span)
         came = led(start, self.motion, end, HALVINGS)[1] if span else 0.0
         if came < 1:
-            came *= SHORT
+            came *= SLIDER_PART
         here = start
-        for step in range(1, count + 1) if came > NOTHING else ():
+        for step in range(1, count + 1) if came > NO_SLIDER else ():
             aim = self._changed(index, self.values[index] + came * span * step / count)
             here, arrived = led(here, self.motion, aim, HALVINGS)
             if arrived < 1:

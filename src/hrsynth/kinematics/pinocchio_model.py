@@ -11,14 +11,13 @@ from __future__ import annotations
 import numpy as np
 import pinocchio as pin
 
+from ..budgets import LARGEST_MODEL
 from ..errors import BadMechanism, BadRequest
 from ..geometry.vectors import Array
 from ..mechanism import Joint, JointType, Mechanism, graphs
 
 _NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
-LARGEST = 256
-"""Coordinates above which a mechanism is refused: Pinocchio's data hold several cubes of their number."""
 
 
 class PinocchioModel:
@@ -39,8 +38,9 @@ class PinocchioModel:
         constraints = [self._loop(joint) for joint in loops]
         self.loops = tuple(joint.name for joint in loops)
         self._gears = self._gear_rows()
-        if self.model.nv > LARGEST:
-            raise BadRequest(f"{mechanism.name}: joints with {self.model.nv} coordinates", None, f"up to {LARGEST}")
+        if self.model.nv > LARGEST_MODEL:
+            raise BadRequest(f"{mechanism.name}: joints with {self.model.nv} coordinates", None,
+                             f"up to {LARGEST_MODEL}")
         self.data = self.model.createData()
         self._models = pin.StdVec_ConstraintModel()
         self._datas = pin.StdVec_ConstraintData()

@@ -13,11 +13,12 @@ from functools import cached_property
 
 import numpy as np
 
+from ..budgets import EASY_ITERATIONS
 from ..errors import BadMechanism, BranchPoint, NotSampled
 from ..geometry.ranks import kernel_basis, largest_angle, range_basis
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
-from ..tolerances import CLOSED, EXACT, FOLLOWED, INVERTED, NUDGE, PASSED_BY, RANK_GAP, SHARP, SOLVED
+from ..tolerances import CLOSED, EXACT, FOLLOWED, INVERTED, NUDGE, PASSED_BY, RANK_GAP, SHARP, SOLVED, STEADY_TANGENT
 from .branch import CORRECTED, follows
 from .configuration import ClosedConfiguration, Target, closed, limited
 from .operation import OperationMode, Signature, grouped
@@ -30,28 +31,16 @@ HALVED = tuple(2.0**-k for k in range(10))
 """Parts of a step that are tried; where the last does not follow the branch, a singularity of the loops lies ahead."""
 TURNS = 3
 """Directions that a walk tries before a singularity before it is given up."""
-BEYOND = 24
-"""Steps of such a walk."""
-STEADY = 1e-10
-"""Turn (radians) of the tangent space that the residual may cause."""
-LEAVING = 24
-"""Steps in random directions by which the branches at a singular zero configuration are sought."""
 ASKED = 40
 """Configurations beyond a singularity that are asked whether they may be of another operation mode."""
 MET = 6
 """How many of those that may are confirmed by walks from there."""
 BEYOND = 16
 """Steps of such a walk."""
-STEADY = 1e-10
-"""Turn (radians) of the tangent space that the residual may cause."""
 LEAVING = 24
 """Steps in random directions by which the branches at a singular zero configuration are sought."""
-MET = 6
-"""Configurations beyond a singularity from which walks are sent, to see whether they are of another operation mode."""
 STEPS = 4
 """Steps from the zero configuration to a sample."""
-EASY = 10
-"""Iterations within which the robot itself must find each configuration of the way again; more are a fold nearby."""
 WEAKEST = 0.05
 """Fraction to which the loops' smallest singular value may fall below that of the zero configuration."""
 
@@ -225,7 +214,7 @@ class _Walks:
     def _found_again(self, sample: Sample) -> bool:
         led = [replace(t, measured=tuple(pair for pair in t.measured if pair[0].key in self.leading))
                for t in sample.way]
-        return followed(sample.configuration.twin, led, iterations=EASY)[1] <= FOLLOWED
+        return followed(sample.configuration.twin, led, iterations=EASY_ITERATIONS)[1] <= FOLLOWED
 
     def walk(self, start: ClosedConfiguration) -> Sample | None:
         """The sample at the end of a random walk; None where it is blocked, or its ranks are not clear."""
@@ -278,13 +267,13 @@ class _Walks:
 def _steady(here: ClosedConfiguration) -> ClosedConfiguration | None:
     """The same configuration, its loops closed so well that T_qC does not turn by the residual; None where numbers do
     not allow that, near a singularity."""
-    if here.residual <= STEADY * here.kernel()[1].weakest ** 2:
+    if here.residual <= STEADY_TANGENT * here.kernel()[1].weakest ** 2:
         return here
     twin = here.twin
     here = ClosedConfiguration.of(twin, closed(twin, here.q, tolerance=SHARP, iterations=5)[0])
     aside, _ = kernel_basis(twin.jacobian(twin.moved(here.q, NUDGE * here.loops.right[:, -1])))
     turn = largest_angle(here.kernel()[0], aside) / NUDGE  # radians for each unit of the weakest direction
-    return here if turn * max(here.residual, SHARP) / here.strengths[-1] <= STEADY else None
+    return here if turn * max(here.residual, SHARP) / here.strengths[-1] <= STEADY_TANGENT else None
 
 
 def _moved(here: ClosedConfiguration, velocity: Array, part: float = 1.0,

@@ -6,9 +6,10 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..budgets import LONGEST_STEP
 from ..geometry.ranks import kernel_basis, range_basis
 from ..geometry.vectors import Array
-from ..tolerances import AS_PRINTED, CLOSED, FOLLOWED, NEAREST, PASSED_BY, RANK_CUTOFF, SOLVED
+from ..tolerances import AS_PRINTED, CLOSED, EASY_RANK, FOLLOWED, NEAR_FOLD, NEAREST, PASSED_BY, RANK_CUTOFF, SOLVED
 from .branch import follows, nears
 from .configuration import Aim, ClosedConfiguration, closed, limited, system
 from .pinocchio_model import PinocchioModel
@@ -23,12 +24,6 @@ JUMP = 0.01
 """Corrections below this are never jumps: on the edge of the workspace even exact steps need them."""
 EASING = 30
 """Further steps at a goal's own place where the way to it was not straight."""
-EASY_RANK = 1e-3
-"""Singular values below this part of the largest are no directions to go in on such a way."""
-NEAR_FOLD = 1e-5
-"""Singular values of loops and goal below which a fold is looked for."""
-LONGEST = 0.3
-"""Largest change of a coordinate in one step."""
 
 
 def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Aim,
@@ -85,7 +80,7 @@ def _stepped(here: ClosedConfiguration, goal: Aim, home: Goal) -> ClosedConfigur
     twin = here.twin
     error, rows = system(twin, here.q, goal)
     step = np.asarray(np.linalg.lstsq(rows, -error, rcond=RANK_CUTOFF)[0])
-    if np.max(np.abs(step), initial=0.0) > LONGEST:
+    if np.max(np.abs(step), initial=0.0) > LONGEST_STEP:
         return None
     there = _corrected(here, step, goal)
     if there is None or _beyond(rows, system(twin, there.q, goal)[1]):

@@ -13,16 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from ..budgets import FARTHEST_POSE, LARGEST_GRID
 from ..errors import BadRequest
 from ..geometry.vectors import Array, rotation_from_rpy
 
 SCALARS = ("x", "y", "z", "phi")
 PARTS = (*SCALARS, "rpy")
 EXAMPLE = "x=0.02,y=0.1,z=-0.7, and phi=10deg or rpy=0.1/0/0"
-LARGEST_GRID = 100_000
-"""Cells of a grid beyond which it is taken for a slip."""
-FARTHEST = 1e9
-"""Metres or radians in a pose beyond which it is taken for a slip: numbers no longer tell nearby poses apart there."""
 
 
 @dataclass(frozen=True)
@@ -42,8 +39,8 @@ class Pose:
         for name, values in self.given.items():
             if not all(map(math.isfinite, values)):
                 raise BadRequest(f"pose: {name} is not finite", "/".join(map(str, values)), "a finite number")
-            if max(map(abs, values)) > FARTHEST:
-                raise BadRequest(f"pose: {name} is too large", "/".join(map(str, values)), f"at most {FARTHEST:g}")
+            if max(map(abs, values)) > FARTHEST_POSE:
+                raise BadRequest(f"pose: {name} is too large", "/".join(map(str, values)), f"at most {FARTHEST_POSE:g}")
 
     @classmethod
     def parse(cls, text: str) -> Pose:

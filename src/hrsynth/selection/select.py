@@ -19,6 +19,7 @@ from ..analysis.modes.modes import modes_at
 from ..analysis.observed import ObservedRobot, prepare, silent
 from ..analysis.posture import Examiner
 from ..batch.reach import reach
+from ..budgets import AXIS_SEEN
 from ..errors import BadRequest, HrsynthError, PoseNotReached
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
@@ -30,7 +31,7 @@ from ..simulation.camera import cylinders, placed
 from ..simulation.ending import GOAL
 from ..simulation.servo import servo
 from .candidate import Candidate, Decision, Modes, singular_at
-from .sight import ENOUGH, Sight, camera_at, of_focal
+from .sight import Sight, camera_at, of_focal
 
 SIZE = 4
 """Legs of the largest sets."""
@@ -198,7 +199,7 @@ class _Work:
         least = self.sight.least(configurations)
         seen = {leg: least[leg] for leg in candidate.legs}
         worst = min(seen, key=lambda leg: seen[leg])
-        why = None if seen[worst] >= ENOUGH else f"the camera sees {100 * seen[worst]:.0f} % of leg {worst}"
+        why = None if seen[worst] >= AXIS_SEEN else f"the camera sees {100 * seen[worst]:.0f} % of leg {worst}"
         return replace(candidate, seen=seen, discarded=why)
 
     def decided(self, candidate: Candidate) -> Candidate:

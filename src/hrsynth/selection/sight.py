@@ -17,8 +17,6 @@ from ..simulation.camera import Camera, Rod
 Flags = NDArray[np.bool_]
 PLACES = 101
 """Points of a leg's axis that are looked at."""
-ENOUGH = 0.5
-"""Part of a leg's axis that is to be seen: its direction is rebuilt from what is seen of its edges."""
 
 
 @dataclass(frozen=True, eq=False)

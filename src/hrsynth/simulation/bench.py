@@ -21,17 +21,13 @@ from ..kinematics.locked import rezeroed
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.relation import relation
 from ..mechanism import Mechanism
-from ..tolerances import CLOSED, SOLVED
+from ..tolerances import BENCH_SETTLED, BENCH_STEADY, CLOSED, SOLVED
 from .law import Command, Poses
 from .mockup import STEP, coordinates, mockup
 from .run import OPEN, SERVED_AT, TIME, Loop, Run
 
 SAMPLE = 0.01
 """Seconds between two commands."""
-STILL = 1e-6
-"""‖e‖ at which the bench has settled."""
-STEADY = 1e-3
-"""Part by which an error may still change in a time constant when the bench has settled."""
 
 
 def simulator(what: str) -> Any:
@@ -75,8 +71,8 @@ class Bench:
                 for name, _, _ in coordinates(joint)]
 
     def run(self, loop: Loop, horizon: float) -> tuple[Run, Array]:
-        """Run until the error is below ``STILL`` or ``horizon`` (s); also the displacement of the platform since the
-        start, as simulated, (4, 4)."""
+        """Run until the error is below ``BENCH_SETTLED`` or ``horizon`` (s); also the displacement of the platform
+        since the start, as simulated, (4, 4)."""
         mujoco = simulator("the physics bench")
         model, data = self._model, mujoco.MjData(self._model)
         motors = [model.actuator(name).id for name in self._names]
@@ -112,9 +108,9 @@ class Bench:
     def _settled(self, loop: Loop, commands: list[Command]) -> bool:
         """Whether the error vanishes, or has stayed as it is for a time constant 1 / λ."""
         now, back = commands[-1].size, round(1 / (loop.law.gain * SAMPLE))
-        if now < STILL:
+        if now < BENCH_SETTLED:
             return True
-        return len(commands) > back and abs(now - commands[-1 - back].size) < STEADY * now
+        return len(commands) > back and abs(now - commands[-1 - back].size) < BENCH_STEADY * now
 
     def _command(self, loop: Loop, time: float, at: ClosedConfiguration, data: Any) -> Command:
         """The law's command for the directions of the simulated bodies."""

@@ -9,12 +9,13 @@ import numpy as np
 
 from ..analysis.modes.modes import AssemblyModes
 from ..analysis.posture import Posture
+from ..budgets import RUN_EVALUATIONS
 from ..errors import HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..tolerances import DAMPED, SAME_RELATION
 from .law import Command
-from .run import AWAY, EFFORT, LIMIT, LOST, MOST, OPEN, POISED, REST, SERVED_AT, Run, margins
+from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, SERVED_AT, Run, margins
 
 GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME = "goal", "mode", "antipodal", "local minimum", "boundary", "time"
 UNDECIDED = "undecided"
@@ -62,7 +63,8 @@ class Referee:
             return Ending(UNDECIDED, "the integrator found no way on, which says nothing of the robot")
         if run.stopped == AWAY:
             return Ending(BOUNDARY, "the platform runs away, nothing limits its slides")
-        over = f"more than {MOST:,} configurations would be needed" if run.stopped == EFFORT else "the time was over"
+        over = (f"more than {RUN_EVALUATIONS:,} configurations would be needed" if run.stopped == EFFORT
+                else "the time was over")
         return Ending(TIME, f"{over}, with ‖e‖ = {last.size:.3g}")
 
     def _served(self, at: ClosedConfiguration, directions: Array) -> Ending:

@@ -9,14 +9,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..budgets import WIDEST_NOISE
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 
 PERIOD = 0.04
 """Seconds between two independent errors (25 pictures a second); in between they change linearly."""
 
-WIDEST = 50.0
-"""Pixels by which an edge may be wrong at most."""
 EXAMPLE = "0.1deg or 0.002 (radians), with edges a number of pixels such as 0.3px"
 
 
@@ -40,8 +39,9 @@ class Amount:
         except ValueError:
             raise BadRequest("noise: not a number", text, EXAMPLE) from None
         value = math.radians(value) if degrees else value
-        if not 0 < value < (WIDEST if pixels else math.pi / 2):
-            raise BadRequest("noise", text, f"more than zero; cones of less than 90deg, edges less than {WIDEST:g}px")
+        if not 0 < value < (WIDEST_NOISE if pixels else math.pi / 2):
+            raise BadRequest("noise", text, "more than zero; cones of less than 90deg, edges less than "
+                                            f"{WIDEST_NOISE:g}px")
         return cls(value, pixels)
 
     def __str__(self) -> str:

@@ -10,6 +10,7 @@ from xml.etree import ElementTree as Xml
 
 import numpy as np
 
+from ..budgets import PICTURE_OVERSAMPLING
 from ..errors import MissingExtra, NotRendered
 from ..geometry.vectors import Array, inverse, unit
 from ..mechanism import Mechanism
@@ -22,8 +23,6 @@ from .noise import PERIOD
 COLOURS = np.array([[1, 0, 0], [0, 1, 0], [0, 0, 1], [1, 1, 0], [0, 1, 1], [1, 0, 1]], dtype=float)
 """Of the watched legs, on black; the others are dark grey."""
 GREY = 0.12
-FINER = 3
-"""Drawn pixels a pixel each way where edges are sought: not every driver smooths edges by itself."""
 PURE = 60.0
 """How far (of 255) a pixel may be from the colours between black and a leg's to count as that leg's."""
 BLACK = 8.0
@@ -71,8 +70,8 @@ class Stage:
         root = Xml.Element("mujoco")
         fov = np.degrees(2 * np.arctan(camera.height / 2 / camera.focal))
         visual = Xml.SubElement(root, "visual")
-        Xml.SubElement(visual, "global", offwidth=str(FINER * camera.width),
-                       offheight=str(FINER * camera.height))
+        Xml.SubElement(visual, "global", offwidth=str(PICTURE_OVERSAMPLING * camera.width),
+                       offheight=str(PICTURE_OVERSAMPLING * camera.height))
         Xml.SubElement(visual, "map", znear=str(0.02))
         Xml.SubElement(visual, "quality", offsamples="8")
         Xml.SubElement(visual, "headlight", ambient="1 1 1", diffuse="0 0 0", specular="0 0 0")
@@ -117,7 +116,7 @@ class Stage:
     @cached_property
     def finer(self) -> Stage:
         """The same, drawn finely enough to find edges in."""
-        return replace(self, fineness=FINER)
+        return replace(self, fineness=PICTURE_OVERSAMPLING)
 
     def _put(self, data: Any, name: str, X: Array) -> None:
         mujoco = drawing()

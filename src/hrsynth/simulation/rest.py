@@ -13,17 +13,11 @@ import numpy as np
 
 from ..errors import LoopsNotClosed
 from ..geometry.vectors import Array
-from ..tolerances import INVERTED, RESTED
+from ..tolerances import INVERTED, NEAR_REST, NEUTRAL_GROWTH, REST_SLOPE, RESTED
 
-SLOPE = 1e-4
-"""Step of the differences of ẏ: less than the width over which the law is damped."""
 ITERATIONS = 8
-NEAR = 0.1
-"""Longest Newton step (characteristic lengths, radians): beyond it no rest is near."""
 PERSISTS = 0.9
 """Part of an error that is left a time constant later where a rest is looked for: of one that vanishes, 1 / e is."""
-NEUTRAL = 1e-6
-"""Growth (per time constant) up to which a motion about a rest counts as none; speed up to which a drift does."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,13 +47,13 @@ def rest_near(rate: Callable[[Array], Array], y: Array) -> Rest | None:
     """The rest next to y (n,) by Newton's method on ẏ = rate(y); None where none was found near."""
     try:
         for _ in range(ITERATIONS):
-            steps = SLOPE * np.eye(len(y))
-            J = np.array([(rate(y + each) - rate(y - each)) / (2 * SLOPE) for each in steps]).T
+            steps = REST_SLOPE * np.eye(len(y))
+            J = np.array([(rate(y + each) - rate(y - each)) / (2 * REST_SLOPE) for each in steps]).T
             here = rate(y)
             step = np.asarray(np.linalg.lstsq(J, -here, rcond=INVERTED)[0], dtype=float)
             size = float(np.linalg.norm(step))
             # where J is singular, a velocity outside of its range goes on for ever
-            if not size <= NEAR or np.linalg.norm(here + J @ step) > NEUTRAL:
+            if not size <= NEAR_REST or np.linalg.norm(here + J @ step) > NEUTRAL_GROWTH:
                 return None
             y = y + step
             if size <= RESTED:

@@ -7,34 +7,32 @@ from typing import Any
 
 import numpy as np
 
+from ..budgets import RUN_AWAY, RUN_EVALUATIONS, WIDEST_CHART
 from ..errors import LoopsNotClosed
 from ..geometry.vectors import Array
 from ..kinematics import wrists
-from ..kinematics.chart import WIDE, Chart
+from ..kinematics.chart import Chart
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Measurement
 from ..mechanism import JointType, Mechanism
-from ..tolerances import ARRIVED, AT_REST, SERVED
+from ..tolerances import (
+    ARRIVED,
+    AT_REST,
+    INTEGRATED,
+    LOOPS_LOST,
+    NEUTRAL_GROWTH,
+    RUN_SHORTEST_STEP,
+    SERVED,
+    STRETCH_END,
+)
 from .law import Command, Desired, Law, Sense
 from .noise import PERIOD
-from .rest import NEUTRAL, Patience, rest_near
+from .rest import Patience, rest_near
 
 State = tuple[ClosedConfiguration, Command]
 
 SERVED_AT, REST, POISED, LIMIT, OPEN = "served", "rest", "poised", "limit", "open"
 AWAY, TIME, EFFORT, LOST = "away", "time", "effort", "lost"
-TOLERANCE = 1e-6
-"""Relative tolerance of the integrator, for coordinates of a chart as for errors at the start of a stretch."""
-CLOSER = 1e-2
-"""Part of its first error at which a stretch ends, so that the tolerance follows the error."""
-FAR = 20.0
-"""Characteristic lengths from its start at which a platform has run away."""
-MOST = 20_000
-"""Configurations that the integrator may ask for in a run."""
-LOOSE = 1e-3
-"""Part of its value at the start to which the loops' weakest singular value has fallen where a run cannot go on."""
-SHORTEST = 1e-9
-"""Longest step (time constants) with which a run that cannot go on has been tried."""
 HALVINGS = 40
 """Bisections that find the moment at which a joint meets its limit."""
 
@@ -44,7 +42,8 @@ class Run:
     """What happened: times (n,), the configurations and commands at them, and why it stopped: the error vanished
     (``served``), a stable rest was reached (``rest``), the command vanished where none was found (``poised``), a joint
     met its limit (``limit``), the loops' rank falls (``open``), the platform ran away (``away``), the time was over
-    (``time``), the integrator's ``MOST`` configurations were (``effort``), or it could not go on (``lost``)."""
+    (``time``), the integrator's ``RUN_EVALUATIONS`` configurations were (``effort``), or it could not go on
+    (``lost``)."""
 
     times: Array
     configurations: tuple[ClosedConfiguration, ...]
@@ -73,7 +72,7 @@ class Loop:
     def simulate(self, start: ClosedConfiguration, horizon: float) -> Run:
         """Run until it ends by itself, or ``horizon`` (s)."""
         times, found = [0.0], [(start, self._command(0.0, start))]
-        stopped, left, longest = None, MOST, np.inf
+        stopped, left, longest = None, RUN_EVALUATIONS, np.inf
         patience = Patience(1 / self.law.gain, 0.0, found[0][1].size)
         while stopped is None:
             stretch = _Stretch(self, Chart.around(found[-1][0], self.moving), found[-1][0], left, patience)
@@ -81,14 +80,14 @@ class Loop:
             left = stretch.left
             times += reached
             found += states
-            if stopped == LOST and longest * self.law.gain > SHORTEST:
+            if stopped == LOST and longest * self.law.gain > RUN_SHORTEST_STEP:
                 # the step was too long for the loops to follow, or for the chart: another chart, shorter steps
                 longest, stopped = min(longest, 1 / self.law.gain) / 8, None
             elif stopped == LOST and _loose(found[-1][0], start):
                 stopped = OPEN
             elif stopped is None:
                 longest *= 2
-                if self._shift(start, found[-1][0]) > FAR:
+                if self._shift(start, found[-1][0]) > RUN_AWAY:
                     stopped = AWAY
         return Run(np.array(times), tuple(c for c, _ in found), tuple(c for _, c in found), stopped)
 
@@ -136,7 +135,7 @@ class _Stretch:
         if settling and (end := self._end(start, np.zeros(self.chart.basis.shape[1]), first)):
             return ([], [], end[0]) if end[1] is first else ([start], [end[1]], end[0])
         until = horizon if start >= loop.steady else min(horizon, loop.steady)
-        tolerances = {"rtol": TOLERANCE, "atol": TOLERANCE * scale}
+        tolerances = {"rtol": INTEGRATED, "atol": INTEGRATED * scale}
         times: list[float] = []
         states: list[State] = []
         try:
@@ -159,7 +158,7 @@ class _Stretch:
                     return times, states, end[0]
                 if self.left <= 0:
                     return times, states, EFFORT
-                if np.linalg.norm(solver.y) > WIDE or (settling and state[1].size < CLOSER * scale):
+                if np.linalg.norm(solver.y) > WIDEST_CHART or (settling and state[1].size < STRETCH_END * scale):
                     return times, states, None
         except LoopsNotClosed:
             return times, states, LOST
@@ -178,7 +177,7 @@ class _Stretch:
     def _rest(self, time: float, y: Array) -> State | None:
         """The stable rest at which a run has arrived that is at y (n,); None where it is still on its way."""
         found = rest_near(lambda y: self.rate(time, y), y)
-        if found is None or np.linalg.norm(found.y - y) > ARRIVED or found.growth > NEUTRAL * self.loop.law.gain:
+        if found is None or np.linalg.norm(found.y - y) > ARRIVED or found.growth > NEUTRAL_GROWTH * self.loop.law.gain:
             return None
         return self.state(time, found.y)
 
@@ -194,7 +193,7 @@ class _Stretch:
 
 def _loose(at: ClosedConfiguration, start: ClosedConfiguration) -> bool:
     """Whether the loops lose their rank at a configuration."""
-    return at.kernel()[1].weakest < LOOSE * start.kernel()[1].weakest
+    return at.kernel()[1].weakest < LOOPS_LOST * start.kernel()[1].weakest
 
 
 def limited(mechanism: Mechanism) -> list[tuple[str, float, float]]:

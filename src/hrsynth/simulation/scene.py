@@ -13,6 +13,7 @@ from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.observed import ObservedRobot, prepare
 from ..analysis.posture import REGULAR, UNDECIDED, Examiner
 from ..batch.reach import reach
+from ..budgets import LONGEST_RUN, RUN_EVALUATIONS
 from ..errors import BadRequest, PoseNotReached, RankUndecided
 from ..geometry.so3 import angle_of
 from ..geometry.vectors import Array
@@ -27,11 +28,9 @@ from .law import Law, Sense, directions
 from .noise import Amount, Cones, Shocks
 from .pictures import Pictures, Stage, drawing, vision
 from .result import Servo, Spread
-from .run import EFFORT, MOST, Loop, Run
+from .run import EFFORT, Loop, Run
 from .track import tracked
 
-LONGEST = 10_000.0
-"""Seconds that a run with noise, on the physics bench or along a way may take: these go on to their end."""
 LASTS, NOISY_LASTS = 60.0, 16.0
 """Time constants 1 / λ that a run may take; that it takes where measurements are noisy."""
 SETTLED = 0.5
@@ -58,8 +57,8 @@ class Scene:
         for what, value in (("gain", gain), ("duration", duration)):
             if value is not None and not 0 < value < math.inf:
                 raise BadRequest(what, value, "a positive number")
-        if duration is not None and duration > LONGEST:
-            raise BadRequest("duration", duration, f"at most {LONGEST:g} seconds")
+        if duration is not None and duration > LONGEST_RUN:
+            raise BadRequest("duration", duration, f"at most {LONGEST_RUN:g} seconds")
         wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
         setting = prepare(robot, observe, camera, seed=seed)
         _sees(setting)
@@ -96,9 +95,9 @@ class Scene:
             raise BadRequest("time", time, "a positive number of seconds")
         steady = self.desired.duration if isinstance(self.desired, Trajectory) else 0.0
         found = time or steady + (NOISY_LASTS if noisy else LASTS) / self.law.gain
-        if noisy and found > LONGEST:
+        if noisy and found > LONGEST_RUN:
             raise BadRequest("seconds of a run with noise or physics", found,
-                             f"at most {LONGEST:g}: a shorter time, a larger gain")
+                             f"at most {LONGEST_RUN:g}: a shorter time, a larger gain")
         return found
 
     def loop(self, sensed: Sense | None = None, smooth: bool = True) -> Loop:
@@ -139,7 +138,7 @@ class Scene:
     def _notes(self, run: Run, still: Run, noisy: bool, simulated: Array | None) -> Iterator[str]:
         """What was measured on the benches."""
         if run.stopped == EFFORT:
-            yield f"the run was broken off after {MOST:,} configurations, at {run.times[-1]:.3g} s"
+            yield f"the run was broken off after {RUN_EVALUATIONS:,} configurations, at {run.times[-1]:.3g} s"
         if noisy:
             angles = np.degrees(np.array([np.arccos(np.clip(np.sum(each.directions * each.seen, axis=1), -1, 1))
                                           for each in run.commands]))

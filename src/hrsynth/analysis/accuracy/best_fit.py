@@ -15,31 +15,20 @@ from functools import cached_property
 
 import numpy as np
 
+from ...budgets import BEST_FIT_FIRST_STEP, BEST_FIT_SHORTEST_STEP, BEST_FIT_STEPS
 from ...errors import LoopsNotClosed
 from ...geometry.vectors import Array, hat
 from ...kinematics.chart import Chart
 from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.relation import Measurement, relation
-from ...tolerances import FOLLOWED, INVERTED
+from ...tolerances import FLAT_CURVATURE, FOLLOWED, HESSIAN_CHANGE, HESSIAN_STEP, INVERTED
 from ..classes import interaction_matrix
 
 FIT, ENDS, NOT_FOUND = "fit", "ends", "not found"
-LONGEST = 0.25
-"""Part of the error that the first step makes."""
-SHORTEST = 2.0**-22
-"""Part of the error below which a step is not shortened any more."""
-SLOPE = 1e-4
-"""Step of the Hessian's differences, whose own error is its square."""
 CORRECTIONS = 8
 """Newton steps within which a prediction is to be corrected."""
-MOST = 200
-"""Steps that are tried on one curve."""
-ALIKE = 0.5
-"""How far the Hessian may change over a step, relative to itself: evenly changed, it is definite all along below 1."""
 AIMED = 0.35
 """The change at which the next step's length aims."""
-FLAT = 0.05
-"""Curvature, as part of that at the start, below which a minimum that cannot be followed further is called flat."""
 
 Wanted = Callable[[float], Array]
 """The directions û (k, 3) at a part of the error."""
@@ -79,9 +68,9 @@ class _Bowl:
     def hessian(self, wanted: Array) -> Array:
         """∇²F (n, n) at y = 0, by central differences of ∇F."""
         columns = []
-        for step in SLOPE * np.eye(self.chart.basis.shape[1]):
+        for step in HESSIAN_STEP * np.eye(self.chart.basis.shape[1]):
             ahead, behind = (self.slope(self.chart.at(each, self.at.q), wanted) for each in (step, -step))
-            columns.append((ahead - behind) / (2 * SLOPE))
+            columns.append((ahead - behind) / (2 * HESSIAN_STEP))
         H = np.array(columns)
         return np.asarray((H + H.T) / 2)
 
@@ -94,7 +83,7 @@ class _Bowl:
             size = float(np.linalg.norm(step))
             if size <= FOLLOWED:
                 return at
-            if size > ALIKE * last:
+            if size > HESSIAN_CHANGE * last:
                 return None
             y, last = y + step, size
             at = self.chart.at(y, at.q)
@@ -115,22 +104,22 @@ def weakest(at: ClosedConfiguration, question: Measurement) -> float:
 
 def best_fits(at: ClosedConfiguration, question: Measurement, wanted: Wanted) -> Fit:
     """The curve of best fits from a configuration whose directions are ``wanted(0)``, led to ``wanted(1)``."""
-    way, done, step = [at], 0.0, LONGEST
+    way, done, step = [at], 0.0, BEST_FIT_FIRST_STEP
     bowl = _Bowl(at, question)
     H = first = bowl.hessian(wanted(0.0))
     if _least(H) <= 0:
         return Fit((at,), 0.0, weakest(at, question), NOT_FOUND)
-    for _ in range(MOST):
-        if done == 1.0 or step < SHORTEST:
+    for _ in range(BEST_FIT_STEPS):
+        if done == 1.0 or step < BEST_FIT_SHORTEST_STEP:
             break
         ahead = min(1.0, done + step)
         found = _stepped(bowl, H, wanted, ahead)
         change = np.inf if found is None else _change(bowl, H, *found)
-        if found is not None and change <= ALIKE:
+        if found is not None and change <= HESSIAN_CHANGE:
             (bowl, H), done = found, ahead
             way.append(bowl.at)
         step *= float(np.clip(AIMED / max(change, 1e-12), 0.25, 2.0))
-    outcome = FIT if done == 1.0 else ENDS if _least(H) < FLAT * _least(first) else NOT_FOUND
+    outcome = FIT if done == 1.0 else ENDS if _least(H) < FLAT_CURVATURE * _least(first) else NOT_FOUND
     return Fit(tuple(way), done, min(weakest(each, question) for each in way), outcome)
 
 

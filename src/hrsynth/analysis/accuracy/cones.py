@@ -10,11 +10,10 @@ import numpy as np
 from ...errors import BadRequest
 from ...geometry.vectors import Array
 from ...mechanism import Observation
+from ...tolerances import NARROWEST_CONE
 
 EXAMPLE = "0.1deg, 0.002 (radians), or one a leg such as 1=0.1deg,2=0.2deg"
 ALLOWED = "more than 0 and less than 90deg"
-NARROWEST = 1e-15
-"""Half-angle (rad) below which directions, as numbers, are no longer told apart."""
 
 Cones = float | str | Mapping[str, float]
 """One half-angle (rad) for all observed directions, one for each leg or link, or either as text."""
@@ -67,6 +66,6 @@ def _angle(text: str) -> float:
 def _checked(value: float, shown: object) -> float:
     if not 0 < value < math.pi / 2:
         raise BadRequest("half-angle of a cone", shown, ALLOWED)
-    if value < NARROWEST:
-        raise BadRequest("half-angle of a cone", shown, f"at least {NARROWEST:g} (radians)")
+    if value < NARROWEST_CONE:
+        raise BadRequest("half-angle of a cone", shown, f"at least {NARROWEST_CONE:g} (radians)")
     return value

@@ -14,12 +14,13 @@ from numpy.typing import NDArray
 from ...batch.engine import Batch, Evaluation
 from ...batch.grids import poses_over
 from ...batch.reach import reach, sweep
+from ...budgets import LARGEST_GRID, POSES_FOR_NUMBA
 from ...errors import BadRequest, Disagreement, HrsynthError, PlaneNotMet
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement
-from ...mechanism.pose import LARGEST_GRID, SCALARS, Grid, Pose
-from ...tolerances import SAME_RELATION
+from ...mechanism.pose import SCALARS, Grid, Pose
+from ...tolerances import SAME_RELATION, USUAL_ERROR
 from ..observed import ObservedRobot
 from ..singularity.locus import framed
 from .pose_errors import maxima, reading
@@ -27,12 +28,8 @@ from .pose_errors import maxima, reading
 Flags = NDArray[np.bool_]
 PART = 25_000
 """Poses, at least, that are evaluated between two signs of progress."""
-MANY = 500_000
-"""Poses of a sweep that make up for numba's start."""
 SPOTS = 10
 """Poses of a grid at which the batch is held against Pinocchio."""
-USUAL = 100.0
-"""Multiple of the median error up to which a pose serves for that: nearer to singularities rounding grows."""
 FINE, COARSE = 201, 41
 """Poses a side of a plane by the batch, and one by one."""
 
@@ -207,7 +204,7 @@ class Mapper:
             self.progress("poses")
             X, possible = poses_over(self.setting.motion, grid, self.setting.robot.name, places[start : start + size])
             yield possible, self.batch.evaluate(X, self.setting.labels, cones,
-                                                compiled=None if len(places) >= MANY else False)
+                                                compiled=None if len(places) >= POSES_FOR_NUMBA else False)
 
     def _one_by_one(self, grid: Grid) -> Seen:
         everything = self.setting.everything
@@ -225,7 +222,7 @@ class Mapper:
     def _spots(self, grid: Grid, seen: Seen, seed: int) -> Spots:
         """Hold the batch against Pinocchio at random poses; raises ``Disagreement``."""
         sizes = [np.where(np.isfinite(each), each, 0.0) for each in (seen.position, seen.orientation)]
-        limits = [USUAL * np.median(each[each > 0]) if (each > 0).any() else np.inf for each in sizes]
+        limits = [USUAL_ERROR * np.median(each[each > 0]) if (each > 0).any() else np.inf for each in sizes]
         finite = np.isfinite(seen.position) & np.isfinite(seen.orientation)
         usual = np.flatnonzero(seen.reached & finite & (sizes[0] <= limits[0]) & (sizes[1] <= limits[1]))
         chosen = np.random.default_rng(seed).choice(usual, min(SPOTS, len(usual)), replace=False)

@@ -7,21 +7,13 @@ from collections.abc import Callable
 import numpy as np
 from numpy.typing import NDArray
 
+from ...budgets import VALLEY_NARROWING, VALLEYS_ON_LINES, VALLEYS_ON_PLANE
 from ...geometry.vectors import Array
+from ...tolerances import VALLEY_DEPTH, VALLEY_ZERO
 from .field import Field
 
-DEEP = 0.5
-"""Part of the median below which a valley of the smallest singular value is looked into."""
-ZERO = 1e-5
-"""Part of the median at which it counts as zero."""
 ROUNDS = 28
 """Times the search is narrowed."""
-NARROWER = 0.5
-"""Part of its reach that a search keeps each time."""
-MANY = 600
-"""Valleys along lines that are looked into at most."""
-FEW = 12
-"""Valleys over the plane that are looked into at most."""
 
 
 def singular_poses(field: Field) -> Array:
@@ -40,11 +32,12 @@ def singular_poses(field: Field) -> Array:
     steps = np.array([values[1] - values[0] for values in axes])
     found = [np.zeros((0, 2))]
     for across in ([0], [1], [0, 1]):
-        cells = _valleys(table, across, DEEP * usual)[: FEW if len(across) == 2 else MANY]
+        most = VALLEYS_ON_PLANE if len(across) == 2 else VALLEYS_ON_LINES
+        cells = _valleys(table, across, VALLEY_DEPTH * usual)[:most]
         if len(cells):
             start = np.stack([axes[k][cells[:, k]] for k in range(2)], axis=1)
             places, depth = _deepest(value, start, steps, across)
-            found.append(places[depth <= ZERO * usual])
+            found.append(places[depth <= VALLEY_ZERO * usual])
     return np.concatenate(found)
 
 
@@ -71,5 +64,5 @@ def _deepest(value: Callable[[Array], Array], start: Array, steps: Array, across
         found = value(places.reshape(-1, 2)).reshape(len(best), -1)
         chosen = np.argmin(found, axis=1)
         rows = np.arange(len(best))
-        best, depth, reach = places[rows, chosen], found[rows, chosen], NARROWER * reach
+        best, depth, reach = places[rows, chosen], found[rows, chosen], VALLEY_NARROWING * reach
     return best, depth

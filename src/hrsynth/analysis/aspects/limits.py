@@ -14,15 +14,13 @@ from ...geometry.balls import Field, cross, dot
 from ...geometry.so3 import wrapped
 from ...geometry.vectors import Array
 from ...mechanism import Joint, JointType, Limits, Mechanism
-from ...tolerances import FOLLOWED, SAME_RELATION
+from ...tolerances import FOLLOWED, SAME_RELATION, TURNING_ARM
 from .sources import NoChart, Source
 
 if TYPE_CHECKING:
     from .pattern import Sight
 
 Value = Callable[[Source], Field]
-SHORTEST = 1e-3
-"""Part of a vector normal to an axis (characteristic lengths) from which a turn about the axis is read."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,7 +114,7 @@ def _bound(sight: Sight, source: Callable[..., Source], joint: Joint, middle: fl
             offsets = [wrapped(float(x)) for x in np.arctan2(sine, cosine) - coordinates]
             size = np.hypot(cosine, sine)
             apart = [wrapped(x - offsets[0]) for x in offsets]
-            if np.max(np.abs(apart)) < SAME_RELATION and np.ptp(size) < FOLLOWED < SHORTEST**2 < size[0]:
+            if np.max(np.abs(apart)) < SAME_RELATION and np.ptp(size) < FOLLOWED < TURNING_ARM**2 < size[0]:
                 return Turn(joint.name, axis, first, second, middle + offsets[0], half, float(size[0]))
     return None
 

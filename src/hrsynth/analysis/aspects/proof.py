@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...budgets import FINEST_INTERVAL, FIRST_INTERVALS
 from ...geometry.balls import Field, above_zero, balls, below, centred, cross, det, dot, finite, jets
 from ...geometry.vectors import Array
 from ..singularity.condition import Named, rows
@@ -19,11 +20,6 @@ from .crossing import Crossing
 
 Way = Stretch | Crossing
 Leading = tuple[int, Field] | None
-
-FIRST = 4
-"""Intervals that a way is first cut into."""
-FINEST = 2.0**-16
-"""Length of an interval (of its way) below which a proof is given up."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +108,7 @@ def prove(reading: Reading, way: Way, budget: int) -> Proof:
 
     Given up as soon as a midpoint is out of reach or lies on the other side, or an interval is too short.
     """
-    ends = np.linspace(0, 1, FIRST + 1)
+    ends = np.linspace(0, 1, FIRST_INTERVALS + 1)
     low, high = ends[:-1], ends[1:]
     side, margin, boxes = 0.0, np.inf, 0
     while len(low):
@@ -127,7 +123,7 @@ def prove(reading: Reading, way: Way, budget: int) -> Proof:
         done = bounds > 0
         margin = min(margin, float(np.min(bounds[done], initial=np.inf)))
         low, high, middle = low[~done], high[~done], middle[~done]
-        if len(low) and high[0] - low[0] < FINEST:
+        if len(low) and high[0] - low[0] < FINEST_INTERVAL:
             return Proof(False, 0.0, boxes)
         low, high = np.concatenate([low, middle]), np.concatenate([middle, high])
     return Proof(True, margin, boxes)

@@ -6,12 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...budgets import REGION_WIDER
 from ...geometry.so3 import exponential, logarithm
 from ...geometry.vectors import Array
 from .carriage import Carriage, Place
-
-WIDER = 1.5
-"""How much wider than the known poses the region is from which poses are drawn."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,7 +30,7 @@ class Region:
         middle = p[0] + motion.shifts @ ((shifts.max(axis=0) + shifts.min(axis=0)) / 2)
         exact = cls(carriage, (middle, R[0]), np.ptp(shifts, axis=0) / 2,
                     np.max(np.abs(turns), axis=0, initial=0.0))
-        return exact.wider(WIDER)
+        return exact.wider(REGION_WIDER)
 
     def wider(self, factor: float) -> Region:
         """The region grown by a factor; no turn is longer than π."""

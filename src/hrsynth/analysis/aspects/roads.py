@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from ...budgets import FIRST_INTERVALS
 from ...geometry.vectors import Array
 from .carriage import Place, Stretch, stretched
 from .crossing import Crossing, crossing
-from .proof import FIRST, Proof, Reading, Way, prove
+from .proof import Proof, Reading, Way, prove
 from .region import Region
 
 if TYPE_CHECKING:
@@ -144,7 +145,7 @@ class RoadMap:
         if key not in self.proofs:
             allowed = min(ROAD, self.budget - self.spent)
             self.proofs[key] = prove(self.readings[self.sheets[key[0]]], self.road(*key), allowed)
-            self.spent += self.proofs[key].boxes + FIRST
+            self.spent += self.proofs[key].boxes + FIRST_INTERVALS
         return self.proofs[key]
 
     def graph(self) -> nx.Graph:

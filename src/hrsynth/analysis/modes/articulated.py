@@ -11,13 +11,13 @@ import numpy as np
 
 from ...errors import BadRequest
 from ...geometry.vectors import Array
-from ...tolerances import PARALLEL
+from ...tolerances import PARALLEL, TIP_ROUNDING
 from .certify import Equation
 from .conics import Conic, Numbers, direction, spatial_frame, spokes
 from .curves import Circle, Curve, Line, Point, Sphere, Surface, cross, extent, length, shifted
 from .quadrics import Chart, Moving, normals, on_circle, shifting
 from .squares import Square, on_plane, single, sum_on_plane, sum_on_sphere
-from .systems import ROUNDING, Shifting
+from .systems import Shifting
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,7 +56,7 @@ class Articulated(Shifting):
     def apart(self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
               ) -> dict[int, float]:
         """As for any system; the points are a place of one body and one of the second relative to the first."""
-        error = self.error + ROUNDING * self.size
+        error = self.error + TIP_ROUNDING * self.size
         return dict.fromkeys(legs, sum(miss for _, miss in points) + error)
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:

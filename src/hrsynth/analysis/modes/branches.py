@@ -9,13 +9,11 @@ from itertools import combinations, islice, product
 
 import numpy as np
 
+from ...budgets import BRANCH_CHOICES
 from ...tolerances import RANK_GAP, SAME_POINT
 from .build import Model, model
 from .solve import Mode, Modes, solve
 from .tips import Confinement, Tip
-
-MOST = 256
-"""Choices of branches that are solved; where there are more the list is not complete."""
 
 
 def choices(confined: Confinement) -> Iterator[Confinement]:
@@ -28,7 +26,7 @@ def choices(confined: Confinement) -> Iterator[Confinement]:
 
 def solve_all(confined: Confinement, *, near: bool = True) -> tuple[Model, Modes]:
     """The goal's own system, and the modes of all choices of branches together, each pose once."""
-    made = [model(each) for each in islice(choices(confined), MOST)]
+    made = [model(each) for each in islice(choices(confined), BRANCH_CHOICES)]
     size = made[0].system.size
     found = [_scaled(solve(each.system, near=near, goal=None if k else each.home), each.system.size / size)
              for k, each in enumerate(made)]

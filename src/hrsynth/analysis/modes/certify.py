@@ -12,11 +12,10 @@ from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
+from ...budgets import FINEST_BOX
+
 ATTEMPTS = 3
 """Boxes that are tried, each wider than the one before where that one was too narrow."""
-
-FINEST = 2.0 ** -100
-"""Radius of the smallest box that is tried, relative to 1 plus the unknown."""
 
 
 class Polynomial(Protocol):
@@ -84,7 +83,7 @@ def krawczyk(equations: Sequence[Polynomial], start: Sequence[Any]) -> list[Any]
         return None
     Y = np.array([[(arb if real else acb)(v) for v in row] for row in inverse.tolist()], dtype=object)
     step = Y @ np.array([equation.value(middle) for equation in equations], dtype=object)
-    least = [FINEST * (1.0 + float(abs(m))) for m in middle]
+    least = [FINEST_BOX * (1.0 + float(abs(m))) for m in middle]
     radii = [4.0 * float(s.abs_upper()) + tiny for s, tiny in zip(step, least, strict=True)]
     for _ in range(ATTEMPTS):
         offsets = np.array([arb(0, r) if real else acb(arb(0, r), arb(0, r)) for r in radii], dtype=object)

@@ -12,16 +12,17 @@ from itertools import combinations
 import numpy as np
 
 from ...geometry.vectors import Array
+from ...tolerances import TIP_ROUNDING
 from .conics import UNIT, Conic
 from .curves import length
 from .quadrics import conditions
 from .roots import PRECISION
-from .systems import ROUNDING, System
+from .systems import System
 
 
 def rounded(system: System, at: Array) -> float:
     """How far a tip that floats put at ``at`` (3,) can be from that of the exact input at the same pose (m)."""
-    return system.error + ROUNDING * (system.size + length(at))
+    return system.error + TIP_ROUNDING * (system.size + length(at))
 
 
 def off(system: System, k: int, at: Array, shift: float, turn: float) -> float:

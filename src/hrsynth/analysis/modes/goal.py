@@ -7,9 +7,7 @@ import numpy as np
 from ...geometry.ranks import range_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration, Wanted, system
-
-ROUNDINGS = 16 * 2.0 ** -52
-"""What thirty-two roundings, those of a chain of joints from the file's decimals on, make of lengths and angles."""
+from ...tolerances import CHAIN_ROUNDING
 
 LEVER = 2.0
 """Least lever (characteristic lengths) of a turn: directions are compared with the size of the tips' curves."""
@@ -28,7 +26,7 @@ def drift(goal: ClosedConfiguration, pose: Wanted | None = None) -> float:
     mechanism, V = twin.mechanism, twin.frames(goal.q, links)[1]
     points = [*(mechanism.links[link].pose[:3, 3] for link in links), *(j.point for j in mechanism.joints.values())]
     extent = 1.0 + float(np.ptp(np.array(points), axis=0).max()) / twin.length
-    miss = float(np.linalg.norm(F)) + ROUNDINGS * extent
+    miss = float(np.linalg.norm(F)) + CHAIN_ROUNDING * extent
     if not len(J):
         return twin.length * miss
     rank = range_basis(J, 1.0)[1].value

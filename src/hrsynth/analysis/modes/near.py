@@ -7,17 +7,11 @@ from collections.abc import Sequence
 import numpy as np
 
 from ...geometry.vectors import Array
-from ...tolerances import LOCUS, NEAR_MODE, VANISHES
+from ...tolerances import LOCUS, NEAR_MODE, NO_NEAR_MODE, SAME_NEAR_MODE, VANISHES
 from .systems import System
 
 STARTS = 40
 """Random poses from which a pose of a continuum is looked for."""
-
-APART = 1e-6
-"""Difference of poses and of misses (sizes) below which two stationary poses are one."""
-
-FAR = 0.3
-"""Misses (sizes) beyond which a start leads to no near mode."""
 
 
 def residual(system: System, q: Array) -> float:
@@ -30,11 +24,11 @@ def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) 
     found: list[tuple[float, Array]] = []
     seen = [np.asarray(q) for q in known]
     for start in starts:
-        if residual(system, start) > FAR:
+        if residual(system, start) > NO_NEAR_MODE:
             continue
         q = _minimised(system, start)
         miss = residual(system, q)
-        if VANISHES < miss <= NEAR_MODE and all(_apart(system, q, other) > APART for other in seen):
+        if VANISHES < miss <= NEAR_MODE and all(_apart(system, q, other) > SAME_NEAR_MODE for other in seen):
             found.append((miss, q))
             seen.append(q)
     return [q for _, q in sorted(found, key=lambda each: each[0])]

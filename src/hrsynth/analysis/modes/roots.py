@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...tolerances import FARTHEST, NEARLY_DOUBLE, RANK_GAP
+from ...tolerances import FARTHEST, NEARLY_DOUBLE, RANK_GAP, SHARP_ROOT
 from .algebra import Eliminant, cycle, height, pair, primitive, univariate, without
 from .certify import Equation, Polynomial, krawczyk
 from .conics import UNIT, Balls, Conic, Within, parameter
@@ -37,8 +37,6 @@ STARTS = (0.0, 1.1, -0.9)
 Solution = tuple[list[Any], int]
 """Balls of all unknowns, and the multiplicity."""
 
-SHARP = 2.0 ** -60
-"""Radius of a ball, relative to 1 plus its middle, above which a solution is sought with more digits."""
 
 NEARLY_REAL = 1e-2
 """Distance from real ones within which a complex solution has to be shown to be none of them for all input."""
@@ -247,7 +245,7 @@ def _finite(values: Sequence[Any], half_angles: Sequence[bool]) -> bool:
 
 def sharp(value: Any) -> bool:
     """Whether a ball is so small that solutions on both sides of a denominator's zero are told apart."""
-    return bool(value.is_finite()) and float(value.rad()) <= SHARP * (1.0 + float(abs(value.mid())))
+    return bool(value.is_finite()) and float(value.rad()) <= SHARP_ROOT * (1.0 + float(abs(value.mid())))
 
 
 def is_real(values: Sequence[Any]) -> bool:

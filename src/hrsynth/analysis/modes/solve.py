@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...geometry.vectors import Array, frozen
-from ...tolerances import FARTHEST, NEARLY_DOUBLE, VANISHES
+from ...tolerances import FARTHEST, NEARLY_DOUBLE, TIP_ROUNDING, VANISHES
 from .curves import Point
 from .fits import excluded, meets, torn, words
 from .meant import Meant, as_meant
@@ -18,7 +18,7 @@ from .near import dimension, residual, stationary
 from .quadrics import Whole
 from .roots import Root, Roots, nearly_double, solve_square
 from .squares import Square
-from .systems import ROUNDING, System
+from .systems import System
 from .translating import Translating
 from .whole import solve_whole, wholes
 
@@ -230,7 +230,7 @@ def _mode(system: System, square: Part, root: Root) -> Mode:
         own = parameters
         apart = system.apart(q, at, square.legs, _points(square, root))
     else:
-        own, apart = (), {k: miss + ROUNDING * system.size for k, miss in enumerate(root.misses)}
+        own, apart = (), {k: miss + TIP_ROUNDING * system.size for k, miss in enumerate(root.misses)}
     shift, turn = system.spread(q, apart)
     sure = _sure(system, root) and bool(np.isfinite(shift))
     return Mode(own, max(shift / system.size, turn), shift, turn, system.residual(at), frozen(system.pose(q)),

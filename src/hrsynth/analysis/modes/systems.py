@@ -17,14 +17,11 @@ import numpy as np
 
 from ...errors import BadRequest
 from ...geometry.vectors import Array, frozen, pose
-from ...tolerances import FARTHEST
+from ...tolerances import FARTHEST, TIP_ROUNDING
 from .conics import SLACK, UNIT, Balls, Frame, Within, spatial_frame
 from .curves import Point, Reach, curves_of, extent, length, shifted
 from .quadrics import Chart
 from .squares import Square
-
-ROUNDING = 2.0 ** -46
-"""What sixty-four roundings make of a length, relative to the size: poses and tips computed in floats."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,7 +93,7 @@ class System:
               ) -> dict[int, float]:
         """How far the tips of some legs can be from those at q (m), which are ``at`` (legs, 3), with the point on each
         leg's curve and how far the exact one is from it (m); a tip at rest has no such point."""
-        error = self.error + ROUNDING * self.size
+        error = self.error + TIP_ROUNDING * self.size
         return {k: miss + length(point - at[k]) + error for k, (point, miss) in self.known(legs, points).items()}
 
     def known(self, legs: Sequence[int], points: Sequence[tuple[Array, float]]) -> dict[int, tuple[Array, float]]:

@@ -9,14 +9,14 @@ from itertools import combinations
 import numpy as np
 
 from ...geometry.vectors import Array
-from ...tolerances import VANISHES
+from ...tolerances import TIP_ROUNDING, VANISHES
 from .certify import Equation
 from .conics import Conic, Numbers, direction, spatial_frame
 from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, cross, extent, length
 from .quadrics import Chart, Moving, shifting
 from .squares import Square, on_plane, on_sphere, resting, single
 from .surfaces import three_surfaces
-from .systems import ROUNDING, Shifting
+from .systems import Shifting
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +37,7 @@ class Translating(Shifting):
     def apart(self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
               ) -> dict[int, float]:
         """As for any system; the points are places of p."""
-        error = self.error + ROUNDING * self.size
+        error = self.error + TIP_ROUNDING * self.size
         return dict.fromkeys(legs, max((miss + length(point - q) for point, miss in points), default=0.0) + error)
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:

@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from ...tolerances import FARTHEST
+from ...tolerances import BALL_ZERO, BOXES_APART, FARTHEST
 from .certify import Quadric, krawczyk
 from .conics import UNIT, Balls, Rounded, Within
 from .msolve import Parametrisation, parametrised
@@ -36,12 +36,6 @@ from .roots import (
 from .systems import System
 
 METHOD = "msolve's parametrisation"
-
-CLEAR = 1e-12
-"""What is added to boxes, relative to their places and radii, before they count as apart."""
-
-FINE = 2.0 ** -256
-"""Radius of a ball that holds zero at which the number in it counts as zero."""
 
 
 def wholes(system: System, number: int = 0) -> Iterator[Whole]:
@@ -105,7 +99,8 @@ def _apart(chart: Chart, thick: Sequence[Any], solutions: Sequence[Sequence[Any]
         if box is None or (chart.nonzero is not None and chart.nonzero.value(box).contains(0)):
             return False
         middles.append([complex(v.mid()) for v in box])
-        radii.append([float(v.rad()) * (1.0 + CLEAR) + CLEAR * abs(m) for v, m in zip(box, middles[-1], strict=True)])
+        radii.append([float(v.rad()) * (1.0 + BOXES_APART) + BOXES_APART * abs(m)
+                      for v, m in zip(box, middles[-1], strict=True)])
     if not middles:
         return True
     m, r = np.array(middles), np.array(radii)
@@ -118,12 +113,12 @@ def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity
     values = answer.others(t)
     if not all(sharp(v) for v in values):
         return []
-    told = nonzero is None or float(nonzero.value(values).rad()) < FINE
+    told = nonzero is None or float(nonzero.value(values).rad()) < BALL_ZERO
     return [(values, multiplicity)] if told else []
 
 
 def _no_pose(nonzero: Quadric | None, values: Sequence[Any]) -> bool:
-    """Whether what vanishes at no pose vanishes, to ``FINE``, at complex coordinates."""
+    """Whether what vanishes at no pose vanishes, to ``BALL_ZERO``, at complex coordinates."""
     from flint import ctx
 
     with ctx.workprec(PRECISION << PRECISIONS):

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...batch.placing import Placer
+from ...budgets import WEAKEST_STARTS
 from ...constraints.pattern import Scene, Structure
 from ...errors import Disagreement
 from ...geometry.ranks import kernel_basis, range_basis
@@ -29,8 +30,6 @@ ON_LOCUS = 10
 """Poses on the locus that are constructed, where there are so many."""
 TRIES = 4
 """Weakest poses from which a pose is sought on a locus across which the expression has no sign, or none was met."""
-MORE = 8
-"""Further starts, the weakest poses of parts of the walk, where these find nothing."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,7 +103,7 @@ def agreement(start: ClosedConfiguration, question: Measurement, structure: Stru
         wrong += _out_of_proportion(np.array(sizes))
     loops = WEAKEST * start.kernel()[1].weakest
     freedoms = max(relation(at, question).dof.value for at in [start, *(at for _, at in low)])
-    others = [pair for pair in sorted(parts, key=_size) if all(pair[1] is not at for _, at in low)][:MORE]
+    others = [pair for pair in sorted(parts, key=_size) if all(pair[1] is not at for _, at in low)][:WEAKEST_STARTS]
     searches = 0
     for starts in ([] if condition.never else
                    [_crossings(walk, signs, structure, condition), _descents(low, question, structure, condition),

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...batch.reach import reach, sweep
+from ...budgets import COARSE_GRID, LOCUS_SIDES
 from ...errors import BadRequest, PlaneNotMet, PoseNotReached
 from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array
@@ -23,10 +24,6 @@ from .agreement import descend, spectrum, weakest
 from .batch_spectrum import Quick
 from .measured import MeasuredRobot
 
-COARSE = 25
-"""Poses a side of the grid that finds how far a plane is reached."""
-WIDE = (2.5, 5.0)
-"""Half the side of that grid (characteristic lengths), and where the robot reaches its border, of a second one."""
 STARTS = 8
 """Valleys of the smallest singular value from which an isolated singular pose is sought."""
 
@@ -120,14 +117,14 @@ def framed(start: ClosedConfiguration, question: Measurement, motion: PlatformMo
         raise PlaneNotMet(name, f"the plane {plane}", str(error).removeprefix(f"{name}: ")) from None
     centre = _coordinates(motion, first, names)
     centre = [0.0 if name == "phi" else c for name, c in zip(names, centre, strict=True)]
-    for wide in WIDE:
+    for wide in LOCUS_SIDES:
         half = [np.pi if name == "phi" else wide * start.twin.length for name in names]
-        axes = [(name, np.linspace(c - h, c + h, COARSE)) for name, c, h in zip(names, centre, half, strict=True)]
+        axes = [(name, np.linspace(c - h, c + h, COARSE_GRID)) for name, c, h in zip(names, centre, half, strict=True)]
         coarse = Grid(tuple(axes), plane)
         cells = np.argwhere(met(first, coarse).reshape(coarse.shape))
         if not len(cells):
-            cells = np.array([[COARSE // 2, COARSE // 2]])
-        if cells.min() > 0 and cells.max() < COARSE - 1:
+            cells = np.array([[COARSE_GRID // 2, COARSE_GRID // 2]])
+        if cells.min() > 0 and cells.max() < COARSE_GRID - 1:
             break
     fine = []
     for (name, values), low, high in zip(axes, cells.min(axis=0), cells.max(axis=0), strict=True):

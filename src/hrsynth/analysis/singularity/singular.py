@@ -6,6 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+from ...budgets import NEIGHBOUR_STEP
 from ...constraints.pattern import Structure
 from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration, closed
@@ -27,8 +28,6 @@ POINTS = 10_000
 EXAMPLES = 3
 STEPS = 51
 """Poses a side of a drawn plane."""
-NEARBY = 0.01
-"""How far from a singular pose its neighbours are looked at (m)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,7 +147,7 @@ def locus_of(setting: ObservedRobot, *, plane: Pose | str | None = None, steps: 
 def _example(setting: ObservedRobot, question: Measurement, at: ClosedConfiguration) -> Example:
     X = at.pose(question.platform)
     lost = name_freedoms(relation(at, question).lost, setting.anatomy, position=X[:3, 3])
-    nearby = max((weakest(other, question) for other in neighbours(at, question, NEARBY)), default=0.0)
+    nearby = max((weakest(other, question) for other in neighbours(at, question, NEIGHBOUR_STEP)), default=0.0)
     return Example(at, setting.motion.pose(X), lost, weakest(at, question), nearby)
 
 

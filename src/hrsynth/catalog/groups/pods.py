@@ -9,7 +9,7 @@ from .legs import leg, robots
 
 KINDS = tuple(map(leg, ("Utn-Pl*-S", "Utn-Pl*-Unt", "Rt-Pl*-S", "S-Pl*-S", "S-Pl*-Rt", "Pr*-Pz-S", "Cr*-Pz-S")))
 """UPS, UPU (parallel outer axes), RPS, SPS, SPR, and PPS, CPS that slide along the radius."""
-LEAST = 6
+UNCONSTRAINED = 6
 """Freedoms of a leg that constrains nothing."""
 
 
@@ -25,6 +25,6 @@ def words() -> Iterator[Word]:
     """Robots of three to six legs, alike or mixed, whose legs leave a freedom by their count; and all legs alike."""
     for count in range(3, 7):
         for word in robots(KINDS, count):
-            constraints = sum(max(0, LEAST - each.freedoms) for each in word.legs)
-            if constraints < LEAST or len(set(word.legs)) == 1:
+            constraints = sum(max(0, UNCONSTRAINED - each.freedoms) for each in word.legs)
+            if constraints < UNCONSTRAINED or len(set(word.legs)) == 1:
                 yield word

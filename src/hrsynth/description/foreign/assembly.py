@@ -13,13 +13,11 @@ import numpy as np
 
 from ...geometry.vectors import Array, inverse, pose
 from ...mechanism.model import JointType, Mechanism
-from ...tolerances import FAINT, NOISE, RANK_CUTOFF, SOLVED
+from ...tolerances import FAINT, NEWTON_REACH, NOISE, RANK_CUTOFF, SOLVED
 from ..draft import Edge, End
 from .graph import Gear, spanning_tree
 from .motion import displacement, kind_of, moved, opening, screws, zero
 
-SHORT = 1e4
-"""Length of a step, as a multiple of the residual that it removes, beyond which it follows rounded numbers."""
 STRIDE = 0.4
 """Largest change of a coordinate in one step."""
 EFFORT = 100_000
@@ -161,7 +159,7 @@ class Assembly:
         start = (state, size)
         for _ in range(10):
             step: Array = np.asarray(-np.linalg.lstsq(J, error, rcond=RANK_CUTOFF)[0], dtype=float)
-            if np.max(np.abs(step), initial=0.0) > SHORT * size:
+            if np.max(np.abs(step), initial=0.0) > NEWTON_REACH * size:
                 return start
             state = self.stepped(state, step)
             error, J = self.system(state)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...budgets import LARGEST_YAML
 from ...errors import BadRobotFile, Defect
 from ...geometry.vectors import Array
 from ...mechanism.model import JointType, Motor
@@ -17,8 +18,6 @@ from . import urdf
 from .closures import CUT, END, WELD
 from .graph import Graph
 
-LARGEST = 1_000_000
-"""Bytes of a YAML file above which it is not read."""
 KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
 _AXES = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 
@@ -29,8 +28,8 @@ def sayings(path: Path) -> dict[str, Any] | None:
 
     data = xml.content(path)
     try:
-        if len(data) > LARGEST:
-            raise _refused(path, "YAML file too large", f"up to {LARGEST} bytes")
+        if len(data) > LARGEST_YAML:
+            raise _refused(path, "YAML file too large", f"up to {LARGEST_YAML} bytes")
         depth = 0
         for count, event in enumerate(yaml.parse(data.decode("utf-8"), Loader=yaml.SafeLoader)):
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 
+from ...budgets import LARGEST_GUESSED
 from ...errors import BadRequest
 from ...mechanism import graphs
 from ...mechanism.model import JointType
 from ..draft import Edge
 from .graph import Graph
-
-LARGEST = 150
-"""Bodies above which ways to the base are not counted."""
 
 
 def base(graph: Graph) -> str:
@@ -101,7 +99,7 @@ class _Bodies:
         """The number of ways from each body to the base that share no body."""
         import networkx as nx
 
-        if len(self.graph) > LARGEST:
+        if len(self.graph) > LARGEST_GUESSED:
             return {}
         found = {}
         for body in others:

@@ -14,6 +14,7 @@ from itertools import combinations
 
 import numpy as np
 
+from ...budgets import LARGEST_RELATED
 from ...geometry.vectors import Array
 from ...mechanism import graphs
 from ...mechanism.model import Joint, JointType, Mechanism
@@ -21,8 +22,6 @@ from ...tolerances import EXACT, NOISE
 
 _LINES = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 _BALLS = (JointType.SPHERICAL, JointType.UNIVERSAL)
-LARGEST = 120
-"""Joints above which relations are not looked for."""
 Rows = list[tuple[float, list[tuple[int, Array]]]]
 """Equations: value, and gradient blocks (first coordinate, (3,))."""
 Relation = Callable[[Array], Rows]
@@ -65,7 +64,7 @@ class _Coordinates:
 
 def exact(mechanism: Mechanism) -> Exact | None:
     """Make nearly held relations exact; None where there are none, or where they contradict each other."""
-    if not 1 < len(mechanism.joints) <= LARGEST:
+    if not 1 < len(mechanism.joints) <= LARGEST_RELATED:
         return None
     coordinates = _Coordinates(mechanism)
     start = coordinates.values
