@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from hrsynth.analysis.modes.curves import Circle
-from hrsynth.analysis.modes.planar import Planar
+from hrsynth.analysis.modes.rigid import Planar
 from hrsynth.analysis.modes.solve import solve
 from hrsynth.geometry.vectors import Array, inverse, perpendicular, pose, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration

@@ -7,12 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hrsynth.analysis.modes.articulated import Articulated
 from hrsynth.analysis.modes.curves import Circle, Line, Plane, Point, Reach, Sphere
-from hrsynth.analysis.modes.planar import Planar
-from hrsynth.analysis.modes.spatial import Spatial
+from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.analysis.modes.systems import System
-from hrsynth.analysis.modes.translating import Translating
+from hrsynth.analysis.modes.translating import Articulated, Translating
 from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
 from strategies import random_rotation
 

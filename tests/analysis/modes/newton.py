@@ -9,12 +9,10 @@ from typing import Any
 
 import numpy as np
 
-from hrsynth.analysis.modes.articulated import Articulated
 from hrsynth.analysis.modes.curves import Circle, Curve, Line
-from hrsynth.analysis.modes.planar import Planar
-from hrsynth.analysis.modes.spatial import Spatial
+from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.analysis.modes.systems import System
-from hrsynth.analysis.modes.translating import Translating
+from hrsynth.analysis.modes.translating import Articulated, Translating
 
 Batch = Any
 """A complex array whose first axis counts the starts."""

@@ -7,11 +7,9 @@ import pytest
 import sympy
 from flint import arb, ctx
 
-from hrsynth.analysis.modes.algebra import cycle, pair
-from hrsynth.analysis.modes.certify import Equation, krawczyk
 from hrsynth.analysis.modes.curves import Circle, Curve, Line, Point
-from hrsynth.analysis.modes.planar import Planar
-from hrsynth.analysis.modes.spatial import Spatial
+from hrsynth.analysis.modes.polynomials import Equation, cycle, krawczyk, pair
+from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.errors import BadRequest
 
 x, y, z = sympy.symbols("x y z")

@@ -10,8 +10,7 @@ import pytest
 from flint import arb, arb_mat, ctx
 
 from analysis.modes.digits import BITS, File, column, turned
-from hrsynth.analysis.modes.goal import drift
-from hrsynth.analysis.modes.modes import AssemblyModes, modes_with
+from hrsynth.analysis.modes.modes import AssemblyModes, drift, modes_with
 from hrsynth.analysis.observed import ObservedRobot, prepare
 from hrsynth.description import load, shipped
 from hrsynth.errors import PoseNotReached

@@ -11,9 +11,8 @@ import pytest
 from analysis.modes.draws import Draw, Rng, on_two_bodies, planar, spatial, translating
 from hrsynth.analysis.modes.curves import Circle, shifted
 from hrsynth.analysis.modes.modes import modes
-from hrsynth.analysis.modes.planar import Planar
+from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.analysis.modes.solve import Modes, solve
-from hrsynth.analysis.modes.spatial import Spatial
 from hrsynth.analysis.modes.translating import Translating
 from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import Array, unit

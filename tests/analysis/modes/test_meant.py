@@ -10,9 +10,9 @@ import pytest
 from analysis.modes.draws import six_rods, spatial
 from analysis.modes.laws import among, installed
 from hrsynth.analysis.modes.curves import Line
-from hrsynth.analysis.modes.meant import as_meant
+from hrsynth.analysis.modes.fits import as_meant
+from hrsynth.analysis.modes.rigid import Spatial
 from hrsynth.analysis.modes.solve import solve
-from hrsynth.analysis.modes.spatial import Spatial
 from hrsynth.errors import MeaningUndecided
 from hrsynth.geometry.vectors import Array
 from strategies import random_rotation

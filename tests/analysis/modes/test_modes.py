@@ -9,13 +9,11 @@ import sympy
 from analysis.modes.draws import FAMILIES, articulated, planar, spatial, translating
 from analysis.modes.laws import among, check_member, draw
 from analysis.modes.newton import pose_of, real_ones, solutions
-from hrsynth.analysis.modes.articulated import Articulated
 from hrsynth.analysis.modes.curves import Circle, Curve, Line, shifted
-from hrsynth.analysis.modes.planar import Planar
+from hrsynth.analysis.modes.rigid import Planar, Spatial
 from hrsynth.analysis.modes.solve import Modes, solve
-from hrsynth.analysis.modes.spatial import Spatial
 from hrsynth.analysis.modes.systems import System
-from hrsynth.analysis.modes.translating import Translating
+from hrsynth.analysis.modes.translating import Articulated, Translating
 from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
 from strategies import random_rotation
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.modes.laws import installed
-from hrsynth.analysis.modes.build import model
+from hrsynth.analysis.modes.branches import model
 from hrsynth.analysis.modes.curves import Circle, Line, Plane, Point, Sphere
 from hrsynth.analysis.modes.solve import solve
 from hrsynth.analysis.modes.tips import confinement

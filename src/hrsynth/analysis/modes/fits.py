@@ -7,15 +7,18 @@ mode is proved only of the goal, at which all tips fit by construction: a match 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 
+from ...errors import MeaningUndecided
 from ...geometry.vectors import Array
-from ...tolerances import TIP_ROUNDING
-from .conics import UNIT, Conic
-from .curves import length
-from .quadrics import conditions
+from ...tolerances import LOCUS, MEANT, NEAR_MODE, NO_NEAR_MODE, RANK_GAP, SAME_NEAR_MODE, TIP_ROUNDING, VANISHES
+from .curves import Sphere, length
+from .quadrics import UNIT, Conic, conditions
+from .rigid import Spatial
 from .roots import PRECISION
 from .systems import System
 
@@ -81,3 +84,119 @@ def words(goal: bool, fitting: Sequence[float], out: int, open_: int) -> str:
     if open_:
         parts.append(f"{open_} neither excluded nor found to fit")
     return ", ".join(parts)
+
+
+STARTS = 40
+"""Random poses from which a pose of a continuum is looked for."""
+
+
+def residual(system: System, q: Array) -> float:
+    """The largest distance of a tip from its curve, in sizes of the mechanism."""
+    return system.residual(system.reached(q))
+
+
+def stationary(system: System, starts: Sequence[Array], known: Sequence[Array]) -> list[Array]:
+    """Poses with a small residual that is stationary, nearest to ``starts``, without those ``known``, best first."""
+    found: list[tuple[float, Array]] = []
+    seen = [np.asarray(q) for q in known]
+    for start in starts:
+        if residual(system, start) > NO_NEAR_MODE:
+            continue
+        q = _minimised(system, start)
+        miss = residual(system, q)
+        if VANISHES < miss <= NEAR_MODE and all(_apart(system, q, other) > SAME_NEAR_MODE for other in seen):
+            found.append((miss, q))
+            seen.append(q)
+    return [q for _, q in sorted(found, key=lambda each: each[0])]
+
+
+def dimension(system: System) -> int | None:
+    """The largest dimension of the real poses about one that closes; None where none is found."""
+    rng = np.random.default_rng(0)
+    found = []
+    for _ in range(STARTS):
+        q = _minimised(system, system.somewhere(rng))
+        if residual(system, q) <= VANISHES:
+            values = np.linalg.svd(_slopes(system, q), compute_uv=False)
+            found.append(int(len(q) - np.sum(values > np.sqrt(LOCUS) * values[0])))
+    return max(found, default=None)
+
+
+def _minimised(system: System, start: Array) -> Array:
+    """The pose of least squared misses next to a start."""
+    from scipy.optimize import least_squares
+
+    result = least_squares(lambda q: system.misses(q).ravel() / system.size, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    return np.asarray(result.x)
+
+
+def _slopes(system: System, q: Array, step: float = 1e-6) -> Array:
+    """Central differences of the misses; shape (3 legs, coordinates)."""
+    columns = [(system.misses(q + e) - system.misses(q - e)).ravel() / (2 * step) for e in step * np.eye(len(q))]
+    return np.column_stack(columns)
+
+
+def _apart(system: System, one: Array, other: Array) -> float:
+    """How far two poses, or the tips of two bodies, are from each other (sizes, pure numbers)."""
+    X, Y = system.pose(one), system.pose(other)
+    moved = (X[:3, 3] - Y[:3, 3], system.misses(one) - system.misses(other))
+    turned = float(np.abs(X[:3, :3] - Y[:3, :3]).max())
+    return max(max(float(np.abs(each).max()) for each in moved) / system.size, turned)
+
+
+@dataclass(frozen=True)
+class Meant:
+    """Joint centres of some legs (their places among all) that were made one: on the ``platform`` or the ``base``, and
+    how far the one that was farthest from the others was (m)."""
+
+    where: str
+    legs: tuple[int, ...]
+    defect: float
+
+    def to_dict(self, labels: tuple[str, ...]) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"where": self.where, "legs": [labels[k] for k in self.legs], "defect_m": self.defect}
+
+
+def as_meant(system: System) -> tuple[System, tuple[Meant, ...]]:
+    """A system with what is meant made exact, and what that is; its error grows by what was moved.
+
+    Coinciding counts as meant where the largest distance accepted (at most ``MEANT`` sizes) is below the smallest one
+    rejected by ``RANK_GAP``; raises ``MeaningUndecided`` where it lies in between.
+    """
+    if system.as_written or not isinstance(system, Spatial):
+        return system, ()
+    spheres = [k for k, curve in enumerate(system.curves) if isinstance(curve, Sphere)]
+    points = {"platform": dict(enumerate(system.tips)), "base": {k: system.curves[k].centre for k in spheres}}
+    apart = [(float(np.linalg.norm(at[i] - at[j])), where, i, j)
+             for where, at in points.items() for i, j in combinations(at, 2)]
+    accepted = [each for each in apart if each[0] <= MEANT * system.size]
+    largest = max((each[0] for each in accepted), default=0.0)
+    smallest = min((each[0] for each in apart if each not in accepted), default=np.inf)
+    if largest * RANK_GAP > smallest:
+        raise MeaningUndecided("joint centres that may be meant to be one", largest / system.size,
+                               smallest / system.size, RANK_GAP)
+    if largest == 0.0:
+        return system, ()
+    tips, curves, told = system.tips.copy(), list(system.curves), []
+    for where, at in points.items():
+        for group in _groups([(i, j) for _, side, i, j in accepted if side == where]):
+            middle = np.mean([at[k] for k in group], axis=0)
+            defect = max(d for d, side, i, _ in accepted if side == where and i in group)
+            if defect > 0:
+                told.append(Meant(where, group, defect))
+            for k in group:
+                if where == "platform":
+                    tips[k] = middle
+                else:
+                    curves[k] = replace(curves[k], centre=middle)
+    return replace(system, tips=tips, curves=tuple(curves), error=system.error + largest), tuple(told)
+
+
+def _groups(pairs: list[tuple[int, int]]) -> list[tuple[int, ...]]:
+    """Those that are joined by pairs, together."""
+    groups: list[set[int]] = []
+    for pair in pairs:
+        joined = [group for group in groups if group & set(pair)]
+        groups = [group for group in groups if group not in joined] + [set(pair).union(*joined)]
+    return [tuple(sorted(group)) for group in groups]

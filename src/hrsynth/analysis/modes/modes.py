@@ -10,21 +10,20 @@ import numpy as np
 
 from ...batch.reach import reach
 from ...errors import BadRequest
+from ...geometry.ranks import range_basis
 from ...geometry.vectors import Array
 from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, outside
 from ...kinematics.closures import Miss
-from ...kinematics.configuration import ClosedConfiguration, Wanted, measure
+from ...kinematics.configuration import ClosedConfiguration, Wanted, measure, system
 from ...kinematics.relation import Measurement
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...results import Result
-from ...tolerances import SAME_RELATION
+from ...tolerances import CHAIN_ROUNDING, SAME_RELATION
 from ..observed import ObservedRobot, prepare, silent
 from ..singularity.agreement import weakest
 from ..singularity.measured import MeasuredRobot
-from .branches import solve_all
-from .build import Model
-from .goal import drift
+from .branches import Model, solve_all
 from .solve import Mode, Modes, continuum
 from .tips import Confinement, confinement
 
@@ -264,3 +263,42 @@ class _Reader:
 def _difference(X: Array, other: Array, length: float) -> float:
     """The largest difference of two poses."""
     return float(max(np.max(np.abs(X[:3, 3] - other[:3, 3])) / length, np.max(np.abs(X[:3, :3] - other[:3, :3]))))
+
+
+LEVER = 2.0
+"""Least lever (characteristic lengths) of a turn: directions are compared with the size of the tips' curves."""
+
+
+def drift(goal: ClosedConfiguration, pose: Wanted | None = None) -> float:
+    """How far a point of a link can be from where it is at the exact goal (m), within the robot's extent; infinite
+    where that is not proved.
+
+    Newton and Kantorovich: with σ the smallest singular value of the rows J that count and L a Lipschitz constant of J,
+    L ‖F‖ ≤ σ²/2 gives an exact goal within 2 ‖J⁺ F‖. Rows that depend on the others are taken as consistent.
+    """
+    twin = goal.twin
+    F, J = system(twin, goal.q, pose)
+    links = tuple(twin.mechanism.links)
+    mechanism, V = twin.mechanism, twin.frames(goal.q, links)[1]
+    points = [*(mechanism.links[link].pose[:3, 3] for link in links), *(j.point for j in mechanism.joints.values())]
+    extent = 1.0 + float(np.ptp(np.array(points), axis=0).max()) / twin.length
+    miss = float(np.linalg.norm(F)) + CHAIN_ROUNDING * extent
+    if not len(J):
+        return twin.length * miss
+    rank = range_basis(J, 1.0)[1].value
+    left, values, right = np.linalg.svd(J, full_matrices=False)
+    sigma, bends = float(values[rank - 1]) if rank else np.inf, twin.nv * extent
+    if bends * miss > sigma ** 2 / 2:
+        return float("inf")
+    inverse: Array = right[:rank].T / values[:rank] @ left[:, :rank].T
+    return 2.0 * twin.length * miss * max(
+        float(np.linalg.norm(moved[:3], 2) + _lever(goal, link) * np.linalg.norm(moved[3:], 2))
+        for link, moved in zip(links, V @ inverse, strict=True))
+
+
+def _lever(goal: ClosedConfiguration, link: str) -> float:
+    """How far a link's joint centres are from its origin (characteristic lengths)."""
+    mechanism = goal.twin.mechanism
+    origin = mechanism.links[link].pose[:3, 3]
+    return max([LEVER, *(float(np.linalg.norm(joint.point - origin)) / goal.twin.length
+                         for joint in mechanism.joints.values() if link in joint.links)])

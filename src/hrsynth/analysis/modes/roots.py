@@ -8,18 +8,18 @@ from __future__ import annotations
 
 import math
 import random
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
 from ...tolerances import FARTHEST, NEARLY_DOUBLE, RANK_GAP, SHARP_ROOT
-from .algebra import Eliminant, cycle, height, pair, primitive, univariate, without
-from .certify import Equation, Polynomial, krawczyk
-from .conics import UNIT, Balls, Conic, Within, parameter
 from .curves import Circle, Curve
+from .polynomials import Eliminant, Equation, Polynomial, cycle, height, krawczyk, pair, primitive, univariate, without
+from .quadrics import UNIT, Balls, Conic, Frame, Within, parameter
 from .squares import Square
 
 if TYPE_CHECKING:
@@ -64,7 +64,7 @@ class Root:
 
 @dataclass(frozen=True, eq=False)
 class Roots:
-    """All solutions of a square system; ``complex`` counts them with multiplicity, ``values`` are those of all.
+    """All solutions of a square system; ``complex`` counts them with multiplicity.
 
     ``degree`` is that of the polynomial that was isolated, ``extraneous`` how many roots of it lie at infinity.
     ``continuum`` says that all such polynomials vanish, ``closest`` is the smallest distance between two solutions.
@@ -84,6 +84,8 @@ class Roots:
     """Whether it is not clear which are."""
     apart: bool = False
     """Whether each complex solution is enclosed, apart from all others, for all input in the balls."""
+    values: tuple[Sequence[Any], ...] = ()
+    """Balls of the unknowns of all."""
 
 
 def solve_square(square: Square, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
@@ -105,7 +107,7 @@ def solve_square(square: Square, balls: Within = Balls, farthest: float = FARTHE
             if _vanishes(eliminant.polynomial, other.polynomial):
                 zeros += 1
                 continue
-            found = _roots(_Enclosing(square, turn, balls, farthest, equations, thick, conics), order, eliminant)
+            found = _roots(_Enclosing(balls, equations, thick, square, turn, conics), order, eliminant, farthest)
             if found.complete:
                 return found
             fallback = max(fallback, found, key=lambda each: each.complex)
@@ -151,41 +153,23 @@ def _vanishes(polynomial: fmpz_poly, noisy: fmpz_poly) -> bool:
     return not polynomial or height(polynomial - noisy) * LOUD > height(polynomial)
 
 
-def _roots(enclosing: _Enclosing, order: tuple[int, ...], eliminant: Eliminant) -> Roots:
+def _roots(square: _Enclosing, order: tuple[int, ...], eliminant: Eliminant, farthest: float) -> Roots:
     """The solutions over the roots of an eliminant."""
     from flint import ctx, fmpz_poly
 
-    square = enclosing.square
-    kept_round = square.round[order[0]]
+    half_angles = square.part.round
+    kept_round = half_angles[order[0]]
     polynomial, extraneous = primitive(eliminant.polynomial), 0
     at_infinity = kept_round and polynomial.degree() < eliminant.bound
     if kept_round:
         polynomial, pairs = without(polynomial, fmpz_poly([1, 0, 1]))
         extraneous = 2 * pairs
-    solutions = all_solutions(polynomial, lambda x, m: _over(x, m, order, eliminant, square.round))
-    resolved, far, undecided = nearer(solutions, enclosing.distance, enclosing.farthest)
+    found = square.all_of(all_solutions(polynomial, lambda x, m: _over(x, m, order, eliminant, half_angles)),
+                          polynomial.degree(), farthest)
     with ctx.workprec(PRECISION):
-        real = tuple(enclosing.enclosed([v.real for v in values], m) for values, m in resolved if is_real(values))
-        real += tuple(enclosing.middle(values) for values, m in resolved if almost_real(values))
-        surely = all(enclosing.complex_for_all(values) for values, _ in resolved
+        surely = all(square.complex_for_all(values) for values in found.values
                      if NEARLY_DOUBLE / 2 <= off_real(values) < NEARLY_REAL)
-    found = gathered(polynomial.degree() - far, resolved, real)
-    return replace(found, extraneous=extraneous, far=far, undecided=undecided,
-                   complete=found.complete and not at_infinity and not undecided and surely)
-
-
-def nearer(solutions: Sequence[Solution], distance: Callable[[Sequence[Any]], float], farthest: float
-           ) -> tuple[list[Solution], int, bool]:
-    """The solutions within a distance (sizes), which are not at infinity but for rounding, how many are beyond, and
-    whether that is not clear; ``distance`` gives that of a solution (sizes)."""
-    if not np.isfinite(farthest):
-        return list(solutions), 0, False
-    placed = [(distance(values), (values, m)) for values, m in solutions]
-    near = [each for size, each in placed if size <= farthest]
-    nearest_beyond = min((size for size, _ in placed if size > farthest), default=np.inf)
-    if max((size for size, _ in placed if size <= farthest), default=0.0) * RANK_GAP > nearest_beyond:
-        return list(solutions), 0, True
-    return near, sum(m for size, (_, m) in placed if size > farthest), False
+    return replace(found, extraneous=extraneous, complete=found.complete and not at_infinity and surely)
 
 
 def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solution]]) -> list[Solution]:
@@ -201,14 +185,6 @@ def all_solutions(polynomial: fmpz_poly, over: Callable[[Any, int], list[Solutio
                 break
         precision *= 2
     return resolved
-
-
-def gathered(degree: int, resolved: Sequence[Solution], real: tuple[Root, ...], method: str = Roots.method) -> Roots:
-    """All solutions together; complete if each root has its solution and each real one is enclosed or multiple."""
-    count = sum(m for _, m in resolved)
-    proved = all(root.real and (root.unique or root.multiplicity > 1) for root in real)
-    return Roots(count, real, degree, complete=count == degree and proved,
-                 closest=_closest([values for values, _ in resolved]), method=method)
 
 
 def _over(x: Any, multiplicity: int, order: tuple[int, ...], eliminant: Eliminant, half_angles: Sequence[bool]
@@ -258,71 +234,109 @@ def off_real(values: Sequence[Any]) -> float:
     return max(abs(float(v.imag)) / (1.0 + abs(float(v.real))) for v in values)
 
 
-def almost_real(values: Sequence[Any]) -> bool:
+def _almost_real(values: Sequence[Any]) -> bool:
     """Whether a solution is the first of a conjugate pair that nearly is one real solution."""
     first = next((float(v.imag) for v in values if not v.imag.is_zero()), 0.0)
     return off_real(values) < NEARLY_DOUBLE / 2 and first > 0
 
 
 @dataclass(frozen=True, eq=False)
-class _Enclosing:
-    """A square system with circles counted from ``turn``: its equations, of the rounded input and of the exact one."""
+class Enclosing(ABC):
+    """What encloses the solutions of a choice of legs: its equations, of the rounded input and of the exact one."""
 
-    square: Square
-    turn: float
     balls: Within
-    farthest: float
-    equations: Sequence[Equation]
-    thick: Sequence[Equation]
+    equations: Sequence[Polynomial]
+    thick: Sequence[Polynomial]
+    method: ClassVar[str]
+
+    @abstractmethod
+    def distance(self, values: Sequence[Any]) -> float:
+        """How far away the points of a solution are, complex ones too (sizes)."""
+
+    @abstractmethod
+    def parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
+        """Balls of what a root tells, for balls of the unknowns."""
+
+    @abstractmethod
+    def misses(self, own: Sequence[Any], values: Sequence[Any]) -> tuple[float, ...]:
+        """How far the points at balls of the parameters ``own`` and of the unknowns are from those at the middle
+        (m)."""
+
+    def all_of(self, solutions: Sequence[Solution], degree: int, farthest: float) -> Roots:
+        """All solutions together, the real ones enclosed, without those beyond ``farthest`` (sizes); complete if each
+        root of ``degree`` has its solution and each real one is enclosed or multiple."""
+        from flint import ctx
+
+        resolved, far, undecided = _nearer(solutions, self.distance, farthest)
+        with ctx.workprec(PRECISION):
+            real = tuple(self._enclosed([v.real for v in values], m) for values, m in resolved if is_real(values))
+            real += tuple(self._middle(values) for values, _ in resolved if _almost_real(values))
+        count, values = sum(m for _, m in resolved), tuple(values for values, _ in resolved)
+        proved = all(root.real and (root.unique or root.multiplicity > 1) for root in real)
+        return Roots(count, real, degree - far, complete=count == degree - far and proved and not undecided,
+                     closest=_closest(values), method=self.method, far=far, undecided=undecided, values=values)
+
+    def _enclosed(self, start: Sequence[Any], multiplicity: int) -> Root:
+        """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
+        for each in (self.thick, self.equations):
+            box = krawczyk(each, start)
+            if box is not None:
+                own = self.parameters(box)
+                return Root(own, self.misses(own, box), 1, True, each is self.thick)
+        own = self.parameters(start)
+        return Root(own, self.misses(own, start), multiplicity, False, False)
+
+    def _middle(self, values: Sequence[Any]) -> Root:
+        """The real part of a conjugate pair, and how far its points are from there at most."""
+        own = self.parameters([v.real.mid() for v in values])
+        wide = [v.real + v.imag.union(-v.imag) for v in values]
+        return Root(own, self.misses(own, wide), 2, False, False, False)
+
+
+@dataclass(frozen=True, eq=False)
+class _Enclosing(Enclosing):
+    """A square system with circles counted from ``turn``."""
+
+    part: Square
+    turn: float
     conics: Sequence[Conic]
     """The unknowns' curves in balls."""
-
-    def enclosed(self, start: Sequence[Any], multiplicity: int) -> Root:
-        """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""
-        values, unique, wide = boxed(self.equations, self.thick, start)
-        own = self._parameters(values)
-        return Root(own, self._misses(own, values), 1 if unique else multiplicity, unique, wide)
+    method = "exact resultant"
 
     def complex_for_all(self, values: Sequence[Any]) -> bool:
         """Whether a complex solution is proved to be no real one for all input in the balls."""
         box = krawczyk(self.thick, values)
         return box is not None and any(not v.imag.contains(0) for v in box)
 
-    def middle(self, values: Sequence[Any]) -> Root:
-        """The real part of a conjugate pair, and how far its curves' points are from it at most."""
-        own = self._parameters([v.real.mid() for v in values])
-        wide = [v.real + v.imag.union(-v.imag) for v in values]
-        return Root(own, self._misses(own, wide), 2, False, False, False)
+    @property
+    def frame(self) -> Frame:
+        """The working frame."""
+        assert self.part.frame is not None
+        return self.part.frame
 
     @cached_property
     def _radii(self) -> list[list[float]]:
         """Of each unknown's curve how far the exact coefficients of t⁰, t¹, t² can be from the rounded ones (m)."""
-        frame = self.square.frame
-        assert frame is not None
-        return [[math.hypot(*(float(each.rad()) for each in row if not isinstance(each, int))) * frame.size / UNIT
+        return [[math.hypot(*(float(each.rad()) for each in row if not isinstance(each, int))) * self.frame.size / UNIT
                  for row in path.N] for path in self.conics]
 
     def distance(self, values: Sequence[Any]) -> float:
-        """How far away the points of a solution are, complex ones too (sizes)."""
         found = []
-        for curve, t in zip(self.square.unknowns, values, strict=True):
+        for curve, t in zip(self.part.unknowns, values, strict=True):
             z = complex(t)
             found.append(abs(z) if not isinstance(curve, Circle) else max(1.0, abs(z)) ** 2 / abs(1.0 + z * z))
         return max(found)
 
-    def _parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
-        square = self.square
-        assert square.frame is not None
-        return tuple(parameter(curve, square.frame, origin, t)
-                     for curve, origin, t in zip(square.unknowns, square.turns(self.turn), values, strict=True))
+    def parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
+        return tuple(parameter(curve, self.frame, origin, t) for curve, origin, t in zip(
+            self.part.unknowns, self.part.turns(self.turn), values, strict=True))
 
-    def _misses(self, own: Sequence[Any], values: Sequence[Any]) -> tuple[float, ...]:
-        """How far the points at balls of the parameters ``own`` and of t are from those at the middle (m)."""
-        if self.square.exact is not None:
-            return tuple(self._miss(*each) for each in zip(self.square.unknowns, own, values,
-                                                           self.square.exact(self.balls), strict=True))
+    def misses(self, own: Sequence[Any], values: Sequence[Any]) -> tuple[float, ...]:
+        if self.part.exact is not None:
+            return tuple(self._miss(*each) for each in zip(self.part.unknowns, own, values,
+                                                           self.part.exact(self.balls), strict=True))
         found = []
-        for curve, s, t, (r0, r1, r2) in zip(self.square.unknowns, own, values, self._radii, strict=True):
+        for curve, s, t, (r0, r1, r2) in zip(self.part.unknowns, own, values, self._radii, strict=True):
             ball, size = float(s.rad()), abs(float(t.mid())) + float(t.rad())
             moved, w = (ball * curve.radius, 1.0 + size * size) if isinstance(curve, Circle) else (ball, 1.0)
             found.append(moved + (r0 + size * (r1 + size * r2)) / w)
@@ -330,22 +344,25 @@ class _Enclosing:
 
     def _miss(self, curve: Curve, s: Any, t: Any, path: Conic) -> float:
         """As above, for a point that is none of the curve's own."""
-        frame = self.square.frame
-        assert frame is not None
-        centre, powers = frame.point(curve.at(float(s.mid()))), np.array([1, t, t * t], dtype=object)
+        centre, powers = self.frame.point(curve.at(float(s.mid()))), np.array([1, t, t * t], dtype=object)
         w = (powers @ path.w) * UNIT
-        return frame.size * math.hypot(*(float((x / w - c).abs_upper())
-                                         for x, c in zip(powers @ path.N, centre.tolist(), strict=True)))
+        return self.frame.size * math.hypot(*(float((x / w - c).abs_upper())
+                                              for x, c in zip(powers @ path.N, centre.tolist(), strict=True)))
 
 
-def boxed(equations: Sequence[Polynomial], thick: Sequence[Polynomial], start: Sequence[Any]
-          ) -> tuple[list[Any], bool, bool]:
-    """The box about a regular solution, whether it holds exactly one, and whether it does so for the exact input."""
-    for each in (thick, equations):
-        box = krawczyk(each, start)
-        if box is not None:
-            return box, True, each is thick
-    return list(start), False, False
+def _nearer(solutions: Sequence[Solution], distance: Callable[[Sequence[Any]], float], farthest: float
+            ) -> tuple[list[Solution], int, bool]:
+    """The solutions within a distance (sizes), which are not at infinity but for rounding, how many are beyond, and
+    whether that is not clear; ``distance`` gives that of a solution (sizes)."""
+    if not np.isfinite(farthest):
+        return list(solutions), 0, False
+    placed = [(distance(values), (values, m)) for values, m in solutions]
+    beyond = [(size, m) for size, (_, m) in placed if size > farthest]
+    near = [(size, each) for size, each in placed if size <= farthest]
+    nearest_beyond = min((size for size, _ in beyond), default=np.inf)
+    if max((size for size, _ in near), default=0.0) * RANK_GAP > nearest_beyond:
+        return list(solutions), 0, True
+    return [each for _, each in near], sum(m for _, m in beyond), False
 
 
 def _closest(solutions: Sequence[Sequence[Any]]) -> float:

@@ -12,15 +12,13 @@ import numpy as np
 from ...geometry.vectors import Array, frozen
 from ...tolerances import FARTHEST, NEARLY_DOUBLE, TIP_ROUNDING, VANISHES
 from .curves import Point
-from .fits import excluded, meets, torn, words
-from .meant import Meant, as_meant
-from .near import dimension, residual, stationary
+from .fits import Meant, as_meant, dimension, excluded, meets, residual, stationary, torn, words
+from .msolve import solve_whole, wholes
 from .quadrics import Whole
 from .roots import Root, Roots, nearly_double, solve_square
 from .squares import Square
 from .systems import System
 from .translating import Translating
-from .whole import solve_whole, wholes
 
 CHOICES = 5
 """Choices of legs that are given to msolve until one has finitely many solutions, and, besides the first, whose

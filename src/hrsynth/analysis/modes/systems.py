@@ -18,9 +18,8 @@ import numpy as np
 from ...errors import BadRequest
 from ...geometry.vectors import Array, frozen, pose
 from ...tolerances import FARTHEST, TIP_ROUNDING
-from .conics import SLACK, UNIT, Balls, Frame, Within, spatial_frame
 from .curves import Point, Reach, curves_of, extent, length, shifted
-from .quadrics import Chart
+from .quadrics import SLACK, UNIT, Balls, Chart, Frame, Within, spatial_frame
 from .squares import Square
 
 

@@ -1,21 +1,37 @@
-"""A platform that only translates."""
+"""A platform that only translates, and one of two such bodies, the second on a circle about the first."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 from itertools import combinations
 
 import numpy as np
 
+from ...errors import BadRequest
 from ...geometry.vectors import Array
-from ...tolerances import TIP_ROUNDING, VANISHES
-from .certify import Equation
-from .conics import Conic, Numbers, direction, spatial_frame
-from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, cross, extent, length
-from .quadrics import Chart, Moving, shifting
-from .squares import Square, on_plane, on_sphere, resting, single
-from .surfaces import three_surfaces
+from ...tolerances import PARALLEL, TIP_ROUNDING, VANISHES
+from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, cross, extent, length, shifted
+from .polynomials import Equation
+from .quadrics import (
+    Chart,
+    Conic,
+    Moving,
+    Numbers,
+    direction,
+    normals,
+    on_circle,
+    on_plane,
+    on_sphere,
+    shifting,
+    spatial_frame,
+    spokes,
+    sum_on_plane,
+    sum_on_sphere,
+)
+from .squares import Square, resting, single, three_surfaces
 from .systems import Shifting
 
 
@@ -113,3 +129,120 @@ def coplanar(one: Curve, other: Curve, size: float) -> bool:
     n = circles[0].axis
     tilt = [length(cross(n, circle.axis)) for circle in circles[1:]] + [float(n @ d) for d in lines]
     return all(abs(value) < VANISHES for value in [*tilt, float(n @ between)])
+
+
+@dataclass(frozen=True, eq=False)
+class Articulated(Shifting):
+    """Two bodies that translate: q = (p, θ), p (3,) the first body's origin, θ where the second is on ``slide``.
+
+    tip_i = p + b_i on the first body, p + slide(θ) + b_i on the second; ``bodies`` says which, 0 or 1, for each
+    leg. The square systems take one leg of each body: with the tip of one as p, the sum (or difference) of two circles
+    lies on the third curve.
+    """
+
+    bodies: tuple[int, ...]
+    slide: Circle
+    freedoms = 4
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if len(self.bodies) != len(self.curves) or not set(self.bodies) <= {0, 1}:
+            raise BadRequest("bodies of an articulated platform", self.bodies, "0 or 1 for each leg")
+
+    @cached_property
+    def size(self) -> float:
+        """What residuals are divided by (m)."""
+        return max(extent(self.curves, self.tips), self.slide.radius)
+
+    def left(self, legs: Sequence[int]) -> int:
+        """Freedoms that some legs leave: of each body's three, and one at least where a body has no leg."""
+        sides = [sum(self.forbids[k] for k in legs if self.bodies[k] == body) for body in (0, 1)]
+        return max(4 - sum(min(3, side) for side in sides), *(int(side == 0) for side in sides), 0)
+
+    def reached(self, q: Array) -> Array:
+        """Where the tips are at a pose; shape (legs, 3), metres."""
+        origins = np.array([q[:3], q[:3] + self.slide.at(float(q[3]))])
+        return np.asarray(origins[list(self.bodies)] + self.tips)
+
+    def apart(self, q: Array, at: Array, legs: Sequence[int], points: Sequence[tuple[Array, float]]
+              ) -> dict[int, float]:
+        """As for any system; the points are a place of one body and one of the second relative to the first."""
+        error = self.error + TIP_ROUNDING * self.size
+        return dict.fromkeys(legs, sum(miss for _, miss in points) + error)
+
+    def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
+        """How far the bodies can be from their places at q (m); they do not turn."""
+        sides = [[each for k, each in apart.items() if self.bodies[k] == body] for body in (0, 1)]
+        return max(min(side, default=math.inf) for side in sides), 0.0
+
+    def bound(self, legs: Sequence[int]) -> tuple[int, str] | None:
+        """Bézout for p in space and the slide's circle (degree 2): of a body's spheres all but one are planes by their
+        differences, and those of the other body are linear in p then: 2 · 2 m, m the other body's conditions; without
+        spheres 2 m."""
+        sides = [[k for k in legs if self.bodies[k] == body] for body in (0, 1)]
+        counts = [sum(self.forbids[k] for k in side) for side in sides]
+        round_ = [any(isinstance(self.curves[k], Circle | Sphere) for k in side) for side in sides]
+        if sum(counts) != self.freedoms or not all(counts):
+            return None
+        found = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
+        return min(found), "the product of degrees in space and on the circle (Bézout)"
+
+    def chart(self, number: int) -> Chart:
+        """p, cos θ and sin θ."""
+        middle = spatial_frame(self.paths, self.size).origin
+        frame = replace(spatial_frame((*self.paths, self.slide), self.size), origin=middle)
+
+        def tips(numbers: Numbers) -> list[Moving]:
+            centre = numbers.vector(frame.vector(self.slide.centre))
+            a, b = spokes(self.slide, frame, 0.0, numbers)
+            both = shifting(5, centre * 0), shifting(5, centre, ((4, a), (5, b)))
+            return [both[body] for body in self.bodies]
+
+        def place(x: Sequence[float]) -> Array:
+            return np.array([*(frame.origin + frame.size * (np.array(x[:3]) @ frame.R)), math.atan2(x[4], x[3])])
+
+        return Chart(frame, 5, self.paths, tips, (on_circle(5, 4, 5),), place)
+
+    def squares(self) -> Iterator[Square]:
+        """The pairs of legs, one on each body, each in both roles; first those where no plane is the slide's own."""
+        curves = [(k, path) for k, path in enumerate(self.paths) if not isinstance(path, Surface)]
+        one, two = ([each for each in curves if self.bodies[each[0]] == body] for body in (0, 1))
+        roles = [roles for i in one for j in two for roles in ((i, j), (j, i))]
+        for first, onto in sorted(roles, key=lambda roles: self._along_slide(roles[1][1])):
+            if not isinstance(onto[1], Point):
+                yield self._square((first[0], onto[0]), first[1], onto[1])
+
+    def _along_slide(self, curve: Curve) -> bool:
+        """Whether a circle lies in a plane parallel to the slide's."""
+        return isinstance(curve, Circle) and length(cross(curve.axis, self.slide.axis)) < PARALLEL
+
+    def _square(self, legs: tuple[int, int], first: Curve, onto: Line | Circle) -> Square:
+        """The first leg's tip carries the slide to the second leg's curve."""
+        sign = 1 if self.bodies[legs[0]] == 0 else -1
+        size = max(extent((first, onto), np.zeros((1, 3))), self.slide.radius, length(self.slide.centre))
+        middle = (first.centre + onto.centre) / 2
+        start, end = shifted(first, -middle), shifted(onto, -middle)
+        frame = replace(spatial_frame((start, end, self.slide), size), origin=np.zeros(3))
+        resting = isinstance(first, Point)
+
+        def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
+            centre = numbers.vector(frame.point(end.centre))
+            across = [direction(n, frame, numbers) for n in normals(onto)]
+            if resting:
+                left = centre - numbers.vector(frame.point(start.centre))
+                quadratics = [on_plane(conics[0], sign * n, n @ left) for n in across]
+                return [single(quadratics[0])]
+            tables = [sum_on_plane(conics[0], conics[1], sign, n, n @ centre) for n in across]
+            if isinstance(onto, Circle):
+                rho = numbers.vector(np.array([onto.radius / frame.size]))[0]
+                tables.append(sum_on_sphere(conics[0], conics[1], sign, centre, rho * rho))
+            return [Equation(table, 0, 1) for table in tables]
+
+        def place(parameters: Sequence[float]) -> Array:
+            tip = first.centre if isinstance(first, Point) else first.at(parameters[0])
+            theta = float(parameters[-1])
+            return np.array([*(tip if sign == 1 else tip - self.slide.at(theta)), theta])
+
+        unknowns = (self.slide,) if resting else (start, self.slide)
+        whole = len(self.curves) == 2 and not resting
+        return Square(legs, unknowns, frame, build, place, whole)

@@ -1,0 +1,349 @@
+"""A rigid platform, in a plane or in space."""
+
+from __future__ import annotations
+
+import cmath
+import math
+import random
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from ...errors import BadRequest
+from ...geometry.so3 import exponential, logarithm
+from ...geometry.vectors import Array, pose
+from ...tolerances import SAME_DIRECTION, SAME_POINT
+from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, cross, curves_of, extent, length
+from .polynomials import Equation, Quadric
+from .quadrics import (
+    UNIT,
+    Chart,
+    Conic,
+    Frame,
+    Moving,
+    Numbers,
+    direction,
+    distance,
+    on_circle,
+    on_sphere,
+    planar_frame,
+    shifting,
+    spatial_frame,
+)
+from .squares import Square, resting, single
+from .systems import System, registered
+
+
+@dataclass(frozen=True, eq=False)
+class Planar(System):
+    """A platform that moves in the plane of ``X_plane`` (4, 4), whose z axis is the normal: q = (x, y, φ).
+
+    ``tips`` are their coordinates in the platform's frame, shape (n, 2); X_platform = X_plane · (turn φ, shift (x, y)).
+    """
+
+    X_plane: Array
+
+    freedoms = 3
+    space = 2
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        n = self.X_plane[:3, 2]
+        for curve in self.curves:
+            off = (length(cross(n, curve.axis)) if isinstance(curve, Circle) else
+                   abs(float(n @ curve.direction)) if isinstance(curve, Line) else 0.0)
+            if off > SAME_DIRECTION:
+                raise BadRequest("a curve outside the plane of motion, sine", off, f"at most {SAME_DIRECTION}")
+        if self.surfaces:
+            raise BadRequest("what tips in a plane are confined to", "a surface", "points, lines and circles")
+
+    def position(self, origin: Array) -> Array:
+        """The coordinates (2,) of a platform whose origin is at a point (3,)."""
+        return np.asarray((origin - self.X_plane[:3, 3]) @ self.X_plane[:3, :2])
+
+    def pose(self, q: Array) -> Array:
+        """The platform's frame in the base frame; shape (4, 4)."""
+        c, s = math.cos(q[2]), math.sin(q[2])
+        return np.asarray(self.X_plane @ np.array([[c, -s, 0, q[0]], [s, c, 0, q[1]], [0, 0, 1, 0], [0, 0, 0, 1]]))
+
+    def reached(self, q: Array) -> Array:
+        """Where the tips are at a pose, each in the plane of its own curve; shape (legs, 3), metres."""
+        X, n = self.pose(q), self.X_plane[:3, 2]
+        found = []
+        for curve, tip in zip(self.curves, self.tips, strict=True):
+            at = X[:3, 3] + X[:3, :2] @ tip
+            found.append(at - n * float(n @ (at - curve.centre)))
+        return np.array(found)
+
+    def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
+        """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
+        return registered(self.tips, apart)
+
+    @cached_property
+    def frame(self) -> Frame:
+        """A working frame in the plane of motion."""
+        return planar_frame(self.curves, self.X_plane, self.size)
+
+    def chart(self, number: int) -> Chart:
+        """x, y, cos and sin of the turn from the working frame to the platform's."""
+        frame = self.frame
+
+        def tips(numbers: Numbers) -> list[Moving]:
+            found = []
+            for tip in self.tips:
+                b = numbers.vector(tip / frame.size)
+                found.append(shifting(4, b * 0, ((3, b), (4, np.array([-b[1], b[0]], dtype=object)))))
+            return found
+
+        def place(x: Sequence[float]) -> Array:
+            at = frame.origin + frame.size * (np.array(x[:2]) @ frame.R)
+            first = self.X_plane[:3, :2].T @ (np.array(x[2:]) @ frame.R)
+            return np.array([*self.position(at), math.atan2(first[1], first[0])])
+
+        return Chart(frame, 4, self.curves, tips, (on_circle(4, 3, 4),), place)
+
+    def squares(self) -> Iterator[Square]:
+        """Two pivots, a pivot and a curve, or three curves in each order that two tips apart allow."""
+        points = [k for k, curve in enumerate(self.curves) if isinstance(curve, Point)]
+        moving = [k for k in range(len(self.curves)) if k not in points]
+        apart = SAME_POINT * self.size
+        for i, j in combinations(points, 2):
+            if length(self.tips[i] - self.tips[j]) > apart:
+                yield resting((i, j), self._square((i, j), False).place(()), False)
+        for i, j in ((i, j) for i in points for j in moving):
+            if length(self.tips[i] - self.tips[j]) > apart:
+                yield self._square((i, j), len(self.curves) == 2)
+        for legs in combinations(moving, 3):
+            for i, j, k in (legs, (legs[1], legs[2], legs[0]), (legs[2], legs[0], legs[1])):
+                if length(self.tips[i] - self.tips[j]) > apart:
+                    yield self._square((i, j, k), len(self.curves) == 3)
+
+    def _square(self, legs: tuple[int, ...], whole: bool) -> Square:
+        curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
+        b = self.tips[list(legs)]
+        frame = planar_frame(curves, self.X_plane, extent(curves, b))
+
+        def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
+            tips = [numbers.vector(tip / frame.size) for tip in b]
+            arm = tips[1] - tips[0]
+            if len(legs) == 2:
+                held = numbers.vector(frame.point(curves[0].centre))
+                return [single(on_sphere(conics[0], held, arm @ arm))]
+            f = distance(conics[0], conics[1], arm @ arm)
+            return [Equation(f, 0, 1), Equation(_third(conics, tips, curves[2], frame, numbers), 0, 1)]
+
+        def place(parameters: Sequence[float]) -> Array:
+            free = iter(parameters)
+            two = np.array([curve.centre if isinstance(curve, Point) else curve.at(next(free)) for curve in curves[:2]])
+            flat = self.position(two)
+            turn = complex(*(flat[1] - flat[0])) / complex(*(b[1] - b[0]))
+            at = flat[0] - _turned(turn / abs(turn), b[0])
+            return np.array([*at, cmath.phase(turn)])
+
+        unknowns = tuple(curve for curve in curves[:2] if not isinstance(curve, Point))
+        return Square(legs, unknowns, frame, build, place, whole)
+
+
+def _third(conics: Sequence[Conic], tips: Sequence[Any], curve: Curve, frame: Frame, numbers: Numbers) -> Any:
+    """The table of *tip₃ on its curve*, with γ tip₃ = α tip₁ + β tip₂ in complex numbers: α = b₂ − b₃, β = b₃ − b₁."""
+    alpha, beta, gamma = (_complex(v) for v in (tips[1] - tips[2], tips[2] - tips[0], tips[1] - tips[0]))
+    one, other = conics
+    scale = (gamma.T @ gamma)[0, 0]
+    centre = numbers.vector(frame.point(curve.centre))
+    if isinstance(curve, Line):
+        d = direction(curve.direction, frame, numbers)
+        normal = np.array([-d[1], d[0]])
+        first, second = alpha.T @ gamma @ normal, beta.T @ gamma @ normal
+        return (np.outer(one.N @ first, other.w) + np.outer(one.w, other.N @ second)
+                - scale * (normal @ centre) * np.outer(one.w, other.w))
+    assert isinstance(curve, Circle)
+    rho = numbers.vector(np.array([curve.radius / frame.size]))[0]
+    first, second = alpha.T @ gamma @ centre, beta.T @ gamma @ centre
+    return (np.outer((alpha.T @ alpha)[0, 0] * one.Q - 2 * (one.N @ first), other.w)
+            + np.outer(one.w, (beta.T @ beta)[0, 0] * other.Q - 2 * (other.N @ second))
+            + 2 * (one.N @ (alpha.T @ beta) @ other.N.T)
+            + scale * (centre @ centre - rho * rho) * np.outer(one.w, other.w))
+
+
+def _turned(turn: complex, v: Array) -> tuple[float, float]:
+    """A vector of the plane multiplied by a complex number."""
+    product = turn * complex(*v)
+    return product.real, product.imag
+
+
+def _complex(v: Any) -> Any:
+    """Multiplication by the complex number v, as a matrix; shape (2, 2)."""
+    return np.array([[v[0], -v[1]], [v[1], v[0]]], dtype=object)
+
+
+@dataclass(frozen=True, eq=False)
+class Spatial(System):
+    """A rigid platform in space: q = (p, rotation vector); ``tips`` has shape (n, 3), no three used on one line."""
+
+    freedoms = 6
+
+    def pose(self, q: Array) -> Array:
+        """The platform's frame in the base frame; shape (4, 4)."""
+        return pose(q[:3], exponential(q[3:]))
+
+    def reached(self, q: Array) -> Array:
+        """Where the tips are at a pose; shape (legs, 3), metres."""
+        X = self.pose(q)
+        return np.asarray(X[:3, 3] + self.tips @ X[:3, :3].T)
+
+    def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
+        """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
+        return registered(self.tips, apart)
+
+    def bound(self, legs: Sequence[int]) -> tuple[int, str] | None:
+        """Six conditions *on a sphere or plane* are linear in (1, R, p, Rᵀp, |p|²), in which poses are of degree 40
+        (M. Gallet, G. Nawratil, J. Schicho, J. Geom. 106, 2015; F. Ronga, T. Vust 1995): at most 40, and no curve
+        besides 40. With a tip at rest, or six planes that leave p to R, three quadrics of the quaternion are left: 8;
+        three rods in one ball let it be in two places.
+        """
+        curves = [self.curves[k] for k in legs]
+        if sum(self.forbids[k] for k in legs) != self.freedoms:
+            return None
+        if any(isinstance(curve, Point) for curve in curves):
+            return 8, "three quadrics of the quaternion (Bézout)"
+        if all(isinstance(curve, Line | Plane) for curve in curves):
+            return 8, "three quadrics of the quaternion (Bézout)"
+        balls = [Counter(tuple(point) for point in points) for points in (
+            (self.tips[k] for k in legs), (self.curves[k].centre for k in legs))]
+        if all(isinstance(curve, Sphere) for curve in curves) and max(max(each.values()) for each in balls) > 2:
+            return 16, "two places of a ball with three rods, three quadrics of the quaternion for each (Bézout)"
+        return 40, "six conditions on points of a rigid body (degree of the poses among 16 coordinates)"
+
+    def chart(self, number: int) -> Chart:
+        """Study's coordinates, with a linear form of the quaternion that depends on the number made 1."""
+        return study(self.curves, self.tips, self.size, number)
+
+    def squares(self) -> Iterator[Square]:
+        """Three tips at rest; two, one or none and as many curves as make three, with tips not on one line."""
+        points = [k for k, curve in enumerate(self.curves) if isinstance(curve, Point)]
+        moving = [k for k in curves_of(self.curves) if k not in points]
+        choices = list(combinations(points, 3)) + [(i, j, k) for j, k in combinations(points, 2) for i in moving]
+        choices += [(i, j, k) for k in points for i, j in combinations(moving, 2)] + list(combinations(moving, 3))
+        for legs in choices:
+            a, b, c = self.tips[list(legs)]
+            if length(cross(b - a, c - a)) > SAME_POINT * self.size ** 2:
+                yield self._square(legs, len(moving) == len(self.curves) == 3)
+
+    def _square(self, legs: tuple[int, ...], whole: bool) -> Square:
+        """Three distances between three tips; with tips at rest, given last, those that decide the others."""
+        curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
+        b = self.tips[list(legs)]
+        unknowns = tuple(curve for curve in curves if not isinstance(curve, Point))
+        frame = spatial_frame(curves, extent(curves, b))
+
+        def build(conics: Sequence[Conic], numbers: Numbers) -> list[Equation]:
+            tips = [numbers.vector(tip / frame.size) for tip in b]
+            arms = [(i, j, tips[j] - tips[i]) for i, j in ((0, 1), (1, 2), (2, 0))]
+            if not unknowns:
+                return []
+            if len(unknowns) == 1:
+                held = numbers.vector(frame.point(curves[1].centre))
+                return [single(on_sphere(conics[0], held, arms[0][2] @ arms[0][2]))]
+            if len(unknowns) == 2:
+                held = numbers.vector(frame.point(curves[2].centre))
+                reach = on_sphere(conics[1], held, arms[1][2] @ arms[1][2])
+                return [Equation(distance(conics[0], conics[1], arms[0][2] @ arms[0][2]), 0, 1),
+                        Equation(np.outer(np.array([1, 0, 0], dtype=object), reach), 0, 1)]
+            return [Equation(distance(conics[i], conics[j], v @ v), i, j) for i, j, v in arms]
+
+        def place(parameters: Sequence[float]) -> Array:
+            free = iter(parameters)
+            three = np.array([curve.at(0.0 if isinstance(curve, Point) else next(free)) for curve in curves])
+            R = _triad(three) @ _triad(b).T
+            return np.array([*(three.mean(axis=0) - R @ b.mean(axis=0)), *logarithm(R)])
+
+        return Square(legs, unknowns, frame, build, place, whole)
+
+
+def _triad(points: Array) -> Array:
+    """A right-handed triad of three points, equal for congruent ones; its columns, shape (3, 3)."""
+    first, second = points[1] - points[0], points[2] - points[0]
+    e = first / length(first)
+    n = cross(first, second)
+    n = n / length(n)
+    return np.column_stack([e, cross(n, e), n])
+
+
+COUNT = 7
+"""Unknowns: three of the quaternion, four of g."""
+
+
+def study(reaches: tuple[Reach, ...], b: Array, size: float, number: int) -> Chart:
+    """The chart of a number for tips b (n, 3)."""
+    frame = spatial_frame(reaches, size)
+    E = _quaternions(number)
+    e, g = E, np.eye(8, dtype=int).astype(object)[4:]
+    w = sum(_product(v, v) for v in e)
+    R = _rotation(e)
+    shift, back = 2 * _vector(e, g, 1), 2 * _vector(e, g, -1)
+    gg = sum(_product(v, v) for v in g)
+
+    def tips(numbers: Numbers) -> list[Moving]:
+        found = []
+        for tip in b:
+            v = numbers.vector(tip / frame.size)
+            Q = 4 * UNIT * UNIT * gg + 2 * UNIT * (back @ v) + (v @ v) * w
+            found.append(Moving(UNIT * shift + R @ v, Q, w))
+        return found
+
+    def place(x: Sequence[float]) -> Array:
+        ends = np.array([1.0, *x])
+        q, t = (ends @ rows.astype(float).T for rows in (e, g))
+        norm = float(q @ q)
+        p = 2.0 * (q[0] * t[1:] - t[0] * q[1:] + cross(q[1:], t[1:])) / norm
+        turned = frame.R.T @ rotation_of(q / math.sqrt(norm))
+        return np.array([*(frame.origin + frame.size * (p @ frame.R)), *logarithm(turned)])
+
+    normal = sum(_product(u, v) for u, v in zip(e, g, strict=True))
+    return Chart(frame, COUNT, reaches, tips, (normal,), place, Quadric(w))
+
+
+def _quaternions(number: int) -> Any:
+    """Four linear forms of (1, x), shape (4, 8), of the first three unknowns; their coefficients are small."""
+    rng = random.Random(number)
+    while True:
+        E = np.array([[rng.randint(-3, 3) for _ in range(4)] for _ in range(4)], dtype=float)
+        if np.linalg.svd(E, compute_uv=False)[-1] > 2.0:
+            return np.hstack([E.astype(int), np.zeros((4, 4), dtype=int)]).astype(object)
+
+
+def _product(u: Any, v: Any) -> Any:
+    return np.multiply.outer(u, v)
+
+
+def _vector(e: Any, g: Any, sign: int) -> Any:
+    """The vector part of g ē, or of ē g where ``sign`` is −1; shape (8, 8, 3)."""
+    parts = []
+    for k in range(1, 4):
+        i, j = k % 3 + 1, (k + 1) % 3 + 1
+        turned = _product(e[i], g[j]) - _product(e[j], g[i])
+        parts.append(_product(e[0], g[k]) - _product(e[k], g[0]) + sign * turned)
+    return np.stack(parts, axis=-1)
+
+
+def _rotation(e: Any) -> Any:
+    """|e|² R; shape (8, 8, 3, 3)."""
+    a, b, c, d = e
+    s = _product
+    rows = [[s(a, a) + s(b, b) - s(c, c) - s(d, d), 2 * (s(b, c) - s(a, d)), 2 * (s(b, d) + s(a, c))],
+            [2 * (s(b, c) + s(a, d)), s(a, a) - s(b, b) + s(c, c) - s(d, d), 2 * (s(c, d) - s(a, b))],
+            [2 * (s(b, d) - s(a, c)), 2 * (s(c, d) + s(a, b)), s(a, a) - s(b, b) - s(c, c) + s(d, d)]]
+    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
+
+
+def rotation_of(q: Array) -> Array:
+    """The rotation of a unit quaternion (w, x, y, z); shape (3, 3)."""
+    w, x, y, z = q.tolist()
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
