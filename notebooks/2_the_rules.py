@@ -63,7 +63,7 @@ def compared(state):
 def step(state, module, trust=False):
     """The first proposal of a rule that keeps the relation; each is told with its angle."""
     print(module.RULE.name.upper(), "–", module.RULE.source)
-    for proposal in module.RULE.propose(state, evidence, "1", trust):
+    for proposal in module.RULE.proposals(state, evidence, "1", waive=trust):
         if isinstance(proposal, Refusal):
             print("   does not apply:", proposal.reason)
             continue

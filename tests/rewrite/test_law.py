@@ -7,6 +7,8 @@ two relations there; the engine that accepted the step has no say in it.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +16,10 @@ import pytest
 from hrsynth.analysis.observed import ObservedRobot, prepare
 from hrsynth.kinematics.certificate import Certificate, certify
 from hrsynth.mechanism.model import Mechanism
-from hrsynth.rewrite import strategy
 from hrsynth.rewrite.evidence import Evidence
-from hrsynth.rewrite.strategy import Rewriting
+from hrsynth.rewrite.rule import Rule
+from hrsynth.rewrite.rules import rules
+from hrsynth.rewrite.strategy import FORMS, Rewriting
 from hrsynth.tolerances import SAME_RELATION
 from kinematics.robots import ROBOTS, led, seen_by_oracle, setting_of, state_of
 from oracle import Oracle, same_relation
@@ -44,6 +47,10 @@ CAMERAS = [("delta", "platform"), ("delta", "arm_1"), ("gough_stewart", "platfor
            ("3upu", "platform"), ("quattro", "platform")]
 
 
+USERS = (("delta", None), ("gough_stewart", None), ("3rrr_m1", None), ("quattro", ("1", "4")))
+"""Robots of which each rule is accepted by one at least."""
+
+
 @dataclass
 class Recorder:
     """A check that keeps every proposal which the certificate passes."""
@@ -63,8 +70,8 @@ class Recorder:
 
 def rewritten(setting: ObservedRobot, form: str = "simplified") -> tuple[Rewriting, Recorder]:
     recorder = Recorder(setting)
-    run = strategy.simplified if form == "simplified" else strategy.general
-    return run(setting.anatomy, Evidence(setting.anatomy, setting.samples), recorder), recorder
+    evidence = Evidence(setting.anatomy, setting.samples)
+    return FORMS[form](Rewriting.of(evidence, recorder)), recorder
 
 
 def obeys(setting: ObservedRobot, form: str = "simplified", thorough: bool = False) -> Rewriting:
@@ -95,6 +102,20 @@ def obeys(setting: ObservedRobot, form: str = "simplified", thorough: bool = Fal
 
 def name(case: object) -> str:
     return "all" if case is None else "-".join(case) if isinstance(case, tuple) else str(case)
+
+
+@cache
+def accepted() -> frozenset[str]:
+    return frozenset(step.rule for robot, legs in USERS for step in rewritten(setting_of(robot, legs, None, 3))[0].steps
+                     if step.accepted)
+
+
+@pytest.mark.parametrize("rule", rules(), ids=lambda rule: rule.name)
+def test_every_rule_has_a_robot(rule: Rule[Any, Any]) -> None:
+    """Whatever file lies among the rules is found, has a stage of its own choice, and is accepted somewhere."""
+    assert rule in rules(rule.stage)
+    assert rule.source
+    assert rule.name in accepted()
 
 
 @pytest.mark.parametrize(("robot", "legs"), CASES, ids=name)

@@ -12,12 +12,11 @@ from hrsynth.analysis.observed import ObservedRobot, prepare
 from hrsynth.kinematics.certificate import certify
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Mechanism
-from hrsynth.rewrite import strategy
 from hrsynth.rewrite.evidence import Evidence, far_from, locus
 from hrsynth.rewrite.rule import Proposal, Refusal
-from hrsynth.rewrite.rules import companion, end_change, leg_removal, lift, motors_off, pi_form, takeover
+from hrsynth.rewrite.rules import end_change, leg_removal, lift, motors_off, pi_form, rules, takeover
 from hrsynth.rewrite.state import State
-from hrsynth.rewrite.strategy import RULES, Rewriting
+from hrsynth.rewrite.strategy import GENERAL, SIMPLIFIED, Rewriting, trusting
 from kinematics.robots import derived, led, seen_by_oracle, setting_of, state_of
 from oracle import NotAssembled, Oracle, Undecided, logarithm, same_relation
 from strategies import deltas, random_direction, random_rotation
@@ -64,7 +63,7 @@ def simplified(setting: ObservedRobot) -> Rewriting:
     def check(mechanism: Mechanism, bodies: tuple[str, ...]) -> object:
         return certify(setting.samples, mechanism, bodies=bodies, complete=False)
 
-    return strategy.simplified(setting.anatomy, evidence_of(setting), check)  # type: ignore[arg-type]
+    return SIMPLIFIED(Rewriting.of(evidence_of(setting), check))  # type: ignore[arg-type]
 
 
 def proposals(found: Iterable[Proposal | Refusal]) -> tuple[list[Proposal], list[Refusal]]:
@@ -76,9 +75,9 @@ def lifted(setting: ObservedRobot) -> State:
     """The exact lift of all observed legs, motors off."""
     evidence = evidence_of(setting)
     state = State(setting.anatomy, replace(setting.anatomy.mechanism, observations=()))
-    state = proposals(motors_off.RULE.propose(state, evidence, "", False))[0][0].state
+    state = proposals(motors_off.RULE.proposals(state, evidence))[0][0].state
     for leg in dict.fromkeys(o.leg for o in setting.observed):
-        state = proposals(lift.RULE.propose(state, evidence, leg, False))[0][0].state
+        state = proposals(lift.RULE.proposals(state, evidence, leg))[0][0].state
     return state
 
 
@@ -120,10 +119,10 @@ def test_takeover_of_a_skew_elbow_is_caught(legs: int, pods: int, seed: int) -> 
     """An R that is skew to the base R cannot give way to U: done without its side condition it changes the relation."""
     setting = prepare(skew(legs, np.random.default_rng(seed), pods), samples=3)
     state, evidence = lifted(setting), evidence_of(setting)
-    offered, refused = proposals(takeover.RULE.propose(state, evidence, "1", False))
+    offered, refused = proposals(takeover.RULE.proposals(state, evidence, "1"))
     assert offered == []
     assert "cannot turn about its own direction" in refused[0].reason
-    forced, _ = proposals(takeover.RULE.propose(state, evidence, "1", True))
+    forced, _ = proposals(takeover.RULE.proposals(state, evidence, "1", waive=True))
     is_wrong(setting, forced[0].state.mechanism)
     is_right(setting, state.mechanism)
 
@@ -150,13 +149,13 @@ def test_removal_of_a_leg_that_holds_the_platform_is_caught(observed: tuple[str,
     kept = {step.leg for step in result.steps if step.rule == "keep"}
     assert kept == set(setting.anatomy.labels) - set(observed)
     for leg in kept:
-        offered, _ = proposals(leg_removal.RULE.propose(result.state, evidence_of(setting), leg or "", False))
+        offered, _ = proposals(leg_removal.RULE.proposals(result.state, evidence_of(setting), leg or ""))
         is_wrong(setting, offered[0].state.mechanism, offered[0].bodies)
 
 
 def test_the_leg_with_the_camera_is_never_removed() -> None:
     setting = setting_of("delta", ("1", "2"), "rod_3a", 3)
-    offered, refused = proposals(leg_removal.RULE.propose(lifted(setting), evidence_of(setting), "3", True))
+    offered, refused = proposals(leg_removal.RULE.proposals(lifted(setting), evidence_of(setting), "3", waive=True))
     assert offered == []
     assert "camera" in refused[0].reason
     assert "rod_3a" in simplified(setting).state.mechanism.links
@@ -177,9 +176,9 @@ def turned_carriers(setting: ObservedRobot, mechanism: Mechanism, state: State) 
 def test_a_parallelogram_with_a_wrong_offset_is_caught(robot: str) -> None:
     """One crank's foot 2 % off: the carrier turns with the arm, and the actuator's angle is not the direction's."""
     setting = setting_of(robot, None, None, 3)
-    before = strategy.general(setting.anatomy, evidence_of(setting),
-                              lambda m, bodies: certify(setting.samples, m, count=1, bodies=bodies, complete=False))
-    offered, _ = proposals(pi_form.RULE.propose(before.state, evidence_of(setting), "1", False))
+    before = GENERAL(Rewriting.of(evidence_of(setting), lambda m, bodies: certify(
+        setting.samples, m, count=1, bodies=bodies, complete=False)))
+    offered, _ = proposals(pi_form.RULE.proposals(before.state, evidence_of(setting), "1"))
     state, right = offered[0].state, offered[0].state.mechanism
     is_right(setting, right)
     assert turned_carriers(setting, right, state) < 1e-9
@@ -197,7 +196,7 @@ def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
     """Where the base R is not parallel to the short side, the companion rod does not stay beside the observed one."""
     setting = prepare(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), False), samples=3)
     evidence = evidence_of(setting)
-    trusted = strategy.trusting(setting.anatomy, evidence, change_ends=False)
+    trusted = trusting(evidence, change_ends=False)
     assert len(trusted) == 1
     assert trusted[0].state.architecture().ascii == "3-Pi-{2-U*S}"
     is_wrong(setting, trusted[0].state.mechanism)
@@ -212,7 +211,7 @@ def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
 @pytest.mark.parametrize("seed", range(3))
 def test_trust_in_aligned_arms_is_justified(seed: int) -> None:
     setting = prepare(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), True), samples=3)
-    trusted = strategy.trusting(setting.anatomy, evidence_of(setting), change_ends=False)
+    trusted = trusting(evidence_of(setting), change_ends=False)
     is_right(setting, trusted[0].state.mechanism)
     result = simplified(setting)
     assert result.state.architecture() == trusted[0].state.architecture()
@@ -223,7 +222,7 @@ def test_a_ball_made_universal_where_the_rod_spins_otherwise_is_caught() -> None
     """Ends of a Gough-Stewart platform may not be changed: each takes a freedom away."""
     setting = setting_of("gough_stewart", None, None, 3)
     state = simplified(setting).state
-    offered, _ = proposals(end_change.RULE.propose(state, evidence_of(setting), "", True))
+    offered, _ = proposals(end_change.RULE.proposals(state, evidence_of(setting), waive=True))
     assert offered
     for proposal in offered:
         is_wrong(setting, proposal.state.mechanism)
@@ -246,10 +245,10 @@ def test_the_lift_has_virtual_motors_only(robot: str) -> None:
 def test_every_rule_gives_a_reason(robot: str) -> None:
     setting = setting_of(robot, None, None, 3)
     state, evidence = lifted(setting), evidence_of(setting)
-    for rule in RULES:
+    for rule in rules():
         assert rule.source
         for leg in setting.anatomy.labels:
-            for found in rule.propose(state, evidence, leg, False):
+            for found in rule.proposals(state, evidence, leg):
                 assert len(found.reason) > 10, rule.name
 
 
@@ -257,10 +256,10 @@ def test_a_rule_does_not_touch_the_state_it_is_given() -> None:
     setting = setting_of("delta", None, None, 3)
     state, evidence = lifted(setting), evidence_of(setting)
     before = (dict(state.mechanism.links), dict(state.mechanism.joints), state.chains, dict(state.owners))
-    for rule in RULES:
+    for rule in rules():
         if rule is not lift.RULE:
             for leg in setting.anatomy.labels:
-                list(rule.propose(state, evidence, leg, False))
+                list(rule.proposals(state, evidence, leg))
     assert before == (dict(state.mechanism.links), dict(state.mechanism.joints), state.chains, dict(state.owners))
 
 
@@ -277,10 +276,10 @@ def test_sliding_joints_are_never_taken_over() -> None:
 def test_companions_are_the_other_rods() -> None:
     setting = setting_of("delta", None, None, 3)
     evidence = evidence_of(setting)
-    assert companion.companions(evidence, "rod_1a") == ("rod_1b",)
-    assert companion.companions(evidence, "rod_1b") == ("rod_1a",)
-    assert companion.companions(evidence, "arm_1") == ()
-    assert companion.companions(evidence_of(setting_of("hexa", None, None, 3)), "rod_1") == ()
+    assert evidence.parallel_rods("rod_1a") == ("rod_1b",)
+    assert evidence.parallel_rods("rod_1b") == ("rod_1a",)
+    assert evidence.parallel_rods("arm_1") == ()
+    assert evidence_of(setting_of("hexa", None, None, 3)).parallel_rods("rod_1") == ()
 
 
 @pytest.mark.parametrize(("robot", "joints", "dimension", "translates"), [

@@ -18,10 +18,9 @@ from ..mechanism import Mechanism
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.notation import Architecture
 from ..results import Result
-from ..rewrite import strategy
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
-from ..rewrite.strategy import Rewriting, Step
+from ..rewrite.strategy import FORMS, GENERAL, Check, Rewriting, Step, Strategy, trusting
 from ..tolerances import SAME_RELATION
 from .controllability import Verdict, verdict_of
 from .exact import ExactVerdict
@@ -35,7 +34,6 @@ if TYPE_CHECKING:
 
 STEP_SAMPLES = 3
 """Configurations at which a single step is checked."""
-FORMS = ("simplified", "general")
 
 
 @dataclass(frozen=True, eq=False)
@@ -134,7 +132,7 @@ def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera:
     ``NotCertified`` if even the exact lift fails.
     """
     if form not in FORMS:
-        raise BadRequest("unknown form", form, FORMS)
+        raise BadRequest("unknown form", form, tuple(FORMS))
     tell = progress or silent
     tell("sampling")
     setting = prepare(robot if at is None else started(robot, at, seed), observe, camera, seed=seed)
@@ -150,16 +148,15 @@ def derived(setting: ObservedRobot, *, form: str = "simplified", beside: bool = 
     exact = exact_architecture(setting).verdict(setting.observed)
     evidence = Evidence(anatomy, samples)
 
-    run = strategy.simplified if form == "simplified" else strategy.general
-    result = run(anatomy, evidence, _check(samples, STEP_SAMPLES), tell)
+    result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), tell))
     paper = None
     if result.state.chains:
         tell("certificate")
         hidden: Mechanism | None = finished(setting, result.state)
         assert hidden is not None
         certificate = certify(samples, hidden)
-        if not (certificate.passed and _virtual_only(result)):
-            result, hidden, certificate = _fallback(setting, evidence, samples, certificate, run)
+        if not (certificate.passed and result.virtual_only):
+            result, hidden, certificate = _fallback(setting, evidence, samples, certificate, FORMS[form])
         architecture: Architecture | None = result.state.architecture()
         if beside and form == "simplified" and architecture is not None:
             tell("the paper's form")
@@ -180,28 +177,20 @@ def finished(setting: ObservedRobot, state: State) -> Mechanism:
     return spanning(replace(mechanism, name=f"{setting.robot.name}_hidden", observations=observations, file=None))
 
 
-def _virtual_only(result: Rewriting) -> bool:
-    """Whether the virtual actuators are the only motors, and every observed leg has one or is blind."""
-    state = result.state
-    driven = {joint.name for joint in state.mechanism.joints.values() if joint.actuated}
-    lifted = all(step.accepted for step in result.steps if step.rule in ("motors off", "lift"))
-    return lifted and driven == {chain.actuator for chain in state.chains}
-
-
-def _check(samples: Samples, count: int | None) -> strategy.Check:
+def _check(samples: Samples, count: int | None) -> Check:
     """The check of a single step, at the first ``count`` samples (None: at all)."""
     return lambda mechanism, bodies: certify(samples, mechanism, count=count, bodies=bodies, complete=False)
 
 
 def _fallback(setting: ObservedRobot, evidence: Evidence, samples: Samples, failed: Certificate,
-              asked: Callable[..., Rewriting]) -> tuple[Rewriting, Mechanism, Certificate]:
+              asked: Strategy) -> tuple[Rewriting, Mechanism, Certificate]:
     """Where the certificate at all samples sees what three did not: check every step of the form that was asked for at
     all samples, then of the general form."""
-    for run in dict.fromkeys((asked, strategy.general)):
-        again = run(setting.anatomy, evidence, _check(samples, None))
+    for run in dict.fromkeys((asked, GENERAL)):
+        again = run(Rewriting.of(evidence, _check(samples, None)))
         hidden = finished(setting, again.state)
         certificate = certify(samples, hidden)
-        if certificate.passed and _virtual_only(again):
+        if certificate.passed and again.virtual_only:
             return again, hidden, certificate
     raise NotCertified(setting.robot.name, failed.largest_angle, SAME_RELATION)
 
@@ -226,10 +215,7 @@ def _paper_form(setting: ObservedRobot, evidence: Evidence, samples: Samples, ce
     planar = _planar(samples)
     change = dof < (3 if planar else 6) and len(samples.question.observations) < len(setting.anatomy.legs)
     tried: list[tuple[Certificate, Architecture]] = []
-    forms = strategy.trusting(setting.anatomy, evidence, change_ends=False)
-    if change:
-        forms += strategy.trusting(setting.anatomy, evidence, change_ends=True)
-    for rewriting in forms:
+    for rewriting in trusting(evidence, change_ends=change):
         architecture = rewriting.state.architecture()
         if architecture == certified:
             return PaperForm(architecture, True, certificate.largest_angle, reason="it is the certified form")

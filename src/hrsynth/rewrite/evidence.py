@@ -14,6 +14,7 @@ from ..kinematics.configuration import ClosedConfiguration, closed
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.sampling import Samples
 from ..mechanism import Joint, JointType, Mechanism, graphs
+from ..mechanism.composites import Edge, WordGraph
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.normal import centre_pair
 from ..tolerances import LOCUS, SOLVED
@@ -41,15 +42,15 @@ def locus(points: Array, scale: float) -> Locus:
 
 
 @dataclass(frozen=True, eq=False)
-class Proximal:
+class ProximalChain:
     """The part of a leg between the reference link and the observed link ℓ, moved on its own.
 
-    ``joints`` are its joints, ``before`` its last link, ``knee`` the joint K to ℓ, ``anchor`` A at zero.
+    ``joints`` are its joints, ``before`` its last link, ``k_joint`` the joint K to ℓ, ``anchor`` A at zero.
     """
 
     joints: tuple[Joint, ...]
     before: str
-    knee: Joint
+    k_joint: Joint
     anchor: Array
     rotations: Array
     """Orientations of ``before`` seen from the reference link, relative to the zero configuration, (n, 3, 3)."""
@@ -96,7 +97,7 @@ class Evidence:
         self.samples = samples
         self.mechanism: Mechanism = anatomy.mechanism
         self.reference = samples.question.reference
-        self._proximal: dict[str, Proximal | None] = {}
+        self._proximal: dict[str, ProximalChain | None] = {}
 
     def directions(self, index: int) -> Array:
         """All sampled values of observation ``index``, (n, 3), in base coordinates with the reference link held."""
@@ -129,14 +130,14 @@ class Evidence:
         axis = at.pose(link)[:3, :3] @ local
         return bool(np.linalg.norm(np.cross(turning[0][:, 0], axis)) < 1e-6)
 
-    def proximal(self, link: str) -> Proximal | None:
-        """The chain before ``link``, or None where it is not a chain of its own (a camera elsewhere, several knees,
-        a sliding knee)."""
+    def proximal(self, link: str) -> ProximalChain | None:
+        """The chain before ``link``, or None where it is not a chain of its own (a camera elsewhere, several joints
+        K, one that slides)."""
         if link not in self._proximal:
             self._proximal[link] = self._find_proximal(link)
         return self._proximal[link]
 
-    def knees(self, link: str) -> list[Joint]:
+    def joints_before(self, link: str) -> list[Joint]:
         """The joints of ``link`` on the reference link's side."""
         mechanism, leg = self.mechanism, self.anatomy.leg_of(link)
         if leg is None or self.reference not in (mechanism.base, mechanism.platform) or link == self.reference:
@@ -144,15 +145,41 @@ class Evidence:
         near = graphs.component(mechanism.adjacency, self.reference, {*leg.links} - {link})
         return [j for j in mechanism.joints_of(link) if j.other(link) in near and j.type is not JointType.FREE]
 
-    def _find_proximal(self, link: str) -> Proximal | None:
-        knees = self.knees(link)
-        if len(knees) != 1 or knees[0].type not in (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL):
+    def carried(self, link: str) -> str:
+        """The link that turns as this one does, moved towards the reference link over P joints."""
+        passed = {link}
+        while True:
+            found = self.joints_before(link)
+            if len(found) != 1 or found[0].type is not JointType.PRISMATIC:
+                return link
+            before = found[0].other(link)
+            if before in passed or before == self.reference:
+                return link
+            passed.add(before)
+            link = before
+
+    def parallel_rods(self, link: str) -> tuple[str, ...]:
+        """The other rods of the group of equal parallel rods that holds a link."""
+        for edge in self._composites:
+            if link in edge.inside and len(edge.joints) == 2 * len(edge.inside):
+                return tuple(other for other in edge.inside if other != link)
+        return ()
+
+    @cached_property
+    def _composites(self) -> tuple[Edge, ...]:
+        """The joints of the real robot with its composite elements recognised."""
+        mechanism = self.mechanism
+        return tuple(WordGraph(mechanism, {mechanism.base, mechanism.platform}).recognise().edges())
+
+    def _find_proximal(self, link: str) -> ProximalChain | None:
+        found = self.joints_before(link)
+        if len(found) != 1 or found[0].type not in (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.SPHERICAL):
             return None
-        knee, before = knees[0], knees[0].other(link)
-        onward = [j for j in self.mechanism.joints_of(link) if j.name != knee.name]
-        anchor = knee.point
+        K, before = found[0], found[0].other(link)
+        onward = [j for j in self.mechanism.joints_of(link) if j.name != K.name]
+        anchor = K.point
         if onward and not onward[0].type.slides:
-            anchor = centre_pair(knee, onward[0])[0]
+            anchor = centre_pair(K, onward[0])[0]
         leg = self.anatomy.leg_of(link)
         assert leg is not None
         nodes = {self.reference}
@@ -161,7 +188,7 @@ class Evidence:
                 nodes.update(path)
         joints = tuple(j for j in self.mechanism.joints.values() if set(j.links) <= nodes)
         rotations, anchors = _moved(self.mechanism, self.reference, nodes, joints, before, anchor)
-        return Proximal(joints, before, knee, anchor, rotations, anchors, self.mechanism.length)
+        return ProximalChain(joints, before, K, anchor, rotations, anchors, self.mechanism.length)
 
 
 def _moved(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequence[Joint], before: str,

@@ -1,40 +1,123 @@
-"""What a rule is: proposals for a leg, in order, each a new state with its reason, or a refusal with its reason."""
+"""What a rule is: ``find`` says where it applies and why, ``apply`` rewrites one such place.
+
+A rule knows nothing of order, of proof or of leave. Strategies (:mod:`.strategy`) say when it is tried, the certificate
+whether what it proposes is the same robot to a camera; and where a rule may be applied without its side condition is
+not for the rule to know either: it says which condition fails (``Match.unmet``), the strategy decides.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from enum import Enum
+from typing import Generic, TypeVar
 
 from .evidence import Evidence
-from .state import State
+from .state import State, VirtualChain
+
+Place = TypeVar("Place")
+Found = TypeVar("Found")
+
+
+class Stage(Enum):
+    """What a rule works on; in which order the stages come is up to a strategy."""
+
+    MOTORS = "the real motors"
+    LIFT = "the virtual chain of a leg, from nothing"
+    DIRECTION = "the virtual actuator, by the locus of the direction"
+    ANCHOR = "the sliders under the actuator, by the locus of the anchor"
+    JOINT = "the real joint K before the observed link"
+    BESIDE = "links that are joined as the observed one is"
+    FORM = "the way in which the actuator's carrier is led"
+    LEG = "a leg that is not observed"
+    ENDS = "the ends of the observed legs on the platform"
+
+
+@dataclass(frozen=True, eq=False)
+class Match(Generic[Found]):
+    """A place where a rule applies: ``found`` is what ``apply`` needs, ``reason`` why the rewritten robot is the same
+    to a camera."""
+
+    found: Found
+    reason: str
+    unmet: str | None = None
+    """The side condition that fails here, in words; None where it holds."""
+    bodies: tuple[str, ...] = ()
+    """Links, besides the platform, whose twists must not change."""
+
+
+@dataclass(frozen=True)
+class Refusal:
+    """Why a rule does not apply."""
+
+    reason: str
 
 
 @dataclass(frozen=True, eq=False)
 class Proposal:
-    """A rewritten state; ``bodies`` are links whose twists must not change either."""
+    """A rewritten state, why, and the links whose twists must not change either."""
 
     state: State
     reason: str
     bodies: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True)
-class Refusal:
-    """The side condition that fails."""
-
-    reason: str
+def each_chain(state: State, leg: str) -> Sequence[VirtualChain]:
+    """The places of a rule about virtual chains: those of the leg."""
+    return state.chain(leg)
 
 
-Propose = Callable[[State, Evidence, str, bool], Iterator[Proposal | Refusal]]
+def whole_leg(state: State, leg: str) -> Sequence[str]:
+    """The only place of a rule about a leg, or about the robot (then ``leg`` is empty)."""
+    return (leg,)
 
 
-@dataclass(frozen=True)
-class Rule:
-    """A named rule: ``propose(state, evidence, leg, trust)`` yields proposals in order of preference.
+@dataclass(frozen=True, eq=False)
+class Rule(Generic[Place, Found]):
+    """A rule of a source, at a stage.
 
-    With ``trust`` side conditions are waived: the rule does what the paper's text does without looking.
+    ``find(state, evidence, place)`` yields matches in order of preference, or a refusal, or nothing where there is
+    nothing to say; ``apply(state, found)`` is the state rewritten there. ``places(state, leg)`` are those of a leg.
     """
 
     name: str
     source: str
-    propose: Propose
+    stage: Stage
+    find: Callable[[State, Evidence, Place], Iterable[Match[Found] | Refusal]]
+    apply: Callable[[State, Found], State]
+    places: Callable[[State, str], Sequence[Place]]
+    otherwise: str | None = None
+    """Why it is refused where nothing is found at any place of a leg."""
+    always: bool = False
+    """Whether it holds for every robot: nothing is right where it is not accepted."""
+
+    def proposals(self, state: State, evidence: Evidence, leg: str = "", *, waive: bool = False
+                  ) -> Iterator[Proposal | Refusal]:
+        """The leg rewritten at all of its places at once, in order of preference, until a refusal; with ``waive`` side
+        conditions are waived: the rule does what the paper's text does without looking."""
+        silent = True
+        for each in self._rewritten(state, evidence, tuple(self.places(state, leg)), (), waive):
+            silent = False
+            yield each
+        if silent and self.otherwise is not None:
+            yield Refusal(self.otherwise)
+
+    def _rewritten(self, state: State, evidence: Evidence, places: Sequence[Place], done: tuple[Match[Found], ...],
+                   waive: bool) -> Iterator[Proposal | Refusal]:
+        """Proposals that rewrite the other ``places`` as well, after the matches that are ``done``."""
+        if not places:
+            if done:
+                reasons = dict.fromkeys(match.reason for match in done)
+                yield Proposal(state, "; ".join(reasons), tuple(body for match in done for body in match.bodies))
+            return
+        found = False
+        for match in self.find(state, evidence, places[0]):
+            found = True
+            if isinstance(match, Match) and match.unmet is not None and not waive:
+                match = Refusal(match.unmet)
+            if isinstance(match, Refusal):
+                yield match
+                return
+            yield from self._rewritten(self.apply(state, match.found), evidence, places[1:], (*done, match), waive)
+        if not found:
+            yield from self._rewritten(state, evidence, places[1:], done, waive)

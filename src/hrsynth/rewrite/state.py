@@ -12,18 +12,18 @@ from ..mechanism.notation import Architecture
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class VirtualChain:
     """The virtual chain of one observation: reference –sliders– carrier T –actuator– (bearing W –roll R(d)–) link ℓ.
 
-    ``anchor`` is A and ``direction`` u at the zero configuration, in the base frame. ``knee`` names the real joint K
-    before ℓ, ``before`` the link before it; ``carrier`` may be a real link that only translates.
+    ``anchor`` is A and ``direction`` u at the zero configuration, in the base frame. ``k_joint`` names the real joint
+    K before ℓ, ``before`` the link before it; ``carrier`` may be a real link that only translates.
     """
 
     leg: str
     link: str
     direction: Array
     anchor: Array
-    knee: str | None
+    k_joint: str | None
     before: str | None
     carrier: str
     sliders: tuple[str, ...]
@@ -42,17 +42,17 @@ class State:
 
     real: LegDecomposition
     mechanism: Mechanism
-    chains: tuple[Chain, ...] = ()
+    chains: tuple[VirtualChain, ...] = ()
     removed: tuple[str, ...] = ()
     """Labels of the legs that were dropped."""
     owners: Mapping[str, str] = field(default_factory=dict)
     """The leg of each virtual link."""
 
-    def chain(self, leg: str) -> tuple[Chain, ...]:
+    def chain(self, leg: str) -> tuple[VirtualChain, ...]:
         """The chains of a leg."""
         return tuple(chain for chain in self.chains if chain.leg == leg)
 
-    def with_chain(self, old: Chain, new: Chain | None, mechanism: Mechanism,
+    def with_chain(self, old: VirtualChain, new: VirtualChain | None, mechanism: Mechanism,
                    owners: Mapping[str, str] | None = None) -> State:
         """The state with one chain replaced (or dropped) and another mechanism."""
         chains = tuple(c for each in self.chains for c in ((new,) if each is old else (each,)) if c is not None)
@@ -94,11 +94,6 @@ class State:
     def architecture(self) -> Architecture:
         """The architecture so far, in words."""
         return self.anatomy().architecture()
-
-
-def passive(joint: Joint) -> Joint:
-    """The joint without its motor."""
-    return replace(joint, motor=None)
 
 
 def towards(joint: Joint, before: str) -> Joint:

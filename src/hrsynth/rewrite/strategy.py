@@ -1,33 +1,22 @@
-"""Which rule is tried when: strategies over rules, every step under the certificate, every attempt on the trace."""
+"""Which rule is tried when: strategies composed of strategies, every step under the certificate and on the trace.
+
+A strategy is a function from a rewriting to a rewriting that has gone further, as in term rewriting: ``chain`` runs
+strategies one after the other, ``each_leg`` tries the rules of some stages on legs, the first proposal that is accepted
+for each, ``best`` tries all proposals and goes on from the one after which most legs can go. All share a budget.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Any, Protocol
 
 from ..mechanism import Mechanism
-from ..mechanism.legs import LegDecomposition
 from ..mechanism.observation import labels_of
 from .evidence import Evidence
-from .rule import Proposal, Refusal, Rule
-from .rules import (
-    anchor_locus,
-    companion,
-    direction_locus,
-    end_change,
-    leg_removal,
-    lift,
-    motors_off,
-    pi_form,
-    prismatic_merge,
-    takeover,
-)
+from .rule import Proposal, Refusal, Rule, Stage
+from .rules import rules
 from .state import State
-
-RULES: tuple[Rule, ...] = (motors_off.RULE, lift.RULE, direction_locus.RULE, anchor_locus.RULE, prismatic_merge.RULE,
-                           takeover.RULE, companion.RULE, pi_form.RULE, leg_removal.RULE, end_change.RULE)
-"""All rules, in the order of the derivation."""
 
 BUDGET = 400
 """The largest number of proposals a derivation may try."""
@@ -51,7 +40,7 @@ Check = Callable[[Mechanism, tuple[str, ...]], Comparison]
 @dataclass(frozen=True)
 class Step:
     """One attempt: the rule, the leg (None: all), whether it was accepted, why, and the angle if it was measured;
-    ``state`` is what an accepted rewriting left behind."""
+    ``state`` is what an accepted rewriting left behind, ``always`` whether the rule holds for every robot."""
 
     rule: str
     leg: str | None
@@ -59,148 +48,177 @@ class Step:
     reason: str
     largest_angle: float | None
     state: State | None = field(default=None, compare=False, repr=False)
+    always: bool = field(default=False, compare=False, repr=False)
 
 
 @dataclass(frozen=True, eq=False)
 class Rewriting:
-    """Where a strategy came to, and how."""
-
-    state: State
-    steps: tuple[Step, ...]
-
-
-@dataclass
-class _Run:
-    """The state so far and the trace; ``check`` None trusts every proposal."""
+    """Where strategies came to, and how; ``check`` None accepts every proposal and waives side conditions."""
 
     state: State
     evidence: Evidence
-    check: Check | None
-    steps: list[Step] = field(default_factory=list)
+    check: Check | None = None
+    tell: Callable[[str], None] | None = None
+    steps: tuple[Step, ...] = ()
     tried: int = 0
-    progress: Callable[[str], None] | None = None
+    """How many proposals were checked."""
 
-    def attempt(self, rule: Rule, leg: str | None) -> bool:
-        """Try a rule's proposals in order until one is accepted."""
-        for proposal in rule.propose(self.state, self.evidence, leg or "", self.check is None):
-            if isinstance(proposal, Refusal):
-                self.steps.append(Step(rule.name, leg, False, proposal.reason, None))
-                continue
-            if self._accept(rule, leg, proposal):
-                return True
-        return False
+    @classmethod
+    def of(cls, evidence: Evidence, check: Check | None = None, tell: Callable[[str], None] | None = None) -> Rewriting:
+        """The real robot, before any rule."""
+        real = evidence.anatomy
+        return cls(State(real, replace(real.mechanism, observations=())), evidence, check, tell)
 
-    def _accept(self, rule: Rule, leg: str | None, proposal: Proposal) -> bool:
-        if self.progress is not None:
-            self.progress(f"{rule.name} {leg or ''}")
+    @property
+    def virtual_only(self) -> bool:
+        """Whether the rules that always hold were accepted, and the virtual actuators are the only motors: then every
+        observed leg has one or is blind."""
+        driven = {joint.name for joint in self.state.mechanism.joints.values() if joint.actuated}
+        return (all(step.accepted for step in self.steps if step.always)
+                and driven == {chain.actuator for chain in self.state.chains})
+
+    def attempt(self, rule: Rule[Any, Any], leg: str | None) -> Rewriting:
+        """The first of a rule's proposals that is accepted, if one is."""
+        at = self
+        for proposal in rule.proposals(at.state, at.evidence, leg or "", waive=at.check is None):
+            at = at.judged(rule, leg, proposal)
+            if at.state is not self.state:
+                break
+        return at
+
+    def judged(self, rule: Rule[Any, Any], leg: str | None, proposal: Proposal | Refusal) -> Rewriting:
+        """After the check of one proposal: its state where that passes."""
+        if isinstance(proposal, Refusal):
+            return self._after(rule, leg, False, proposal.reason)
+        if self.tell is not None:
+            self.tell(f"{rule.name} {leg or ''}")
         if self.check is None:
-            self.state = proposal.state
-            self.steps.append(Step(rule.name, leg, True, proposal.reason, None, proposal.state))
-            return True
-        self.tried += 1
-        if self.tried > BUDGET:
-            self.steps.append(Step(rule.name, leg, False, "the budget of attempts is used up", None))
-            return False
+            return self._after(rule, leg, True, proposal.reason, None, proposal.state)
+        if self.tried >= BUDGET:
+            return self._after(rule, leg, False, "the budget of attempts is used up")
         found = self.check(proposal.state.mechanism, proposal.bodies)
         reason = proposal.reason if found.passed else f"{proposal.reason}: refused, {found.reason}"
-        self.steps.append(Step(rule.name, leg, found.passed, reason, found.largest_angle,
-                               proposal.state if found.passed else None))
-        if found.passed:
-            self.state = proposal.state
-        return found.passed
+        after = self._after(rule, leg, found.passed, reason, found.largest_angle, proposal.state)
+        return replace(after, tried=self.tried + 1)
 
-    def each(self, rules: Iterable[Rule], legs: Iterable[str]) -> None:
-        """Every rule on every leg."""
-        wanted = list(legs)
-        for rule in rules:
-            for leg in wanted:
-                if rule is lift.RULE or self.state.chain(leg):
-                    self.attempt(rule, leg)
+    def _after(self, rule: Rule[Any, Any], leg: str | None, accepted: bool, reason: str, angle: float | None = None,
+               state: State | None = None) -> Rewriting:
+        state = state if accepted else None
+        step = Step(rule.name, leg, accepted, reason, angle, state, rule.always)
+        return replace(self, state=state or self.state, steps=(*self.steps, step))
 
 
-def general(anatomy: LegDecomposition, evidence: Evidence, check: Check,
-            progress: Callable[[str], None] | None = None) -> Rewriting:
-    """The general form: sliders under every virtual actuator, all legs kept."""
-    return _finished(_virtual_legs(anatomy, evidence, check, progress))
+Strategy = Callable[[Rewriting], Rewriting]
+"""What takes a rewriting further."""
 
 
-def simplified(anatomy: LegDecomposition, evidence: Evidence, check: Check,
-               progress: Callable[[str], None] | None = None) -> Rewriting:
-    """The form of the paper, as far as the certificate goes along with it."""
-    run = _virtual_legs(anatomy, evidence, check, progress)
-    run.each([pi_form.RULE], run.state.observed())
-    if run.state.chains:
-        _drop_legs(run)
-    return _finished(run)
+def chain(*strategies: Strategy) -> Strategy:
+    """One strategy after the other."""
+    def run(at: Rewriting) -> Rewriting:
+        for strategy in strategies:
+            at = strategy(at)
+        return at
 
-
-def trusting(anatomy: LegDecomposition, evidence: Evidence, *, change_ends: bool) -> list[Rewriting]:
-    """The form that the paper's rules alone give, nothing checked: one rewriting for each choice of outer axes."""
-    run = _virtual_legs(anatomy, evidence, None, None)
-    run.each([pi_form.RULE], run.state.observed())
-    observed = run.state.observed()
-    starts = [run.state]
-    if change_ends:
-        tried = [p.state for p in end_change.RULE.propose(run.state, evidence, "", True) if isinstance(p, Proposal)]
-        starts = tried or starts
-    results = []
-    for start in starts:
-        each = replace(run, state=start, steps=list(run.steps))
-        for label in anatomy.labels:
-            if label not in observed:
-                each.attempt(leg_removal.RULE, label)
-        results.append(_finished(each))
-    return results
-
-
-def _virtual_legs(anatomy: LegDecomposition, evidence: Evidence, check: Check | None,
-                  progress: Callable[[str], None] | None) -> _Run:
-    start = State(anatomy, replace(anatomy.mechanism, observations=()))
-    run = _Run(start, evidence, check, progress=progress)
-    run.attempt(motors_off.RULE, None)
-    legs = labels_of(evidence.samples.question.observations)
-    run.each([lift.RULE, direction_locus.RULE, anchor_locus.RULE, prismatic_merge.RULE, takeover.RULE,
-              companion.RULE], legs)
     return run
 
 
-def _drop_legs(run: _Run) -> None:
-    """Drop unobserved legs; where they hold the platform, change the ends of the observed legs; else keep them."""
-    observed = run.state.observed()
-    rest = [label for label in run.state.real.labels if label not in observed]
-    left = [label for label in rest if not run.attempt(leg_removal.RULE, label)]
-    if left:
-        left = _change_ends(run, left)
-    for label in left:
-        run.steps.append(Step("keep", label, True, "nothing else restores the relation: the leg stays, passive", None))
+def each_leg(legs: Callable[[Rewriting], Iterable[str]], *stages: Stage) -> Strategy:
+    """The rules of some stages, each on all legs that have a place for it."""
+    def run(at: Rewriting) -> Rewriting:
+        wanted = list(legs(at))
+        for rule in rules(*stages):
+            for leg in wanted:
+                if rule.places(at.state, leg):
+                    at = at.attempt(rule, leg)
+        return at
+
+    return run
 
 
-def _change_ends(run: _Run, left: list[str]) -> list[str]:
-    """Try outer axes until all legs can go; keep the try that drops most."""
-    best: tuple[list[str], State, list[Step]] | None = None
-    for proposal in end_change.RULE.propose(run.state, run.evidence, "", False):
-        if isinstance(proposal, Refusal):
-            run.steps.append(Step(end_change.RULE.name, None, False, proposal.reason, None))
-            break
-        trial = replace(run, steps=[])
-        if not trial._accept(end_change.RULE, None, proposal):
-            run.tried = trial.tried
-            run.steps.extend(trial.steps)
-            continue
-        remaining = [label for label in left if not trial.attempt(leg_removal.RULE, label)]
-        run.tried = trial.tried
-        if best is None or len(remaining) < len(best[0]):
-            best = remaining, trial.state, trial.steps
-        if not remaining:
-            break
-        run.steps.extend(replace(step, accepted=False, reason=step.reason + " (taken back: legs remain)", state=None)
-                         for step in trial.steps)
-    if best is not None and len(best[0]) < len(left):
-        run.state = best[1]
-        run.steps.extend(best[2])
-        return best[0]
-    return left
+def whole_robot(stage: Stage) -> Strategy:
+    """The rules of a stage, each on the robot as a whole."""
+    def run(at: Rewriting) -> Rewriting:
+        for rule in rules(stage):
+            at = at.attempt(rule, None)
+        return at
+
+    return run
 
 
-def _finished(run: _Run) -> Rewriting:
-    return Rewriting(run.state, tuple(run.steps))
+def best(stage: Stage, after: Strategy, left: Callable[[Rewriting], Iterable[str]]) -> Strategy:
+    """The proposal of a stage's rules from which another strategy leaves the fewest legs; none if none leaves fewer
+    than there are. The first that leaves nothing ends the search; others are taken back on the trace."""
+    def run(start: Rewriting) -> Rewriting:
+        least, found, trace, tried = len(list(left(start))), start, start.steps, start.tried
+        for rule in rules(stage):
+            for proposal in rule.proposals(start.state, start.evidence) if least else ():
+                trial = replace(start, steps=(), tried=tried).judged(rule, None, proposal)
+                accepted = trial.state is not start.state
+                trial = after(trial) if accepted else trial
+                tried, rest = trial.tried, len(list(left(trial)))
+                if accepted and rest < least:
+                    least, found = rest, trial
+                if accepted and not rest:
+                    break
+                trace += tuple(_taken_back(step) for step in trial.steps) if accepted else trial.steps
+        return replace(found, steps=trace if found is start else trace + found.steps, tried=tried)
+
+    return run
+
+
+def _taken_back(step: Step) -> Step:
+    return replace(step, accepted=False, reason=step.reason + " (taken back: legs remain)", state=None)
+
+
+def observed(at: Rewriting) -> tuple[str, ...]:
+    """The legs that are observed."""
+    return labels_of(at.evidence.samples.question.observations)
+
+
+def unobserved(at: Rewriting) -> tuple[str, ...]:
+    """The legs that have no virtual chain and have not gone."""
+    known = {*at.state.observed(), *at.state.removed}
+    return tuple(label for label in at.state.real.labels if label not in known)
+
+
+def keep_unobserved(at: Rewriting) -> Rewriting:
+    """Say of the legs that are left why they are."""
+    reason = "nothing else restores the relation: the leg stays, passive"
+    return replace(at, steps=at.steps + tuple(Step("keep", leg, True, reason, None) for leg in unobserved(at)))
+
+
+def unless_blind(strategy: Strategy) -> Strategy:
+    """A strategy for robots of which some leg is not blind."""
+    return lambda at: strategy(at) if at.state.chains else at
+
+
+LIFTED = chain(whole_robot(Stage.MOTORS), each_leg(observed, Stage.LIFT))
+"""The exact lift, of which the relation is that of the real robot for every robot."""
+
+GENERAL = chain(LIFTED, each_leg(observed, Stage.DIRECTION, Stage.ANCHOR, Stage.JOINT, Stage.BESIDE))
+"""The general form: sliders under every virtual actuator, all legs kept."""
+
+DROPPED = each_leg(unobserved, Stage.LEG)
+"""All unobserved legs tried, whether they can go."""
+
+SIMPLIFIED = chain(
+    GENERAL,
+    each_leg(observed, Stage.FORM),
+    unless_blind(chain(DROPPED, best(Stage.ENDS, DROPPED, unobserved), keep_unobserved)))
+"""The form of the paper, as far as the certificate goes along with it: where unobserved legs hold the platform, the
+ends of the observed legs are changed; what still does not go is kept."""
+
+
+FORMS = {"simplified": SIMPLIFIED, "general": GENERAL}
+"""The forms of a hidden robot that can be asked for."""
+
+
+def trusting(evidence: Evidence, *, change_ends: bool) -> list[Rewriting]:
+    """The form that the paper's rules alone give, nothing checked; with ``change_ends`` one for each choice of outer
+    axes besides."""
+    start = chain(GENERAL, each_leg(observed, Stage.FORM))(Rewriting.of(evidence))
+    starts = [start]
+    for rule in rules(Stage.ENDS) if change_ends else ():
+        starts += [start.judged(rule, None, each) for each in rule.proposals(start.state, evidence, waive=True)
+                   if isinstance(each, Proposal)]
+    return [DROPPED(each) for each in starts]

@@ -7,12 +7,13 @@ from dataclasses import dataclass, replace
 
 from ...analysis.derive import Derivation
 from ...mechanism.legs import LegDecomposition
+from ...rewrite.rules import rules
 from ...rewrite.state import State
-from ...rewrite.strategy import RULES, Step
+from ...rewrite.strategy import Step
 from ..drawings.graph import graph_svg
 from ..drawings.schematic import leg_svg
 
-SOURCES = {rule.name: rule.source for rule in RULES}
+SOURCES = {rule.name: rule.source for rule in rules()}
 _NAMES = re.compile(r"<title>.*?</title>|<desc>.*?</desc>|<text[^>]*>leg [^<]*</text>"
                     r'| (?:data-joint|data-link|aria-label)="[^"]*"', re.DOTALL)
 """What tells drawings of equal legs apart."""

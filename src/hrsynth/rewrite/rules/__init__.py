@@ -1,1 +1,23 @@
-"""The table of rules: one file a rule, each with its drawing, its source, its side condition."""
+"""The rules: one file each, with its drawing, its source and its side condition. What lies here is found by itself."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+from typing import Any
+
+from ..rule import Rule, Stage
+
+
+@cache
+def rules(*stages: Stage) -> tuple[Rule[Any, Any], ...]:
+    """The rules of some stages (default: of all), stage by stage, by their files' names in each."""
+    found = list(_found())
+    return tuple(rule for stage in stages or Stage for rule in found if rule.stage is stage)
+
+
+def _found() -> Iterator[Rule[Any, Any]]:
+    for module in sorted(iter_modules(__path__), key=lambda module: module.name):
+        yield import_module(f"{__name__}.{module.name}").RULE

@@ -9,40 +9,39 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from ...geometry.vectors import Array
 from ...mechanism import Joint, JointType
 from ..evidence import Evidence
-from ..rule import Proposal, Refusal, Rule
-from ..state import Chain, State
+from ..rule import Match, Rule, Stage, each_chain
+from ..state import State, VirtualChain
+
+Carried = tuple[VirtualChain, str | Array]
+"""A chain, and the link that is to be its carrier, or the axes (n, 3) along which its own carrier is to slide."""
 
 
-def propose(state: State, evidence: Evidence, leg: str, trust: bool) -> Iterator[Proposal | Refusal]:
-    """All chains of the leg."""
-    before = state
-    notes = []
-    for chain in state.chain(leg):
-        proximal = evidence.proximal(chain.link)
-        if proximal is None or chain.before is None:
-            continue
-        if proximal.translates:
-            state = _on(state, chain, chain.before)
-            notes.append("the anchor is fixed" if chain.before == state.mechanism.reference
-                         else "the link before the observed one only translates: it carries the actuator")
-            continue
-        found = proximal.anchor_locus
-        if found.dimension == 0:
-            state = _on(state, chain, state.mechanism.reference)
-            notes.append("the anchor is fixed")
-        elif found.dimension < 3:
-            state = _slid(state, chain, found.axes[: found.dimension])
-            notes.append(f"the anchor moves {'on a line' if found.dimension == 1 else 'in a plane'}")
-    if state is before:
-        yield Refusal("the anchor moves in space, or the part before the observed link is not a chain of its own")
-    else:
-        yield Proposal(state, "; ".join(notes))
+def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Carried]]:
+    """The locus of the chain's anchor; nothing where that is all of space, or where the part before the observed link
+    is not a chain of its own."""
+    proximal, reference = evidence.proximal(chain.link), state.mechanism.reference
+    if proximal is None or chain.before is None:
+        return
+    locus = proximal.anchor_locus
+    if proximal.translates and chain.before != reference:
+        yield Match((chain, chain.before), "the link before the observed one only translates: it carries the actuator")
+    elif proximal.translates or locus.dimension == 0:
+        yield Match((chain, reference), "the anchor is fixed")
+    elif locus.dimension < 3:
+        yield Match((chain, locus.axes[: locus.dimension]),
+                    f"the anchor moves {'on a line' if locus.dimension == 1 else 'in a plane'}")
 
 
-def _on(state: State, chain: Chain, carrier: str) -> State:
-    """T becomes the link ``carrier``."""
+def apply(state: State, found: Carried) -> State:
+    """T is the carrier, or stands on one P or two."""
+    chain, carrier = found
+    return _on(state, chain, carrier) if isinstance(carrier, str) else _sliding(state, chain, carrier)
+
+
+def _on(state: State, chain: VirtualChain, carrier: str) -> State:
     mechanism = state.mechanism
     actuator = mechanism.joints[chain.actuator].relinked(chain.carrier, carrier)
     changed = mechanism.changed(remove_links=[chain.carrier, *chain.slider_links], joints=[actuator])
@@ -51,18 +50,17 @@ def _on(state: State, chain: Chain, carrier: str) -> State:
     return state.with_chain(chain, replace(chain, carrier=carrier, sliders=(), slider_links=()), changed)
 
 
-def _slid(state: State, chain: Chain, axes: object) -> State:
-    """T on one P or two."""
+def _sliding(state: State, chain: VirtualChain, axes: Array) -> State:
     mechanism = state.mechanism
-    directions = list(axes)  # type: ignore[call-overload]
-    links = chain.slider_links[: len(directions) - 1]
+    links = chain.slider_links[: len(axes) - 1]
     path = [mechanism.reference, *links, chain.carrier]
-    names = chain.sliders[: len(directions)]
+    names = chain.sliders[: len(axes)]
     joints = [Joint(name, JointType.PRISMATIC, a, b, chain.anchor, (axis,))
-              for name, a, b, axis in zip(names, path, path[1:], directions, strict=False)]
+              for name, a, b, axis in zip(names, path, path[1:], axes, strict=False)]
     changed = mechanism.changed(remove_links=chain.slider_links[len(links):], remove_joints=chain.sliders,
                                 joints=joints)
     return state.with_chain(chain, replace(chain, sliders=names, slider_links=links), changed)
 
 
-RULE = Rule("anchor locus", "MMT 3.2", propose)
+RULE = Rule("anchor locus", "MMT 3.2", Stage.ANCHOR, find, apply, each_chain,
+            otherwise="the anchor moves in space, or the part before the observed link is not a chain of its own")

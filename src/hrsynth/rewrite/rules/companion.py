@@ -1,4 +1,4 @@
-"""Companion: the other rod of a spatial parallelogram moves to T as well.
+"""Companion: the parallel rod beside an observed one moves to T as well.
 
     before –S– rod b   →   T –U– rod b        the vector between the two balls keeps its direction        (MMT Fig. 13)
 """
@@ -7,51 +7,43 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from ...mechanism import JointType
-from ...mechanism.composites import WordGraph
+from ...mechanism import Joint, JointType
 from ..evidence import Evidence
-from ..rule import Proposal, Refusal, Rule
-from ..state import State, ball_to_universal
+from ..rule import Match, Rule, Stage, each_chain
+from ..state import State, VirtualChain, ball_to_universal
+
+Beside = tuple[VirtualChain, list[Joint]]
+"""A chain, and the joints on the link before K of the rods beside its link."""
 
 
-def companions(evidence: Evidence, link: str) -> tuple[str, ...]:
-    """The other rods of the group of equal parallel rods that holds ``link``, in the real robot."""
-    mechanism = evidence.mechanism
-    graph = WordGraph(mechanism, {mechanism.base, mechanism.platform}).recognise()
-    for edge in graph.edges():
-        if link in edge.inside and len(edge.joints) == 2 * len(edge.inside):
-            return tuple(other for other in edge.inside if other != link)
-    return ()
+def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Beside]]:
+    """The rods beside the observed one, where the actuator has taken the place of that one's joint."""
+    proximal = evidence.proximal(chain.link)
+    if not chain.taken or proximal is None or chain.before is None:
+        return
+    rods: dict[str, Joint] = {}
+    for rod in evidence.parallel_rods(chain.link):
+        for joint in state.mechanism.joints_of(rod):
+            if joint.other(rod) == chain.before:
+                rods.setdefault(rod, joint)
+    if rods:
+        kept = all(proximal.keeps(joint.point - chain.anchor) for joint in rods.values())
+        yield Match((chain, list(rods.values())),
+                    f"{', '.join(map(repr, rods))} keeps its place beside the observed rod",
+                    None if kept else "the vector between the two rods' joints changes its direction")
 
 
-def propose(state: State, evidence: Evidence, leg: str, trust: bool) -> Iterator[Proposal | Refusal]:
-    """All taken-over chains of the leg that observe one of several equal parallel rods."""
-    before = state
-    moved: list[str] = []
-    for chain in state.chain(leg):
-        proximal = evidence.proximal(chain.link)
-        if not chain.taken or proximal is None or chain.before is None:
-            continue
-        mechanism = state.mechanism
-        actuator = mechanism.joints[chain.actuator]
-        joints = []
-        for rod in companions(evidence, chain.link):
-            near = next((j for j in mechanism.joints_of(rod) if j.other(rod) == chain.before), None)
-            if near is None:
-                continue
-            if not (trust or proximal.keeps(near.point - chain.anchor)):
-                yield Refusal("the vector between the two rods' joints changes its direction")
-                return
-            if near.type is JointType.SPHERICAL and actuator.type is JointType.UNIVERSAL:
-                near = ball_to_universal(near, chain.before, (actuator.axes[0], actuator.axes[1]))
-            if chain.carrier != chain.before:
-                near = near.relinked(chain.before, chain.carrier)
-            joints.append(near)
-            moved.append(rod)
-        if joints:
-            state = state.with_chain(chain, chain, mechanism.changed(joints=joints))
-    if state is not before:
-        yield Proposal(state, f"{', '.join(map(repr, moved))} keeps its place beside the observed rod")
+def apply(state: State, found: Beside) -> State:
+    """The rods' joints moved to T, an S made a U as the actuator is one."""
+    chain, joints = found
+    mechanism, before = state.mechanism, str(chain.before)
+    actuator = mechanism.joints[chain.actuator]
+    moved = [ball_to_universal(joint, before, (actuator.axes[0], actuator.axes[1]))
+             if joint.type is JointType.SPHERICAL and actuator.type is JointType.UNIVERSAL else joint
+             for joint in joints]
+    if chain.carrier != before:
+        moved = [joint.relinked(before, chain.carrier) for joint in moved]
+    return state.with_chain(chain, chain, mechanism.changed(joints=moved))
 
 
-RULE = Rule("companion", "MMT Fig. 13", propose)
+RULE = Rule("companion", "MMT Fig. 13", Stage.BESIDE, find, apply, each_chain)

@@ -9,40 +9,40 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from ...geometry.vectors import Array
 from ...mechanism import JointType
 from ..evidence import Evidence, locus
-from ..rule import Proposal, Refusal, Rule
-from ..state import Chain, State
+from ..rule import Match, Rule, Stage, each_chain
+from ..state import State, VirtualChain
+
+Turning = tuple[VirtualChain, Array | None]
+"""A chain, and the axis about which its direction turns; None for a direction that is constant."""
 
 
-def propose(state: State, evidence: Evidence, leg: str, trust: bool) -> Iterator[Proposal | Refusal]:
-    """All chains of the leg."""
-    notes = []
-    before = state
-    for chain in state.chain(leg):
-        found = locus(evidence.directions(_index(evidence, chain)), 1.0)
-        if found.dimension == 0:
-            links = (chain.carrier, chain.bearing, *chain.slider_links)
-            gone = {link for link in links if link is not None and link in state.owners}
-            state = state.with_chain(chain, None, state.mechanism.changed(
-                remove_links=gone, remove_joints=[chain.actuator, *([chain.roll] if chain.roll else [])]))
-            notes.append("the direction is constant: the leg is blind")
-        elif found.dimension == 2:
-            joint = state.mechanism.joints[chain.actuator]
-            turned = replace(joint, type=JointType.REVOLUTE, axes=(found.normal,))
-            state = state.with_chain(chain, chain, state.mechanism.changed(joints=[turned]))
-            notes.append("the direction only turns about an axis of constant direction")
-    if state is before:
-        yield Refusal("the direction moves in two ways")
-    else:
-        yield Proposal(state, "; ".join(notes))
+def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Turning]]:
+    """The locus of the chain's direction; nothing where that moves in two ways."""
+    observations = evidence.samples.question.observations
+    own = [i for i, o in enumerate(observations) if o.leg == chain.leg]
+    index = next((i for i in own if observations[i].link == chain.link), own[0])
+    found = locus(evidence.directions(index), 1.0)
+    if found.dimension == 0:
+        yield Match((chain, None), "the direction is constant: the leg is blind")
+    elif found.dimension == 2:
+        yield Match((chain, found.normal), "the direction only turns about an axis of constant direction")
 
 
-def _index(evidence: Evidence, chain: Chain) -> int:
-    for index, observation in enumerate(evidence.samples.question.observations):
-        if observation.leg == chain.leg and observation.link == chain.link:
-            return index
-    return next(i for i, o in enumerate(evidence.samples.question.observations) if o.leg == chain.leg)
+def apply(state: State, found: Turning) -> State:
+    """The chain with R for U, or without the chain."""
+    chain, axis = found
+    mechanism = state.mechanism
+    if axis is None:
+        links = {chain.carrier, chain.bearing, *chain.slider_links}
+        gone = [link for link in mechanism.links if link in links and link in state.owners]
+        joints = [chain.actuator, *([chain.roll] if chain.roll else [])]
+        return state.with_chain(chain, None, mechanism.changed(remove_links=gone, remove_joints=joints))
+    turned = replace(mechanism.joints[chain.actuator], type=JointType.REVOLUTE, axes=(axis,))
+    return state.with_chain(chain, chain, mechanism.changed(joints=[turned]))
 
 
-RULE = Rule("direction locus", "MMT 3.2, 4.1.1", propose)
+RULE = Rule("direction locus", "MMT 3.2, 4.1.1", Stage.DIRECTION, find, apply, each_chain,
+            otherwise="the direction moves in two ways")

@@ -9,71 +9,85 @@ directions fixed in T are tried for the outer axis: whether the platform stays h
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...geometry.vectors import Array, perpendicular, unit
 from ...mechanism import Joint, JointType
 from ..evidence import Evidence
-from ..rule import Proposal, Refusal, Rule
-from ..state import Chain, State, ball_to_universal
-from .companion import companions
+from ..rule import Match, Refusal, Rule, Stage, whole_leg
+from ..state import State, VirtualChain, ball_to_universal
 
-_TRIES = ((0.0, 0.0, 0.0), (0, 0, 1), (1, 1, 0), (1, -1, 0), (0, 1, 1), (0, 1, -1), (1, 2, 3), (3, -1, 2))
-"""Outer axes in the leg's own frame (u, side, u × side); zero: the axis as it is."""
+OUTER_AXES = ((0.0, 0.0, 0.0), (0, 0, 1), (1, 1, 0), (1, -1, 0), (0, 1, 1), (0, 1, -1), (1, 2, 3), (3, -1, 2))
+"""Outer axes that are tried, in the leg's own frame (u, side, u × side); zero: the axis as it is."""
 
 
-def propose(state: State, evidence: Evidence, leg: str, trust: bool) -> Iterator[Proposal | Refusal]:
-    """All observed legs at once (``leg`` is ignored): one proposal for each direction of the outer axis."""
-    chains = [chain for chain in state.chains if chain.taken and _ends(state, evidence, chain)]
-    if not chains:
+@dataclass(frozen=True, eq=False)
+class LegEnds:
+    """The S joints (``ends``) by which a chain's leg ends on a link of the platform, the joints of parallel rods on T,
+    and the two axes of the U that they are to become."""
+
+    chain: VirtualChain
+    attach: str
+    ends: list[Joint]
+    beside: list[Joint]
+    axes: tuple[Array, Array]
+    turned: bool
+    """Whether these are not the actuator's axes: it and the parallel rods' joints are to have them as well."""
+
+    def with_outer(self, trial: Array) -> LegEnds:
+        """The same with another outer axis where the actuator's axes are free."""
+        if not (self.chain.spins and trial.any()):
+            return self
+        u = self.chain.direction
+        side = perpendicular(u, self.beside[0].point - self.chain.anchor if self.beside else None)
+        outer = unit(np.column_stack([u, side, np.cross(u, side)]) @ trial)
+        return replace(self, axes=(outer, unit(np.cross(outer, u))), turned=True)
+
+
+def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[LegEnds]] | Refusal]:
+    """All observed legs at once: a match for each direction of the outer axis."""
+    found = [ends for chain in state.chains if chain.taken and (ends := _ends(state, evidence, chain)) is not None]
+    if not found:
         yield Refusal("no observed leg ends in an S whose rod the actuator moves")
-        return
-    for trial in _TRIES:
-        if any(trial) and not any(chain.spins for chain in chains):
-            return
-        result = state
-        words = []
-        for chain in chains:
-            result, outer = _changed(result, evidence, chain, np.asarray(trial, dtype=float))
-            words.append(f"leg {chain.leg}: {_text(outer)}")
-        yield Proposal(result, "the last S becomes U, inner axes parallel, outer axes parallel to " + ", ".join(words))
+    elif any(each.chain.spins for each in found):
+        for trial in OUTER_AXES:
+            yield _match([each.with_outer(np.asarray(trial, dtype=float)) for each in found])
+    else:
+        yield _match(found)
 
 
-def _text(axis: Array) -> str:
-    return "(" + " ".join(f"{value + 0.0:.3f}" for value in axis) + ")"
+def _match(found: list[LegEnds]) -> Match[list[LegEnds]]:
+    axes = (" ".join(f"{value + 0.0:.3f}" for value in each.axes[0]) for each in found)
+    words = ", ".join(f"leg {each.chain.leg}: ({axis})" for each, axis in zip(found, axes, strict=True))
+    return Match(found, f"the last S becomes U, inner axes parallel, outer axes parallel to {words}")
 
 
-def _rods(evidence: Evidence, chain: Chain) -> tuple[str, ...]:
-    return (chain.link, *companions(evidence, chain.link))
-
-
-def _ends(state: State, evidence: Evidence, chain: Chain) -> list[Joint]:
-    """The S joints between the leg and its end on the platform."""
-    leg = state.real.leg(chain.leg)
-    if state.mechanism.joints[chain.actuator].type is not JointType.UNIVERSAL:
-        return []
-    inside = set(leg.links)
-    return [j for j in state.mechanism.joints_of(leg.attach)
-            if j.type is JointType.SPHERICAL and j.other(leg.attach) in inside]
-
-
-def _changed(state: State, evidence: Evidence, chain: Chain, trial: Array) -> tuple[State, Array]:
-    mechanism = state.mechanism
-    leg = state.real.leg(chain.leg)
+def _ends(state: State, evidence: Evidence, chain: VirtualChain) -> LegEnds | None:
+    """How a leg ends; None where its actuator is no U or its ends are no S."""
+    mechanism, leg = state.mechanism, state.real.leg(chain.leg)
     actuator = mechanism.joints[chain.actuator]
-    axes: tuple[Array, Array] = (actuator.axes[0], actuator.axes[1])
-    joints: list[Joint] = []
-    if chain.spins and trial.any():
-        others = [j for rod in companions(evidence, chain.link) for j in mechanism.joints_of(rod)
-                  if j.other(rod) == chain.carrier]
-        side = perpendicular(chain.direction, others[0].point - chain.anchor if others else None)
-        outer = unit(np.column_stack([chain.direction, side, np.cross(chain.direction, side)]) @ trial)
-        axes = (outer, unit(np.cross(outer, chain.direction)))
-        joints.extend(ball_to_universal(j, chain.carrier, axes) for j in (actuator, *others))
-    for end in _ends(state, evidence, chain):
-        joints.append(ball_to_universal(end, end.other(leg.attach), (axes[1], axes[0])))
-    return state.with_chain(chain, chain, mechanism.changed(joints=joints)), axes[0]
+    ends = [j for j in mechanism.joints_of(leg.attach)
+            if j.type is JointType.SPHERICAL and j.other(leg.attach) in leg.links]
+    if actuator.type is not JointType.UNIVERSAL or not ends:
+        return None
+    beside = [j for rod in evidence.parallel_rods(chain.link) for j in mechanism.joints_of(rod)
+              if j.other(rod) == chain.carrier]
+    return LegEnds(chain, leg.attach, ends, beside, (actuator.axes[0], actuator.axes[1]), False)
 
 
-RULE = Rule("end change", "MMT 3.2, 4.2.2", propose)
+def apply(state: State, found: list[LegEnds]) -> State:
+    """U for S at all ends, and the actuators with the axes that were chosen."""
+    for each in found:
+        mechanism, (outer, inner) = state.mechanism, each.axes
+        joints = [ball_to_universal(end, end.other(each.attach), (inner, outer)) for end in each.ends
+                  if mechanism.joints[end.name].type is JointType.SPHERICAL]
+        if each.turned:
+            joints += [ball_to_universal(joint, each.chain.carrier, each.axes)
+                       for joint in (mechanism.joints[each.chain.actuator], *each.beside)]
+        state = state.with_chain(each.chain, each.chain, mechanism.changed(joints=joints))
+    return state
+
+
+RULE = Rule("end change", "MMT 3.2, 4.2.2", Stage.ENDS, find, apply, whole_leg)

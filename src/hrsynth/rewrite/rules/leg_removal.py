@@ -12,26 +12,28 @@ from collections.abc import Iterator
 from dataclasses import replace
 
 from ..evidence import Evidence
-from ..rule import Proposal, Refusal, Rule
+from ..rule import Match, Refusal, Rule, Stage, whole_leg
 from ..state import State
 
 
-def propose(state: State, evidence: Evidence, leg: str, trust: bool) -> Iterator[Proposal | Refusal]:
-    """The leg ``leg``, which has no virtual chain."""
-    part = state.real.leg(leg)
-    mechanism = state.mechanism
-    if mechanism.reference in part.links:
+def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[str] | Refusal]:
+    """The leg, which has no virtual chain."""
+    if state.mechanism.reference in state.real.leg(leg).links:
         yield Refusal("the leg carries the camera")
         return
-    links = [name for name in part.links if name in mechanism.links]
-    links += [name for name, owner in state.owners.items() if owner == leg and name in mechanism.links]
-    joints = [name for name in part.joints if name in mechanism.joints]
-    changed = mechanism.changed(remove_links=links, remove_joints=joints)
     observed = state.observed()
     ends = dict.fromkeys(each.attach for each in state.real.legs if each.label in observed)
-    yield Proposal(replace(state, mechanism=changed, removed=(*state.removed, leg)),
-                   "platform and observed legs move as before without it",
-                   tuple(end for end in ends if end != mechanism.platform))
+    yield Match(leg, "platform and observed legs move as before without it",
+                bodies=tuple(end for end in ends if end != state.mechanism.platform))
 
 
-RULE = Rule("leg removal", "MMT 4.2", propose)
+def apply(state: State, leg: str) -> State:
+    """The robot without the leg's links and joints, virtual links included."""
+    part, mechanism = state.real.leg(leg), state.mechanism
+    links = [*part.links, *(name for name, owner in state.owners.items() if owner == leg)]
+    changed = mechanism.changed(remove_links=[name for name in links if name in mechanism.links],
+                                remove_joints=[name for name in part.joints if name in mechanism.joints])
+    return replace(state, mechanism=changed, removed=(*state.removed, leg))
+
+
+RULE = Rule("leg removal", "MMT 4.2", Stage.LEG, find, apply, whole_leg)

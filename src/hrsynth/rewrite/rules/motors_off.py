@@ -8,17 +8,21 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import replace
 
+from ...mechanism import Joint
 from ..evidence import Evidence
-from ..rule import Proposal, Refusal, Rule
-from ..state import State, passive
+from ..rule import Match, Rule, Stage, whole_leg
+from ..state import State
 
 
-def propose(state: State, evidence: Evidence, leg: str, trust: bool) -> Iterator[Proposal | Refusal]:
-    """One proposal for all legs at once."""
-    mechanism = state.mechanism
-    joints = [passive(joint) for joint in mechanism.joints.values() if joint.actuated]
-    yield Proposal(replace(state, mechanism=mechanism.changed(joints=joints)),
-                   f"{len(joints)} real motors become passive")
+def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Joint]]]:
+    """All motors of all legs at once."""
+    driven = [joint for joint in state.mechanism.joints.values() if joint.actuated]
+    yield Match(driven, f"{len(driven)} real motors become passive")
 
 
-RULE = Rule("motors off", "MMT 3.2", propose)
+def apply(state: State, driven: list[Joint]) -> State:
+    """The same joints without motors."""
+    return replace(state, mechanism=state.mechanism.changed(joints=[replace(joint, motor=None) for joint in driven]))
+
+
+RULE = Rule("motors off", "MMT 3.2", Stage.MOTORS, find, apply, whole_leg, always=True)

@@ -16,41 +16,43 @@ from ...geometry.lines import foot
 from ...geometry.vectors import pose
 from ...mechanism import Joint, JointType, Link
 from ..evidence import Evidence
-from ..rule import Proposal, Refusal, Rule
-from ..state import State
+from ..rule import Match, Refusal, Rule, Stage, each_chain
+from ..state import State, VirtualChain
+
+Circling = tuple[VirtualChain, Joint]
+"""A chain, and the base R about which its anchor moves on a circle."""
 
 
-def propose(state: State, evidence: Evidence, leg: str, trust: bool) -> Iterator[Proposal | Refusal]:
-    """All chains of the leg whose carrier slides on PP behind one R."""
-    before = state
-    for chain in state.chain(leg):
-        proximal = evidence.proximal(chain.link)
-        if proximal is None or len(chain.sliders) != 2:
-            continue
-        base = proximal.single_revolute
-        if base is None:
-            yield Refusal("the anchor is not on a circle about a base R joint")
-            return
-        mechanism = state.mechanism
-        reference = mechanism.reference
-        centre = foot(chain.anchor, base.point, base.axis)
-        side = np.cross(base.axis, chain.anchor - centre)
-        offsets = [side] if chain.taken else [np.zeros(3), side]
-        links, joints = [], []
-        for number, offset in enumerate(offsets):
-            tag = f"{chain.leg}" if number == len(offsets) - 1 else f"{chain.leg}_0"
-            crank = mechanism.fresh(f"crank_{tag}")
-            links.append(Link(crank, pose(centre + offset)))
-            joints.append(Joint(mechanism.fresh(f"crank_base_{tag}"), JointType.REVOLUTE, reference, crank,
-                                centre + offset, (base.axis,)))
-            joints.append(Joint(mechanism.fresh(f"crank_tip_{tag}"), JointType.REVOLUTE, crank, chain.carrier,
-                                chain.anchor + offset, (base.axis,)))
-        changed = mechanism.changed(remove_links=chain.slider_links, remove_joints=chain.sliders, links=links,
-                                    joints=joints)
-        state = state.with_chain(chain, replace(chain, sliders=(), slider_links=()), changed,
-                                 {link.name: chain.leg for link in links})
-    if state is not before:
-        yield Proposal(state, "the anchor moves on a circle about a base R joint")
+def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Circling] | Refusal]:
+    """A chain whose carrier slides on PP behind one R."""
+    proximal = evidence.proximal(chain.link)
+    if proximal is None or len(chain.sliders) != 2:
+        return
+    if proximal.single_revolute is None:
+        yield Refusal("the anchor is not on a circle about a base R joint")
+        return
+    yield Match((chain, proximal.single_revolute), "the anchor moves on a circle about a base R joint")
 
 
-RULE = Rule("pi form", "MMT Fig. 4(c)", propose)
+def apply(state: State, found: Circling) -> State:
+    """Cranks from the reference link to T in the place of the sliders: one beside the real one, or two."""
+    chain, base = found
+    mechanism = state.mechanism
+    centre = foot(chain.anchor, base.point, base.axis)
+    side = np.cross(base.axis, chain.anchor - centre)
+    offsets = {chain.leg: side} if chain.taken else {f"{chain.leg}_0": np.zeros(3), chain.leg: side}
+    links, joints = [], []
+    for tag, offset in offsets.items():
+        crank = Link(mechanism.fresh(f"crank_{tag}"), pose(centre + offset))
+        links.append(crank)
+        joints.append(Joint(mechanism.fresh(f"crank_base_{tag}"), JointType.REVOLUTE, mechanism.reference, crank.name,
+                            centre + offset, (base.axis,)))
+        joints.append(Joint(mechanism.fresh(f"crank_tip_{tag}"), JointType.REVOLUTE, crank.name, chain.carrier,
+                            chain.anchor + offset, (base.axis,)))
+    changed = mechanism.changed(remove_links=chain.slider_links, remove_joints=chain.sliders, links=links,
+                                joints=joints)
+    return state.with_chain(chain, replace(chain, sliders=(), slider_links=()), changed,
+                            {link.name: chain.leg for link in links})
+
+
+RULE = Rule("pi form", "MMT Fig. 4(c)", Stage.FORM, find, apply, each_chain)

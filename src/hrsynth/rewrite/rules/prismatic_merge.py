@@ -8,14 +8,15 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from ..evidence import Evidence
-from ..rule import Proposal, Refusal, Rule
-from ..state import State
-from .takeover import proposals
+from ..rule import Match, Refusal, Rule, Stage, each_chain
+from ..state import State, VirtualChain
+from .takeover import Substitution, apply, substitution
 
 
-def propose(state: State, evidence: Evidence, leg: str, trust: bool) -> Iterator[Proposal | Refusal]:
-    """All chains of the leg whose knee is on the reference link."""
-    yield from proposals(state, evidence, leg, trust, on_reference=True)
+def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Substitution | None] | Refusal]:
+    """A joint K on the reference link."""
+    if chain.before == evidence.reference:
+        yield from substitution(state, evidence, chain)
 
 
-RULE = Rule("prismatic merge", "MMT 4.2.1", propose)
+RULE = Rule("prismatic merge", "MMT 4.2.1", Stage.JOINT, find, apply, each_chain)

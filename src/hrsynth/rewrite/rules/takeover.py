@@ -1,4 +1,4 @@
-"""Takeover: the actuator takes the place of the real joint K before the observed link.
+"""Takeover, the substitution of a joint: the actuator takes the place of the real joint K before the observed link.
 
     before –K– ℓ,  T –U̲– W –R(d)– ℓ   →   before –S– T –U̲– ℓ        (MMT Fig. 2(b))
 
@@ -12,84 +12,80 @@ over.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from ...geometry.lines import parallel
+from ...geometry.vectors import Array
 from ...mechanism import Joint, JointType
-from ..evidence import Evidence, Proximal
-from ..rule import Proposal, Refusal, Rule
-from ..state import Chain, State, towards
+from ..evidence import Evidence, ProximalChain
+from ..rule import Match, Refusal, Rule, Stage, each_chain
+from ..state import State, VirtualChain, towards
 
 
-def propose(state: State, evidence: Evidence, leg: str, trust: bool) -> Iterator[Proposal | Refusal]:
-    """All chains of the leg whose knee is not on the reference link itself."""
-    yield from proposals(state, evidence, leg, trust, on_reference=False)
+@dataclass(frozen=True, eq=False)
+class Substitution:
+    """How a chain's actuator takes K's place: ``own`` is K itself where the actuator takes its axes (None: the
+    actuator's stay), ``turning`` the constant axis about which the link before K turns (None: about no single one)."""
+
+    chain: VirtualChain
+    own: Joint | None
+    turning: Array | None
 
 
-def proposals(state: State, evidence: Evidence, leg: str, trust: bool, *,
-              on_reference: bool) -> Iterator[Proposal | Refusal]:
-    """The takeover of knees on the reference link, or of all others."""
-    before = state
-    notes: list[str] = []
-    for chain in state.chain(leg):
-        if chain.taken or (chain.before == evidence.reference) != on_reference:
-            continue
-        if chain.knee is not None and chain.knee not in state.mechanism.joints:
-            notes.append(f"{chain.knee!r} before {chain.link!r} is taken over already")
-            continue
-        result = _taken(state, evidence, chain, trust)
-        if isinstance(result, Refusal):
-            yield result
-            return
-        state, note = result
-        notes.append(note)
-    if state is not before:
-        yield Proposal(state, "; ".join(notes))
+def find(state: State, evidence: Evidence, chain: VirtualChain) -> Iterator[Match[Substitution | None] | Refusal]:
+    """A joint K that is not on the reference link itself."""
+    if chain.before != evidence.reference:
+        yield from substitution(state, evidence, chain)
 
 
-def _taken(state: State, evidence: Evidence, chain: Chain, trust: bool) -> tuple[State, str] | Refusal:
-    mechanism = state.mechanism
+def substitution(state: State, evidence: Evidence, chain: VirtualChain
+                 ) -> Iterator[Match[Substitution | None] | Refusal]:
+    """The joint K of a chain that has not taken one over; None where another chain of the leg has taken it."""
+    if chain.taken:
+        return
+    if chain.k_joint is not None and chain.k_joint not in state.mechanism.joints:
+        yield Match(None, f"{chain.k_joint!r} before {chain.link!r} is taken over already")
+        return
     proximal = evidence.proximal(chain.link)
-    if proximal is None or chain.knee is None or chain.before is None:
-        return Refusal("no single R, U or S joint stands before the observed link")
-    knee = towards(mechanism.joints[chain.knee], chain.before)
-    actuator = mechanism.joints[chain.actuator]
-    if (own := _own_axes(knee, actuator, proximal)) is not None:
-        taken, spins, note = own, False, f"the actuator takes the axes of {knee.name!r}"
-    elif evidence.spins(chain.link, chain.direction) and knee.type is not JointType.REVOLUTE:
-        taken, spins = actuator, True
-        note = f"{chain.link!r} can turn about its own direction with all else at rest"
-    elif trust:
-        taken, spins, note = actuator, True, "done without its side condition"
+    if proximal is None or chain.k_joint is None or chain.before is None:
+        yield Refusal("no single R, U or S joint stands before the observed link")
+        return
+    K = towards(state.mechanism.joints[chain.k_joint], chain.before)
+    if _steady(K, state.mechanism.joints[chain.actuator], proximal):
+        yield Match(Substitution(chain, K, proximal.turning_axis), f"the actuator takes the axes of {K.name!r}")
+        return
+    found = Substitution(chain, None, proximal.turning_axis)
+    if K.type is not JointType.REVOLUTE and evidence.spins(chain.link, chain.direction):
+        yield Match(found, f"{chain.link!r} can turn about its own direction with all else at rest")
     else:
-        return Refusal(f"{chain.link!r} cannot turn about its own direction, and {knee.name!r} is not an R or a U "
-                       "whose axes the actuator could take")
-    joint = replace(taken, name=actuator.name, motor=actuator.motor, predecessor=chain.carrier, successor=chain.link,
-                    point=chain.anchor if taken is actuator else taken.point, in_tree=True, limits=None, xml=())
-    joints = [joint]
+        yield Match(found, "done without its side condition",
+                    unmet=f"{chain.link!r} cannot turn about its own direction, and {K.name!r} is not an R or a U "
+                          "whose axes the actuator could take")
+
+
+def _steady(K: Joint, actuator: Joint, proximal: ProximalChain) -> bool:
+    """Condition (ii): K has as many axes as the direction has ways to move, the first one steady."""
+    return (K.type is actuator.type and proximal.keeps(K.axis)
+            and (K.type is not JointType.REVOLUTE or parallel(K.axis, actuator.axis)))
+
+
+def apply(state: State, found: Substitution | None) -> State:
+    """The actuator between T and ℓ in K's place, and T following the link before K at A."""
+    if found is None:
+        return state
+    mechanism, chain = state.mechanism, found.chain
+    actuator = mechanism.joints[chain.actuator]
+    taken = replace(actuator, point=chain.anchor) if found.own is None else found.own
+    joints = [replace(taken, name=actuator.name, motor=actuator.motor, predecessor=chain.carrier, successor=chain.link,
+                      in_tree=True, limits=None, xml=())]
     if chain.carrier != chain.before:
-        joints.append(_follower(state, chain, proximal))
+        kind, axes = (JointType.SPHERICAL, ()) if found.turning is None else (JointType.REVOLUTE, (found.turning,))
+        joints.append(Joint(mechanism.fresh(f"follow_{chain.leg}"), kind, str(chain.before), chain.carrier,
+                            chain.anchor, axes))
     changed = mechanism.changed(remove_links=[chain.bearing] if chain.bearing else [],
-                                remove_joints=[chain.knee], joints=joints)
-    return state.with_chain(chain, replace(chain, taken=True, spins=spins, bearing=None, roll=None), changed), note
+                                remove_joints=[str(chain.k_joint)], joints=joints)
+    return state.with_chain(chain, replace(chain, taken=True, spins=found.own is None, bearing=None, roll=None),
+                            changed)
 
 
-def _own_axes(knee: Joint, actuator: Joint, proximal: Proximal) -> Joint | None:
-    """K itself, where condition (ii) holds: as many axes as the direction has ways to move, the first one steady."""
-    if knee.type is not actuator.type or not proximal.keeps(knee.axis):
-        return None
-    if knee.type is JointType.REVOLUTE and not parallel(knee.axis, actuator.axis):
-        return None
-    return knee
-
-
-def _follower(state: State, chain: Chain, proximal: Proximal) -> Joint:
-    """The joint by which T follows the link before K at A."""
-    name = state.mechanism.fresh(f"follow_{chain.leg}")
-    axis = proximal.turning_axis
-    if axis is not None:
-        return Joint(name, JointType.REVOLUTE, str(chain.before), chain.carrier, chain.anchor, (axis,))
-    return Joint(name, JointType.SPHERICAL, str(chain.before), chain.carrier, chain.anchor)
-
-
-RULE = Rule("takeover", "MMT 3.2, Fig. 2(b)", propose)
+RULE = Rule("takeover", "MMT 3.2, Fig. 2(b)", Stage.JOINT, find, apply, each_chain)
