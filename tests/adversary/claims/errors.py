@@ -11,7 +11,8 @@ from adversary.claims.first_order import inverse_law
 from adversary.robot import Array
 
 PSI = 2e-3
-CLOSE = 1e-6
+CLOSE, ROUNDING = 1e-6, 1e-13
+"""How near, as a part of the bound, errors must come; rounding of the inverse law, as a part of its largest entry."""
 
 
 def errors(case: Case) -> None:
@@ -38,11 +39,11 @@ def judge(case: Case, told: Any) -> None:
             continue
         A = np.einsum("aki,kij->kaj", part.reshape(3, -1, 3), P) * told.cones[:, None, None]
         own = largest(A, case.rng)
-        scale = extent.largest + 1e-6 * PSI
-        over = own > extent.largest + CLOSE * scale
+        near = CLOSE * (extent.largest + 1e-6 * PSI) + ROUNDING * PSI * float(np.abs(J).max())
+        over = own > extent.largest + near
         # of one cone and two the maxima are exact, else the gap says how far the bound may be above
-        under = own < extent.largest * (1 - extent.gap) - CLOSE * scale
-        under |= len(u) <= 2 and own < extent.largest - CLOSE * scale
+        under = own < extent.largest * (1 - extent.gap) - near
+        under |= len(u) <= 2 and own < extent.largest - near
         case.say("error bound", WRONG if over or under else HELD,
                  f"{name}: {extent.largest!r} told (gap {extent.gap:.1e}), {own!r} found" if over or under else "")
 
