@@ -16,10 +16,10 @@ import numpy as np
 from hrsynth.catalog.entry import model
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
-from hrsynth.mechanism.legs import default_observation, dissect
+from hrsynth.geometry.vectors import Array, unit
+from hrsynth.mechanism.legs import decompose, default_observation
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.observation import Direction
-from hrsynth.mechanism.vectors import Array, unit
 from oracle import GAP, RANK, NotAssembled, Oracle, Undecided, exponential, split_rank
 
 STATES, STARTS, LONG = 6, 60, 40
@@ -43,7 +43,7 @@ class Witness:
     @cached_property
     def watched(self) -> dict[str, Direction]:
         """The observed direction of each leg: what the word marks, else its last segment."""
-        anatomy = dissect(self.oracle.mechanism)
+        anatomy = decompose(self.oracle.mechanism)
         marked = {each.leg: each for each in self.oracle.mechanism.observations if isinstance(each, Direction)}
         return {leg.label: marked.get(leg.label) or default_observation(anatomy, leg) for leg in anatomy.legs}
 

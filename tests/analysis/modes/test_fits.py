@@ -77,6 +77,20 @@ def test_a_match_below_the_tolerance_that_is_none_is_excluded():
     assert any(each.residual < 1e-9 for each in found.near)
 
 
+@pytest.mark.parametrize("name", ["planar CCCC", "spatial CCLL", "translating CC", "two bodies CC+C"])
+def test_a_goal_whose_solution_is_known_too_roughly_is_a_mode_all_the_same(name: str):
+    """A leg off by 1e-8 sizes, with no error told that would make it one: the goal was dropped."""
+    system, X = MORE[name](np.random.default_rng(0))
+    goal = solve(system, near=False).modes[0].q
+    curves = (*system.curves[:-1], shifted(system.curves[-1], 1e-8 * system.size * np.ones(3)))
+    rough = replace(system, curves=curves, error=np.inf)
+    found = solve(rough, near=False, goal=goal)
+    assert not found.complete
+    assert listed(found, X, 1e-6)
+    assert [(mode.proved, mode.fits) for mode in found.modes] == [(False, False)]
+    assert solve(rough, near=False).modes == ()
+
+
 def mirrored(rng: Rng) -> tuple[Translating, Array]:
     """Four circles through two points that mirror each other at a plane in which all centres and axes lie."""
     R, o = random_rotation(rng), rng.normal(size=3)

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...geometry.vectors import Array, frozen
-from ...tolerances import FARTHEST, NEARLY_DOUBLE, TIP_ROUNDING, VANISHES
+from ...tolerances import FARTHEST, NEARLY_DOUBLE, SAME_RELATION, TIP_ROUNDING, VANISHES
 from .curves import Point
 from .fits import Meant, as_meant, dimension, excluded, meets, residual, stationary, torn, words
 from .msolve import solve_whole, wholes
@@ -185,11 +185,17 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
     modes = tuple(mode if mode is at_goal else replace(mode, proved=False, fits=mode.proved)
                   for mode in left if mode is at_goal or mode.residual <= VANISHES)
     enclosed = roots.complete and len(modes) == len(left) and all(mode.proved or mode.fits for mode in modes)
+    open_ = [mode for mode in left if mode is not at_goal and mode.residual > VANISHES]
+    if goal is not None and not any(_same(system, mode.q, goal) for mode in modes):
+        # a mode by construction, whose solution is known too roughly to fit
+        at_goal = Mode((), np.inf, np.inf, np.pi, system.residual(system.reached(goal)), frozen(system.pose(goal)),
+                       frozen(goal), square.legs)
+        modes, open_ = (*modes, at_goal), [mode for mode in open_ if not _same(system, mode.q, goal)]
     near = () if others is None else _near(system, found, modes, others)
     near = tuple(_nearly(system, mode.q) for mode in found if mode not in left and mode.residual <= VANISHES) + near
     fitting = [mode.residual for mode in modes if mode is not at_goal]
     proof = (f"from {len(square.legs)} of {len(system.curves)} legs: {proof}; of these "
-             + words(at_goal is not None, fitting, len(found) - len(left), len(left) - len(modes)))
+             + words(at_goal is not None, fitting, len(found) - len(left), len(open_)))
     return Modes(len(modes), modes, enclosed and bound != "none", proof, near, _special(roots), None, bound, enclosed)
 
 
@@ -199,6 +205,11 @@ def _goal(system: System, roots: Roots, found: Sequence[Mode], goal: Array | Non
         return None
     able = [mode for mode in found if not mode.proved or meets(system, mode.q, goal, mode.shift, mode.turn)]
     return able[0] if len(able) == 1 and able[0].proved else None
+
+
+def _same(system: System, q: Array, goal: Array) -> bool:
+    """Whether a pose is the goal, but for what poses of one relation may differ."""
+    return float(np.abs(system.reached(q) - system.reached(goal)).max()) <= SAME_RELATION * system.size
 
 
 def _bounded(system: System, part: Whole, roots: Roots) -> tuple[str, str]:

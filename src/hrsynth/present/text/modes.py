@@ -64,7 +64,9 @@ def proved(mode: AssemblyMode) -> str:
         return f"fits all legs to {mode.fits:.1e}, which does not prove it; if it is a mode, {known}"
     if mode.rounded:
         return f"not proved: enclosed {within} for the rounded geometry, not for the file's".replace("  ", " ")
-    return f"not proved, a multiple one {within}".rstrip() if mode.multiplicity > 1 else f"not proved, {known}"
+    if mode.multiplicity > 1:
+        return f"not proved, a multiple one {within}".rstrip()
+    return f"{'a mode by construction, its place ' if mode.goal else ''}not proved, {known}"
 
 
 def at_mode(mode: AssemblyMode, kind: str) -> list[tuple[str, str]]:
