@@ -23,7 +23,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES
 from analysis.modes.laws import installed
 from analysis.modes.newton import real_ones, solutions
-from hrsynth.analysis.modes.solve import Modes, solve, solve_by_msolve
+from hrsynth.analysis.modes.solve import SystemModes, solve, solve_by_msolve
 from hrsynth.analysis.modes.systems import System
 
 BASELINE = 20
@@ -33,7 +33,7 @@ EXTERNAL = 3
 """Instances on which msolve is tried."""
 
 
-def timed(solver: Callable[[System], Modes], system: System) -> tuple[float, Modes]:
+def timed(solver: Callable[[System], SystemModes], system: System) -> tuple[float, SystemModes]:
     """Processor time in ms, that of subprocesses included, and the modes."""
     before = sum(os.times()[:4])
     found = solver(system)

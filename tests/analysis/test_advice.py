@@ -15,8 +15,7 @@ from hypothesis import strategies as st
 
 import hrsynth
 from hrsynth.analysis import advice as module
-from hrsynth.analysis.advice import Advice, advise
-from hrsynth.analysis.candidates import candidates
+from hrsynth.analysis.advice import Advice, advise, candidates
 from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.analysis.observed import prepare
 from hrsynth.description import load

@@ -12,10 +12,9 @@ from hypothesis import HealthCheck, given, settings
 
 from hrsynth.analysis import posture as posture_module
 from hrsynth.analysis.check import MEASURES, Check, check
-from hrsynth.analysis.classes import Counts, interaction_matrix
+from hrsynth.analysis.classes import Counts, interaction_matrix, redundant_rows, surplus
 from hrsynth.analysis.observed import prepare
 from hrsynth.analysis.posture import Examiner, Posture
-from hrsynth.analysis.redundancy import redundant_rows, surplus
 from hrsynth.description import load
 from hrsynth.geometry.ranks import CLEAN
 from hrsynth.geometry.vectors import Array, inverse

@@ -8,7 +8,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 
-from hrsynth.analysis.candidates import candidates
+from hrsynth.analysis.advice import candidates
 from hrsynth.description import load
 from hrsynth.geometry.vectors import Array, perpendicular, pose, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration, measure

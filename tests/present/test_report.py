@@ -204,7 +204,7 @@ def test_letters_and_lines_of_drawings_stand_out():
 def test_formulas_are_mathml_without_old_elements_or_entities():
     import sympy
 
-    from hrsynth.analysis.singularity.algebra import products, vector
+    from hrsynth.constraints.vector_algebra import products, vector
 
     dot, cross, det = products()
     a, b, n = vector("B1"), vector("tau2"), vector("n")

@@ -1,8 +1,8 @@
-"""What is missing: the smallest sets of further measurements that make a robot controllable."""
+"""What is missing: the smallest sets of further measurements that make a robot controllable, of all candidates."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, islice
 from math import comb
@@ -10,16 +10,93 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import RankUndecided
+from ..errors import HrsynthError, RankUndecided
 from ..geometry.ranks import kernel_basis, largest_angle, range_basis, singular_values
 from ..geometry.vectors import Array
 from ..kinematics.sampling import Samples
-from ..mechanism import Mechanism
+from ..mechanism import Direction, JointType, Mechanism, Observation
+from ..mechanism.legs import LegDecomposition, observation_of
+from ..mechanism.sensors import encoders, line_position
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
-from .candidates import Measurement, candidates
 from .controllability import CONTROLLABLE, Verdict, verdict_of
 from .observed import ObservedRobot, prepare, restricted, silent
+
+AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
+"""The names of the coordinates of joints that have two."""
+
+
+@dataclass(frozen=True, eq=False)
+class FurtherMeasurement:
+    """A measurement that could be added.
+
+    ``kind`` is leg (its default segment), direction (of another link), line (the position of a line whose direction is
+    observed) or encoder; ``of`` names the leg, the link or the joint. An encoder says which coordinate of the joint it
+    reads where there are two, and whether a motor drives the joint.
+    """
+
+    kind: str
+    of: str
+    observation: Observation
+    leg: str | None
+    axis: str | None = None
+    actuated: bool | None = None
+
+    @property
+    def name(self) -> str:
+        """The name in words: a star marks a joint with a motor."""
+        star = "*" if self.actuated else ""
+        return f"{self.of}{star}" + (f" ({self.axis})" if self.axis else "")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        record: dict[str, Any] = {"kind": self.kind, "of": self.of, "leg": self.leg}
+        if self.kind == "encoder":
+            return {**record, "axis": self.axis, "actuated": self.actuated}
+        return {**record, "link": self.observation.link}
+
+
+def candidates(setting: ObservedRobot) -> tuple[FurtherMeasurement, ...]:
+    """Everything that could be added: legs, directions of other links, positions of observed lines, encoders."""
+    return (*_legs(setting), *_directions(setting), *_lines(setting), *_encoders(setting.anatomy))
+
+
+def _legs(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
+    for segment in setting.segments:
+        if segment.leg not in setting.labels:
+            yield FurtherMeasurement("leg", segment.leg, segment, segment.leg)
+
+
+def _directions(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
+    """Segments of all legs but the observed ones and those that a leg is; links without a direction are left out."""
+    taken = {o.key for o in setting.observed} | {each.observation.key for each in _legs(setting)}
+    for leg in setting.anatomy.legs:
+        ends = (setting.mechanism.platform,) if leg.takes_platform else ()
+        for link in (*leg.links, *ends):
+            if (leg.label, link) in taken:
+                continue
+            try:
+                yield FurtherMeasurement("direction", link, observation_of(setting.anatomy, link), leg.label)
+            except HrsynthError:
+                continue
+
+
+def _lines(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
+    for seen in setting.observed:
+        if isinstance(seen, Direction):
+            yield FurtherMeasurement("line", seen.link, line_position(setting.anatomy, seen), seen.leg)
+
+
+def _encoders(anatomy: LegDecomposition) -> Iterator[FurtherMeasurement]:
+    """Encoders on all joints of the normal form, those with motors first; joints between links of an articulated
+    platform are of no leg."""
+    owner = {joint: leg.label for leg in anatomy.legs for joint in leg.joints}
+    for joint in sorted(anatomy.mechanism.joints.values(), key=lambda joint: not joint.actuated):
+        leg = owner.get(joint.name)
+        for number, encoder in enumerate(encoders(anatomy.mechanism, joint, leg or "")):
+            axis = AXES[joint.type][number] if joint.type in AXES else None
+            yield FurtherMeasurement("encoder", joint.name, encoder, leg, axis, joint.actuated)
+
 
 PROBES = 3
 """Configurations at which all sets are tried; what sees most there is verified at all samples."""
@@ -35,7 +112,7 @@ BATCH = 2000
 class Cure:
     """A set of measurements, and the verdict with them at all samples."""
 
-    measurements: tuple[Measurement, ...]
+    measurements: tuple[FurtherMeasurement, ...]
     verdict: Verdict
 
     def to_dict(self) -> dict[str, Any]:
@@ -123,7 +200,7 @@ def advised(setting: ObservedRobot, tell: Callable[[str], None] = silent, *, mos
     return Advice(setting, now, kept, search.tried, complete and not undecided, undecided)
 
 
-def _verified(setting: ObservedRobot, samples: Samples, sets: Sequence[tuple[Measurement, ...]]) -> list[Cure]:
+def _verified(setting: ObservedRobot, samples: Samples, sets: Sequence[tuple[FurtherMeasurement, ...]]) -> list[Cure]:
     """Each set with its verdict at all samples; those whose rank has no clear gap are left out."""
     found: list[Cure] = []
     for added in sets:
@@ -142,7 +219,7 @@ class Search:
     ker C ⊂ ker T, T the twist's rows: what stays lost has dimension rank [C; T] − rank C.
     """
 
-    def __init__(self, samples: Samples, observed: int, everything: Sequence[Measurement]) -> None:
+    def __init__(self, samples: Samples, observed: int, everything: Sequence[FurtherMeasurement]) -> None:
         self.tried = 0
         kept: list[int] = list(range(len(everything)))
         rates: list[list[Array]] = []
@@ -197,7 +274,7 @@ class Search:
         return chosen, False
 
 
-def _without_twins(kept: Sequence[int], everything: Sequence[Measurement], rates: Sequence[Sequence[Array]]
+def _without_twins(kept: Sequence[int], everything: Sequence[FurtherMeasurement], rates: Sequence[Sequence[Array]]
                    ) -> list[int]:
     """Leave out a link's direction whose rates tell what a direction before it does (links joined by P joints only)."""
     spans = {i: [range_basis(blocks[i].T, 1.0)[0] for blocks in rates] for i in kept

@@ -12,9 +12,9 @@ from ..batch.reach import reach, sweep
 from ..mechanism import Mechanism
 from ..mechanism.pose import SCALARS, Grid, Pose
 from ..results import Result
+from .classes import Redundancy, listed
 from .observed import ObservedRobot, prepare, silent
 from .posture import Examiner, Posture
-from .redundancy import Redundancy, listed
 
 UNREACHABLE = "unreachable"
 MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degrees_per_degree")

@@ -14,10 +14,21 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Relation, relation, relation_of
 from ..mechanism.pose import Pose
 from ..tolerances import PASSED_BY, RANK_GAP
-from .classes import Classes, Counts, gap_of, generic, interaction_matrix
+from .classes import (
+    Classes,
+    Counts,
+    Redundancy,
+    Rows,
+    gap_of,
+    generic,
+    interaction_matrix,
+    listed,
+    redundant_rows,
+    surplus,
+    usual_rows,
+)
 from .freedoms import Freedom, name_freedoms
 from .observed import Mobility, ObservedRobot
-from .redundancy import Redundancy, Rows, listed, redundant_rows, surplus, usual_rows
 
 UNDECIDED, REGULAR, CONSTRAINT = "undecided", "regular", "constraint"
 

@@ -13,9 +13,9 @@ from ..analysis.advice import Advice, advised
 from ..analysis.controllability import CONTROLLABLE, Verdict, verdict_of
 from ..analysis.derive import derived
 from ..analysis.exact import ExactArchitecture, architecture
+from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.modes import counted
 from ..analysis.observed import ObservedRobot, prepare, restricted, selected
-from ..analysis.singularity.measured import MeasuredRobot
 from ..errors import BadRequest, HrsynthError, NotConfined, NotConfirmed, Unsolved
 from ..geometry.ranks import range_basis
 from ..kinematics.relation import Relation

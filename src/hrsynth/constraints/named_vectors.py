@@ -19,7 +19,7 @@ Poses = Mapping[str, Array]
 
 
 @dataclass(frozen=True, eq=False)
-class Feature:
+class NamedVector:
     """A vector with the symbol it has in expressions and what it means, in words."""
 
     symbol: str
@@ -36,7 +36,7 @@ class Feature:
 
 
 @dataclass(frozen=True, eq=False)
-class Carried(Feature):
+class BodyVector(NamedVector):
     """A unit vector fixed in a link, given in the link's frame."""
 
     link: str
@@ -51,7 +51,7 @@ class Carried(Feature):
 
 
 @dataclass(frozen=True, eq=False)
-class Spot(Feature):
+class BodyPoint(NamedVector):
     """A point fixed in a link, given in the link's frame (characteristic lengths)."""
 
     link: str
@@ -68,12 +68,12 @@ class Spot(Feature):
 
 
 @dataclass(frozen=True, eq=False)
-class Tangent(Feature):
+class Tangent(NamedVector):
     """The unit tangent a × (Q − P) of the path of Q when the link that carries it turns about the axis (P, a)."""
 
-    axis: Carried
-    start: Spot
-    end: Spot
+    axis: BodyVector
+    start: BodyPoint
+    end: BodyPoint
 
     @property
     def links(self) -> tuple[str, ...]:
@@ -84,11 +84,11 @@ class Tangent(Feature):
 
 
 @dataclass(frozen=True, eq=False)
-class Segment(Feature):
+class Segment(NamedVector):
     """The unit vector from a point to another."""
 
-    start: Spot
-    end: Spot
+    start: BodyPoint
+    end: BodyPoint
 
     @property
     def links(self) -> tuple[str, ...]:
@@ -104,18 +104,18 @@ def unit_rows(vectors: Array) -> Array:
     return np.asarray(vectors / np.where(size > 0, size, 1.0))
 
 
-def axis_of(mechanism: Mechanism, joint: Joint, symbol: str, which: int = 0) -> Carried:
+def axis_of(mechanism: Mechanism, joint: Joint, symbol: str, which: int = 0) -> BodyVector:
     """The (first or second) axis of a joint, as fixed in the link that carries it."""
     link = joint.links[which]
     direction = mechanism.links[link].pose[:3, :3].T @ joint.axes[which]
     words = f"axis of {joint.name}" if len(joint.axes) == 1 else f"{('first', 'second')[which]} axis of {joint.name}"
-    return Carried(symbol, words, link, frozen(direction))
+    return BodyVector(symbol, words, link, frozen(direction))
 
 
-def centre_of(mechanism: Mechanism, joint: Joint, link: str, symbol: str, length: float) -> Spot:
+def centre_of(mechanism: Mechanism, joint: Joint, link: str, symbol: str, length: float) -> BodyPoint:
     """The centre of a joint, as fixed in one of its links."""
     place = inverse(mechanism.links[link].pose) @ np.append(joint.point, 1.0)
-    return Spot(symbol, f"centre of {joint.name}", link, frozen(place[:3] / length))
+    return BodyPoint(symbol, f"centre of {joint.name}", link, frozen(place[:3] / length))
 
 
 def poses_at(configurations: Sequence[ClosedConfiguration], links: Sequence[str]) -> dict[str, Array]:

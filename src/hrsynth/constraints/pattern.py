@@ -22,7 +22,7 @@ from ..mechanism import JointType, Mechanism, Observation
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.observation import Direction
 from ..tolerances import SAME_RELATION
-from .named_vectors import Carried, Feature, Segment, Spot, Tangent, axis_of, centre_of, poses_at
+from .named_vectors import BodyPoint, BodyVector, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at
 
 TURNING = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.CYLINDRICAL)
 
@@ -37,9 +37,9 @@ class LockedLeg:
 
     label: str
     body: str
-    tip: Spot
-    line: Feature | None
-    normal: Feature | None
+    tip: BodyPoint
+    line: NamedVector | None
+    normal: NamedVector | None
     fixed: bool
     turns: int
 
@@ -49,13 +49,13 @@ class LockedLeg:
         return self.line is None and self.normal is None and not self.fixed
 
     @property
-    def features(self) -> tuple[Feature, ...]:
+    def features(self) -> tuple[NamedVector, ...]:
         """All named vectors of the leg."""
         return tuple(f for f in (self.tip, self.line, self.normal) if f is not None)
 
 
 @dataclass(frozen=True, eq=False)
-class Structure:
+class ConstraintPattern:
     """How the platform can move and what the held legs leave of it.
 
     ``motion`` is ``translations`` (held legs leave translations alone), ``planar``, ``spatial``, ``bodies`` (an
@@ -67,41 +67,41 @@ class Structure:
     bodies: tuple[str, ...]
     """The links of the platform on which legs end."""
     legs: tuple[LockedLeg, ...] = ()
-    plane: Feature | None = None
+    plane: NamedVector | None = None
     """The normal of the plane in which everything moves, of ``translations`` that in which all tips move, or None."""
-    slide: Feature | None = None
+    slide: NamedVector | None = None
 
     @property
-    def features(self) -> tuple[Feature, ...]:
+    def features(self) -> tuple[NamedVector, ...]:
         """All named vectors."""
         extra = tuple(f for f in (self.plane, self.slide) if f is not None)
         return tuple(f for leg in self.legs for f in leg.features) + extra
 
-    def scene(self, configurations: Sequence[ClosedConfiguration]) -> Scene:
+    def values_at(self, configurations: Sequence[ClosedConfiguration]) -> PatternValues:
         """The named vectors at several configurations."""
-        return Scene(self, tuple(configurations))
+        return PatternValues(self, tuple(configurations))
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
-    """A structure at n configurations: its named vectors, (n, 3) each, and where its bodies are."""
+class PatternValues:
+    """A pattern at n configurations: its named vectors, (n, 3) each, and where its bodies are."""
 
-    structure: Structure
+    pattern: ConstraintPattern
     configurations: tuple[ClosedConfiguration, ...]
 
     @cached_property
     def _poses(self) -> dict[str, Array]:
-        links = [link for feature in self.structure.features for link in feature.links]
-        return poses_at(self.configurations, [*links, *self.structure.bodies])
+        links = [link for feature in self.pattern.features for link in feature.links]
+        return poses_at(self.configurations, [*links, *self.pattern.bodies])
 
     @cached_property
     def values(self) -> dict[str, Array]:
         """The vectors by their symbols; points are measured from the first leg's tip."""
-        features = self.structure.features
+        features = self.pattern.features
         found = {feature.symbol: feature.value(self._poses) for feature in features}
-        if self.structure.legs:
-            origin = found[self.structure.legs[0].tip.symbol]
-            found.update({f.symbol: found[f.symbol] - origin for f in features if isinstance(f, Spot)})
+        if self.pattern.legs:
+            origin = found[self.pattern.legs[0].tip.symbol]
+            found.update({f.symbol: found[f.symbol] - origin for f in features if isinstance(f, BodyPoint)})
         return found
 
     def allowances(self, leg: LockedLeg) -> Array:
@@ -113,7 +113,7 @@ class Scene:
         if leg.turns == 0:
             turns = np.broadcast_to(np.eye(3, 6, 3), (len(arms), 3, 6))
             blocks = np.concatenate([blocks, turns], axis=1)
-        bodies = self.structure.bodies
+        bodies = self.pattern.bodies
         found = np.zeros((len(arms), blocks.shape[1], 6 * len(bodies)))
         start = 6 * bodies.index(leg.body)
         found[:, :, start : start + 6] = blocks
@@ -141,9 +141,10 @@ def attached(anatomy: LegDecomposition) -> tuple[str, ...]:
     return tuple(dict.fromkeys(leg.attach for leg in anatomy.legs))
 
 
-def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]) -> Structure:
+def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]
+              ) -> ConstraintPattern:
     """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones."""
-    other = Structure("other", anatomy.mechanism.base, attached(anatomy))
+    other = ConstraintPattern("other", anatomy.mechanism.base, attached(anatomy))
     if anatomy.mechanism.couplings:
         return other
     held = {leg.label: _held(anatomy, leg, question, samples) for leg in anatomy.legs}
@@ -155,7 +156,7 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
     other = replace(other, legs=legs)
     motions = _motions(anatomy, question, samples)
     if anatomy.point is not None:
-        found: Structure | None = _translating(anatomy, legs, samples)
+        found: ConstraintPattern | None = _translating(anatomy, legs, samples)
     elif len(other.bodies) == 1:
         found = _one_body(anatomy, held, legs, motions, samples)
     else:
@@ -166,7 +167,7 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
 
 
 def _one_body(anatomy: LegDecomposition, held: dict[str, LockedLeg | None], legs: tuple[LockedLeg, ...], motions: Array,
-              samples: Sequence[ClosedConfiguration]) -> Structure | None:
+              samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
     base, bodies = anatomy.mechanism.base, attached(anatomy)
     every = tuple(leg for leg in held.values() if leg is not None)
     if _vanishes(motions[:, 3:]):
@@ -175,19 +176,19 @@ def _one_body(anatomy: LegDecomposition, held: dict[str, LockedLeg | None], legs
         return _translating(anatomy, every, samples) if len(every) == len(held) else None
     normal = _plane_of(motions)
     if normal is not None and all(leg.line is not None for leg in legs):
-        return Structure("planar", base, bodies, legs, plane=_normal(anatomy.mechanism, normal))
+        return ConstraintPattern("planar", base, bodies, legs, plane=_normal(anatomy.mechanism, normal))
     if len(every) == len(held) and all(leg.turns == 1 and leg.normal is None for leg in every):
         plane = _common_plane(anatomy.mechanism, every, samples)
-        return None if plane is None else Structure("planar", base, bodies, every, plane=plane)
+        return None if plane is None else ConstraintPattern("planar", base, bodies, every, plane=plane)
     if motions.shape[2] == 6 and all(leg.turns == 3 for leg in legs):
-        return Structure("spatial", base, bodies, legs)
+        return ConstraintPattern("spatial", base, bodies, legs)
     if len(every) == len(held) and all(leg.turns == 3 for leg in every):
-        return Structure("spatial", base, bodies, every)
+        return ConstraintPattern("spatial", base, bodies, every)
     return None
 
 
 def _translating(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...],
-                 samples: Sequence[ClosedConfiguration]) -> Structure:
+                 samples: Sequence[ClosedConfiguration]) -> ConstraintPattern:
     lines = [leg.line for leg in legs if leg.line is not None]
     plane = None
     if lines and len(lines) == sum(not leg.free for leg in legs):
@@ -195,11 +196,11 @@ def _translating(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...],
         _, s, Vt = np.linalg.svd(np.concatenate([line.value(poses) for line in lines]))
         if s[1] > SAME_RELATION * s[0] > s[2]:
             plane = _normal(anatomy.mechanism, Vt[2], "direction normal to the lines along which the tips move")
-    return Structure("translations", anatomy.mechanism.base, attached(anatomy), legs, plane=plane)
+    return ConstraintPattern("translations", anatomy.mechanism.base, attached(anatomy), legs, plane=plane)
 
 
 def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions: Array,
-                samples: Sequence[ClosedConfiguration]) -> Structure | None:
+                samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
     """Two bodies that only translate, the second along one direction relative to the first."""
     bodies = attached(anatomy)
     if len(bodies) != 2 or motions.shape[2] != 4 or not _vanishes(motions[:, [3, 4, 5, 9, 10, 11]]):
@@ -212,7 +213,7 @@ def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions:
     slide = next((f for f in _tangents(anatomy, inner, "e") if _along(f, directions, samples)), None)
     if slide is None:
         return None
-    return Structure("bodies", anatomy.mechanism.base, attached(anatomy), legs, slide=slide)
+    return ConstraintPattern("bodies", anatomy.mechanism.base, attached(anatomy), legs, slide=slide)
 
 
 def _motions(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]) -> Array:
@@ -226,7 +227,7 @@ def _motions(anatomy: LegDecomposition, question: Measurement, samples: Sequence
 
 
 def _common_plane(mechanism: Mechanism, legs: Sequence[LockedLeg], samples: Sequence[ClosedConfiguration]
-                  ) -> Feature | None:
+                  ) -> NamedVector | None:
     """The constant direction about which all legs turn and across which all tips move."""
     joints = [j for j in mechanism.joints.values() if j.type is JointType.REVOLUTE]
     axes = [axis_of(mechanism, joint, "n") for joint in joints]
@@ -253,11 +254,11 @@ def _plane_of(motions: Array) -> Array | None:
     return normal if s[1] < SAME_RELATION and flat < SAME_RELATION else None
 
 
-def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the plane of motion") -> Carried:
+def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the plane of motion") -> BodyVector:
     """A constant direction, of the sense in which its largest component is positive."""
     sense = np.sign(normal[np.argmax(np.abs(normal))])
     direction = mechanism.links[mechanism.base].pose[:3, :3].T @ (normal * sense)
-    return Carried("n", meaning, mechanism.base, frozen(direction))
+    return BodyVector("n", meaning, mechanism.base, frozen(direction))
 
 
 def _held(anatomy: LegDecomposition, leg: Leg, question: Measurement,
@@ -288,12 +289,12 @@ def _held(anatomy: LegDecomposition, leg: Leg, question: Measurement,
     return None
 
 
-def _tips(anatomy: LegDecomposition, leg: Leg, symbol: str, length: float) -> Iterator[Spot]:
+def _tips(anatomy: LegDecomposition, leg: Leg, symbol: str, length: float) -> Iterator[BodyPoint]:
     """Points at which the leg may come apart: its joints on the platform first, then the others, inwards."""
     mechanism = anatomy.mechanism
     joints = [mechanism.joints[name] for name in leg.joints]
     if anatomy.point is not None:
-        yield Spot(f"B{symbol}", "the platform's point", mechanism.platform, frozen(anatomy.point / length))
+        yield BodyPoint(f"B{symbol}", "the platform's point", mechanism.platform, frozen(anatomy.point / length))
     for joint in joints:
         if leg.attach in joint.links:
             yield centre_of(mechanism, joint, leg.attach, f"B{symbol}", length)
@@ -303,13 +304,13 @@ def _tips(anatomy: LegDecomposition, leg: Leg, symbol: str, length: float) -> It
 
 
 def _named(anatomy: LegDecomposition, leg: Leg, locks: Sequence[Observation], symbol: str, values: Array,
-           samples: Sequence[ClosedConfiguration]) -> Feature | None:
+           samples: Sequence[ClosedConfiguration]) -> NamedVector | None:
     """The first vector with a name that is parallel to ``values`` (n, 3) at all samples."""
     mechanism = anatomy.mechanism
-    candidates: list[Feature] = []
+    candidates: list[NamedVector] = []
     for lock in locks:
         if isinstance(lock, Direction):
-            candidates.append(Carried(f"u{symbol}", f"direction watched in leg {leg.label} ({lock.link})", lock.link,
+            candidates.append(BodyVector(f"u{symbol}", f"direction watched in leg {leg.label} ({lock.link})", lock.link,
                                       lock.direction))
     joints = [mechanism.joints[name] for name in leg.joints]
     candidates += [axis_of(mechanism, j, f"p{symbol}") for j in joints if j.type.slides]
@@ -344,7 +345,7 @@ def _segments(anatomy: LegDecomposition, names: Sequence[str], symbol: str) -> I
                           centre_of(mechanism, one, link, "P", length), centre_of(mechanism, two, link, "Q", length))
 
 
-def _along(feature: Feature, values: Array, samples: Sequence[ClosedConfiguration]) -> bool:
+def _along(feature: NamedVector, values: Array, samples: Sequence[ClosedConfiguration]) -> bool:
     """Whether a feature is parallel to vectors (n, 3) at all samples."""
     found = feature.value(poses_at(samples, feature.links))
     if np.min(np.linalg.norm(found, axis=1)) < SAME_RELATION:

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..analysis.singularity.locus import Field, Locus
+from ..analysis.singularity.locus import Locus, SingularityMap
 from ..analysis.singularity.singular import Singularity
 from ..description.files import require_folder, write_whole
 from ..errors import BadRequest
@@ -65,7 +65,7 @@ def write(found: Singularity, drawn: Locus, path: str) -> None:
     write_whole(path, locus_map(found, drawn))
 
 
-def _field(place: Any, x: Array, y: Array, field: Field, xname: str, yname: str, name: str) -> None:
+def _field(place: Any, x: Array, y: Array, field: SingularityMap, xname: str, yname: str, name: str) -> None:
     colour, style, mark = COLOURS[name]
     if field.signed and np.nanmin(field.value) < 0 < np.nanmax(field.value):
         place.contour(x, y, np.ma.masked_invalid(field.value).T, levels=[0.0], colors=[colour], linestyles=[style],

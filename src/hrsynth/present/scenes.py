@@ -14,7 +14,7 @@ import numpy as np
 
 from ..analysis.modes.curves import Circle, Curve, Line, Point, Reach, Sphere, shifted
 from ..analysis.modes.modes import AssemblyMode, AssemblyModes
-from ..analysis.modes.tips import Confinement, Tip
+from ..analysis.modes.tips import Tip, TipLoci
 from ..geometry.vectors import Array, inverse
 from .coupler import chains, points, swept, traced
 from .skeleton import legs_of, outline
@@ -131,7 +131,7 @@ def _at_goal(found: AssemblyModes, tip: Tip) -> Array:
     return np.asarray(X[:3, :3] @ tip.place + X[:3, 3])
 
 
-def _platform(found: AssemblyModes, confined: Confinement) -> _Plot:
+def _platform(found: AssemblyModes, confined: TipLoci) -> _Plot:
     """The platform's own position, and no curves."""
     body = confined.bodies[0]
     p = found.pose
@@ -139,7 +139,7 @@ def _platform(found: AssemblyModes, confined: Confinement) -> _Plot:
     return _Plot(body, place[:3])
 
 
-def _translating(found: AssemblyModes, confined: Confinement) -> _Plot:
+def _translating(found: AssemblyModes, confined: TipLoci) -> _Plot:
     """What the platform's position can be by each leg alone: they meet in the modes (MMT Fig. 5)."""
     plot = _platform(found, confined)
     X = found.goal.pose(plot.body)
@@ -150,7 +150,7 @@ def _translating(found: AssemblyModes, confined: Confinement) -> _Plot:
     return _Plot(plot.body, plot.place, (), reaches)
 
 
-def _planar(found: AssemblyModes, confined: Confinement) -> _Plot:
+def _planar(found: AssemblyModes, confined: TipLoci) -> _Plot:
     """The coupler curve of two tips and the third leg's curve (MMT Fig. 7); about a pivot a circle and a curve."""
     n = confined.plane
     legs = _deciding(found, confined, 3) or _deciding(found, confined, 2)
@@ -171,7 +171,7 @@ def _planar(found: AssemblyModes, confined: Confinement) -> _Plot:
     return _Plot(last.body, last.place, traces, (reach,), names)
 
 
-def _spatial(found: AssemblyModes, confined: Confinement) -> _Plot:
+def _spatial(found: AssemblyModes, confined: TipLoci) -> _Plot:
     """The surface of the third tip while two tips slide on their curves, and the third leg's curve (MMT Fig. 11)."""
     legs = _deciding(found, confined, 3)
     if not legs:
@@ -186,7 +186,7 @@ def _spatial(found: AssemblyModes, confined: Confinement) -> _Plot:
     return _Plot(last.body, last.place, traces, ((last.curve, _on(last, (last,))),), tuple(tip.leg for tip in tips))
 
 
-def _bodies(found: AssemblyModes, confined: Confinement) -> _Plot:
+def _bodies(found: AssemblyModes, confined: TipLoci) -> _Plot:
     """The surface of translation of one body's curve and the slide, and the other body's curve (MMT Fig. 15)."""
     legs = _deciding(found, confined, 2)
     if not legs or confined.slide is None or len({confined.tips[k].body for k in legs}) < 2:
@@ -201,7 +201,7 @@ def _bodies(found: AssemblyModes, confined: Confinement) -> _Plot:
                  (first.leg, last.leg))
 
 
-_PLOTS: dict[str, Callable[[AssemblyModes, Confinement], _Plot]] = {
+_PLOTS: dict[str, Callable[[AssemblyModes, TipLoci], _Plot]] = {
     "translations": _translating, "planar": _planar, "spatial": _spatial, "bodies": _bodies}
 
 
@@ -210,7 +210,7 @@ def _on(tip: Tip, legs: Sequence[Tip]) -> str:
     return f"$B_{{{tip.leg}}}$ on leg{'s' if len(legs) > 1 else ''} {', '.join(each.leg for each in legs)}"
 
 
-def _deciding(found: AssemblyModes, confined: Confinement, count: int) -> tuple[int, ...]:
+def _deciding(found: AssemblyModes, confined: TipLoci, count: int) -> tuple[int, ...]:
     """The places of this many legs on curves for which the modes were solved, tips at rest first, and last the moving
     tip whose places at the modes are farthest apart. Empty where there are none or legs have several branches."""
     if any(tip.others for tip in confined.tips):

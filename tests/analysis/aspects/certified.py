@@ -8,7 +8,7 @@ from hrsynth.analysis.aspects.answer import PathAnswer
 from hrsynth.analysis.aspects.crossing import Crossing
 from hrsynth.analysis.aspects.path import Aspects
 from hrsynth.analysis.singularity.agreement import smallest_of, weakest
-from hrsynth.analysis.singularity.condition import Condition
+from hrsynth.constraints.condition import Condition
 from hrsynth.constraints.named_vectors import unit_rows
 from hrsynth.kinematics.configuration import ClosedConfiguration, Target, closed, measure
 from hrsynth.tolerances import CLOSED, RANK_CUTOFF
@@ -56,7 +56,7 @@ def check_certified(aspects: Aspects, answer: PathAnswer, points: int) -> None:
     end = way[-1].pose(aspects.setting.mechanism.platform) - answer.goal.configuration.pose(
         aspects.setting.mechanism.platform)
     assert np.max(np.abs(end)) < 1e-7
-    scene = aspects.structure.scene(way)
+    scene = aspects.structure.values_at(way)
     condition: Condition = aspects.condition
     values = condition.expressed(scene) if answer.signed else smallest_of(condition.rows(scene))
     assert np.all(np.sign(values) == np.sign(answer.start.value))

@@ -8,7 +8,7 @@ import numpy as np
 
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES, Draw
 from hrsynth.analysis.modes.msolve import executable
-from hrsynth.analysis.modes.solve import Modes, solve, solve_by_msolve
+from hrsynth.analysis.modes.solve import SystemModes, solve, solve_by_msolve
 from hrsynth.analysis.modes.systems import System
 from hrsynth.errors import MissingExtra
 from hrsynth.geometry.vectors import Array
@@ -32,12 +32,12 @@ def draw(name: str, seed: int) -> Draw:
     return EVERY[name].draw(np.random.default_rng(seed))
 
 
-def among(goal: Array, modes: Modes) -> float:
+def among(goal: Array, modes: SystemModes) -> float:
     """How far the nearest mode is from a pose."""
     return min((float(np.abs(mode.pose - goal).max()) for mode in modes.modes), default=np.inf)
 
 
-def check_member(name: str, seed: int, solver: Callable[[System], Modes] = solve) -> None:
+def check_member(name: str, seed: int, solver: Callable[[System], SystemModes] = solve) -> None:
     """Counted, complete, the goal among them, all tips in place."""
     system, goal = draw(name, seed)
     modes = solver(system)

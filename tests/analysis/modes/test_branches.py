@@ -7,7 +7,7 @@ import pytest
 
 from analysis.modes.drives import closings, driven
 from analysis.modes.pods import displacements, pods
-from hrsynth.analysis.modes.chain import Body, Chain, Underived
+from hrsynth.analysis.modes.chain import Chain, ChainBody, Underived
 from hrsynth.analysis.modes.curves import Line
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.analysis.modes.reaches import reaches
@@ -116,7 +116,8 @@ def offset_u(offset: float) -> Chain:
     """Two oblique axes that miss each other by an offset, and a slide along the watched direction."""
     a, b, d = unit([0, 0.3, 1]), unit([1, 0.2, -0.1]), unit([0.3, 0.5, 0.8])
     off = offset * unit(np.cross(a, b))
-    bodies = (Body(None, np.zeros(3)), Body(a, np.zeros(3), off), Body(b, off, 0.9 * d, (d,), watched=(d,)))
+    bodies = (ChainBody(None, np.zeros(3)), ChainBody(a, np.zeros(3), off),
+              ChainBody(b, off, 0.9 * d, (d,), watched=(d,)))
     return Chain(bodies, False, 1.0)
 
 

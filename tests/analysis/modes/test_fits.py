@@ -12,7 +12,7 @@ from analysis.modes.draws import Draw, Rng, on_two_bodies, planar, spatial, tran
 from hrsynth.analysis.modes.curves import Circle, shifted
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.modes.rigid import Planar, Spatial
-from hrsynth.analysis.modes.solve import Modes, solve
+from hrsynth.analysis.modes.solve import SystemModes, solve
 from hrsynth.analysis.modes.translating import Translating
 from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import Array, unit
@@ -29,7 +29,7 @@ MORE: dict[str, Callable[[Rng], Draw]] = {
 """Platforms with more legs than needed, through a pose that is a mode."""
 
 
-def listed(modes: Modes, goal: Array, tolerance: float = 1e-9) -> bool:
+def listed(modes: SystemModes, goal: Array, tolerance: float = 1e-9) -> bool:
     return any(np.abs(mode.pose - goal).max() < tolerance for mode in modes.modes)
 
 

@@ -11,7 +11,7 @@ from analysis.modes.laws import among, check_member, draw
 from analysis.modes.newton import pose_of, real_ones, solutions
 from hrsynth.analysis.modes.curves import Circle, Curve, Line, shifted
 from hrsynth.analysis.modes.rigid import Planar, Spatial
-from hrsynth.analysis.modes.solve import Modes, solve
+from hrsynth.analysis.modes.solve import SystemModes, solve
 from hrsynth.analysis.modes.systems import System
 from hrsynth.analysis.modes.translating import Articulated, Translating
 from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
@@ -272,7 +272,7 @@ def test_a_camera_that_sees_an_equilateral_triangle_has_eight_regular_modes(seed
     assert all(mode.proved and mode.multiplicity == 1 and mode.radius < 1e-11 for mode in modes.modes)
 
 
-def singular(kind: str, rng: np.random.Generator) -> Modes:
+def singular(kind: str, rng: np.random.Generator) -> SystemModes:
     """The modes of a platform at the origin whose curves' normals meet in one point."""
     tips, centre = rng.normal(size=(3, 2)), np.array([0.3, -0.4])
     curves: list[Curve] = []

@@ -9,7 +9,7 @@ from analysis.modes.laws import installed
 from hrsynth.analysis.modes.branches import model
 from hrsynth.analysis.modes.curves import Circle, Line, Plane, Point, Sphere
 from hrsynth.analysis.modes.solve import solve
-from hrsynth.analysis.modes.tips import confinement
+from hrsynth.analysis.modes.tips import tip_loci
 from hrsynth.analysis.observed import motors, prepare
 from hrsynth.constraints.pattern import recognise
 from hrsynth.description import load, shipped
@@ -30,8 +30,8 @@ def confined(name: str, *, real: bool = False, member: int = 1):
     setting = prepare(load(shipped()[name]))
     question = motors(setting) if real else setting.samples.question
     configurations = [each.configuration for each in setting.samples.members]
-    structure = recognise(setting.anatomy, question, configurations)
-    return confinement(setting.anatomy, question, structure, configurations[member])
+    pattern = recognise(setting.anatomy, question, configurations)
+    return tip_loci(setting.anatomy, question, pattern, configurations[member])
 
 
 def missed(found) -> float:

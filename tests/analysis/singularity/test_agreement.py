@@ -15,9 +15,9 @@ import strategies
 from analysis.singularity.found import found
 from analysis.singularity.test_conditions import CASES, HEAVY
 from hrsynth.analysis.singularity.agreement import Agreement, agreement
-from hrsynth.analysis.singularity.condition import Condition, condition
 from hrsynth.analysis.singularity.singular import Singularity, singular
-from hrsynth.constraints.pattern import LockedLeg, Structure
+from hrsynth.constraints.condition import Condition, condition
+from hrsynth.constraints.pattern import ConstraintPattern, LockedLeg
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest, Disagreement
 from hrsynth.mechanism import Mechanism
@@ -101,7 +101,7 @@ def check_random_robot(robot: Mechanism, seed: int, real: bool, points: int) -> 
     turned = strategies.transformed(robot, strategies.random_rotation(rng), rng.normal(size=3))
     two = singular(turned, real=real, points=points)
     check(two, points)
-    assert one.structure.motion == two.structure.motion
+    assert one.pattern.motion == two.pattern.motion
     assert one.to_dict()["expression"] == two.to_dict()["expression"]
     if one.condition is not None:
         assert one.words == two.words
@@ -110,30 +110,30 @@ def check_random_robot(robot: Mechanism, seed: int, real: bool, points: int) -> 
 # ---- what is wrong is told
 
 
-def again(answer: Singularity, structure: Structure, wrong: Condition, points: int = 60) -> Agreement:
-    return agreement(answer.setting.samples.start, answer.question, structure, wrong, points)
+def again(answer: Singularity, pattern: ConstraintPattern, wrong: Condition, points: int = 60) -> Agreement:
+    return agreement(answer.setting.samples.start, answer.question, pattern, wrong, points)
 
 
-def with_leg(structure: Structure, leg: LockedLeg) -> Structure:
-    return replace(structure, legs=(leg, *structure.legs[1:]))
+def with_leg(pattern: ConstraintPattern, leg: LockedLeg) -> ConstraintPattern:
+    return replace(pattern, legs=(leg, *pattern.legs[1:]))
 
 
 def elsewhere(answer: Singularity) -> LockedLeg:
     """The first leg with its tip a hand's breadth off."""
-    leg = answer.structure.legs[0]
+    leg = answer.pattern.legs[0]
     return replace(leg, tip=replace(leg.tip, place=leg.tip.place + [0.1, 0.2, 0.0]))
 
 
 def of_another(answer: Singularity) -> LockedLeg:
     """The first leg with the line of the second."""
-    first, second = answer.structure.legs[:2]
+    first, second = answer.pattern.legs[:2]
     return replace(first, line=replace(second.line, symbol=first.line.symbol))
 
 
 @pytest.mark.parametrize("robot", [("3rrr_m1",), ("3rpr_m1",), ("gough_stewart", "1,2,3"), ("hexa", "1,2,3")])
 def test_another_tip_is_told(robot: Sequence[str]) -> None:
     answer = found(*robot)
-    wrong = with_leg(answer.structure, elsewhere(answer))
+    wrong = with_leg(answer.pattern, elsewhere(answer))
     with pytest.raises(Disagreement) as caught:
         again(answer, wrong, condition(wrong, answer.question))
     assert caught.value.angle > 1e-3
@@ -144,7 +144,7 @@ def test_another_tip_is_told(robot: Sequence[str]) -> None:
                                    ("quattro", "1,4"), ("rrrrr_m1",)])
 def test_another_line_is_told(robot: Sequence[str]) -> None:
     answer = found(*robot)
-    wrong = with_leg(answer.structure, of_another(answer))
+    wrong = with_leg(answer.pattern, of_another(answer))
     with pytest.raises(Disagreement) as caught:
         again(answer, wrong, condition(wrong, answer.question))
     assert caught.value.angle > 1e-3
@@ -156,14 +156,14 @@ def test_another_expression_is_told(robot: Sequence[str]) -> None:
     answer = found(*robot)
     wrong = replace(answer.condition, expression=answer.condition.expression + sympy.Rational(1, 20))
     with pytest.raises(Disagreement) as caught:
-        again(answer, answer.structure, wrong, 150)
+        again(answer, answer.pattern, wrong, 150)
     assert caught.value.poses > 0
     assert caught.value.angle < ANGLE
 
 
 def test_the_right_condition_passes_again() -> None:
     answer = found("3rrr_m1")
-    assert again(answer, answer.structure, answer.condition).disagreements == 0
+    assert again(answer, answer.pattern, answer.condition).disagreements == 0
 
 
 def test_a_robot_without_motors_has_no_real_condition() -> None:

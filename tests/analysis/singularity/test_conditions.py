@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from analysis.singularity.found import found
-from hrsynth.analysis.singularity.algebra import products, vector
+from hrsynth.constraints.vector_algebra import products, vector
 from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import inverse
 
@@ -127,7 +127,7 @@ def test_words_and_expression(robot: str, legs: str | None, real: bool) -> None:
     motion, words, expression = CASES[robot, legs, real]
     answer = found(robot, legs, real=real)
     record = answer.to_dict()
-    assert answer.structure.motion == motion
+    assert answer.pattern.motion == motion
     assert answer.words == words
     assert record["expression"] == expression
     assert record["always"] is words.startswith("always") is (answer.checked is None)
@@ -140,9 +140,9 @@ def test_words_and_expression(robot: str, legs: str | None, real: bool) -> None:
 def test_with_the_camera_on_the_platform_the_tips_are_the_lower_joints() -> None:
     """Theory 4: the planes go through A_i, and A1A2A3 is the fourth."""
     answer = found("gough_stewart", "1,2,3", camera="platform")
-    assert (answer.structure.motion, answer.words, str(answer.condition.expression)) == spatial("u", "A")
+    assert (answer.pattern.motion, answer.words, str(answer.condition.expression)) == spatial("u", "A")
     mechanism = load("gough_stewart")
-    for leg in answer.structure.legs:
+    for leg in answer.pattern.legs:
         foot = next(joint for joint in mechanism.joints_of(mechanism.base) if joint.name.endswith(leg.label))
         place = inverse(mechanism.links[leg.tip.link].pose) @ np.append(foot.point, 1)
         np.testing.assert_allclose(leg.tip.place * mechanism.length, place[:3], atol=1e-12)

@@ -10,13 +10,38 @@ import pytest
 import sympy
 
 from analysis.singularity.found import found
-from hrsynth.analysis.singularity.algebra import components, evaluate, products, vector
-from hrsynth.analysis.singularity.condition import Named
+from hrsynth.constraints.condition import Named
 from hrsynth.constraints.named_vectors import Tangent
+from hrsynth.constraints.vector_algebra import evaluate, products, vector
 from hrsynth.mechanism.screws import force
 
 SEEDS = range(4)
 Vectors = dict[str, sympy.Matrix]
+
+
+def components(expression: Any) -> Any:
+    """The expression as a polynomial in coordinates ``u1_x`` … of its vectors."""
+    dot, cross, det = products()
+
+    def expand(node: Any) -> Any:
+        if isinstance(node, sympy.Symbol):
+            return sympy.Matrix(sympy.symbols([f"{node.name}_{axis}" for axis in "xyz"]))
+        if node.func is dot:
+            return expand(node.args[0]).dot(expand(node.args[1]))
+        if node.func is cross:
+            return expand(node.args[0]).cross(expand(node.args[1]))
+        if node.func is det:
+            a, b, c = map(expand, node.args)
+            return a.dot(b.cross(c))
+        if node.is_Number:
+            return node
+        parts = [expand(argument) for argument in node.args]
+        total = parts[0]
+        for part in parts[1:]:
+            total = total + part if node.is_Add else total**part if node.is_Pow else total * part
+        return total
+
+    return expand(expression)
 
 
 def rational(rng: np.random.Generator, size: int = 3) -> sympy.Matrix:
@@ -170,7 +195,7 @@ def test_three_rods_leave_a_translation_where_they_are_parallel_to_a_plane(seed:
 def test_six_lines_of_a_complex_are_dependent_wrenches() -> None:
     answer = found("gough_stewart", real=True)
     members = [member.configuration for member in answer.setting.samples.members]
-    scene = answer.structure.scene(members)
+    scene = answer.pattern.values_at(members)
     values = scene.values
     for k, value in enumerate(answer.condition.expressed(scene)):
         wrenches = [force(values[f"p{i}"][k], values[f"B{i}"][k]) for i in range(1, 7)]
@@ -217,8 +242,8 @@ def test_the_factors_that_were_split_off_never_vanish(case: tuple[str, ...]) -> 
     answer = found(*case)
     assert isinstance(answer.condition, Named)
     members = [member.configuration for member in answer.setting.samples.members]
-    poses = answer.structure.scene(members)._poses
-    for leg in answer.structure.legs:
+    poses = answer.pattern.values_at(members)._poses
+    for leg in answer.pattern.legs:
         assert isinstance(leg.line, Tangent)
         axis, arm = leg.line.axis.value(poses), leg.line.end.value(poses) - leg.line.start.value(poses)
         sizes = np.linalg.norm(np.cross(axis, arm), axis=1)

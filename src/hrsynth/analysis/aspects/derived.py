@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...constraints.named_vectors import Carried, Feature, Spot
+from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector
 from ...geometry.lines import distance
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -64,13 +64,13 @@ class Derived:
                         reached.append(other)
         return known
 
-    def rule(self, feature: Feature) -> Rigid | None:
+    def rule(self, feature: NamedVector) -> Rigid | None:
         """The rule of a point or direction, where a link that the pose carries holds it too."""
-        if isinstance(feature, Spot):
+        if isinstance(feature, BodyPoint):
             x = self.zero(feature)
             rules = (self.point(link, x) for link in self.holders(feature) if link in self.bodies)
             return next((rule for rule in rules if rule is not None), None)
-        if isinstance(feature, Carried):
+        if isinstance(feature, BodyVector):
             d = self.zero(feature)
             turns = [self.bodies[link].turns for link in self.holders(feature) if link in self.bodies]
             if False in turns:
@@ -90,31 +90,32 @@ class Derived:
         turned, constant = (self._turned(arm), np.zeros(3)) if body.turns else (np.zeros(3), arm)
         return Rigid(body.rule.follows, body.rule.turned + turned, body.rule.constant + constant)
 
-    def zero(self, feature: Spot | Carried) -> Array:
+    def zero(self, feature: BodyPoint | BodyVector) -> Array:
         """A point (characteristic lengths) or direction at the zero configuration."""
         X = self.mechanism.links[feature.link].pose
-        if isinstance(feature, Carried):
+        if isinstance(feature, BodyVector):
             return np.asarray(X[:3, :3] @ feature.direction)
         return np.asarray(X[:3, :3] @ feature.place + X[:3, 3] / self.length)
 
-    def holders(self, feature: Spot | Carried) -> tuple[str, ...]:
+    def holders(self, feature: BodyPoint | BodyVector) -> tuple[str, ...]:
         """The links in which a point or direction is fixed."""
         value, found = self.zero(feature), [feature.link]
-        shared = self._same_point if isinstance(feature, Spot) else _same_direction
+        shared = self._same_point if isinstance(feature, BodyPoint) else _same_direction
         for link in found:
             for joint in self.mechanism.joints_of(link):
                 if joint.other(link) not in found and shared(joint, value):
                     found.append(joint.other(link))
         return tuple(found)
 
-    def same(self, one: Feature, other: Feature) -> float:
+    def same(self, one: NamedVector, other: NamedVector) -> float:
         """±1 where two points, or directions of this sense, are the same in all configurations; else 0."""
-        if type(one) is not type(other) or not isinstance(one, Spot | Carried) or not isinstance(other, Spot | Carried):
+        if (type(one) is not type(other) or not isinstance(one, BodyPoint | BodyVector)
+                or not isinstance(other, BodyPoint | BodyVector)):
             return 0.0
         if not set(self.holders(one)) & set(self.holders(other)):
             return 0.0
         a, b = self.zero(one), self.zero(other)
-        for sense in (1.0, -1.0) if isinstance(one, Carried) else (1.0,):
+        for sense in (1.0, -1.0) if isinstance(one, BodyVector) else (1.0,):
             if np.linalg.norm(a - sense * b) <= EXACT:
                 return sense
         return 0.0

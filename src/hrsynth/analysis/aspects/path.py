@@ -9,16 +9,16 @@ from functools import cached_property
 import numpy as np
 
 from ...batch.reach import reach
-from ...constraints.pattern import Structure
+from ...constraints.condition import Condition, Named
+from ...constraints.pattern import ConstraintPattern
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
+from ..measured import MeasuredRobot
 from ..observed import ObservedRobot, prepare
 from ..singularity.agreement import smallest_of
-from ..singularity.condition import Condition, Named
-from ..singularity.measured import MeasuredRobot
 from .answer import SAME, SEPARATED, UNDECIDED, End, PathAnswer, between
 from .carriage import Place, carriages
 from .crossing import Crossing
@@ -41,7 +41,7 @@ class Aspects:
 
     setting: ObservedRobot
     motion: PlatformMotion
-    structure: Structure
+    structure: ConstraintPattern
     condition: Condition
     lost: tuple[str, ...]
     """Freedoms that are never seen: then every pose is singular."""
@@ -56,7 +56,7 @@ class Aspects:
     def about(cls, setting: ObservedRobot) -> Aspects:
         """The condition of a robot from the samples of a setting."""
         seen = MeasuredRobot.watched(setting)
-        return cls(setting, setting.motion, seen.structure, seen.condition,
+        return cls(setting, setting.motion, seen.pattern, seen.condition,
                    tuple(freedom.name for freedom in seen.verdict.lost))
 
     @property
@@ -90,7 +90,7 @@ class Aspects:
     def join(self, start: ClosedConfiguration, goal: ClosedConfiguration, *, seed: int = 0, budget: int = BUDGET,
              progress: Callable[[], None] | None = None) -> PathAnswer:
         """Whether a path without Type 2 singularity joins two configurations."""
-        found, scene = self.condition, self.structure.scene([start, goal])
+        found, scene = self.condition, self.structure.values_at([start, goal])
         values = found.expressed(scene) if found.signed else smallest_of(found.rows(scene))
         ends = [End(self.motion.pose(at.pose(self.motion.link)), at, float(value))
                 for at, value in zip((start, goal), values, strict=True)]

@@ -8,7 +8,7 @@ from typing import cast
 
 import numpy as np
 
-from ...constraints.named_vectors import Feature, Segment, Spot, Tangent, axis_of, centre_of, poses_at
+from ...constraints.named_vectors import BodyPoint, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Joint, JointType, Mechanism
@@ -28,7 +28,7 @@ class Pattern:
 
     carriage: Carriage
     limbs: tuple[Limb, ...]
-    carried: tuple[Feature, ...]
+    carried: tuple[NamedVector, ...]
     vectors: Mapping[str, Source]
     points: tuple[str, ...]
     bounds: tuple[Bound, ...] = ()
@@ -54,11 +54,11 @@ class Pattern:
         return Chart(tuple(limbs), self.vectors, self.points, self.bounds)
 
 
-def pattern(anatomy: LegDecomposition, features: Sequence[Feature], carriage: Carriage,
+def pattern(anatomy: LegDecomposition, features: Sequence[NamedVector], carriage: Carriage,
             configurations: Sequence[ClosedConfiguration]) -> Pattern:
     """The forms of all legs and of the wanted features; raises ``NoChart`` where one fits none."""
     sight = Sight(anatomy.mechanism, carriage, configurations, Derived.of(anatomy, carriage, configurations))
-    found: list[tuple[Limb, Feature]] = []
+    found: list[tuple[Limb, NamedVector]] = []
     for leg in anatomy.legs:
         of_leg = list(sight.limbs(leg))
         if not of_leg:
@@ -66,7 +66,7 @@ def pattern(anatomy: LegDecomposition, features: Sequence[Feature], carriage: Ca
         found += of_leg
     limbs, carried = (tuple(part) for part in zip(*found, strict=True))
     vectors = {f.symbol: sight.source(f, carried) for f in features}
-    return Pattern(carriage, limbs, carried, vectors, tuple(f.symbol for f in features if isinstance(f, Spot)),
+    return Pattern(carriage, limbs, carried, vectors, tuple(f.symbol for f in features if isinstance(f, BodyPoint)),
                    tuple(bounds(sight, lambda feature: sight.source(feature, carried))))
 
 
@@ -79,10 +79,10 @@ class Sight:
     configurations: Sequence[ClosedConfiguration]
     derived: Derived
 
-    def values(self, feature: Feature) -> Array:
+    def values(self, feature: NamedVector) -> Array:
         return feature.value(poses_at(self.configurations, feature.links))
 
-    def rule(self, feature: Feature) -> Rigid | None:
+    def rule(self, feature: NamedVector) -> Rigid | None:
         """How a vector follows from the pose: read from the joints, if that is what samples show, else fitted."""
         values, places = self.values(feature), self.carriage.of(self.configurations)
         found = self.derived.rule(feature)
@@ -90,7 +90,7 @@ class Sight:
             return found
         return rigid(values, *places)
 
-    def limbs(self, leg: Leg) -> Iterator[tuple[Limb, Feature]]:
+    def limbs(self, leg: Leg) -> Iterator[tuple[Limb, NamedVector]]:
         """The rods of a leg with the vectors that they carry, each equation once; else its sliding rod."""
         seen: list[tuple[Array, Array]] = []
         for tip, spot in self.tips(leg):
@@ -103,7 +103,7 @@ class Sight:
         if not seen:
             yield from self.slides(leg)
 
-    def tips(self, leg: Leg) -> Iterator[tuple[Rigid, Spot]]:
+    def tips(self, leg: Leg) -> Iterator[tuple[Rigid, BodyPoint]]:
         """Joint centres of a leg, and the point whose position is told, that the pose alone decides."""
         for joint in self.joints(leg):
             if self.mechanism.base not in joint.links:
@@ -114,9 +114,9 @@ class Sight:
         if not self.carriage.turning:
             motion = self.carriage.motion
             yield (Rigid(True, np.zeros(3), np.zeros(3)),
-                   Spot("P", "the point", motion.link, motion.point / self.carriage.length))
+                   BodyPoint("P", "the point", motion.link, motion.point / self.carriage.length))
 
-    def rods(self, leg: Leg, tip: Rigid, spot: Spot) -> Iterator[tuple[Limb, Feature]]:
+    def rods(self, leg: Leg, tip: Rigid, spot: BodyPoint) -> Iterator[tuple[Limb, NamedVector]]:
         joints, tips = self.joints(leg), self.values(spot)
         for foot in joints:
             if self.mechanism.base not in foot.links or foot.type not in (JointType.REVOLUTE, JointType.PRISMATIC):
@@ -138,7 +138,7 @@ class Sight:
                     rod = set(self.derived.holders(spot)) & set(self.derived.holders(end))
                     yield replace(found, fitted=tip.fitted or not rod), end
 
-    def slides(self, leg: Leg) -> Iterator[tuple[Limb, Feature]]:
+    def slides(self, leg: Leg) -> Iterator[tuple[Limb, NamedVector]]:
         joints = self.joints(leg)
         feet = [joint for joint in joints if self.mechanism.base in joint.links]
         for tip, spot in self.tips(leg):
@@ -156,7 +156,7 @@ class Sight:
                             yield replace(found, fitted=fitted), direction
                             return
 
-    def drawn(self, foot: Joint, slide: Joint, tip: Spot, limb: Sliding) -> bool:
+    def drawn(self, foot: Joint, slide: Joint, tip: BodyPoint, limb: Sliding) -> bool:
         """Whether a P joint between a link that holds the foot's centre and one that holds the tip makes the form: its
         axis passes through both, or stays normal to the foot's axis."""
         centre = self.centre(foot, self.mechanism.base)
@@ -168,14 +168,14 @@ class Sight:
             return bool(np.linalg.norm(np.cross(arm, slide.axis)) <= EXACT * max(1.0, float(np.linalg.norm(arm))))
         return foot.type is JointType.REVOLUTE and bool(abs(foot.axis @ slide.axis) <= EXACT)
 
-    def source(self, feature: Feature, carried: Sequence[Feature]) -> Source:
+    def source(self, feature: NamedVector, carried: Sequence[NamedVector]) -> Source:
         """How a vector follows from pose and limbs: read from the joints where that can be, else fitted to samples."""
         found = list(self.sources(feature, carried))
         if not found:
             raise NoChart(f"{feature.symbol} ({feature.meaning}) does not follow from the pose by a known form")
         return next((each for each in found if not each.fitted), found[0])
 
-    def sources(self, feature: Feature, carried: Sequence[Feature]) -> Iterator[Source]:
+    def sources(self, feature: NamedVector, carried: Sequence[NamedVector]) -> Iterator[Source]:
         values, rule = self.values(feature), self.rule(feature)
         if rule is not None:
             yield rule
@@ -206,5 +206,5 @@ class Sight:
     def joints(self, leg: Leg) -> list[Joint]:
         return [self.mechanism.joints[name] for name in leg.joints]
 
-    def centre(self, joint: Joint, link: str) -> Spot:
+    def centre(self, joint: Joint, link: str) -> BodyPoint:
         return centre_of(self.mechanism, joint, link, "P", self.carriage.length)

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...budgets import FINEST_INTERVAL, FIRST_INTERVALS
+from ...constraints.condition import Named, rows
 from ...geometry.balls import Field, above_zero, balls, below, centred, cross, det, dot, finite, jets
 from ...geometry.vectors import Array
-from ..singularity.condition import Named, rows
 from .carriage import Stretch
 from .chart import Chart
 from .crossing import Crossing
@@ -58,7 +58,7 @@ class Reading:
             return reached, np.array([_weakest({name: value[i : i + 1] for name, value in found.values.items()},
                                                self.condition) if reached[i] else 0.0 for i in range(len(p))])
         values = np.full(len(p), np.nan)
-        blocks = rows(self.condition.structure, found.values)
+        blocks = rows(self.condition.pattern, found.values)
         values[reached] = np.linalg.svd(blocks[reached], compute_uv=False)[:, -1]
         return reached, values
 
@@ -143,7 +143,7 @@ def _weakest(values: dict[str, Field], condition: Named) -> float:
     midpoints, σ ≥ (1 − |I − B A|) / |B|."""
     from flint import arb_mat
 
-    A = rows(condition.structure, values)[0]
+    A = rows(condition.pattern, values)[0]
     count, size = A.shape
     middle = np.array([float(getattr(x, "mid", lambda x=x: x)()) for x in A.flat]).reshape(A.shape)
     if not np.all(np.isfinite(middle)):

@@ -14,9 +14,9 @@ from ...geometry.vectors import Array, inverse, perpendicular, pose
 from ...tolerances import RANK_GAP, SAME_POINT
 from .curves import Reach
 from .rigid import Planar, Spatial
-from .solve import Mode, Modes, solve
+from .solve import SystemMode, SystemModes, solve
 from .systems import System
-from .tips import Confinement, Tip
+from .tips import Tip, TipLoci
 from .translating import Articulated, Translating
 
 
@@ -30,14 +30,14 @@ class Model:
     home: Array
 
 
-def model(confined: Confinement) -> Model:
+def model(confined: TipLoci) -> Model:
     """The system for the way in which the platform moves."""
     made = {"translations": _translating, "planar": _planar, "spatial": _spatial,
             "bodies": _articulated}[confined.motion](confined)
     return replace(made, system=replace(made.system, error=confined.error, as_written=confined.as_written))
 
 
-def _translating(confined: Confinement) -> Model:
+def _translating(confined: TipLoci) -> Model:
     """q is the position of the first body's origin; tips are counted from there."""
     at = _poses(confined)
     p = at[confined.bodies[0]][:3, 3]
@@ -49,7 +49,7 @@ def _translating(confined: Confinement) -> Model:
     return Model(Translating(_curves(confined), tips), bodies, p)
 
 
-def _planar(confined: Confinement) -> Model:
+def _planar(confined: TipLoci) -> Model:
     """q is counted from the goal: the plane's frame lies at the first body's origin there."""
     assert confined.plane is not None
     at = _poses(confined)
@@ -66,7 +66,7 @@ def _planar(confined: Confinement) -> Model:
     return Model(system, bodies, np.zeros(3))
 
 
-def _spatial(confined: Confinement) -> Model:
+def _spatial(confined: TipLoci) -> Model:
     """q is counted from the goal: the system's frame is the base's, moved to the first body's origin there."""
     at = _poses(confined)
     origin = pose(at[confined.bodies[0]][:3, 3])
@@ -80,7 +80,7 @@ def _spatial(confined: Confinement) -> Model:
     return Model(system, bodies, np.array([*origin[:3, 3], 0.0, 0.0, 0.0]))
 
 
-def _articulated(confined: Confinement) -> Model:
+def _articulated(confined: TipLoci) -> Model:
     """q is the first body's origin and the second's place on its circle about it."""
     assert confined.slide is not None
     at = _poses(confined)
@@ -97,11 +97,11 @@ def _articulated(confined: Confinement) -> Model:
     return Model(Articulated(_curves(confined), tips, sides, slide), bodies, np.array([*p, 0.0]))
 
 
-def _poses(confined: Confinement) -> dict[str, Array]:
+def _poses(confined: TipLoci) -> dict[str, Array]:
     return {body: confined.goal.pose(body) for body in confined.bodies}
 
 
-def _curves(confined: Confinement) -> tuple[Reach, ...]:
+def _curves(confined: TipLoci) -> tuple[Reach, ...]:
     return tuple(tip.curve for tip in confined.tips)
 
 
@@ -115,7 +115,7 @@ def _moved(X: Array, by: Array) -> Array:
     return pose(X[:3, 3] + by, X[:3, :3])
 
 
-def choices(confined: Confinement) -> Iterator[Confinement]:
+def choices(confined: TipLoci) -> Iterator[TipLoci]:
     """The platform with each tip on one of its reaches, in all combinations, the goal's own first."""
     for chosen in product(*(((tip.curve, 1.0), *tip.others) for tip in confined.tips)):
         tips = tuple(replace(tip, curve=reach, others=())
@@ -123,7 +123,7 @@ def choices(confined: Confinement) -> Iterator[Confinement]:
         yield replace(confined, tips=tips, error=confined.error * max(gain for _, gain in chosen))
 
 
-def solve_all(confined: Confinement, *, near: bool = True) -> tuple[Model, Modes]:
+def solve_all(confined: TipLoci, *, near: bool = True) -> tuple[Model, SystemModes]:
     """The goal's own system, and the modes of all choices of branches together, each pose once."""
     made = [model(each) for each in islice(choices(confined), BRANCH_CHOICES)]
     size = made[0].system.size
@@ -141,10 +141,10 @@ def solve_all(confined: Confinement, *, near: bool = True) -> tuple[Model, Modes
     return made[0], modes
 
 
-def _scaled(modes: Modes, factor: float) -> Modes:
+def _scaled(modes: SystemModes, factor: float) -> SystemModes:
     """Radii and residuals in sizes of another system."""
 
-    def scaled(each: Sequence[Mode]) -> tuple[Mode, ...]:
+    def scaled(each: Sequence[SystemMode]) -> tuple[SystemMode, ...]:
         return tuple(replace(mode, radius=max(mode.radius * factor, mode.turn), residual=mode.residual * factor)
                      for mode in each)
 
@@ -154,7 +154,7 @@ def _scaled(modes: Modes, factor: float) -> Modes:
     return replace(modes, modes=scaled(modes.modes), near=scaled(modes.near))
 
 
-def _together(found: Sequence[Modes], tips: Sequence[Tip], size: float) -> Modes:
+def _together(found: Sequence[SystemModes], tips: Sequence[Tip], size: float) -> SystemModes:
     """One list of the modes of several systems, the goal's own first; a pose that is in two of them counts once.
 
     A continuum on the goal's own branches is all that is told; on others it leaves the list open.
@@ -174,21 +174,21 @@ def _together(found: Sequence[Modes], tips: Sequence[Tip], size: float) -> Modes
     special = found[0].degenerate or next((f"on other branches of the legs: {each.degenerate}" for each in found
                                            if each.degenerate is not None), None)
     complete = not unclear and all(each.complete for each in found)
-    return Modes(sum(each.complex for each in found) - twice, modes, complete, proof, near, special, None,
+    return SystemModes(sum(each.complex for each in found) - twice, modes, complete, proof, near, special, None,
                  next((each.bound for each in found if each.bound != "resultant"), "resultant"),
                  all(each.enclosed for each in found), found[0].meant)
 
 
-def _once(modes: Sequence[Mode], size: float) -> tuple[Mode, ...]:
+def _once(modes: Sequence[SystemMode], size: float) -> tuple[SystemMode, ...]:
     """Each pose once, the first of those that are one to rounding."""
-    found: list[Mode] = []
+    found: list[SystemMode] = []
     for mode in modes:
         if all(_apart(mode, other, size) > SAME_POINT / RANK_GAP for other in found):
             found.append(mode)
     return tuple(found)
 
 
-def _apart(one: Mode, other: Mode, size: float) -> float:
+def _apart(one: SystemMode, other: SystemMode, size: float) -> float:
     """How far two poses are apart (sizes, entries of the rotations)."""
     gap = np.abs(one.pose - other.pose)
     return float(max(np.max(gap[:3, 3]) / size, np.max(gap[:3, :3])))

@@ -43,7 +43,7 @@ class Crank:
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class ChainBody:
     """A body that turns against the one before about ``axis`` (None: about all, in a ball; the base: not at all).
 
     ``point`` is on that axis; ``shift`` leads from there to the next body's, cranks left out; ``slides`` are directions
@@ -72,7 +72,7 @@ class Chain:
     ``kept``: whether the last body keeps the orientation that it has at the goal; ``length`` is the robot's.
     """
 
-    bodies: tuple[Body, ...]
+    bodies: tuple[ChainBody, ...]
     kept: bool
     length: float
 
@@ -83,7 +83,7 @@ def chain(anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal
     the plane in which that turns. Raises :class:`Underived`."""
     bodies = _Walk(anatomy, leg, held, goal).bodies(tip)
     if not isinstance(end, str):
-        bodies = (*bodies, Body(end, tip))
+        bodies = (*bodies, ChainBody(end, tip))
     for one, other in pairwise(bodies):
         if one.axis is not None and other.axis is not None:
             sine = float(np.linalg.norm(np.cross(one.axis, other.axis)))
@@ -110,10 +110,10 @@ class _Walk:
             else:
                 raise Underived("what is measured is no direction seen from the base")
 
-    def bodies(self, tip: Array) -> tuple[Body, ...]:
+    def bodies(self, tip: Array) -> tuple[ChainBody, ...]:
         """The bodies, shifts included; every measurement must be met on the way."""
         at = self.anatomy.mechanism.base
-        found = [Body(None, np.zeros(3), watched=self._seen(at))]
+        found = [ChainBody(None, np.zeros(3), watched=self._seen(at))]
         path = self.anatomy.path(self.leg)
         self.beside = set(self.leg.joints).difference(*(edge.joints for edge in path))
         for edge in path:
@@ -138,7 +138,7 @@ class _Walk:
         point, axes = carried(self.anatomy.mechanism, joint, self.goal.pose)
         return point, axes if joint.predecessor == at else axes[::-1]
 
-    def _joint(self, found: list[Body], joint: Joint, at: str) -> None:
+    def _joint(self, found: list[ChainBody], joint: Joint, at: str) -> None:
         point, axes = self._geometry(joint, at)
         held = self.coordinates.pop(joint.name, 0)
         if held:
@@ -146,13 +146,13 @@ class _Walk:
                 raise Underived(f"a motor holds a part of joint {joint.name}")
             return
         if joint.type is JointType.SPHERICAL:
-            found.append(Body(None, point))
+            found.append(ChainBody(None, point))
             return
         if joint.type not in _TURNS:
             raise Underived(f"joint {joint.name} of type {joint.type.value}")
         slides = axes if joint.type.slides else normals(axes[0]) if joint.type is JointType.PLANAR else ()
         found[-1] = replace(found[-1], slides=(*found[-1].slides, *(unit(s) for s in slides)))
-        found.extend(Body(axis, point) for axis in axes if _TURNS[joint.type])
+        found.extend(ChainBody(axis, point) for axis in axes if _TURNS[joint.type])
         if joint.type is JointType.REVOLUTE and self.beside:
             found[-1] = replace(found[-1], angles=self._driven(joint, at))
 
@@ -198,7 +198,7 @@ class _Walk:
                     new.append(joint.other(at))
         return found
 
-    def _parallelogram(self, found: list[Body], edge: Edge, at: str) -> None:
+    def _parallelogram(self, found: list[ChainBody], edge: Edge, at: str) -> None:
         """Both cranks are one: they stay parallel (a parallelogram is not crossed)."""
         joints = [self.anatomy.mechanism.joints[name] for name in edge.joints]
         near, far = joints[:2] if edge.tail == at else joints[1::-1]
@@ -209,7 +209,7 @@ class _Walk:
         crank = Crank(axis, way - axis * float(axis @ way), watched, held)
         found[-1] = replace(found[-1], cranks=(*found[-1].cranks, crank))
 
-    def _rods(self, found: list[Body], edge: Edge, at: str) -> None:
+    def _rods(self, found: list[ChainBody], edge: Edge, at: str) -> None:
         """The rod that is watched, or the first: all have one direction."""
         if any(name in self.coordinates for name in edge.joints):
             raise Underived("a motor holds a rod")
@@ -217,8 +217,8 @@ class _Walk:
         joints = [self.anatomy.mechanism.joints[name] for name in edge.joints[2 * number : 2 * number + 2]]
         near, far = joints if edge.tail == at else joints[::-1]
         watched = tuple(d for link in edge.inside for d in self._seen(link))
-        found.append(Body(None, self._geometry(near, at)[0], watched=watched))
-        found.append(Body(None, self._geometry(far, at)[0]))
+        found.append(ChainBody(None, self._geometry(near, at)[0], watched=watched))
+        found.append(ChainBody(None, self._geometry(far, at)[0]))
 
 
 _TURNS = {JointType.REVOLUTE: True, JointType.UNIVERSAL: True, JointType.CYLINDRICAL: True, JointType.PLANAR: True,
@@ -226,7 +226,7 @@ _TURNS = {JointType.REVOLUTE: True, JointType.UNIVERSAL: True, JointType.CYLINDR
 """Joints that are read axis by axis, and whether those are axes of turns."""
 
 
-def _shifted(bodies: Sequence[Body], tip: Array, small: float) -> tuple[Body, ...]:
+def _shifted(bodies: Sequence[ChainBody], tip: Array, small: float) -> tuple[ChainBody, ...]:
     """Bodies with their shifts, counted from points of their axes that neighbours share where axes meet."""
     points = [bodies[0].point]
     for k, body in enumerate(bodies[1:], 1):
@@ -241,7 +241,8 @@ def _shifted(bodies: Sequence[Body], tip: Array, small: float) -> tuple[Body, ..
     return tuple(found)
 
 
-def _meeting(body: Body, before: Body | None, after: Body | None, tip: Array | None, small: float) -> Array:
+def _meeting(body: ChainBody, before: ChainBody | None, after: ChainBody | None, tip: Array | None, small: float
+             ) -> Array:
     """The point of a body's axis at which a ball, the tip or a neighbour's axis is, else its own."""
     assert body.axis is not None
     balls = [each.point for each in (before, after) if each is not None and each.axis is None]

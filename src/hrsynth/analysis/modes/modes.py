@@ -20,12 +20,12 @@ from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...results import Result
 from ...tolerances import CHAIN_ROUNDING, SAME_RELATION
+from ..measured import MeasuredRobot
 from ..observed import ObservedRobot, prepare, silent
 from ..singularity.agreement import weakest
-from ..singularity.measured import MeasuredRobot
 from .branches import Model, solve_all
-from .solve import Mode, Modes, continuum
-from .tips import Confinement, confinement
+from .solve import SystemMode, SystemModes, continuum
+from .tips import TipLoci, tip_loci
 
 WITHIN = {"translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
           "planar": "poses in the plane of motion", "spatial": "poses in space"}
@@ -99,18 +99,19 @@ class AssemblyMode:
 class AssemblyModes(Result):
     """All assembly modes with the measurements of one pose, the goal.
 
-    ``complex``, ``complete``, ``proof``, ``degenerate`` and ``continuum`` as for :class:`Modes`; ``kind`` is ``hidden``
-    or ``real``; ``confined`` holds the curves of the tips (None where the measurements never decide the pose).
+    ``complex``, ``complete``, ``proof``, ``degenerate`` and ``continuum`` as for :class:`SystemModes`; ``kind`` is
+    ``hidden`` or ``real``; ``confined`` holds the curves of the tips (None where the measurements never decide the
+    pose).
     """
 
     setting: ObservedRobot
     kind: str
     goal: ClosedConfiguration
     pose: Pose
-    found: Modes
+    found: SystemModes
     modes: tuple[AssemblyMode, ...]
     near: tuple[AssemblyMode, ...]
-    confined: Confinement | None = None
+    confined: TipLoci | None = None
     model: Model | None = None
 
     @property
@@ -187,12 +188,12 @@ def modes_at(setting: ObservedRobot, goal: ClosedConfiguration, wanted: Wanted |
         return AssemblyModes(setting, kind, goal, pose, continuum(f"{text}: a continuum of dimension {free}", free),
                              (), ())
     progress("modes")
-    confined = confinement(setting.anatomy, measured.question, measured.structure, goal)
+    confined = tip_loci(setting.anatomy, measured.question, measured.pattern, goal)
     # a curve that was fitted to a leg's moves is not known to hold its exact tip
     fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
     confined = replace(confined, error=np.inf if fitted else drift(goal, wanted), as_written=as_written)
     made, found = solve_all(confined)
-    reader = _Reader(setting, measured.question, goal, made)
+    reader = _ModeReader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
     return AssemblyModes(setting, kind, goal, pose, found,
@@ -200,14 +201,14 @@ def modes_at(setting: ObservedRobot, goal: ClosedConfiguration, wanted: Wanted |
                          tuple(reader.read(mode, False) for mode in found.near), confined, made)
 
 
-def counted(measured: MeasuredRobot, at: ClosedConfiguration) -> Modes:
+def counted(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
     """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
     as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
-    confined = confinement(measured.setting.anatomy, measured.question, measured.structure, at)
+    confined = tip_loci(measured.setting.anatomy, measured.question, measured.pattern, at)
     return solve_all(confined, near=False)[1]
 
 
-class _Reader:
+class _ModeReader:
     """Poses of a system read as poses of the robot."""
 
     def __init__(self, setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, made: Model) -> None:
@@ -216,12 +217,12 @@ class _Reader:
         values = measure(goal.twin, goal.q, question.reference, question.observations)[2]
         self.measured = tuple(zip(question.observations, values, strict=True))
 
-    def away(self, mode: Mode) -> float:
+    def away(self, mode: SystemMode) -> float:
         """How far a mode is from the goal (characteristic lengths, differences of rotation matrices)."""
         return max(_difference(X, self.goal.pose(body), self.goal.twin.length)
                    for body, X in self.made.bodies(mode.q).items())
 
-    def read(self, mode: Mode, nearest: bool) -> AssemblyMode:
+    def read(self, mode: SystemMode, nearest: bool) -> AssemblyMode:
         """What a mode is for the robot; of all modes the ``nearest`` to the goal can be it."""
         bodies, size = self.made.bodies(mode.q), self.goal.twin.length
         at_goal = nearest and self.away(mode) <= SAME_RELATION
@@ -240,14 +241,14 @@ class _Reader:
             mode.proved, mode.rounded, mode.residual * scale if mode.fits else None,
             () if self.motion.link in bodies else tuple(bodies), size, bodies)
 
-    def known(self, mode: Mode) -> float:
+    def known(self, mode: SystemMode) -> float:
         """How far the bodies' exact poses can be from the system's (characteristic lengths, radians); 0 where nothing
         was proved of them: the told poses are meant."""
         length = self.goal.twin.length
         found = max(mode.shift / length, mode.turn) + self.made.system.error / length
         return found if np.isfinite(found) else 0.0
 
-    def radius(self, mode: Mode, bodies: dict[str, Array], X: Array) -> tuple[float, float]:
+    def radius(self, mode: SystemMode, bodies: dict[str, Array], X: Array) -> tuple[float, float]:
         """How far the exact pose can be from the pose X (4, 4) that is told (m, rad): the system's, with what its frame
         at the goal may be off, and what the told pose is from the system's; of the bodies where X is none of theirs."""
         first, error = next(iter(bodies.values())), self.made.system.error

@@ -28,7 +28,7 @@ import numpy as np
 from ...errors import MissingExtra, Unsolved
 from ...tolerances import BALL_ZERO, BOXES_APART, FARTHEST
 from .polynomials import Quadric, krawczyk
-from .quadrics import UNIT, Balls, Chart, Moving, Rounded, Whole, Within
+from .quadrics import UNIT, Balls, Moving, PoseParametrization, PoseSystem, Rounded, Within
 from .roots import PRECISION, PRECISIONS, Enclosing, Roots, Solution, all_solutions, is_real, sharp
 from .systems import System
 
@@ -142,21 +142,21 @@ def read(text: str, count: int) -> Parametrisation | None:
 METHOD = "msolve's parametrisation"
 
 
-def wholes(system: System, number: int = 0) -> Iterator[Whole]:
+def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
     """The choices of legs with just as many equations as freedoms, then those with too many."""
     chart = system.chart(number)
     for size in range(1, len(system.curves) + 1):
         for legs in combinations(range(len(system.curves)), size):
             if sum(system.forbids[k] for k in legs) == system.freedoms and not system.left(legs):
-                yield Whole(legs, chart, size == len(system.curves))
+                yield PoseSystem(legs, chart, size == len(system.curves))
     for size in range(1, len(system.curves) + 1):
         for legs in combinations(sorted(range(len(system.curves)), key=lambda k: -system.forbids[k]), size):
             given = [system.forbids[k] for k in legs]
             if sum(given) > system.freedoms > sum(given[:-1]) and not system.left(legs):
-                yield Whole(legs, chart, False)
+                yield PoseSystem(legs, chart, False)
 
 
-def solve_whole(part: Whole, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
+def solve_whole(part: PoseSystem, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
     """All solutions of a choice of legs, as :func:`solve_square`, distinct ones once.
 
     Raises ``MissingExtra``, ``Unsolved``."""
@@ -186,7 +186,7 @@ def solve_whole(part: Whole, balls: Within = Balls, farthest: float = FARTHEST) 
 class _Tips(Enclosing):
     """Solutions in the pose's own coordinates, told by where the legs' tips are."""
 
-    chart: Chart
+    chart: PoseParametrization
     method = METHOD
 
     @cached_property
@@ -211,7 +211,7 @@ class _Tips(Enclosing):
         return tuple(found)
 
 
-def _apart(chart: Chart, thick: Sequence[Any], solutions: Sequence[Sequence[Any]]) -> bool:
+def _apart(chart: PoseParametrization, thick: Sequence[Any], solutions: Sequence[Sequence[Any]]) -> bool:
     """Whether all solutions, real ones in their boxes already, have boxes with one pose each, and no two the same."""
     from flint import arb
 

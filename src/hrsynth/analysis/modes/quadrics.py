@@ -43,7 +43,7 @@ class Conic:
 
 
 @dataclass(frozen=True, eq=False)
-class Frame:
+class WorkingFrame:
     """The working frame: tip = origin + Rᵀ x, with coordinates x in units of ``size``·2⁻⁵².
 
     ``R`` has shape (d, 3); ``special`` (3,) is the direction that is made exact.
@@ -63,7 +63,7 @@ class Frame:
         return self.vector(p - self.origin)
 
 
-def spatial_frame(curves: Sequence[Reach], size: float) -> Frame:
+def spatial_frame(curves: Sequence[Reach], size: float) -> WorkingFrame:
     """A frame whose third axis is the direction that most share, circles first; size rounded to a power of 2."""
     directions = [curve.axis for curve in curves if isinstance(curve, Circle)]
     directions += [curve.direction for curve in curves if isinstance(curve, Line)]
@@ -71,17 +71,17 @@ def spatial_frame(curves: Sequence[Reach], size: float) -> Frame:
     shared = [sum(_parallel(a, b) for b in directions) for a in directions]
     n = directions[int(np.argmax(shared))] if directions else np.array([0.0, 0.0, 1.0])
     e = perpendicular(n)
-    return Frame(_middle(curves), np.array([e, cross(n, e), n]), _power(size), n)
+    return WorkingFrame(_middle(curves), np.array([e, cross(n, e), n]), _power(size), n)
 
 
-def planar_frame(curves: Sequence[Reach], X_plane: Array, size: float) -> Frame:
+def planar_frame(curves: Sequence[Reach], X_plane: Array, size: float) -> WorkingFrame:
     """Two axes in the plane of X_plane (4, 4), the first along the direction that most lines share."""
     lines = [curve.direction for curve in curves if isinstance(curve, Line)]
     shared = [sum(_parallel(a, b) for b in lines) for a in lines]
     first = lines[int(np.argmax(shared))] if lines else X_plane[:3, 0]
     n = X_plane[:3, 2]
     first = perpendicular(n, first)
-    return Frame(_middle(curves), np.array([first, cross(n, first)]), _power(size), first)
+    return WorkingFrame(_middle(curves), np.array([first, cross(n, first)]), _power(size), first)
 
 
 class Rounded:
@@ -113,7 +113,7 @@ Balls = Within(SLACK)
 Numbers = type[Rounded] | Within
 
 
-def conic(curve: Curve, frame: Frame, turn: float, numbers: Numbers = Rounded) -> Conic:
+def conic(curve: Curve, frame: WorkingFrame, turn: float, numbers: Numbers = Rounded) -> Conic:
     """A curve in a working frame; t = 0 is at θ = ``turn`` on a circle, at s = 0 on a line."""
     c = numbers.vector(frame.point(curve.centre))
     zero = c * 0
@@ -129,7 +129,7 @@ def conic(curve: Curve, frame: Frame, turn: float, numbers: Numbers = Rounded) -
     return Conic(np.array([c, zero, zero]), np.array([c @ c, nothing, nothing]), np.array([1, 0, 0], dtype=object))
 
 
-def direction(along: Array, frame: Frame, numbers: Numbers) -> Any:
+def direction(along: Array, frame: WorkingFrame, numbers: Numbers) -> Any:
     """A unit direction as numbers, made exact where it nearly is the frame's own or normal to that."""
     d = frame.R @ along
     if _parallel(along, frame.special):
@@ -139,14 +139,14 @@ def direction(along: Array, frame: Frame, numbers: Numbers) -> Any:
     return numbers.vector(d)
 
 
-def parameter(curve: Curve, frame: Frame, turn: float, t: Any) -> Any:
+def parameter(curve: Curve, frame: WorkingFrame, turn: float, t: Any) -> Any:
     """The curve's own parameter, s in metres or θ in radians, of the conic's t: a ball of a ball."""
     from flint import arb
 
     return 2 * t.atan() + arb(turn) if isinstance(curve, Circle) else t * arb(frame.size)
 
 
-def spokes(circle: Circle, frame: Frame, turn: float, numbers: Numbers) -> tuple[Any, Any]:
+def spokes(circle: Circle, frame: WorkingFrame, turn: float, numbers: Numbers) -> tuple[Any, Any]:
     """Spokes a ⟂ b of equal length with tip = c + a cos φ + b sin φ, φ = θ − ``turn``, exactly so where planes are
     shared."""
     assert circle.start is not None
@@ -216,7 +216,7 @@ class Moving(Conic):
 
 
 @dataclass(frozen=True, eq=False)
-class Chart:
+class PoseParametrization:
     """Coordinates of a pose.
 
     ``reaches`` are what the ``tips`` can reach; ``own`` the equations that the coordinates themselves satisfy;
@@ -224,7 +224,7 @@ class Chart:
     coordinates that are none.
     """
 
-    frame: Frame
+    frame: WorkingFrame
     count: int
     reaches: tuple[Reach, ...]
     tips: Callable[[Numbers], list[Moving]]
@@ -234,7 +234,7 @@ class Chart:
 
 
 @dataclass(frozen=True, eq=False)
-class Whole:
+class PoseSystem:
     """One choice of legs with as many equations as unknowns, the pose's own coordinates.
 
     Equations of the last leg that are too many are replaced by as many random combinations of them as are needed;
@@ -242,7 +242,7 @@ class Whole:
     """
 
     legs: tuple[int, ...]
-    chart: Chart
+    chart: PoseParametrization
     whole: bool
 
     def place(self, parameters: Sequence[float]) -> Array:
@@ -259,7 +259,7 @@ class Whole:
                                      *_combined(groups[-1], needed))]
 
 
-def conditions(tip: Conic, reach: Reach, frame: Frame, numbers: Numbers) -> list[Any]:
+def conditions(tip: Conic, reach: Reach, frame: WorkingFrame, numbers: Numbers) -> list[Any]:
     """The forms that vanish where a tip is within its reach."""
     centre = numbers.vector(frame.point(reach.centre))
     if isinstance(reach, Point):
@@ -287,12 +287,12 @@ def normals(reach: Line | Circle | Plane) -> tuple[Array, ...]:
     return (reach.axis if isinstance(reach, Circle) else reach.normal,)
 
 
-def _across(tip: Conic, normal: Array, centre: Any, frame: Frame, numbers: Numbers) -> Any:
+def _across(tip: Conic, normal: Array, centre: Any, frame: WorkingFrame, numbers: Numbers) -> Any:
     n = direction(normal, frame, numbers)
     return on_plane(tip, n, n @ centre)
 
 
-def _at_distance(tip: Conic, radius: float, centre: Any, frame: Frame, numbers: Numbers) -> Any:
+def _at_distance(tip: Conic, radius: float, centre: Any, frame: WorkingFrame, numbers: Numbers) -> Any:
     rho = numbers.vector(np.array([radius / frame.size]))[0]
     return on_sphere(tip, centre, rho * rho)
 

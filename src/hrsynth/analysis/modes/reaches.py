@@ -15,7 +15,7 @@ import numpy as np
 from ...geometry import lines
 from ...geometry.vectors import Array
 from ...tolerances import RANK_GAP, SAME_POINT
-from .chain import Body, Chain, Underived
+from .chain import Chain, ChainBody, Underived
 from .curves import Circle, Line, Plane, Point, Reach, Sphere
 from .turns import Known, groups, orientations, ways
 
@@ -112,7 +112,7 @@ def _sum(chain: Chain, known: Known) -> Reach:
     return total.reach()
 
 
-def _rests(total: _Sum, body: Body, Q: Array) -> None:
+def _rests(total: _Sum, body: ChainBody, Q: Array) -> None:
     """A body of fixed orientation."""
     total.centre = total.centre + Q @ body.shift
     total.lines += [Q @ slide for slide in body.slides]
@@ -137,7 +137,7 @@ def _crank(total: _Sum, Q: Array, axis: Array, vector: Array, watched: Sequence[
     total.turn(axis, Q @ vector)
 
 
-def _turns(total: _Sum, body: Body, Q: Array, a: Array) -> None:
+def _turns(total: _Sum, body: ChainBody, Q: Array, a: Array) -> None:
     """A body that turns about the fixed direction Q a, counted from the orientation Q."""
     axis = Q @ a
     total.turn(axis, Q @ body.shift)
@@ -155,7 +155,7 @@ def _turns(total: _Sum, body: Body, Q: Array, a: Array) -> None:
         _crank(total, Q, axis, crank.vector, crank.watched)
 
 
-def _spins(total: _Sum, body: Body) -> None:
+def _spins(total: _Sum, body: ChainBody) -> None:
     """A body with a direction held that turns about it."""
     d = body.watched[0]
     total.turn(d, body.shift)

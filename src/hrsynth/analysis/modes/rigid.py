@@ -22,11 +22,11 @@ from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, c
 from .polynomials import Equation, Quadric
 from .quadrics import (
     UNIT,
-    Chart,
     Conic,
-    Frame,
     Moving,
     Numbers,
+    PoseParametrization,
+    WorkingFrame,
     direction,
     distance,
     on_circle,
@@ -35,7 +35,7 @@ from .quadrics import (
     shifting,
     spatial_frame,
 )
-from .squares import Square, resting, single
+from .squares import SquareSystem, resting, single
 from .systems import System, registered
 
 
@@ -85,11 +85,11 @@ class Planar(System):
         return registered(self.tips, apart)
 
     @cached_property
-    def frame(self) -> Frame:
+    def frame(self) -> WorkingFrame:
         """A working frame in the plane of motion."""
         return planar_frame(self.curves, self.X_plane, self.size)
 
-    def chart(self, number: int) -> Chart:
+    def chart(self, number: int) -> PoseParametrization:
         """x, y, cos and sin of the turn from the working frame to the platform's."""
         frame = self.frame
 
@@ -105,9 +105,9 @@ class Planar(System):
             first = self.X_plane[:3, :2].T @ (np.array(x[2:]) @ frame.R)
             return np.array([*self.position(at), math.atan2(first[1], first[0])])
 
-        return Chart(frame, 4, self.curves, tips, (on_circle(4, 3, 4),), place)
+        return PoseParametrization(frame, 4, self.curves, tips, (on_circle(4, 3, 4),), place)
 
-    def squares(self) -> Iterator[Square]:
+    def squares(self) -> Iterator[SquareSystem]:
         """Two pivots, a pivot and a curve, or three curves in each order that two tips apart allow."""
         points = [k for k, curve in enumerate(self.curves) if isinstance(curve, Point)]
         moving = [k for k in range(len(self.curves)) if k not in points]
@@ -123,7 +123,7 @@ class Planar(System):
                 if length(self.tips[i] - self.tips[j]) > apart:
                     yield self._square((i, j, k), len(self.curves) == 3)
 
-    def _square(self, legs: tuple[int, ...], whole: bool) -> Square:
+    def _square(self, legs: tuple[int, ...], whole: bool) -> SquareSystem:
         curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
         b = self.tips[list(legs)]
         frame = planar_frame(curves, self.X_plane, extent(curves, b))
@@ -146,10 +146,10 @@ class Planar(System):
             return np.array([*at, cmath.phase(turn)])
 
         unknowns = tuple(curve for curve in curves[:2] if not isinstance(curve, Point))
-        return Square(legs, unknowns, frame, build, place, whole)
+        return SquareSystem(legs, unknowns, frame, build, place, whole)
 
 
-def _third(conics: Sequence[Conic], tips: Sequence[Any], curve: Curve, frame: Frame, numbers: Numbers) -> Any:
+def _third(conics: Sequence[Conic], tips: Sequence[Any], curve: Curve, frame: WorkingFrame, numbers: Numbers) -> Any:
     """The table of *tip₃ on its curve*, with γ tip₃ = α tip₁ + β tip₂ in complex numbers: α = b₂ − b₃, β = b₃ − b₁."""
     alpha, beta, gamma = (_complex(v) for v in (tips[1] - tips[2], tips[2] - tips[0], tips[1] - tips[0]))
     one, other = conics
@@ -219,11 +219,11 @@ class Spatial(System):
             return 16, "two places of a ball with three rods, three quadrics of the quaternion for each (Bézout)"
         return 40, "six conditions on points of a rigid body (degree of the poses among 16 coordinates)"
 
-    def chart(self, number: int) -> Chart:
+    def chart(self, number: int) -> PoseParametrization:
         """Study's coordinates, with a linear form of the quaternion that depends on the number made 1."""
         return study(self.curves, self.tips, self.size, number)
 
-    def squares(self) -> Iterator[Square]:
+    def squares(self) -> Iterator[SquareSystem]:
         """Three tips at rest; two, one or none and as many curves as make three, with tips not on one line."""
         points = [k for k, curve in enumerate(self.curves) if isinstance(curve, Point)]
         moving = [k for k in curves_of(self.curves) if k not in points]
@@ -234,7 +234,7 @@ class Spatial(System):
             if length(cross(b - a, c - a)) > SAME_POINT * self.size ** 2:
                 yield self._square(legs, len(moving) == len(self.curves) == 3)
 
-    def _square(self, legs: tuple[int, ...], whole: bool) -> Square:
+    def _square(self, legs: tuple[int, ...], whole: bool) -> SquareSystem:
         """Three distances between three tips; with tips at rest, given last, those that decide the others."""
         curves = tuple(curve for k in legs if not isinstance(curve := self.curves[k], Surface))
         b = self.tips[list(legs)]
@@ -262,7 +262,7 @@ class Spatial(System):
             R = _triad(three) @ _triad(b).T
             return np.array([*(three.mean(axis=0) - R @ b.mean(axis=0)), *logarithm(R)])
 
-        return Square(legs, unknowns, frame, build, place, whole)
+        return SquareSystem(legs, unknowns, frame, build, place, whole)
 
 
 def _triad(points: Array) -> Array:
@@ -278,7 +278,7 @@ COUNT = 7
 """Unknowns: three of the quaternion, four of g."""
 
 
-def study(reaches: tuple[Reach, ...], b: Array, size: float, number: int) -> Chart:
+def study(reaches: tuple[Reach, ...], b: Array, size: float, number: int) -> PoseParametrization:
     """The chart of a number for tips b (n, 3)."""
     frame = spatial_frame(reaches, size)
     E = _quaternions(number)
@@ -305,7 +305,7 @@ def study(reaches: tuple[Reach, ...], b: Array, size: float, number: int) -> Cha
         return np.array([*(frame.origin + frame.size * (p @ frame.R)), *logarithm(turned)])
 
     normal = sum(_product(u, v) for u, v in zip(e, g, strict=True))
-    return Chart(frame, COUNT, reaches, tips, (normal,), place, Quadric(w))
+    return PoseParametrization(frame, COUNT, reaches, tips, (normal,), place, Quadric(w))
 
 
 def _quaternions(number: int) -> Any:

@@ -19,8 +19,8 @@ import numpy as np
 from ...tolerances import FARTHEST, NEARLY_DOUBLE, RANK_GAP, SHARP_ROOT
 from .curves import Circle, Curve
 from .polynomials import Eliminant, Equation, Polynomial, cycle, height, krawczyk, pair, primitive, univariate, without
-from .quadrics import UNIT, Balls, Conic, Frame, Within, parameter
-from .squares import Square
+from .quadrics import UNIT, Balls, Conic, Within, WorkingFrame, parameter
+from .squares import SquareSystem
 
 if TYPE_CHECKING:
     from flint import fmpz_poly
@@ -88,7 +88,7 @@ class Roots:
     """Balls of the unknowns of all."""
 
 
-def solve_square(square: Square, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
+def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
     """All solutions of a square system: those of the rounded input counted, those of all in the balls enclosed; those
     beyond the distance ``farthest`` (sizes) are taken to be at infinity."""
     from flint import ctx
@@ -297,7 +297,7 @@ class Enclosing(ABC):
 class _Enclosing(Enclosing):
     """A square system with circles counted from ``turn``."""
 
-    part: Square
+    part: SquareSystem
     turn: float
     conics: Sequence[Conic]
     """The unknowns' curves in balls."""
@@ -309,7 +309,7 @@ class _Enclosing(Enclosing):
         return box is not None and any(not v.imag.contains(0) for v in box)
 
     @property
-    def frame(self) -> Frame:
+    def frame(self) -> WorkingFrame:
         """The working frame."""
         assert self.part.frame is not None
         return self.part.frame

@@ -14,9 +14,9 @@ from ...tolerances import FARTHEST, NEARLY_DOUBLE, SAME_RELATION, TIP_ROUNDING, 
 from .curves import Point
 from .fits import Meant, as_meant, dimension, excluded, meets, residual, stationary, torn, words
 from .msolve import solve_whole, wholes
-from .quadrics import Whole
+from .quadrics import PoseSystem
 from .roots import Root, Roots, nearly_double, solve_square
-from .squares import Square
+from .squares import SquareSystem
 from .systems import System
 from .translating import Translating
 
@@ -24,11 +24,11 @@ CHOICES = 5
 """Choices of legs that are given to msolve until one has finitely many solutions, and, besides the first, whose
 solutions are starts for near modes."""
 
-Part = Square | Whole
+Part = SquareSystem | PoseSystem
 
 
 @dataclass(frozen=True, eq=False)
-class Mode:
+class SystemMode:
     """A pose with the directions that are held.
 
     The exact pose is within ``shift`` (m, the origins of all bodies) and ``turn`` (rad) of ``pose`` (4, 4), the
@@ -65,7 +65,7 @@ class Mode:
 
 
 @dataclass(frozen=True, eq=False)
-class Modes:
+class SystemModes:
     """All modes: ``complex`` solutions counted with multiplicity, the real ones as ``modes``, and in words the proof.
 
     Where more is observed than needed, ``complex`` counts only the modes. ``complete`` holds only if every complex
@@ -77,10 +77,10 @@ class Modes:
     """
 
     complex: int
-    modes: tuple[Mode, ...]
+    modes: tuple[SystemMode, ...]
     complete: bool
     proof: str
-    near: tuple[Mode, ...] = ()
+    near: tuple[SystemMode, ...] = ()
     degenerate: str | None = None
     continuum: int | None = None
     bound: str = "none"
@@ -95,7 +95,7 @@ class Modes:
                 "degenerate": self.degenerate, "continuum": self.continuum}
 
 
-def solve(system: System, *, near: bool = True, goal: Array | None = None) -> Modes:
+def solve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:
     """All modes of a system: the solutions of its first square part that is not degenerate at which all tips fit.
 
     Where more is observed than needed, the ``goal``, coordinates of a pose at which all tips fit by construction, is
@@ -109,7 +109,7 @@ def solve(system: System, *, near: bool = True, goal: Array | None = None) -> Mo
     return replace(_solved(system, near, goal), meant=told)
 
 
-def _solved(system: System, near: bool, goal: Array | None) -> Modes:
+def _solved(system: System, near: bool, goal: Array | None) -> SystemModes:
     if system.missing:
         return _too_few(system)
     square = None
@@ -126,7 +126,7 @@ def _solved(system: System, near: bool, goal: Array | None) -> Modes:
     return _undecided(system, square is not None)
 
 
-def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = None) -> Modes:
+def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:
     """All modes of a system in the pose's own coordinates, counted by msolve and enclosed here.
 
     As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
@@ -136,7 +136,7 @@ def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = N
     return replace(_proposed(system, near, goal), meant=told)
 
 
-def _proposed(system: System, near: bool, goal: Array | None) -> Modes:
+def _proposed(system: System, near: bool, goal: Array | None) -> SystemModes:
     if system.missing:
         return _too_few(system)
     part = None
@@ -147,37 +147,37 @@ def _proposed(system: System, near: bool, goal: Array | None) -> Modes:
     return _undecided(system, part is not None)
 
 
-def _too_few(system: System) -> Modes:
+def _too_few(system: System) -> SystemModes:
     return continuum(f"too few legs: a continuum of dimension {system.missing}", system.missing)
 
 
-def _undecided(system: System, tried: bool) -> Modes:
+def _undecided(system: System, tried: bool) -> SystemModes:
     """What is said where no choice of legs has finitely many solutions."""
     if not tried:
-        return Modes(0, (), False, "nothing proved", degenerate="no choice of legs decides the pose: tips on one line, "
-                     "in one point, or at rest")
+        return SystemModes(0, (), False, "nothing proved", degenerate="no choice of legs decides the pose: tips on one "
+                           "line, in one point, or at rest")
     size = dimension(system)
     if size is None:
         return continuum("the equations depend on each other, but no real pose was found", None)
     return continuum(f"the tips can move together: a continuum of dimension {size}", size)
 
 
-def continuum(text: str, size: int | None) -> Modes:
+def continuum(text: str, size: int | None) -> SystemModes:
     """Modes that form a continuum of this dimension, None where it is not known."""
-    return Modes(0, (), False, "a continuum is not counted", degenerate=text, continuum=size)
+    return SystemModes(0, (), False, "a continuum is not counted", degenerate=text, continuum=size)
 
 
 def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[Part, Roots]] | None,
-            goal: Array | None) -> Modes:
+            goal: Array | None) -> SystemModes:
     """The modes among the solutions of a square part; near ones are looked for from those of others too (not at all
     where these are None)."""
     found = [_mode(system, square, root) for root in roots.real]
     enclosed = roots.complete and all(mode.proved for mode in found)
-    bound, proof = (("resultant", _proof(system, roots)) if isinstance(square, Square)
+    bound, proof = (("resultant", _proof(system, roots)) if isinstance(square, SquareSystem)
                     else _bounded(system, square, roots))
     if square.whole:
-        return Modes(roots.complex, tuple(found), enclosed and bound != "none", proof, (), _special(roots), None, bound,
-                     enclosed)
+        return SystemModes(roots.complex, tuple(found), enclosed and bound != "none", proof, (), _special(roots), None,
+                           bound, enclosed)
     whole = [mode for mode, root in zip(found, roots.real, strict=True) if not _torn(system, square, root)]
     at_goal = _goal(system, roots, whole, goal)
     left = [mode for mode in whole if mode is at_goal
@@ -188,18 +188,19 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
     open_ = [mode for mode in left if mode is not at_goal and mode.residual > VANISHES]
     if goal is not None and not any(_same(system, mode.q, goal) for mode in modes):
         # a mode by construction, whose solution is known too roughly to fit
-        at_goal = Mode((), np.inf, np.inf, np.pi, system.residual(system.reached(goal)), frozen(system.pose(goal)),
-                       frozen(goal), square.legs)
+        at_goal = SystemMode((), np.inf, np.inf, np.pi, system.residual(system.reached(goal)),
+                             frozen(system.pose(goal)), frozen(goal), square.legs)
         modes, open_ = (*modes, at_goal), [mode for mode in open_ if not _same(system, mode.q, goal)]
     near = () if others is None else _near(system, found, modes, others)
     near = tuple(_nearly(system, mode.q) for mode in found if mode not in left and mode.residual <= VANISHES) + near
     fitting = [mode.residual for mode in modes if mode is not at_goal]
     proof = (f"from {len(square.legs)} of {len(system.curves)} legs: {proof}; of these "
              + words(at_goal is not None, fitting, len(found) - len(left), len(open_)))
-    return Modes(len(modes), modes, enclosed and bound != "none", proof, near, _special(roots), None, bound, enclosed)
+    return SystemModes(len(modes), modes, enclosed and bound != "none", proof, near, _special(roots), None, bound,
+                       enclosed)
 
 
-def _goal(system: System, roots: Roots, found: Sequence[Mode], goal: Array | None) -> Mode | None:
+def _goal(system: System, roots: Roots, found: Sequence[SystemMode], goal: Array | None) -> SystemMode | None:
     """The solution that is the goal: the only one that can be, where all are known."""
     if goal is None or not roots.complete:
         return None
@@ -212,7 +213,7 @@ def _same(system: System, q: Array, goal: Array) -> bool:
     return float(np.abs(system.reached(q) - system.reached(goal)).max()) <= SAME_RELATION * system.size
 
 
-def _bounded(system: System, part: Whole, roots: Roots) -> tuple[str, str]:
+def _bounded(system: System, part: PoseSystem, roots: Roots) -> tuple[str, str]:
     """By what there are no more solutions than msolve proposes, and the proof in words (theory 10)."""
     most, proof = system.bound(part.legs), _proof(system, roots)
     if most is not None and roots.apart and roots.complex == most[0]:
@@ -222,8 +223,8 @@ def _bounded(system: System, part: Whole, roots: Roots) -> tuple[str, str]:
     return "none", f"{proof}; found by msolve, whose count is trusted{limit}"
 
 
-def _near(system: System, found: Sequence[Mode], modes: Sequence[Mode], others: Iterable[tuple[Part, Roots]]
-          ) -> tuple[Mode, ...]:
+def _near(system: System, found: Sequence[SystemMode], modes: Sequence[SystemMode], others: Iterable[tuple[Part, Roots]]
+          ) -> tuple[SystemMode, ...]:
     """Near modes, from all solutions of one square part and of others."""
     starts = [mode.q for mode in found]
     for other, found_there in others:
@@ -231,22 +232,22 @@ def _near(system: System, found: Sequence[Mode], modes: Sequence[Mode], others: 
     return tuple(_nearly(system, q) for q in stationary(system, starts, [mode.q for mode in modes]))
 
 
-def _mode(system: System, square: Part, root: Root) -> Mode:
+def _mode(system: System, square: Part, root: Root) -> SystemMode:
     parameters = tuple(float(each.mid()) for each in root.parameters)
     q = square.place(parameters)
     at = system.reached(q)
-    if isinstance(square, Square):
+    if isinstance(square, SquareSystem):
         own = parameters
         apart = system.apart(q, at, square.legs, _points(square, root))
     else:
         own, apart = (), {k: miss + TIP_ROUNDING * system.size for k, miss in enumerate(root.misses)}
     shift, turn = system.spread(q, apart)
     sure = _sure(system, root) and bool(np.isfinite(shift))
-    return Mode(own, max(shift / system.size, turn), shift, turn, system.residual(at), frozen(system.pose(q)),
+    return SystemMode(own, max(shift / system.size, turn), shift, turn, system.residual(at), frozen(system.pose(q)),
                 frozen(q), square.legs, root.multiplicity, sure, root.unique and not sure)
 
 
-def _points(square: Square, root: Root) -> list[tuple[Array, float]]:
+def _points(square: SquareSystem, root: Root) -> list[tuple[Array, float]]:
     """The points of a square's curves at a solution, and how far the exact ones can be from them (m)."""
     points = [curve.at(float(s.mid())) for curve, s in zip(square.unknowns, root.parameters, strict=True)]
     return list(zip(points, root.misses, strict=True))
@@ -255,7 +256,7 @@ def _points(square: Square, root: Root) -> list[tuple[Array, float]]:
 def _torn(system: System, square: Part, root: Root) -> bool:
     """Whether the tips of a solution's legs are torn from a rigid platform; where none rests, the square part's
     equations are that they are not."""
-    return (isinstance(square, Square) and system.rigid and _sure(system, root)
+    return (isinstance(square, SquareSystem) and system.rigid and _sure(system, root)
             and any(isinstance(system.curves[k], Point) for k in square.legs)
             and torn(system, system.known(square.legs, _points(square, root))))
 
@@ -265,8 +266,8 @@ def _sure(system: System, root: Root) -> bool:
     return bool(np.isfinite(system.error) and root.unique and root.thick)
 
 
-def _nearly(system: System, q: Array) -> Mode:
-    return Mode((), np.inf, np.inf, np.pi, residual(system, q), frozen(system.pose(q)), frozen(q), near=True)
+def _nearly(system: System, q: Array) -> SystemMode:
+    return SystemMode((), np.inf, np.inf, np.pi, residual(system, q), frozen(system.pose(q)), frozen(q), near=True)
 
 
 def _proof(system: System, roots: Roots) -> str:

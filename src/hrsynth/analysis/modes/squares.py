@@ -11,14 +11,14 @@ import numpy as np
 from ...geometry.vectors import Array, unit
 from .curves import Circle, Curve, Line, Plane, Sphere, Surface, cross, extent, length
 from .polynomials import Equation
-from .quadrics import UNIT, Conic, Frame, Numbers, Rounded, conic, direction, on_plane, on_sphere, spatial_frame
+from .quadrics import UNIT, Conic, Numbers, Rounded, WorkingFrame, conic, direction, on_plane, on_sphere, spatial_frame
 
 TURNS = (0.7, 1.9, 2.6)
 """Where t = 0 lies on the circles of the first, second and third unknown (rad): nowhere special."""
 
 
 @dataclass(frozen=True, eq=False)
-class Square:
+class SquareSystem:
     """One choice of legs with as many equations as unknowns.
 
     ``unknowns`` are the curves whose parameters are solved for; ``build`` gives the equations from their conics;
@@ -28,7 +28,7 @@ class Square:
 
     legs: tuple[int, ...]
     unknowns: tuple[Curve, ...]
-    frame: Frame | None
+    frame: WorkingFrame | None
     build: Callable[[Sequence[Conic], Numbers], list[Equation]]
     place: Callable[[Sequence[float]], Array]
     whole: bool
@@ -59,12 +59,12 @@ def single(quadratic: Any) -> Equation:
     return Equation(table, 0, 0)
 
 
-def resting(legs: tuple[int, ...], q: Array, whole: bool) -> Square:
+def resting(legs: tuple[int, ...], q: Array, whole: bool) -> SquareSystem:
     """A pose that a tip at rest decides: nothing to solve."""
-    return Square(legs, (), None, lambda conics, numbers: [], lambda parameters: q, whole)
+    return SquareSystem(legs, (), None, lambda conics, numbers: [], lambda parameters: q, whole)
 
 
-def three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tuple[float, Square]:
+def three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tuple[float, SquareSystem]:
     """The points on the surfaces of three legs, and the sine of the angle between the two planes: where that vanishes
     the surfaces have no point in common, or a continuum of them."""
     first, second, last = _ordered([surface for _, surface in legs])
@@ -93,7 +93,7 @@ def three_surfaces(legs: Sequence[tuple[int, Surface]], whole: bool) -> tuple[fl
         rho = numbers.vector(np.array([last.radius / frame.size]))[0]
         return [single(on_sphere(point(numbers), centre, rho * rho))]
 
-    return sine, Square(tuple(k for k, _ in legs), (line,), frame, build, lambda s: line.at(s[0]), whole,
+    return sine, SquareSystem(tuple(k for k, _ in legs), (line,), frame, build, lambda s: line.at(s[0]), whole,
                         lambda numbers: [point(numbers)])
 
 

@@ -19,8 +19,8 @@ from ...errors import BadRequest
 from ...geometry.vectors import Array, frozen, pose
 from ...tolerances import FARTHEST, TIP_ROUNDING
 from .curves import Point, Reach, curves_of, extent, length, shifted
-from .quadrics import SLACK, UNIT, Balls, Chart, Frame, Within, spatial_frame
-from .squares import Square
+from .quadrics import SLACK, UNIT, Balls, PoseParametrization, Within, WorkingFrame, spatial_frame
+from .squares import SquareSystem
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,14 +77,14 @@ class System:
         """Beyond which a solution is at infinity but for rounding (sizes)."""
         return math.inf if self.as_written else FARTHEST
 
-    def balls(self, frame: Frame | None) -> Within:
+    def balls(self, frame: WorkingFrame | None) -> Within:
         """Balls that hold the exact input in a working frame; the finest where it is not known how far it is."""
         if frame is None or not np.isfinite(self.error):
             return Balls
         return Within(SLACK + UNIT * self.error / min(frame.size, self.size))
 
     @cached_property
-    def frame(self) -> Frame:
+    def frame(self) -> WorkingFrame:
         """A working frame for all tips and what they can reach."""
         return spatial_frame(self.curves, self.size)
 
@@ -137,7 +137,7 @@ class System:
         """The platform's frame in the base frame; shape (4, 4)."""
         raise NotImplementedError
 
-    def squares(self) -> Iterator[Square]:
+    def squares(self) -> Iterator[SquareSystem]:
         """The choices of legs that can be solved by elimination, best first."""
         raise NotImplementedError
 
@@ -146,7 +146,7 @@ class System:
         finitely many, and why; None where that is not known."""
         return None
 
-    def chart(self, number: int) -> Chart:
+    def chart(self, number: int) -> PoseParametrization:
         """Coordinates of the pose; where there are many charts, that of a number."""
         raise NotImplementedError
 

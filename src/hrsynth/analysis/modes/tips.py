@@ -14,8 +14,8 @@ from itertools import combinations
 
 import numpy as np
 
-from ...constraints.named_vectors import Carried, Feature, Spot, Tangent, poses_at
-from ...constraints.pattern import LockedLeg, Structure
+from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector, Tangent, poses_at
+from ...constraints.pattern import ConstraintPattern, LockedLeg
 from ...errors import NotConfined
 from ...geometry.ranks import kernel_basis
 from ...geometry.vectors import Array
@@ -57,11 +57,12 @@ class Tip:
 
 
 @dataclass(frozen=True, eq=False)
-class Confinement:
+class TipLoci:
     """The platform at one configuration with its directions held: tips on curves and surfaces.
 
-    ``motion`` is that of :class:`Structure`; ``plane`` the normal of planar motion; ``slide`` the circle on which the
-    second body's origin moves relative to the first's, ``doubt`` why it may have other ways; ``bodies`` their names.
+    ``motion`` is that of :class:`ConstraintPattern`; ``plane`` the normal of planar motion; ``slide`` the circle on
+    which the second body's origin moves relative to the first's, ``doubt`` why it may have other ways;
+    ``bodies`` their names.
     """
 
     goal: ClosedConfiguration
@@ -77,22 +78,22 @@ class Confinement:
     """Whether the numbers count as they are, and no special geometry is meant."""
 
 
-def confinement(anatomy: LegDecomposition, question: Measurement, structure: Structure,
-                goal: ClosedConfiguration) -> Confinement:
+def tip_loci(anatomy: LegDecomposition, question: Measurement, pattern: ConstraintPattern,
+                goal: ClosedConfiguration) -> TipLoci:
     """Where all watched legs' tips can be with the directions held at their values at ``goal``.
 
     Raises ``NotConfined`` where that is no point, line, circle, sphere or plane, or the platform's motion none of those
     known.
     """
     name = anatomy.mechanism.name
-    if structure.motion == "other":
+    if pattern.motion == "other":
         raise NotConfined(name, "the pattern of its legs is none of those known")
-    plane = None if structure.plane is None else _value(structure.plane, goal)
-    end = (plane if plane is not None and structure.motion == "planar" else
-           "free" if structure.motion == "spatial" or anatomy.point is not None else "kept")
-    tips = tuple(_tip(anatomy, question, leg, goal, end) for leg in structure.legs)
-    slide, doubt = (None, None) if structure.slide is None else _slide(anatomy, structure, goal)
-    return Confinement(goal, structure.motion, tips, structure.bodies, plane, slide, doubt=doubt)
+    plane = None if pattern.plane is None else _value(pattern.plane, goal)
+    end = (plane if plane is not None and pattern.motion == "planar" else
+           "free" if pattern.motion == "spatial" or anatomy.point is not None else "kept")
+    tips = tuple(_tip(anatomy, question, leg, goal, end) for leg in pattern.legs)
+    slide, doubt = (None, None) if pattern.slide is None else _slide(anatomy, pattern, goal)
+    return TipLoci(goal, pattern.motion, tips, pattern.bodies, plane, slide, doubt=doubt)
 
 
 def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration,
@@ -139,7 +140,7 @@ def _candidates(anatomy: LegDecomposition, leg: LockedLeg, tip: Array, goal: Clo
     the normal that it names: a plane, or a sphere with the radius of a link that lies along the normal."""
     if leg.fixed:
         yield Point(tip)
-    elif isinstance(leg.line, Carried):
+    elif isinstance(leg.line, BodyVector):
         yield Line(tip, _value(leg.line, goal))
     elif isinstance(leg.line, Tangent):
         turning = _circle(leg.line, tip, goal)
@@ -179,14 +180,15 @@ def _opposite(circle: Circle, tip: Array) -> Circle:
     return Circle(2 * tip - circle.centre, circle.axis, circle.radius, circle.centre - tip)
 
 
-def _slide(anatomy: LegDecomposition, structure: Structure, goal: ClosedConfiguration) -> tuple[Circle, str | None]:
+def _slide(anatomy: LegDecomposition, pattern: ConstraintPattern, goal: ClosedConfiguration
+           ) -> tuple[Circle, str | None]:
     """The circle of the second body's origin relative to the first's, and why it may not be all.
 
     Where a parallelogram joins the bodies it is that of a crank; else of the two with the tangent that the pattern
     names (whichever of the bodies its link turns about) the one that nearby configurations keep to."""
-    at, moving = _apart(structure, goal, goal.q)
-    one, other = structure.bodies
-    graph = WordGraph(anatomy.mechanism, structure.bodies, anatomy.platform).recognise()
+    at, moving = _apart(pattern, goal, goal.q)
+    one, other = pattern.bodies
+    graph = WordGraph(anatomy.mechanism, pattern.bodies, anatomy.platform).recognise()
     for _, edge in graph.between(one, other):
         if len(edge.joints) == 4:
             joints = [anatomy.mechanism.joints[name] for name in edge.joints[:2]]
@@ -194,20 +196,20 @@ def _slide(anatomy: LegDecomposition, structure: Structure, goal: ClosedConfigur
             (start, axes), (end, _) = moved(goal, near), moved(goal, far)
             spoke = (end - start - axes[0] * float(axes[0] @ (end - start))) * goal.twin.length
             return Circle(at - spoke, axes[0], float(np.linalg.norm(spoke)), spoke), None
-    assert isinstance(structure.slide, Tangent)
-    first = _circle(structure.slide, at, goal)
+    assert isinstance(pattern.slide, Tangent)
+    first = _circle(pattern.slide, at, goal)
     second = _opposite(first, at)
     kernel, _ = goal.kernel()
     step = kernel @ np.linalg.svd(moving @ kernel)[2][0]
     nearby, _ = closed(goal.twin, goal.twin.moved(goal.q, MOVES[-1] * step), tolerance=SOLVED)
-    there, _ = _apart(structure, goal, nearby)
+    there, _ = _apart(pattern, goal, nearby)
     circle = min((first, second), key=lambda circle: float(np.linalg.norm(circle.miss(there))))
     return circle, f"no parallelogram joins {one} and {other}"
 
 
-def _apart(structure: Structure, goal: ClosedConfiguration, q: Array) -> tuple[Array, Array]:
+def _apart(pattern: ConstraintPattern, goal: ClosedConfiguration, q: Array) -> tuple[Array, Array]:
     """From the first body's origin to the second's (3,), and its velocity (3, nv)."""
-    X, V = goal.twin.frames(q, structure.bodies)
+    X, V = goal.twin.frames(q, pattern.bodies)
     return X[1, :3, 3] - X[0, :3, 3], V[1, :3] - V[0, :3]
 
 
@@ -250,6 +252,6 @@ def _held_paths(anatomy: LegDecomposition, own: Sequence[Observation], reference
     return found
 
 
-def _value(feature: Feature | Spot, goal: ClosedConfiguration) -> Array:
+def _value(feature: NamedVector | BodyPoint, goal: ClosedConfiguration) -> Array:
     value: Array = feature.value(poses_at([goal], feature.links))[0]
     return value

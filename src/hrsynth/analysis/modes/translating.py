@@ -16,10 +16,10 @@ from ...tolerances import PARALLEL, TIP_ROUNDING, VANISHES
 from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, cross, extent, length, shifted
 from .polynomials import Equation
 from .quadrics import (
-    Chart,
     Conic,
     Moving,
     Numbers,
+    PoseParametrization,
     direction,
     normals,
     on_circle,
@@ -31,7 +31,7 @@ from .quadrics import (
     sum_on_plane,
     sum_on_sphere,
 )
-from .squares import Square, resting, single, three_surfaces
+from .squares import SquareSystem, resting, single, three_surfaces
 from .systems import Shifting
 
 
@@ -60,16 +60,17 @@ class Translating(Shifting):
         """How far the platform can be from its place at q (m); it does not turn."""
         return min(apart.values()), 0.0
 
-    def chart(self, number: int) -> Chart:
+    def chart(self, number: int) -> PoseParametrization:
         """The position."""
         frame = spatial_frame(self.paths, self.size)
 
         def tips(numbers: Numbers) -> list[Moving]:
             return [shifting(3, numbers.vector(np.zeros(3)))] * len(self.paths)
 
-        return Chart(frame, 3, self.paths, tips, (), lambda x: frame.origin + frame.size * (np.array(x) @ frame.R))
+        return PoseParametrization(frame, 3, self.paths, tips, (),
+                                   lambda x: frame.origin + frame.size * (np.array(x) @ frame.R))
 
-    def squares(self) -> Iterator[Square]:
+    def squares(self) -> Iterator[SquareSystem]:
         """A tip at rest; pairs of paths that are curves, those of one plane first; a curve and a surface; three
         surfaces, those that meet most squarely first."""
         curves = {k: path for k, path in enumerate(self.paths) if not isinstance(path, Surface)}
@@ -92,7 +93,7 @@ class Translating(Shifting):
                    for legs in combinations(surfaces, 3)]
         yield from (square for _, square in sorted(triples, key=lambda each: -each[0]))
 
-    def _on_curve(self, legs: tuple[int, int], one: Curve, other: Reach, whole: bool) -> Square:
+    def _on_curve(self, legs: tuple[int, int], one: Curve, other: Reach, whole: bool) -> SquareSystem:
         """The curve's points at which the other is met."""
         both = (one, other)
         frame = spatial_frame(both, extent(both, np.zeros((1, 3))))
@@ -105,7 +106,7 @@ class Translating(Shifting):
             normal = direction(_normal(one, other), frame, numbers)
             return [single(on_plane(conics[0], normal, normal @ centre))]
 
-        return Square(legs, (one,), frame, build, lambda parameters: one.at(parameters[0]), whole)
+        return SquareSystem(legs, (one,), frame, build, lambda parameters: one.at(parameters[0]), whole)
 
 
 def _normal(one: Curve, other: Reach) -> Array:
@@ -187,7 +188,7 @@ class Articulated(Shifting):
         found = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
         return min(found), "the product of degrees in space and on the circle (Bézout)"
 
-    def chart(self, number: int) -> Chart:
+    def chart(self, number: int) -> PoseParametrization:
         """p, cos θ and sin θ."""
         middle = spatial_frame(self.paths, self.size).origin
         frame = replace(spatial_frame((*self.paths, self.slide), self.size), origin=middle)
@@ -201,9 +202,9 @@ class Articulated(Shifting):
         def place(x: Sequence[float]) -> Array:
             return np.array([*(frame.origin + frame.size * (np.array(x[:3]) @ frame.R)), math.atan2(x[4], x[3])])
 
-        return Chart(frame, 5, self.paths, tips, (on_circle(5, 4, 5),), place)
+        return PoseParametrization(frame, 5, self.paths, tips, (on_circle(5, 4, 5),), place)
 
-    def squares(self) -> Iterator[Square]:
+    def squares(self) -> Iterator[SquareSystem]:
         """The pairs of legs, one on each body, each in both roles; first those where no plane is the slide's own."""
         curves = [(k, path) for k, path in enumerate(self.paths) if not isinstance(path, Surface)]
         one, two = ([each for each in curves if self.bodies[each[0]] == body] for body in (0, 1))
@@ -216,7 +217,7 @@ class Articulated(Shifting):
         """Whether a circle lies in a plane parallel to the slide's."""
         return isinstance(curve, Circle) and length(cross(curve.axis, self.slide.axis)) < PARALLEL
 
-    def _square(self, legs: tuple[int, int], first: Curve, onto: Line | Circle) -> Square:
+    def _square(self, legs: tuple[int, int], first: Curve, onto: Line | Circle) -> SquareSystem:
         """The first leg's tip carries the slide to the second leg's curve."""
         sign = 1 if self.bodies[legs[0]] == 0 else -1
         size = max(extent((first, onto), np.zeros((1, 3))), self.slide.radius, length(self.slide.centre))
@@ -245,4 +246,4 @@ class Articulated(Shifting):
 
         unknowns = (self.slide,) if resting else (start, self.slide)
         whole = len(self.curves) == 2 and not resting
-        return Square(legs, unknowns, frame, build, place, whole)
+        return SquareSystem(legs, unknowns, frame, build, place, whole)

@@ -14,7 +14,8 @@ import numpy as np
 
 from ...batch.placing import Placer
 from ...budgets import WEAKEST_STARTS
-from ...constraints.pattern import Scene, Structure
+from ...constraints.condition import Condition, Named
+from ...constraints.pattern import ConstraintPattern, PatternValues
 from ...errors import Disagreement
 from ...geometry.ranks import kernel_basis, range_basis
 from ...geometry.vectors import Array
@@ -23,7 +24,6 @@ from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.sampling import WEAKEST, wander
 from ...tolerances import CLOSED, FOLLOWED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT, SHARP
 from .batch_spectrum import SPOTS, Quick
-from .condition import Condition, Named
 
 CHUNK = 250
 ON_LOCUS = 10
@@ -58,7 +58,7 @@ class Agreement:
                 "on_locus": len(self.on_locus), "searches": self.searches}
 
 
-def agreement(start: ClosedConfiguration, question: Measurement, structure: Structure, condition: Condition,
+def agreement(start: ClosedConfiguration, question: Measurement, pattern: ConstraintPattern, condition: Condition,
               count: int, *, seed: int = 0, progress: Callable[[], None] | None = None,
               placer: Placer | None = None) -> Agreement:
     """Compare at ``count`` random reachable poses and at poses on the locus.
@@ -77,14 +77,14 @@ def agreement(start: ClosedConfiguration, question: Measurement, structure: Stru
     quick = Quick.of(placer, question)
     walks = wander(start, count, seed) if quick is None else quick.placer.wander(count, seed)
     for number, chunk in enumerate(_chunks(walks)):
-        scene = structure.scene(chunk)
+        here = pattern.values_at(chunk)
         if quick is None:
-            ranks, apart = _weakest(scene, question, condition)
+            ranks, apart = _weakest(here, question, condition)
         else:
             ranks, _ = quick.spectrum(chunk, spectrum, seed + number)
-            apart = _weakest(structure.scene(chunk[:: CHUNK // SPOTS]), question, condition)[1]
-        matrices = condition.rows(scene)
-        rows, values = smallest_of(matrices), condition.expressed(scene)
+            apart = _weakest(pattern.values_at(chunk[:: CHUNK // SPOTS]), question, condition)[1]
+        matrices = condition.rows(here)
+        rows, values = smallest_of(matrices), condition.expressed(here)
         angle = max(angle, apart)
         smallest = min(smallest, float(ranks.min()))
         wrong += int(np.sum(_differ(ranks, rows, np.abs(values))))
@@ -99,21 +99,21 @@ def agreement(start: ClosedConfiguration, question: Measurement, structure: Stru
         if progress is not None:
             progress()
     on_locus: list[ClosedConfiguration] = []
-    if all(leg.tip.link == leg.body for leg in structure.legs):
+    if all(leg.tip.link == leg.body for leg in pattern.legs):
         wrong += _out_of_proportion(np.array(sizes))
     loops = WEAKEST * start.kernel()[1].weakest
     freedoms = max(relation(at, question).dof.value for at in [start, *(at for _, at in low)])
     others = [pair for pair in sorted(parts, key=_size) if all(pair[1] is not at for _, at in low)][:WEAKEST_STARTS]
     searches = 0
     for starts in ([] if condition.never else
-                   [_crossings(walk, signs, structure, condition), _descents(low, question, structure, condition),
-                    _descents(others, question, structure, condition)]):
+                   [_crossings(walk, signs, pattern, condition), _descents(low, question, pattern, condition),
+                    _descents(others, question, pattern, condition)]):
         for at in starts:
             searches += 1
             if (at is None or at.kernel()[1].weakest < loops or relation(at, question).dof.value < freedoms
                     or _known(at, on_locus, question)):
                 continue
-            sigma = float(_weakest(structure.scene([at]), question, condition)[0][0])
+            sigma = float(_weakest(pattern.values_at([at]), question, condition)[0][0])
             if sigma > RANK_CUTOFF:
                 wrong += 1
             on_locus.append(at)
@@ -197,21 +197,21 @@ def _relations(chunk: Sequence[ClosedConfiguration], question: Measurement, bodi
     return np.array(sigma), parts
 
 
-def _weakest(scene: Scene, question: Measurement, condition: Condition) -> tuple[Array, float]:
+def _weakest(here: PatternValues, question: Measurement, condition: Condition) -> tuple[Array, float]:
     """Smallest singular values by Pinocchio, and the largest angle by which a watched leg's named vectors miss what
     Pinocchio says it lets the platform do."""
     named = isinstance(condition, Named)
-    sigma, parts = _relations(scene.configurations, question, scene.structure.bodies if named else ())
+    sigma, parts = _relations(here.configurations, question, here.pattern.bodies if named else ())
     labels = np.repeat([o.leg for o in question.observations], question.sizes)
     angle = 0.0
-    for leg in scene.structure.legs if named else ():
-        for (rates, twists, _), block in zip(parts, scene.allowances(leg), strict=True):
+    for leg in here.pattern.legs if named else ():
+        for (rates, twists, _), block in zip(parts, here.allowances(leg), strict=True):
             held, _ = kernel_basis(rates[labels == leg.label], 1.0)
             angle = max(angle, float(np.linalg.norm(block @ twists @ held, 2)))
     return sigma, angle
 
 
-def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], structure: Structure,
+def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], pattern: ConstraintPattern,
                condition: Condition) -> Iterator[ClosedConfiguration | None]:
     """Zeros of the expression between neighbours of a walk at which it has different signs, None where one is not
     found."""
@@ -229,15 +229,15 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], stru
             return _stepped(one, fraction * step)
 
         def value(fraction: float, there: Callable[[float], ClosedConfiguration] = there) -> float:
-            return float(condition.expressed(structure.scene([there(fraction)]))[0])
+            return float(condition.expressed(pattern.values_at([there(fraction)]))[0])
 
         if value(0.0) * value(1.0) >= 0:
             yield None
             continue
         root = there(float(brentq(value, 0.0, 1.0, xtol=1e-15, rtol=1e-14)))
         if root.residual <= CLOSED:
-            found = _sharpened(ClosedConfiguration.of(twin, root.q), step, structure, condition)
-            yield found if abs(float(condition.expressed(structure.scene([found]))[0])) <= FOLLOWED else None
+            found = _sharpened(ClosedConfiguration.of(twin, root.q), step, pattern, condition)
+            yield found if abs(float(condition.expressed(pattern.values_at([found]))[0])) <= FOLLOWED else None
 
 
 def _stepped(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
@@ -246,7 +246,7 @@ def _stepped(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
     return ClosedConfiguration(here.twin, q, residual)
 
 
-def _sharpened(at: ClosedConfiguration, step: Array, structure: Structure, condition: Condition
+def _sharpened(at: ClosedConfiguration, step: Array, pattern: ConstraintPattern, condition: Condition
                ) -> ClosedConfiguration:
     """A last Newton step along the mechanism's own motion, too short to need closing again."""
     kernel, _ = at.kernel()
@@ -255,7 +255,7 @@ def _sharpened(at: ClosedConfiguration, step: Array, structure: Structure, condi
 
     def value(size: float) -> float:
         q = at.twin.moved(at.q, size * motion)
-        return float(condition.expressed(structure.scene([ClosedConfiguration(at.twin, q, at.residual)]))[0])
+        return float(condition.expressed(pattern.values_at([ClosedConfiguration(at.twin, q, at.residual)]))[0])
 
     here, slope = value(0.0), (value(NUDGE) - value(-NUDGE)) / (2 * NUDGE)
     if slope == 0.0 or abs(here / slope) > NUDGE:
@@ -263,11 +263,11 @@ def _sharpened(at: ClosedConfiguration, step: Array, structure: Structure, condi
     return ClosedConfiguration.of(at.twin, at.twin.moved(at.q, -here / slope * motion))
 
 
-def _descents(low: Sequence[tuple[float, ClosedConfiguration]], question: Measurement, structure: Structure,
+def _descents(low: Sequence[tuple[float, ClosedConfiguration]], question: Measurement, pattern: ConstraintPattern,
               condition: Condition) -> Iterator[ClosedConfiguration | None]:
     """Zeros of the rows sought from weak poses: rows(q) x = 0 with |x| = 1; None where one is not found."""
     for _, start in low:
-        yield descend(start, question, structure, condition)
+        yield descend(start, question, pattern, condition)
 
 
 def _size(pair: tuple[float, ClosedConfiguration]) -> float:
@@ -280,7 +280,7 @@ def _known(at: ClosedConfiguration, others: Sequence[ClosedConfiguration], quest
     return any(np.linalg.norm(X - other.pose(question.platform)) <= SAME_SPOT for other in others)
 
 
-def descend(start: ClosedConfiguration, question: Measurement, structure: Structure,
+def descend(start: ClosedConfiguration, question: Measurement, pattern: ConstraintPattern,
             condition: Condition) -> ClosedConfiguration | None:
     """A pose on the locus near ``start``: least squares in the platform's motions and the lost one; None where there is
     none near."""
@@ -290,7 +290,7 @@ def descend(start: ClosedConfiguration, question: Measurement, structure: Struct
     for _ in range(4):
         motion = platform_motions(here, question)
         count = motion.shape[1]
-        start_rows = condition.rows(structure.scene([here]))[0]
+        start_rows = condition.rows(pattern.values_at([here]))[0]
         shape, x0 = start_rows.shape, np.linalg.svd(start_rows)[2][-1]
 
         def reached(s: Array, here: ClosedConfiguration = here, motion: Array = motion) -> ClosedConfiguration:
@@ -300,7 +300,7 @@ def descend(start: ClosedConfiguration, question: Measurement, structure: Struct
                       reached: Callable[[Array], ClosedConfiguration] = reached) -> Array:
             at = reached(z[:count])
             x = z[count:]
-            rows = condition.rows(structure.scene([at]))[0]
+            rows = condition.rows(pattern.values_at([at]))[0]
             if at.residual > CLOSED or rows.shape[1] != len(x):
                 return np.ones(shape[0] + 1)
             return np.append(rows @ x, x @ x - 1.0)

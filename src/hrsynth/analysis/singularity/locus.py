@@ -20,16 +20,16 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...mechanism.pose import Grid, Pose
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
+from ..measured import MeasuredRobot
 from .agreement import descend, spectrum, weakest
 from .batch_spectrum import Quick
-from .measured import MeasuredRobot
 
 STARTS = 8
 """Valleys of the smallest singular value from which an isolated singular pose is sought."""
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
+class SingularityMap:
     """A robot over a plane: the expression's value, the smallest singular value (Type 2 where zero) and the inverse of
     the largest (Type 1 where zero), each (nx, ny), NaN where no pose is reached; ``spots`` are singular poses (k, 2)
     where the locus is no curve."""
@@ -46,8 +46,8 @@ class Locus:
     """The fields of the hidden and, where it has motors that determine its platform, the real robot over a plane."""
 
     grid: Grid
-    hidden: Field
-    real: Field | None
+    hidden: SingularityMap
+    real: SingularityMap | None
 
     @property
     def reached(self) -> int:
@@ -85,13 +85,13 @@ def locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None,
     if not any(configurations):
         raise PlaneNotMet(start.twin.mechanism.name, f"the plane {grid.fixed}", "none of its poses is reached")
 
-    def field(measured: MeasuredRobot) -> Field:
+    def field(measured: MeasuredRobot) -> SingularityMap:
         condition = measured.condition
         reached = [(i, at) for i, at in enumerate(configurations) if at is not None]
         places, here = [i for i, _ in reached], [at for _, at in reached]
         quick = Quick.of(placer, measured.question)
         smallest, largest = (spectrum(here, measured.question) if quick is None else quick.spectrum(here, spectrum))
-        value = condition.expressed(measured.structure.scene(here))
+        value = condition.expressed(measured.pattern.values_at(here))
         tables = []
         for column in (value, smallest, 1 / np.where(largest > 0, largest, np.nan)):
             table = np.full(len(configurations), np.nan)
@@ -99,7 +99,7 @@ def locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None,
             tables.append(table.reshape(grid.shape))
         spots = np.zeros((0, 2)) if condition.signed or condition.never else _spots(
             grid, [here[places.index(i)] for i in _valleys(tables[1])], measured)
-        return Field(tables[0], condition.signed, tables[1], tables[2], spots)
+        return SingularityMap(tables[0], condition.signed, tables[1], tables[2], spots)
 
     return Locus(grid, field(hidden), None if real is None else field(real))
 
@@ -193,7 +193,7 @@ def _spots(grid: Grid, starts: Sequence[ClosedConfiguration], measured: Measured
     motion, question = measured.setting.motion, measured.question
     found: list[list[float]] = []
     for start in starts:
-        at = descend(start, question, measured.structure, measured.condition)
+        at = descend(start, question, measured.pattern, measured.condition)
         if at is None:
             continue
         error, _ = motion.goal(grid.fixed).rows(at.twin, at.q)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...budgets import NEIGHBOUR_STEP
-from ...constraints.pattern import Structure
+from ...constraints.condition import Condition, always
+from ...constraints.pattern import ConstraintPattern
 from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration, closed
 from ...kinematics.relation import Measurement, platform_motions, relation
@@ -17,11 +18,10 @@ from ...results import Result
 from ...tolerances import SOLVED
 from ..controllability import Verdict
 from ..freedoms import Freedom, name_freedoms
+from ..measured import MeasuredRobot
 from ..observed import ObservedRobot, prepare, silent
 from .agreement import Agreement, agreement, weakest
-from .condition import Condition, always
 from .locus import Locus, locus
-from .measured import MeasuredRobot
 
 POINTS = 10_000
 """Random poses at which words, expression and rank are compared."""
@@ -55,7 +55,7 @@ class Singularity(Result):
     question: Measurement
     real: bool
     verdict: Verdict
-    structure: Structure
+    pattern: ConstraintPattern
     condition: Condition | None
     """None where a freedom is lost everywhere."""
     words: str
@@ -105,16 +105,16 @@ def singular(robot: Mechanism, observe: Sequence[str] | str | None = None, camer
     measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)
     question, verdict = measured.question, measured.verdict
     tell("pattern of the legs' wrenches")
-    structure = measured.structure
+    pattern = measured.pattern
     if verdict.rank < verdict.dof:
-        words = always(structure, [freedom.name for freedom in verdict.lost])
-        return Singularity(setting, question, real, verdict, structure, None, words, None, ())
+        words = always(pattern, [freedom.name for freedom in verdict.lost])
+        return Singularity(setting, question, real, verdict, pattern, None, words, None, ())
     found = measured.condition
-    checked = agreement(setting.everything.start, question, structure, found, points, seed=seed,
+    checked = agreement(setting.everything.start, question, pattern, found, points, seed=seed,
                         progress=lambda: tell("random poses"), placer=setting.placer)
     tell("singular poses")
     examples = tuple(_example(setting, question, at) for at in checked.on_locus[:EXAMPLES])
-    return Singularity(setting, question, real, verdict, structure, found, found.words, checked, examples)
+    return Singularity(setting, question, real, verdict, pattern, found, found.words, checked, examples)
 
 
 def drawn(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from math import comb, prod
 
-from ...analysis.advice import Advice
-from ...analysis.candidates import Measurement
+from ...analysis.advice import Advice, FurtherMeasurement
 from ...tolerances import RANK_GAP
 from .tables import listing
 
@@ -36,7 +35,7 @@ def _missing(found: Advice) -> list[str]:
         limits = [f"Not every set was tried or decided: {found.tried} tried, {found.undecided} undecided"]
     if not found.sets:
         return limits
-    groups: dict[tuple[str, ...], list[tuple[Measurement, ...]]] = {}
+    groups: dict[tuple[str, ...], list[tuple[FurtherMeasurement, ...]]] = {}
     for each in found.sets:
         groups.setdefault(tuple(m.kind for m in each.measurements), []).append(each.measurements)
     best = found.sets[0].verdict
@@ -50,7 +49,7 @@ def _missing(found: Advice) -> list[str]:
     return [*lines, *(["* a joint with a motor"] if starred else []), *limits]
 
 
-def _ways(kinds: tuple[str, ...], sets: Sequence[tuple[Measurement, ...]]) -> list[str]:
+def _ways(kinds: tuple[str, ...], sets: Sequence[tuple[FurtherMeasurement, ...]]) -> list[str]:
     """The sets of the same kinds in a few words: any so many of each kind where all choices do, else one by one."""
     counts = {kind: kinds.count(kind) for kind in kinds}
     names = {kind: list(dict.fromkeys(m.name for each in sets for m in each if m.kind == kind)) for kind in counts}

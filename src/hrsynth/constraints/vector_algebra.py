@@ -1,7 +1,7 @@
 """Vector algebra in SymPy: symbols stand for vectors; ``dot``, ``cross`` and ``det`` (triple product) for the products.
 
 The expressions are ordinary SymPy trees over these three functions; :func:`evaluate` gives their values for arrays of
-vectors, :func:`components` the polynomial in the vectors' coordinates.
+vectors.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...geometry.vectors import Array
+from ..geometry.vectors import Array
 
 
 class Products(NamedTuple):
@@ -79,30 +79,3 @@ def _compiled(expression: Any) -> tuple[tuple[str, ...], Callable[..., Any]]:
         "det": lambda a, b, c: np.einsum("...i,...i->...", a, np.cross(b, c)),
     }
     return names, sympy.lambdify([sympy.Symbol(name) for name in names], expression, modules=[functions, "numpy"])
-
-
-def components(expression: Any) -> Any:
-    """The expression as a polynomial in coordinates ``u1_x`` … of its vectors."""
-    import sympy
-
-    dot, cross, det = products()
-
-    def expand(node: Any) -> Any:
-        if isinstance(node, sympy.Symbol):
-            return sympy.Matrix(sympy.symbols([f"{node.name}_{axis}" for axis in "xyz"]))
-        if node.func is dot:
-            return expand(node.args[0]).dot(expand(node.args[1]))
-        if node.func is cross:
-            return expand(node.args[0]).cross(expand(node.args[1]))
-        if node.func is det:
-            a, b, c = map(expand, node.args)
-            return a.dot(b.cross(c))
-        if node.is_Number:
-            return node
-        parts = [expand(argument) for argument in node.args]
-        total = parts[0]
-        for part in parts[1:]:
-            total = total + part if node.is_Add else total**part if node.is_Pow else total * part
-        return total
-
-    return expand(expression)

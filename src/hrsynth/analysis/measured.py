@@ -5,13 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 from functools import cached_property
 
-from ...constraints.pattern import Structure, recognise
-from ...kinematics.relation import Measurement
-from ...kinematics.sampling import Samples
-from ...mechanism.observation import labels_of
-from ..controllability import Verdict, verdict_of
-from ..observed import ObservedRobot, motors
-from .condition import Condition, condition
+from ..constraints.condition import Condition, condition
+from ..constraints.pattern import ConstraintPattern, recognise
+from ..kinematics.relation import Measurement
+from ..kinematics.sampling import Samples
+from ..mechanism.observation import labels_of
+from .controllability import Verdict, verdict_of
+from .observed import ObservedRobot, motors
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +47,11 @@ class MeasuredRobot:
         return verdict_of(self.setting, labels_of(self.question.observations), self.samples)
 
     @cached_property
-    def structure(self) -> Structure:
+    def pattern(self) -> ConstraintPattern:
         """The pattern of the legs with their measurements held."""
         return recognise(self.setting.anatomy, self.question, self.setting.configurations)
 
     @cached_property
     def condition(self) -> Condition:
         """When a freedom is lost that is seen generically."""
-        return condition(self.structure, self.question)
+        return condition(self.pattern, self.question)

@@ -1,4 +1,4 @@
-"""The Type 2 condition of a structure: rows that must lose rank, a SymPy expression that must vanish, and words.
+"""The Type 2 condition of a pattern: rows that must lose rank, a SymPy expression that must vanish, and words.
 
 Feasible motions of the platform have coordinates x (d of them); held leg i allows those for which its tip's velocity
 J_i x lies along its line: N_i J_i x = 0. A freedom is lost where the stacked rows have a kernel (theory 4).
@@ -13,13 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from ...constraints.named_vectors import Carried, Feature, Tangent
-from ...constraints.pattern import LockedLeg, Scene, Structure, forbidden, projectors
-from ...geometry.vectors import Array, hats
-from ...kinematics.locked import interaction
-from ...kinematics.relation import Measurement
-from ...tolerances import SAME_RELATION
-from .algebra import evaluate, products, vector
+from ..geometry.vectors import Array, hats
+from ..kinematics.locked import interaction
+from ..kinematics.relation import Measurement
+from ..tolerances import SAME_RELATION
+from .named_vectors import BodyVector, NamedVector, Tangent
+from .pattern import ConstraintPattern, LockedLeg, PatternValues, forbidden, projectors
+from .vector_algebra import evaluate, products, vector
 
 Values = Mapping[str, Array]
 
@@ -40,15 +40,15 @@ class Condition:
     where: Mapping[str, str] = field(default_factory=dict)
     """What each symbol means."""
 
-    def rows(self, scene: Scene) -> Array:
+    def rows(self, here: PatternValues) -> Array:
         """The rows (n, rows, d) that have a kernel exactly where a freedom is lost."""
         raise NotImplementedError
 
-    def expressed(self, scene: Scene) -> Array:
+    def expressed(self, here: PatternValues) -> Array:
         """The expression's value, (n,), as a first power of the distance to the locus (the root of a sum of squares).
 
         Here that of the determinant of a Gram matrix of the rows."""
-        M = self.rows(scene)
+        M = self.rows(here)
         return np.sqrt(np.abs(np.linalg.det(M.transpose(0, 2, 1) @ M)))
 
 
@@ -56,17 +56,17 @@ class Condition:
 class Named(Condition):
     """A condition in vectors that have names."""
 
-    structure: Structure = field(kw_only=True)
+    pattern: ConstraintPattern = field(kw_only=True)
 
-    def rows(self, scene: Scene) -> Array:
-        return rows(self.structure, scene.values)
+    def rows(self, here: PatternValues) -> Array:
+        return rows(self.pattern, here.values)
 
-    def expressed(self, scene: Scene) -> Array:
+    def expressed(self, here: PatternValues) -> Array:
         import sympy
 
         if isinstance(self.expression, sympy.Determinant):
-            return np.linalg.det(plucker(self.structure, scene.values)) if self.signed else super().expressed(scene)
-        found = evaluate(self.expression, scene.values)
+            return np.linalg.det(plucker(self.pattern, here.values)) if self.signed else super().expressed(here)
+        found = evaluate(self.expression, here.values)
         return found if self.signed else np.sqrt(np.abs(found))
 
 
@@ -76,78 +76,78 @@ class General(Condition):
 
     question: Measurement = field(kw_only=True)
 
-    def rows(self, scene: Scene) -> Array:
-        return np.array([interaction(at, self.question) for at in scene.configurations])
+    def rows(self, here: PatternValues) -> Array:
+        return np.array([interaction(at, self.question) for at in here.configurations])
 
 
-def rows(structure: Structure, values: Values) -> Array:
+def rows(pattern: ConstraintPattern, values: Values) -> Array:
     """The rows of all legs, and those that keep to a plane."""
     blocks = []
-    some = values[structure.legs[0].tip.symbol]
+    some = values[pattern.legs[0].tip.symbol]
     eye = np.broadcast_to(np.eye(3), (len(some), 3, 3))
     zero = np.zeros_like(eye)
-    for leg in structure.legs:
-        match structure.motion:
+    for leg in pattern.legs:
+        match pattern.motion:
             case "translations":
                 J = eye
             case "bodies":
-                moves = float(leg.body in structure.bodies[1:])
-                J = np.concatenate([eye, moves * values[_symbol(structure.slide)][:, :, None]], axis=2)
+                moves = float(leg.body in pattern.bodies[1:])
+                J = np.concatenate([eye, moves * values[_symbol(pattern.slide)][:, :, None]], axis=2)
             case _:
                 J = np.concatenate([eye, -hats(values[leg.tip.symbol])], axis=2)
         blocks.append(forbidden(leg, values) @ J)
-    if structure.motion == "planar":
-        n = values[_symbol(structure.plane)]
+    if pattern.motion == "planar":
+        n = values[_symbol(pattern.plane)]
         blocks.append(np.concatenate([n[:, None, :], np.zeros((len(n), 1, 3))], axis=2))
         blocks.append(np.concatenate([zero, projectors(n)], axis=2))
     return np.concatenate(blocks, axis=1)
 
 
-def plucker(structure: Structure, values: Values) -> Array:
+def plucker(pattern: ConstraintPattern, values: Values) -> Array:
     """The lines (n_i, B_i × n_i) through the tips along the legs' normals, (n, legs, 6)."""
-    pairs = [(values[_symbol(leg.normal)], values[leg.tip.symbol]) for leg in structure.legs]
+    pairs = [(values[_symbol(leg.normal)], values[leg.tip.symbol]) for leg in pattern.legs]
     return np.stack([np.concatenate([n, np.cross(B, n)], axis=-1) for n, B in pairs], axis=1)
 
 
-def condition(structure: Structure, question: Measurement) -> Condition:
-    """The condition of a structure: by name where its pattern is a known one, else by the screws of all joints."""
-    if structure.motion == "other":
+def condition(pattern: ConstraintPattern, question: Measurement) -> Condition:
+    """The condition of a pattern: by name where it is a known one, else by the screws of all joints."""
+    if pattern.motion == "other":
         return _general(question)
-    if any(leg.fixed for leg in structure.legs) and structure.motion == "translations":
-        return Named("never: a held leg leaves the platform no motion", _number(1), never=True, structure=structure)
-    lines = [leg for leg in structure.legs if leg.line is not None]
-    if structure.motion == "translations":
-        return _translations(structure, lines)
-    normals = [leg for leg in structure.legs if leg.normal is not None]
-    fixed = [leg for leg in structure.legs if leg.fixed]
-    if structure.motion == "spatial" and len(normals) == len(structure.legs) == 6:
-        return _complex(structure, normals)
-    if structure.motion == "planar" and (len(lines), len(fixed)) == (1, 1):
-        return _pivot(structure, lines[0], fixed[0])
-    if len(lines) == len(structure.legs):
-        if structure.motion == "planar" and len(lines) == 3:
-            return _planar(structure, lines)
-        if structure.motion == "spatial" and len(lines) == 3:
-            return _spatial(structure, lines)
-        if structure.motion == "bodies" and len(lines) == 2 and lines[0].body != lines[1].body:
-            return _bodies(structure, lines)
-    return _gram(structure)
+    if any(leg.fixed for leg in pattern.legs) and pattern.motion == "translations":
+        return Named("never: a held leg leaves the platform no motion", _number(1), never=True, pattern=pattern)
+    lines = [leg for leg in pattern.legs if leg.line is not None]
+    if pattern.motion == "translations":
+        return _translations(pattern, lines)
+    normals = [leg for leg in pattern.legs if leg.normal is not None]
+    fixed = [leg for leg in pattern.legs if leg.fixed]
+    if pattern.motion == "spatial" and len(normals) == len(pattern.legs) == 6:
+        return _complex(pattern, normals)
+    if pattern.motion == "planar" and (len(lines), len(fixed)) == (1, 1):
+        return _pivot(pattern, lines[0], fixed[0])
+    if len(lines) == len(pattern.legs):
+        if pattern.motion == "planar" and len(lines) == 3:
+            return _planar(pattern, lines)
+        if pattern.motion == "spatial" and len(lines) == 3:
+            return _spatial(pattern, lines)
+        if pattern.motion == "bodies" and len(lines) == 2 and lines[0].body != lines[1].body:
+            return _bodies(pattern, lines)
+    return _gram(pattern)
 
 
-def _translations(structure: Structure, lines: Sequence[LockedLeg]) -> Condition:
+def _translations(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
     dot, cross, det = products()
     symbols = [vector(_symbol(leg.line)) for leg in lines]
-    normals = [vector(_symbol(leg.normal)) for leg in structure.legs if leg.normal is not None]
+    normals = [vector(_symbol(leg.normal)) for leg in pattern.legs if leg.normal is not None]
     names = _listed(leg.line for leg in lines)
-    constant = all(isinstance(leg.line, Carried) and leg.line.link == structure.base for leg in lines)
+    constant = all(isinstance(leg.line, BodyVector) and leg.line.link == pattern.base for leg in lines)
     signed = False
     if not lines:
         expression = sum(det(*triple) ** 2 for triple in combinations(normals, 3))
-        words = f"{_listed(leg.normal for leg in structure.legs)} are parallel to one plane"
+        words = f"{_listed(leg.normal for leg in pattern.legs)} are parallel to one plane"
         if len(normals) == 3:
             expression, signed = det(*normals), True
-    elif not normals and len(lines) == 2 and structure.plane is not None:
-        expression, signed = det(vector(_symbol(structure.plane)), *symbols), True
+    elif not normals and len(lines) == 2 and pattern.plane is not None:
+        expression, signed = det(vector(_symbol(pattern.plane)), *symbols), True
         words = f"{names} are parallel"
     elif not normals:
         expression = sum(dot(cross(a, b), cross(a, b)) for a, b in combinations(symbols, 2))
@@ -160,23 +160,23 @@ def _translations(structure: Structure, lines: Sequence[LockedLeg]) -> Condition
     if constant and not normals and len(lines) > 1:
         several = "all " if len(lines) > 2 else ""
         never = f"never: {names} are constant and not {several}parallel"
-        return _named(structure, never, expression, False, never=True)
-    if reason := _apart(structure):
-        return _named(structure, f"never: {reason}", expression, False, never=True)
-    return _named(structure, words, expression, signed)
+        return _named(pattern, never, expression, False, never=True)
+    if reason := _apart(pattern):
+        return _named(pattern, f"never: {reason}", expression, False, never=True)
+    return _named(pattern, words, expression, signed)
 
 
-def _apart(structure: Structure) -> str | None:
+def _apart(pattern: ConstraintPattern) -> str | None:
     """Why held legs leave no translation x in common at any pose, None where this is not known: x would have to lie
     along each line that is constant, and be normal to each constant axis about which a tip turns and to each constant
     normal of a tip's plane; no x does where these rows have rank 3."""
     rows, reasons = [], []
-    for leg in structure.legs:
+    for leg in pattern.legs:
         line, axis = leg.line, leg.line.axis if isinstance(leg.line, Tangent) else leg.normal
-        if isinstance(line, Carried) and line.link == structure.base:
+        if isinstance(line, BodyVector) and line.link == pattern.base:
             rows.append(np.eye(3) - np.outer(line.direction, line.direction))
             reasons.append(f"along {_symbol(line)}")
-        elif isinstance(axis, Carried) and axis.link == structure.base:
+        elif isinstance(axis, BodyVector) and axis.link == pattern.base:
             rows.append(axis.direction[None])
             reasons.append(f"normal to the {axis.meaning}")
     if not rows or np.linalg.svd(np.vstack(rows), compute_uv=False)[2:].sum() <= SAME_RELATION:
@@ -184,20 +184,20 @@ def _apart(structure: Structure) -> str | None:
     return f"a translation that all legs leave would be {_and(reasons)}, which are constant, and there is none"
 
 
-def _planar(structure: Structure, lines: Sequence[LockedLeg]) -> Condition:
+def _planar(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
     """det of the tips' normals s_i = (n × τ_i; B_i·τ_i) as lines of the plane: s1·(s2 × s3)."""
     dot, _, det = products()
-    n = vector(_symbol(structure.plane))
+    n = vector(_symbol(pattern.plane))
     tau = [vector(_symbol(leg.line)) for leg in lines]
     tips = [vector(leg.tip.symbol) for leg in lines]
     expression = sum(dot(tips[i], tau[i]) * det(n, tau[(i + 1) % 3], tau[(i + 2) % 3]) for i in range(3))
     at = ", ".join(leg.tip.symbol for leg in lines)
     kinds = _kinds(lines, "normal to")
     words = f"the lines through {at}, {kinds}, meet in a point or are parallel"
-    return _named(structure, words, expression, True)
+    return _named(pattern, words, expression, True)
 
 
-def _spatial(structure: Structure, lines: Sequence[LockedLeg]) -> Condition:
+def _spatial(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
     """The tips' speeds along their lines that keep |B_i B_j|: a 3 × 3 determinant."""
     dot, _, _ = products()
     line = [vector(_symbol(leg.line)) for leg in lines]
@@ -210,18 +210,18 @@ def _spatial(structure: Structure, lines: Sequence[LockedLeg]) -> Condition:
     names = [leg.tip.symbol for leg in lines]
     words = (f"the planes through {', '.join(names)} {_kinds(lines, 'normal to')}, and the plane {''.join(names)}, "
              "meet in a point (which may lie at infinity)")
-    return _named(structure, words, forth - back, True)
+    return _named(pattern, words, forth - back, True)
 
 
-def _pivot(structure: Structure, line: LockedLeg, fixed: LockedLeg) -> Condition:
+def _pivot(pattern: ConstraintPattern, line: LockedLeg, fixed: LockedLeg) -> Condition:
     """One tip rests: the platform turns about it where the other tip's line is the path of that turn."""
     dot, _, _ = products()
     one, other, along = fixed.tip.symbol, line.tip.symbol, _symbol(line.line)
     words = f"the line {one}{other} is normal to {along}"
-    return _named(structure, words, dot(vector(other) - vector(one), vector(along)), True)
+    return _named(pattern, words, dot(vector(other) - vector(one), vector(along)), True)
 
 
-def _complex(structure: Structure, legs: Sequence[LockedLeg]) -> Condition:
+def _complex(pattern: ConstraintPattern, legs: Sequence[LockedLeg]) -> Condition:
     """Six forces along lines through the tips: their Plücker coordinates are dependent."""
     import sympy
 
@@ -229,52 +229,52 @@ def _complex(structure: Structure, legs: Sequence[LockedLeg]) -> Condition:
     words = (f"the lines through {', '.join(leg.tip.symbol for leg in legs)} along "
              f"{', '.join(_symbol(leg.normal) for leg in legs)} belong to one linear complex")
     expression = sympy.Determinant(sympy.MatrixSymbol("L", 6, 6))
-    return _named(structure, words, expression, True, matrices={"L": "rows " + ", ".join(lines)})
+    return _named(pattern, words, expression, True, matrices={"L": "rows " + ", ".join(lines)})
 
 
-def _bodies(structure: Structure, lines: Sequence[LockedLeg]) -> Condition:
+def _bodies(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
     _, _, det = products()
-    slide = vector(_symbol(structure.slide))
+    slide = vector(_symbol(pattern.slide))
     expression = det(*(vector(_symbol(leg.line)) for leg in lines), slide)
     words = (f"{_listed(leg.line for leg in lines)} and the direction {slide}, in which the platform's halves move on "
              "each other, are parallel to one plane")
-    return _named(structure, words, expression, True)
+    return _named(pattern, words, expression, True)
 
 
-def _gram(structure: Structure) -> Condition:
+def _gram(pattern: ConstraintPattern) -> Condition:
     """det Σ J_iᵀ N_i J_i: more rows than freedoms, they must lose rank together."""
     import sympy
 
-    size = 4 if structure.motion == "bodies" else 6
+    size = 4 if pattern.motion == "bodies" else 6
     total = sympy.ZeroMatrix(size, size)
     matrices = []
-    for leg in structure.legs:
+    for leg in pattern.legs:
         label, moving = leg.tip.symbol[1:], leg.line or leg.normal
         J, N = sympy.MatrixSymbol(f"J{label}", 3, size), sympy.MatrixSymbol(f"N{label}", 3, 3)
         total += J.T * N * J
-        slides = "[I, e]" if leg.body in structure.bodies[1:] else "[I, 0]"
-        matrices.append((J.name, slides if structure.motion == "bodies" else f"[I, -[{leg.tip.symbol}]x]"))
+        slides = "[I, e]" if leg.body in pattern.bodies[1:] else "[I, 0]"
+        matrices.append((J.name, slides if pattern.motion == "bodies" else f"[I, -[{leg.tip.symbol}]x]"))
         name = "" if moving is None else _symbol(moving)
         across = "I" if leg.fixed else f"I - {name} {name}^T" if leg.line is not None else f"{name} {name}^T"
         matrices.append((N.name, across))
-    moves = _moves(structure.legs)
-    if structure.motion == "bodies":
+    moves = _moves(pattern.legs)
+    if pattern.motion == "bodies":
         words = f"the platform's halves can translate, one along e relative to the other, and move {moves}"
     else:
         words = f"some motion of the platform moves {moves}"
-    return _named(structure, words, sympy.Determinant(total), False, matrices=dict(matrices))
+    return _named(pattern, words, sympy.Determinant(total), False, matrices=dict(matrices))
 
 
-def _named(structure: Structure, words: str, expression: Any, signed: bool, *, never: bool = False,
+def _named(pattern: ConstraintPattern, words: str, expression: Any, signed: bool, *, never: bool = False,
            matrices: Mapping[str, str] | None = None) -> Named:
     """A condition with the meaning of its symbols and the factors that were split off."""
     import sympy
 
     expression = sympy.sympify(expression)
     used = {str(symbol) for symbol in expression.free_symbols}
-    named = {f.symbol: f.meaning for f in structure.features if f.symbol in used or matrices}
-    return Named(words.replace("tau", "τ"), expression, signed, tuple(_lengths(structure.legs)), never,
-                 {**(matrices or {}), **dict(sorted(named.items()))}, structure=structure)
+    named = {f.symbol: f.meaning for f in pattern.features if f.symbol in used or matrices}
+    return Named(words.replace("tau", "τ"), expression, signed, tuple(_lengths(pattern.legs)), never,
+                 {**(matrices or {}), **dict(sorted(named.items()))}, pattern=pattern)
 
 
 def _general(question: Measurement) -> General:
@@ -289,24 +289,24 @@ def _general(question: Measurement) -> General:
     return General(words, sympy.Determinant(M.T * M), where=where, question=question)
 
 
-def always(structure: Structure, lost: Sequence[str]) -> str:
+def always(pattern: ConstraintPattern, lost: Sequence[str]) -> str:
     """Words for a robot that loses a freedom everywhere."""
     text = f"always: {'; '.join(lost)} {'is' if len(lost) == 1 else 'are'} never seen"
-    lines = [leg for leg in structure.legs if leg.line is not None]
-    if structure.motion != "planar" and len(lines) == len(structure.legs) > 0:
-        constant = all(isinstance(leg.line, Carried) and leg.line.link == structure.base for leg in lines)
+    lines = [leg for leg in pattern.legs if leg.line is not None]
+    if pattern.motion != "planar" and len(lines) == len(pattern.legs) > 0:
+        constant = all(isinstance(leg.line, BodyVector) and leg.line.link == pattern.base for leg in lines)
         parallel = constant and all(_parallel(lines[0].line, leg.line) for leg in lines)
         if parallel and len(lines) > 1:
             return f"{text}, because {_listed(leg.line for leg in lines)} are parallel"
     return text
 
 
-def _parallel(a: Feature | None, b: Feature | None) -> bool:
-    return (isinstance(a, Carried) and isinstance(b, Carried)
+def _parallel(a: NamedVector | None, b: NamedVector | None) -> bool:
+    return (isinstance(a, BodyVector) and isinstance(b, BodyVector)
             and bool(np.linalg.norm(np.cross(a.direction, b.direction)) < SAME_RELATION))
 
 
-def _listed(features: Iterable[Feature | None]) -> str:
+def _listed(features: Iterable[NamedVector | None]) -> str:
     """``the tangents tau1, tau2`` and the like, by what the vectors are."""
     groups: dict[str, list[str]] = {}
     for feature in features:
@@ -344,10 +344,10 @@ def _kinds(lines: Sequence[LockedLeg], relation: str) -> str:
 def _lengths(lines: Sequence[LockedLeg]) -> list[str]:
     """Factors that vanish only where a crank has no length: none for unit vectors that are fixed in a link."""
     return [f"|{leg.line.meaning.removeprefix('tangent ')}|" for leg in lines
-            if leg.line is not None and not isinstance(leg.line, Carried)]
+            if leg.line is not None and not isinstance(leg.line, BodyVector)]
 
 
-def _symbol(feature: Feature | None) -> str:
+def _symbol(feature: NamedVector | None) -> str:
     assert feature is not None
     return feature.symbol
 
