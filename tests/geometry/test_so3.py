@@ -18,7 +18,7 @@ from hrsynth.geometry.so3 import (
     turn_about,
     wrapped,
 )
-from hrsynth.geometry.vectors import Array, hat, hats, rotation_from_rpy
+from hrsynth.geometry.vectors import Array, hat, rotation_from_rpy
 from hrsynth.mechanism.pose import Pose, rpy_of
 
 NEAR = 1e-12
@@ -62,7 +62,7 @@ def test_many_at_once_are_as_one_by_one() -> None:
     for place in np.ndindex(4, 5):
         assert R[place] == pytest.approx(exponential(vectors[place]), abs=1e-15)
         assert logarithm(R)[place] == pytest.approx(logarithm(R[place]), abs=1e-14)
-        assert hats(vectors)[place] == pytest.approx(hat(vectors[place]))
+        assert hat(vectors)[place] == pytest.approx(hat(vectors[place]))
 
 
 @given(axes, angles)

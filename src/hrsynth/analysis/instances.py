@@ -19,10 +19,12 @@ import numpy as np
 from ..budgets import LARGEST_RANDOM
 from ..geometry.incidences import Incidence
 from ..geometry.ranks import rank_of
+from ..geometry.screws import normals
+from ..geometry.vectors import Numbers, cross
 from ..mechanism import Joint, Mechanism, graphs
 from ..mechanism.observation import Direction
 from ..mechanism.relations import Relations, Sight
-from ..mechanism.screws import Numbers, allowed, cross, normals
+from ..mechanism.screws import allowed
 from ..tolerances import RANK_CUTOFF, RANK_GAP
 
 if TYPE_CHECKING:
@@ -117,11 +119,11 @@ def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[
     t = velocities[mechanism.platform]
     if relations.point is not None:
         point, scale = scaled(drawn.centres[relations.point])
-        t = scale * t[:3] + cross(t[3:], point)
+        t = scale * t[:3] + cross(t[3:], point[:, None], axis=-2)
     parts = [t]
     for observation, sight in zip(observations, relations.sights, strict=True):
         turn = velocities[observation.link] - velocities[observation.seen_from or mechanism.reference]
-        parts.append(cross(scaled(seen(sight, drawn))[0], turn[3:]))
+        parts.append(cross(scaled(seen(sight, drawn))[0][:, None], turn[3:], axis=-2))
     rows, (free, _) = np.vstack(parts), _reduced(loops)
     t, *rates = np.split(_times(rows, free), np.cumsum([len(part) for part in parts[:-1]]))
     return Instance(drawn, t, tuple(rates), velocities, free)

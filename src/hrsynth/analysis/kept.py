@@ -15,13 +15,14 @@ identity's degree by the range of the numbers (Schwartz and Zippel), of which :f
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from functools import partial
 from itertools import groupby
 
 import numpy as np
 
+from ..geometry.vectors import Numbers, cross, dot
 from ..mechanism.carried import Tie
 from ..mechanism.relations import Relations
-from ..mechanism.screws import Numbers
 from .instances import Instance, scaled
 
 
@@ -116,12 +117,4 @@ def _rate(times: Callable[[Numbers, Numbers], Numbers], a: Numbers, da: Numbers,
     return np.asarray(times(da, b) + times(a, db))
 
 
-def _cross(a: Numbers, b: Numbers) -> Numbers:
-    """a × b along the last dimension but one."""
-    (a0, a1, a2), (b0, b1, b2) = np.moveaxis(a, -2, 0), np.moveaxis(b, -2, 0)
-    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-2)
-
-
-def _dot(a: Numbers, b: Numbers) -> Numbers:
-    """a · b along the last dimension but one."""
-    return np.asarray((a * b).sum(axis=-2))
+_cross, _dot = partial(cross, axis=-2), partial(dot, axis=-2)

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..budgets import CHAIN_STEP, CHAIN_STEPS
 from ..geometry.so3 import exponential, logarithm
-from ..geometry.vectors import Array, hats, inverse, perpendicular
+from ..geometry.vectors import Array, hat, inverse, perpendicular
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg
 from ..mechanism.observation import Direction
@@ -177,7 +177,7 @@ class Chain:
         twists = np.zeros((len(X), len(self.links), 6, 6))
         twists[:, given] = np.eye(6)
         twists[:, self.free] = -(back @ end).reshape(len(X), len(self.free), 6, 6)
-        minus = -hats(u)
+        minus = -hat(u)
         _, s, right = np.linalg.svd(np.concatenate([wrenches, np.zeros((len(X), 6, 6))], axis=1), full_matrices=False)
         return u, minus @ twists[:, number, 3:], right * (s > RANK_CUTOFF)[:, :, None]
 
@@ -240,7 +240,7 @@ class Ends:
         moves = np.broadcast_to(v, (len(self.R), *v.shape))
         if body is None:
             return np.concatenate([moves / self.chain.length, np.zeros_like(moves)], axis=1)
-        moves = moves - hats(self.R @ body.b) @ w
+        moves = moves - hat(self.R @ body.b) @ w
         turns = np.broadcast_to(w if body.turns else np.zeros_like(w), moves.shape)
         return np.concatenate([moves / self.chain.length, turns], axis=1)
 

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry.vectors import Array, hats
+from ..geometry.vectors import Array, hat
 from ..kinematics.locked import interaction
 from ..kinematics.relation import Measurement
 from ..tolerances import SAME_RELATION
@@ -94,7 +94,7 @@ def rows(pattern: ConstraintPattern, values: Values) -> Array:
                 moves = float(leg.body in pattern.bodies[1:])
                 J = np.concatenate([eye, moves * values[_symbol(pattern.slide)][:, :, None]], axis=2)
             case _:
-                J = np.concatenate([eye, -hats(values[leg.tip.symbol])], axis=2)
+                J = np.concatenate([eye, -hat(values[leg.tip.symbol])], axis=2)
         blocks.append(forbidden(leg, values) @ J)
     if pattern.motion == "planar":
         n = values[_symbol(pattern.plane)]

@@ -14,7 +14,7 @@ from itertools import combinations
 import numpy as np
 
 from ..geometry.ranks import range_basis
-from ..geometry.vectors import Array, frozen, hats
+from ..geometry.vectors import Array, frozen, hat
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import leg_twists, split
 from ..kinematics.relation import Measurement, relation
@@ -109,7 +109,7 @@ class PatternValues:
         origins: its tip's velocity across V_i, and a turn where it allows none."""
         arms = leg.tip.value(self._poses) - self._poses[leg.body][:, :3, 3]
         across = forbidden(leg, self.values)
-        blocks = np.concatenate([across, -across @ hats(arms)], axis=2)
+        blocks = np.concatenate([across, -across @ hat(arms)], axis=2)
         if leg.turns == 0:
             turns = np.broadcast_to(np.eye(3, 6, 3), (len(arms), 3, 6))
             blocks = np.concatenate([blocks, turns], axis=1)

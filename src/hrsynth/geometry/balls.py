@@ -11,26 +11,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .vectors import Array
+from .vectors import Array, dot
 
 Field = NDArray[Any]
 """Floats, or objects that are balls."""
-
-
-def dot(a: Field, b: Field) -> Field:
-    """a·b along the last axis."""
-    return np.asarray((a * b).sum(-1))
-
-
-def cross(a: Field, b: Field) -> Field:
-    """a × b along the last axis."""
-    (ax, ay, az), (bx, by, bz) = np.moveaxis(a, -1, 0), np.moveaxis(b, -1, 0)
-    return np.stack(np.broadcast_arrays(ay * bz - az * by, az * bx - ax * bz, ax * by - ay * bx), -1)
-
-
-def det(a: Field, b: Field, c: Field) -> Field:
-    """a·(b × c) along the last axis."""
-    return dot(a, cross(b, c))
 
 
 def normed(v: Field) -> Field:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from ..budgets import SURELY_MEANT
 from ..tolerances import RANK_GAP, SAME_POINT
-from .vectors import Array, crossed
+from .vectors import Array, cross, dot
 
 Indices = NDArray[np.intp]
 
@@ -73,11 +73,6 @@ def rows(tuples: Iterable[Sequence[int]], k: int) -> Indices:
     return np.array(list(tuples), dtype=np.intp).reshape(-1, k)
 
 
-def triple(a: Array, b: Array, c: Array) -> Array:
-    """a · (b × c) along the last dimension."""
-    return np.asarray(np.sum(a * crossed(b, c), axis=-1))
-
-
 def incidences(sieve: Sieve, classes: Array, points: Array, together: NDArray[np.bool_], owns: Sequence[set[int]],
                slides: Sequence[set[int]]) -> list[Incidence]:
     """All incidences of ``points`` (n, configurations, 3) towards ``classes`` of directions (m, configurations, 3).
@@ -89,10 +84,10 @@ def incidences(sieve: Sieve, classes: Array, points: Array, together: NDArray[np
         return np.asarray(points[c[:, 1], s] - points[c[:, 0], s])
 
     def along(c: Indices, s: slice) -> Array:
-        return crossed(between(c, s), classes[c[:, 2], s])
+        return cross(between(c, s), classes[c[:, 2], s])
 
     def across(c: Indices, s: slice) -> Array:
-        return np.asarray(np.sum(between(c, s) * classes[c[:, 2], s], axis=-1))
+        return dot(between(c, s), classes[c[:, 2], s])
 
     count = range(len(classes))
     pairs = choices(len(points), 2)
@@ -116,7 +111,7 @@ def _parallelograms(sieve: Sieve, classes: Array, points: Array, together: NDArr
         return np.asarray(points[c[:, 0], s] - points[c[:, 1], s] - points[c[:, 2], s] + points[c[:, 3], s])
 
     def gap_across(c: Indices, s: slice) -> Array:
-        return crossed(gap(c, s), classes[c[:, 4], s])
+        return cross(gap(c, s), classes[c[:, 4], s])
 
     beside = [set(np.flatnonzero(each).tolist()) - {i} for i, each in enumerate(together)]
     quads = [(i, j, k, m) for i, near in enumerate(beside) for j, k in combinations(sorted(near), 2)

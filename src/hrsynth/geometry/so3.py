@@ -10,13 +10,13 @@ import math
 
 import numpy as np
 
-from .vectors import Array, hats
+from .vectors import Array, hat
 
 
 def exponential(vectors: Array) -> Array:
     """The rotations (..., 3, 3) of rotation vectors (..., 3): I + sin θ / θ [v]ₓ + (1 − cos θ) / θ² [v]ₓ²."""
     angle = np.linalg.norm(vectors, axis=-1)[..., None, None] / np.pi
-    K = hats(vectors)
+    K = hat(vectors)
     return np.asarray(np.eye(3) + np.sinc(angle) * K + 0.5 * np.sinc(0.5 * angle) ** 2 * (K @ K))
 
 
@@ -41,7 +41,7 @@ def angle_of(R: Array) -> float:
 def logarithm_rate(vector: Array) -> Array:
     """The map (3, 3) from the angular velocity to the rate of the rotation vector, shorter than 2π:
     I − [v]ₓ/2 + (1/θ² − cot(θ/2) / 2θ) [v]ₓ²."""
-    angle, K = float(np.linalg.norm(vector)), hats(vector)
+    angle, K = float(np.linalg.norm(vector)), hat(vector)
     factor = 1 / 12 if angle < 1e-3 else 1 / angle**2 - 1 / (2 * angle * math.tan(angle / 2))
     return np.asarray(np.eye(3) - 0.5 * K + factor * K @ K)
 

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 Array = NDArray[np.float64]
+Numbers = NDArray[Any]
+"""Floats, or objects: whole and rational numbers, balls, duals."""
 
 
 def frozen(values: ArrayLike) -> Array:
@@ -26,27 +29,48 @@ def unit(vector: ArrayLike) -> Array:
     return array / length
 
 
-def crossed(a: Array, b: Array) -> Array:
-    """a × b along the last dimension (…, 3), without the bookkeeping of ``numpy.cross``, slow for few vectors."""
-    found = np.empty(np.broadcast(a, b).shape)
-    for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        found[..., i] = a[..., j] * b[..., k] - a[..., k] * b[..., j]
+def dot(a: Numbers, b: Numbers, axis: int = -1) -> Numbers:
+    """a · b along one dimension."""
+    return np.asarray((a * b).sum(axis))
+
+
+def cross(a: Numbers, b: Numbers, axis: int = -1) -> Numbers:
+    """a × b along one dimension (counted from the last), without the bookkeeping of ``numpy.cross``, slow for few
+    vectors."""
+    kind = a.dtype if a.dtype == b.dtype else np.result_type(a, b)
+    if a.ndim == b.ndim == 1:
+        (x, y, z), (u, v, w) = a.tolist(), b.tolist()
+        found = np.empty(3, kind)
+        found[0], found[1], found[2] = y * w - z * v, z * u - x * w, x * v - y * u
+        return found
+    found = np.empty(np.broadcast(a, b).shape, kind)
+    X, Y, Z = ((..., i, *[slice(None)] * (-1 - axis)) for i in range(3))
+    for i, j, k in ((X, Y, Z), (Y, Z, X), (Z, X, Y)):
+        found[i] = a[j] * b[k] - a[k] * b[j]
     return found
 
 
-def hat(vector: ArrayLike) -> Array:
-    """The matrix [v]ₓ with [v]ₓ w = v × w; shape (3, 3)."""
-    x, y, z = np.asarray(vector, dtype=float)
-    return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+def triple(a: Numbers, b: Numbers, c: Numbers) -> Numbers:
+    """a · (b × c) along the last dimension."""
+    return dot(a, cross(b, c))
 
 
-def hats(vectors: Array) -> Array:
-    """The matrices [v]ₓ (..., 3, 3) of vectors (..., 3)."""
-    found = np.zeros((*vectors.shape, 3))
+def hat(vectors: ArrayLike) -> Array:
+    """The matrices [v]ₓ (..., 3, 3) of vectors (..., 3): [v]ₓ w = v × w."""
+    v = np.asarray(vectors, dtype=float)
+    if v.ndim == 1:
+        x, y, z = v
+        return np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    found = np.zeros((*v.shape, 3))
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
-        found[..., k, j] = vectors[..., i]
-        found[..., j, k] = -vectors[..., i]
+        found[..., k, j] = v[..., i]
+        found[..., j, k] = -v[..., i]
     return found
+
+
+def angle_between(one: Array, other: Array) -> float:
+    """The angle of two vectors, 0 to π."""
+    return float(np.arctan2(np.linalg.norm(cross(one, other)), one @ other))
 
 
 def pose(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = None) -> Array:

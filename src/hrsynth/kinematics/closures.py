@@ -19,9 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry.balls import Field, around, cross
+from ..geometry.balls import Field, around
 from ..geometry.so3 import logarithm
-from ..geometry.vectors import Array, inverse, perpendicular
+from ..geometry.vectors import Array, cross, inverse, perpendicular
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY
 from .ways import Part
 

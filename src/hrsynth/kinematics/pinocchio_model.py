@@ -13,10 +13,9 @@ import pinocchio as pin
 
 from ..budgets import LARGEST_MODEL
 from ..errors import BadMechanism, BadRequest
-from ..geometry.vectors import Array
+from ..geometry.vectors import Array, cross
 from ..mechanism import Joint, JointType, Mechanism, graphs
 
-_NEXT, _LAST = [1, 2, 0], [2, 0, 1]
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
 
 
@@ -217,7 +216,7 @@ class PinocchioModel:
         """Poses (k, 4, 4) and velocities (k, 6, nv) of several links at once."""
         X = self.poses(q, links)
         V = self.data.J * self._several[links][2]
-        V[:, :3] += _cross_rows(V[:, 3:], X[:, :3, 3] / self.length)
+        V[:, :3] += cross(V[:, 3:], X[:, :3, 3, None] / self.length, axis=-2)
         return X, V
 
     def poses(self, q: Array, links: tuple[str, ...]) -> Array:
@@ -255,8 +254,3 @@ class PinocchioModel:
     def actuated(self) -> list[int]:
         """Velocity indices of the actuated joints' coordinates."""
         return [i for joint in self.mechanism.joints.values() if joint.actuated for i in self.coordinates[joint.name]]
-
-
-def _cross_rows(omega: Array, arms: Array) -> Array:
-    """ω × r for each column of ω (k, 3, n) and each arm r (k, 3)."""
-    return omega[:, _NEXT] * arms[:, _LAST, None] - omega[:, _LAST] * arms[:, _NEXT, None]

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ..geometry.balls import Field, around, cross, dot
-from ..geometry.vectors import Array
+from ..geometry.balls import Field, around
+from ..geometry.vectors import Array, cross, dot
 from ..mechanism.wrist import Wrist
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY, SAME_POINT
 from .configuration import ClosedConfiguration

@@ -17,12 +17,12 @@ import numpy as np
 
 from ..errors import BadMechanism
 from ..geometry import lines
-from ..geometry.vectors import Array
+from ..geometry.vectors import Array, angle_between
 from ..tolerances import SAME_POINT
 from . import graphs
 from .model import Joint, JointType, Mechanism
 from .observation import Direction
-from .wrist import Interval, Wrist, between, chained
+from .wrist import Interval, Wrist, chained
 
 
 @dataclass(frozen=True, eq=False)
@@ -148,13 +148,13 @@ def _wrist(*joints: Joint) -> Wrist | None:
     span: Interval = 0.0, 0.0
     for joint in joints:
         if joint.axes:
-            angle = between(joint.axes[0], joint.axes[-1])
+            angle = angle_between(joint.axes[0], joint.axes[-1])
             first, last, own = joint.axes[0], joint.axes[-1], (angle, angle)
         elif joint.wrist is not None:
             first, last, own = joint.wrist.first, joint.wrist.last, (joint.wrist.low, joint.wrist.high)
         else:
             return None
-        span = own if ends is None else chained(span, between(ends[1], first), own)
+        span = own if ends is None else chained(span, angle_between(ends[1], first), own)
         ends = (first if ends is None else ends[0]), last
     return None if ends is None else Wrist.of(*ends, span)
 

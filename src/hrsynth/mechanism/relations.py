@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import lines
-from ..geometry.incidences import Incidence, Sieve, choices, incidences, triple
-from ..geometry.vectors import Array, crossed, inverse, unit
+from ..geometry.incidences import Incidence, Sieve, choices, incidences
+from ..geometry.vectors import Array, cross, dot, inverse, triple, unit
 from ..tolerances import RANK_GAP, SAME_DIRECTION, SAME_PLANE, SAME_POINT
 from . import graphs
 from .model import Joint, JointType, Mechanism
@@ -181,7 +181,7 @@ class _Drawing:
 
         def on_axis(point: Array, joint: Joint) -> bool:
             arm, axis = point - self.points[self.centres[joint.name]], self.directions[self.axes[joint.name][0]]
-            return bool(np.max(np.abs(crossed(arm, axis))) < near)
+            return bool(np.max(np.abs(cross(arm, axis))) < near)
 
         found: list[tuple[str, Array]] = []
         for a, b in combinations(turning, 2):
@@ -212,7 +212,7 @@ class _Drawing:
 
 def _parallels(sieve: Sieve, D: Array) -> tuple[Array, list[int]]:
     """One direction of each class of parallels (classes, configurations, 3), and the class of each direction."""
-    pairs = sieve.held(choices(len(D), 2), lambda c, s: crossed(D[c[:, 0], s], D[c[:, 1], s]), SAME_DIRECTION)
+    pairs = sieve.held(choices(len(D), 2), lambda c, s: cross(D[c[:, 0], s], D[c[:, 1], s]), SAME_DIRECTION)
     first = list(range(len(D)))
     for a, b in pairs.tolist():
         first[b] = min(first[b], first[a])
@@ -226,7 +226,7 @@ def _tower(sieve: Sieve, classes: Array) -> tuple[tuple[tuple[tuple[int, ...], .
     The last is the one that lies in the fewest different planes, and so on with the rest.
     """
     n = len(classes)
-    normal = sieve.held(choices(n, 2), lambda c, s: np.sum(classes[c[:, 0], s] * classes[c[:, 1], s], axis=-1),
+    normal = sieve.held(choices(n, 2), lambda c, s: dot(classes[c[:, 0], s], classes[c[:, 1], s]),
                         SAME_DIRECTION)
     planar = sieve.held(choices(n, 3), lambda c, s: triple(*(classes[c[:, i], s] for i in range(3))),
                         SAME_DIRECTION)
@@ -248,13 +248,13 @@ def _tower(sieve: Sieve, classes: Array) -> tuple[tuple[tuple[tuple[int, ...], .
 def _normal_of(classes: frozenset[int], directions: Array) -> Array:
     """The normal that one or two classes stand for."""
     first, *rest = (directions[c] for c in sorted(classes))
-    return unit(crossed(first, rest[0])) if rest else first
+    return unit(cross(first, rest[0])) if rest else first
 
 
 def _number(normal: Array, known: list[Array]) -> int:
     """The number of a normal among those known, to which it is added if it is new."""
     for number, other in enumerate(known):
-        if np.linalg.norm(crossed(normal, other)) < SAME_PLANE:
+        if np.linalg.norm(cross(normal, other)) < SAME_PLANE:
             return number
     known.append(normal)
     return len(known) - 1
@@ -265,7 +265,7 @@ def _sight(u: Array, classes: Array, points: Array, own: Sequence[int], near: Se
     def along(vectors: Array) -> bool:
         sizes = np.linalg.norm(vectors, axis=1)
         return bool(np.min(sizes) > SAME_POINT
-                    and np.max(np.linalg.norm(crossed(vectors, u), axis=1) / sizes) < SAME_DIRECTION)
+                    and np.max(np.linalg.norm(cross(vectors, u), axis=1) / sizes) < SAME_DIRECTION)
 
     for c, direction in enumerate(classes):
         if along(direction):
@@ -278,6 +278,6 @@ def _sight(u: Array, classes: Array, points: Array, own: Sequence[int], near: Se
             if along(between - classes[c] * np.sum(between * classes[c], axis=1, keepdims=True)):
                 return Sight("foot", (j, k), (c,))
     for a, b in combinations(near, 2):
-        if along(crossed(classes[a], classes[b])):
+        if along(cross(classes[a], classes[b])):
             return Sight("normal", classes=(a, b))
     return None

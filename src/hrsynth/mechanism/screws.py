@@ -1,7 +1,5 @@
-"""Screws of joints: the wrenches a joint transmits, and the constraints of a mechanism on the twists of its links.
-
-A twist (v, ω) is that of a body at the *origin of the base frame*, base axes; a wrench (f, m) is the linear form
-f·v + m·ω on it. Numbers may be floats or exact (object arrays): nothing here divides or takes roots.
+"""Screws of joints: the wrenches a joint transmits, the twists it allows, and the constraints of a mechanism on the
+twists of its links. Numbers may be floats or exact, as in :mod:`hrsynth.geometry.screws`.
 """
 
 from __future__ import annotations
@@ -10,45 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..geometry.screws import couple, force, normals, rotation, translation
+from ..geometry.vectors import Numbers, cross
 from .model import Joint, JointType
 
-Numbers = NDArray[Any]
 Geometry = Callable[[Joint], tuple[Numbers, Sequence[Numbers]]]
 """The centre and the axes of a joint, in base axes, at the configuration in question."""
-
-
-def cross(a: Numbers, b: Numbers) -> Numbers:
-    """a × b for numbers of any kind, shape (3,)."""
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
-
-
-def normals(axis: Numbers) -> tuple[Numbers, Numbers]:
-    """Two independent vectors normal to ``axis`` (not unit vectors)."""
-    smallest = min(range(3), key=lambda i: abs(axis[i]))
-    first = cross(axis, np.array([int(i == smallest) for i in range(3)], dtype=axis.dtype))
-    return first, cross(axis, first)
-
-
-def force(direction: Numbers, point: Numbers) -> Numbers:
-    """The wrench of a pure force through a point, (f, P × f)."""
-    return np.concatenate([direction, cross(point, direction)])
-
-
-def couple(direction: Numbers) -> Numbers:
-    """The wrench of a pure couple, (0, m)."""
-    return np.concatenate([0 * direction, direction])
-
-
-def rotation(axis: Numbers, point: Numbers) -> Numbers:
-    """The twist of a rotation about an axis through a point, (P × a, a)."""
-    return np.concatenate([cross(point, axis), axis])
-
-
-def translation(direction: Numbers) -> Numbers:
-    """The twist of a translation, (d, 0)."""
-    return np.concatenate([direction, 0 * direction])
 
 
 def transmitted(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.vectors import Array
+from ..geometry.vectors import Array, angle_between
 from ..tolerances import SAME_DIRECTION
 
 Interval = tuple[float, float]
@@ -54,14 +54,9 @@ class Wrist:
 
     def margin(self) -> float:
         """How far the angle is from the nearer end (rad); negative beyond it."""
-        angle = between(self.first, self.last)
+        angle = angle_between(self.first, self.last)
         return min(np.inf if self.lower is None else angle - self.lower,
                    np.inf if self.upper is None else self.upper - angle)
-
-
-def between(one: Array, other: Array) -> float:
-    """The angle of two unit vectors, 0 to π."""
-    return float(np.arctan2(np.linalg.norm(np.cross(one, other)), one @ other))
 
 
 def chained(one: Interval, gap: float, other: Interval) -> Interval:

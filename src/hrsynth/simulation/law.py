@@ -13,7 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.vectors import Array, hat
+from ..geometry.vectors import Array, cross, hat
 from ..kinematics.configuration import ClosedConfiguration, measure
 from ..kinematics.relation import Measurement
 from ..tolerances import DAMPED
@@ -64,21 +64,16 @@ class Law:
         """The command at a configuration (of the joint velocities of its twin)."""
         u, rates = directions(configuration, self.question)
         wanted, moving = desired
-        true = crossed(u, wanted)
+        true = cross(u.T, wanted.T, axis=-2).T
         seen = u if sensed is None else sensed(time, configuration.pose, u)
-        error = true if sensed is None else crossed(seen, wanted)
+        error = true if sensed is None else cross(seen, wanted)
         kernel, _ = configuration.kernel()
         rows = np.vstack([-hat(w) @ r for w, r in zip(wanted, rates, strict=True)]) @ kernel
         left, values, right = np.linalg.svd(rows, full_matrices=False)
         left, values, right = left[:, : self.dof], values[: self.dof], right[: self.dof]
-        asked = self.gain * error.ravel() + crossed(seen, moving).ravel()
+        asked = self.gain * error.ravel() + cross(seen, moving).ravel()
         velocity = -kernel @ (right.T @ (inverted(values) * (left.T @ asked)))
         return Command(velocity, true, u, seen, values, kernel @ right[-1])
-
-
-def crossed(a: Array, b: Array) -> Array:
-    """The products a_i × b_i of rows (k, 3)."""
-    return np.asarray(a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]])
 
 
 def inverted(values: Array) -> Array:

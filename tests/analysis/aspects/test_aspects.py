@@ -25,7 +25,8 @@ from hrsynth.analysis.aspects.region import Region
 from hrsynth.analysis.singularity.agreement import smallest_of
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
-from hrsynth.geometry.balls import balls, below, centred, cross, det, dot, jets
+from hrsynth.geometry.balls import balls, below, centred, jets
+from hrsynth.geometry.vectors import cross, dot, triple
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.sampling import wander
 from strategies import planar
@@ -283,8 +284,8 @@ _DYADIC = st.integers(-640, 640).map(lambda numerator: Fraction(numerator, 64))
 def test_products_of_balls_hold_the_products_of_numbers(entries: list[Fraction], width: int):
     exact = np.array(entries, dtype=object).reshape(3, 3)
     a, b, c = (balls([x - Fraction(width, 64) for x in v], [x + Fraction(width, 64) for x in v]) for v in exact)
-    numbers = [dot(*exact[:2]).item(), det(*exact).item(), *cross(*exact[:2])]
-    for ball, number in zip([dot(a, b).item(), det(a, b, c).item(), *cross(a, b)], numbers, strict=True):
+    numbers = [dot(*exact[:2]).item(), triple(*exact).item(), *cross(*exact[:2])]
+    for ball, number in zip([dot(a, b).item(), triple(a, b, c).item(), *cross(a, b)], numbers, strict=True):
         assert ball.contains(flint.fmpq(number.numerator, number.denominator))
         assert below(np.array([ball]))[0] <= abs(number)
 

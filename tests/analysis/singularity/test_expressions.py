@@ -13,7 +13,7 @@ from analysis.singularity.found import found
 from hrsynth.constraints.condition import Named
 from hrsynth.constraints.named_vectors import Tangent
 from hrsynth.constraints.vector_algebra import evaluate, products, vector
-from hrsynth.mechanism.screws import force
+from hrsynth.geometry.screws import force
 
 SEEDS = range(4)
 Vectors = dict[str, sympy.Matrix]

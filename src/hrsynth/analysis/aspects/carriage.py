@@ -13,7 +13,7 @@ import numpy as np
 
 from ...geometry.balls import Field, widened
 from ...geometry.so3 import exponential, logarithm
-from ...geometry.vectors import Array, hats, inverse
+from ...geometry.vectors import Array, hat, inverse
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement, relation
@@ -84,7 +84,7 @@ class Stretch:
         angle = float(np.linalg.norm(self.turn))
         R: Field = np.broadcast_to(self.R, (len(fractions), 3, 3))
         if angle > 0:
-            K = hats(self.turn / angle)
+            K = hat(self.turn / angle)
             sines, cosines = np.sin(fractions * angle), np.cos(fractions * angle)
             R = self.R + sines[:, None, None] * (K @ self.R) + (1 - cosines)[:, None, None] * (K @ K @ self.R)
         if p.dtype == object:

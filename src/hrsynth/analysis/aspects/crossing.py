@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.balls import Field, cross, widened
-from ...geometry.vectors import Array
+from ...geometry.balls import Field, widened
+from ...geometry.vectors import Array, cross
 from ...tolerances import FOLLOWED
 from .carriage import Carriage, Place, Rigid
 from .limbs import Limb, OnCrank, OnRail

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.balls import Field, cross, dot, normed, widened
-from ...geometry.vectors import Array
+from ...geometry.balls import Field, normed, widened
+from ...geometry.vectors import Array, cross, dot
 from ...tolerances import FOLLOWED
 from .carriage import Rigid
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...constraints.named_vectors import axis_of
-from ...geometry.balls import Field, cross, dot
+from ...geometry.balls import Field
 from ...geometry.so3 import wrapped
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, cross, dot
 from ...mechanism import Joint, JointType, Limits, Mechanism
 from ...tolerances import FOLLOWED, SAME_RELATION, TURNING_ARM
 from .sources import NoChart, Source

@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 
 from ...budgets import FINEST_INTERVAL, FIRST_INTERVALS
 from ...constraints.condition import Named, rows
-from ...geometry.balls import Field, above_zero, balls, below, centred, cross, det, dot, finite, jets
-from ...geometry.vectors import Array
+from ...geometry.balls import Field, above_zero, balls, below, centred, finite, jets
+from ...geometry.vectors import Array, cross, dot, triple
 from .carriage import Stretch
 from .chart import Chart
 from .crossing import Crossing
@@ -83,7 +83,7 @@ def _compiled(expression: Any) -> tuple[list[str], Callable[..., Any]]:
     import sympy
 
     names = sorted(str(symbol) for symbol in expression.free_symbols)
-    products = {"dot": dot, "cross": cross, "det": det}
+    products = {"dot": dot, "cross": cross, "det": triple}
     return names, sympy.lambdify([sympy.Symbol(name) for name in names], expression, modules=[products])
 
 

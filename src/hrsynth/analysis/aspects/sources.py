@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.balls import Field, cross, normed
-from ...geometry.vectors import Array
+from ...geometry.balls import Field, normed
+from ...geometry.vectors import Array, cross
 from .carriage import Rigid
 
 

@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from ...geometry import lines
+from ...geometry.screws import normals
 from ...geometry.vectors import Array, unit
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.locked import carried
@@ -23,7 +24,6 @@ from ...mechanism.composites import Edge
 from ...mechanism.legs import Leg, LegDecomposition
 from ...mechanism.notation import Rods
 from ...mechanism.observation import Direction, Encoder
-from ...mechanism.screws import normals
 from ...tolerances import RANK_GAP, SAME_DIRECTION, SAME_POINT
 
 

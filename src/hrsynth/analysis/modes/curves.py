@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...errors import BadRequest
-from ...geometry.vectors import Array, frozen, perpendicular
+from ...geometry.vectors import Array, cross, frozen, perpendicular
 from ...tolerances import EXACT
 
 
@@ -154,12 +154,6 @@ def shifted(reach: Reach, by: ArrayLike) -> Reach: ...
 def shifted(reach: Reach, by: ArrayLike) -> Reach:
     """The same moved by ``by`` (3,), with the same parameter at each point of a curve."""
     return replace(reach, centre=reach.centre + np.asarray(by, dtype=float))
-
-
-def cross(a: Array, b: Array) -> Array:
-    """a × b for vectors of three numbers, many times faster than for arrays of any shape."""
-    (x, y, z), (u, v, w) = a.tolist(), b.tolist()
-    return np.array([y * w - z * v, z * u - x * w, x * v - y * u])
 
 
 def length(v: Array) -> float:

@@ -20,9 +20,9 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.vectors import Array, perpendicular
+from ...geometry.vectors import Array, cross, perpendicular
 from ...tolerances import PARALLEL
-from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, cross, length
+from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, length
 from .polynomials import Quadric
 
 BITS = 52

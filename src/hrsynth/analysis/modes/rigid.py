@@ -16,9 +16,9 @@ import numpy as np
 
 from ...errors import BadRequest
 from ...geometry.so3 import exponential, logarithm
-from ...geometry.vectors import Array, pose
+from ...geometry.vectors import Array, cross, pose
 from ...tolerances import SAME_DIRECTION, SAME_POINT
-from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, cross, curves_of, extent, length
+from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, curves_of, extent, length
 from .polynomials import Equation, Quadric
 from .quadrics import (
     UNIT,

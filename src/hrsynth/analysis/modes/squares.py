@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from ...geometry.vectors import Array, unit
-from .curves import Circle, Curve, Line, Plane, Sphere, Surface, cross, extent, length
+from ...geometry.vectors import Array, cross, unit
+from .curves import Circle, Curve, Line, Plane, Sphere, Surface, extent, length
 from .polynomials import Equation
 from .quadrics import UNIT, Conic, Numbers, Rounded, WorkingFrame, conic, direction, on_plane, on_sphere, spatial_frame
 

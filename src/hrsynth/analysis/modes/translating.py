@@ -11,9 +11,9 @@ from itertools import combinations
 import numpy as np
 
 from ...errors import BadRequest
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, cross
 from ...tolerances import PARALLEL, TIP_ROUNDING, VANISHES
-from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, cross, extent, length, shifted
+from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, extent, length, shifted
 from .polynomials import Equation
 from .quadrics import (
     Conic,
@@ -126,7 +126,7 @@ def coplanar(one: Curve, other: Curve, size: float) -> bool:
     circles = [curve for curve in (one, other) if isinstance(curve, Circle)]
     lines = [curve.direction for curve in (one, other) if isinstance(curve, Line)]
     if not circles:
-        return abs(float(cross(*lines) @ between)) < VANISHES
+        return abs(float(cross(lines[0], lines[1]) @ between)) < VANISHES
     n = circles[0].axis
     tilt = [length(cross(n, circle.axis)) for circle in circles[1:]] + [float(n @ d) for d in lines]
     return all(abs(value) < VANISHES for value in [*tilt, float(n @ between)])

@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...geometry.screws import rotation, translation
 from ...geometry.so3 import exponential, logarithm
 from ...geometry.vectors import Array, hat, perpendicular, pose, rotation_about
 from ...mechanism.model import JointType
-from ...mechanism.screws import rotation, translation
 from ..draft import Edge
 
 _MATRIX = (JointType.SPHERICAL, JointType.FREE)
