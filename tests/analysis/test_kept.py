@@ -120,7 +120,7 @@ def test_the_degree_of_identities_is_bounded(robot: str, monkeypatch: pytest.Mon
     relations = architecture(setting).relations
     bits = []
     for power in (20, 100):
-        monkeypatch.setattr(instances, "LARGEST", 2**power)
+        monkeypatch.setattr(instances, "LARGEST_RANDOM", 2**power)
         found = instance(setting.mechanism, relations, architecture(setting).observations,
                          draw(relations, random.Random(0)))
         bits.append(max(int(x).bit_length() for twist in found.twists().values() for x in twist.ravel()))

@@ -39,7 +39,7 @@ def runs(name: str, start: ClosedConfiguration, goal: ClosedConfiguration,
         monkeypatch.setattr("hrsynth.simulation.scene.LASTS", 0.8 * lasts)
         yield run_between(name, start, goal)
     for tolerance in (1e-5, 1e-7):
-        monkeypatch.setattr(engine, "TOLERANCE", tolerance)
+        monkeypatch.setattr(engine, "INTEGRATED", tolerance)
         yield run_between(name, start, goal)
 
 

@@ -39,13 +39,14 @@ def cross(a: Numbers, b: Numbers, axis: int = -1) -> Numbers:
     vectors."""
     kind = a.dtype if a.dtype == b.dtype else np.result_type(a, b)
     if a.ndim == b.ndim == 1:
-        (x, y, z), (u, v, w) = a.tolist(), b.tolist()
+        (a0, a1, a2), (b0, b1, b2) = a.tolist(), b.tolist()
         found = np.empty(3, kind)
-        found[0], found[1], found[2] = y * w - z * v, z * u - x * w, x * v - y * u
+        found[0], found[1], found[2] = a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0
         return found
     found = np.empty(np.broadcast(a, b).shape, kind)
-    X, Y, Z = ((..., i, *[slice(None)] * (-1 - axis)) for i in range(3))
-    for i, j, k in ((X, Y, Z), (Y, Z, X), (Z, X, Y)):
+    x, y, z = ((..., i, *[slice(None)] * (-1 - axis)) for i in range(3))
+    turns: Any = ((x, y, z), (y, z, x), (z, x, y))
+    for i, j, k in turns:
         found[i] = a[j] * b[k] - a[k] * b[j]
     return found
 
