@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from .selection.select import select
     from .simulation.servo import servo
 
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 __all__ = ["__version__", "accuracy", "advise", "catalog", "check", "derive", "draw", "html", "legs", "load", "modes",
            "path", "save", "select", "servo", "shipped", "singular", "text", "view"]
 
