@@ -25,7 +25,7 @@ from hrsynth.catalog.groups import GROUPS
 from hrsynth.catalog.source import unmoved
 from hrsynth.catalog.words import parse
 from hrsynth.description import load, shipped
-from hrsynth.description.writers.mjcf import write
+from hrsynth.description.formats.mjcf.write import write
 from hrsynth.errors import HrsynthError
 from hrsynth.geometry.ranks import kernel_basis, largest_angle, range_basis
 from hrsynth.geometry.vectors import Array
@@ -80,7 +80,7 @@ def jacobians() -> Iterator[Row]:
     for robot in ("quattro", "gough_stewart", "delta"):
         here = rezeroed(prepare(load(robot), samples=3).configurations[0])
         twin = PinocchioModel(here)
-        model = mujoco.MjModel.from_xml_string(write(here)[0])
+        model = mujoco.MjModel.from_xml_string(write(here).texts[0])
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
         model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
         data = mujoco.MjData(model)

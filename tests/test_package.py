@@ -43,6 +43,7 @@ def test_the_names_survive_the_import_of_their_modules():
 def test_a_derivation_of_a_native_file_imports_only_what_it_uses():
     code = "import sys, hrsynth; hrsynth.derive(hrsynth.load('3rpr_m1')); print(*sys.modules)"
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    readers = {f"hrsynth.description.foreign.{name}" for name in ("build", "gepetto", "mjcf", "sdf", "urdf")}
-    writers = {f"hrsynth.description.writers.{name}" for name in ("gepetto", "mjcf", "sdf")}
+    readers = {f"hrsynth.description.formats.{name}.read" for name in ("gepetto", "mjcf", "sdf", "urdf")}
+    readers |= {"hrsynth.description.assembly.build"}
+    writers = {f"hrsynth.description.formats.{name}.write" for name in ("gepetto", "mjcf", "sdf")}
     assert not {"networkx", "sympy", "scipy", "matplotlib", *readers, *writers} & set(run.stdout.split())

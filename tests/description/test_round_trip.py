@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 import strategies as some
 from description.samples import FOUR_BAR, every_joint, moved, rotation, with_rods
 from hrsynth.description import native, numerals, spanning, xml
-from hrsynth.description.closure import LoopEnds, residual
-from hrsynth.description.urdf import LOOP_TYPES
+from hrsynth.description.jointgraph import LOOP_TYPES, FrameSpec, JointSpec
+from hrsynth.description.jointmotion import residual
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import pose, rotation_from_rpy
 from hrsynth.mechanism.model import Coupling, Joint, JointType, Limits, Link, Mechanism, Motor
@@ -99,7 +99,8 @@ def test_a_written_file_is_assembled_at_zero(mechanism: Mechanism):
         axes = [np.array([float(word) for word in loop.find(tag).get("xyz").split()])
                 for tag in ("axis", "axis2") if loop.find(tag) is not None]
         kind = LOOP_TYPES[loop.get("type")]
-        assert residual(LoopEnds(loop.get("name"), kind, *ends, tuple(axes)), mechanism.length) <= ASSEMBLED
+        joint = JointSpec(loop.get("name"), kind, (FrameSpec("a"), FrameSpec("b")), tuple(axes))
+        assert residual(joint, *ends, mechanism.length) <= ASSEMBLED
         if kind is JointType.UNIVERSAL:
             assert abs((ends[0][:3, :3] @ axes[0]) @ (ends[1][:3, :3] @ axes[1])) <= ASSEMBLED
     assert loops
@@ -123,7 +124,7 @@ def test_written_angles_give_the_rotation(seed: int):
 def test_a_written_axis_is_a_unit_vector_and_a_fixed_point(seed: int):
     direction = np.random.default_rng(seed).normal(size=3)
     text = numerals.axis(direction)
-    read = numerals.parsed(text, 3)
+    read = numerals.parse(text, 3)
     assert abs(np.linalg.norm(read) - 1) < 2e-15
     assert numerals.axis(read) == text
     assert np.linalg.norm(np.cross(read, direction)) < 1e-12 * np.linalg.norm(direction)
@@ -132,7 +133,7 @@ def test_a_written_axis_is_a_unit_vector_and_a_fixed_point(seed: int):
 @pytest.mark.parametrize(("value", "text"), [(-0.0, "0"), (1e-16, "0"), (-1e-14, "0"), (0.1 + 0.2, "0.3"), (2.0, "2"),
                                              (-0.25, "-0.25"), (1 / 3, "0.3333333333333"), (1e-7, "1e-07")])
 def test_numbers_are_short(value: float, text: str):
-    assert numerals.printed(value, 13) == text
+    assert numerals.decimal(value, 13) == text
 
 
 def test_the_file_of_the_contract_reads_as_it_says():

@@ -11,15 +11,13 @@ from pathlib import Path
 
 from ..errors import BadRequest
 from ..mechanism.model import Mechanism, Note
-from . import native
+from . import formats
+from .dialect import Dialect
 from .files import require_same, write_whole
-from .foreign.given import Given, names
-from .foreign.reading import read
+from .formats import native
+from .overrides import Overrides, names
+from .reading import read
 from .tree import spanning
-
-DIALECTS = ("native", "gepetto", "mjcf", "sdf")
-ENDINGS = {".urdf": "native", ".xml": "mjcf", ".mjcf": "mjcf", ".sdf": "sdf", ".yaml": "gepetto",
-           ".yml": "gepetto"}
 
 __all__ = ["load", "native", "save", "shipped", "spanning", "targets"]
 
@@ -51,69 +49,58 @@ def load(robot: str | Path, *, base: str | None = None, platform: str | None = N
     LoopsNotClosed, RankUndecided
         For a file whose loops stay open, or in which rounded numbers leave no gap between free and held.
     """
-    wishes = Given(base, platform, names(motors), names(close) or (), names(freeze) or (), names(observe))
+    overrides = Overrides(base, platform, names(motors), names(close) or (), names(freeze) or (), names(observe))
     path = Path(robot)
     if isinstance(robot, str) and not path.suffix and len(path.parts) == 1:
         robots = shipped()
         with contextlib.suppress(OSError, ValueError):
             if path.is_file():
-                return read(path, wishes)
+                return read(path, overrides)
         if robot in robots:
-            return read(robots[robot], wishes)
+            return read(robots[robot], overrides)
         if not os.path.exists(robot):
             close_names = difflib.get_close_matches(robot, robots, n=5) or list(robots)
             raise BadRequest("neither a file nor a shipped robot", robot,
                              "a file, or a name that `hrsynth robots` lists, such as " + ", ".join(close_names))
-    return read(path, wishes)
+    return read(path, overrides)
 
 
 def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
     """The files that :func:`save` writes, the tree first; raises ``BadRequest`` for an unknown dialect or ending."""
-    target = Path(path)
-    if _kind(target, dialect) != "gepetto":
-        return (target,)
-    settings = target if target.suffix.lower() in (".yaml", ".yml") else target.with_suffix(".yaml")
-    return target.with_suffix(".urdf"), settings
+    return _dialect(Path(path), dialect).files(Path(path))
 
 
 def save(mechanism: Mechanism, path: str | Path, dialect: str | None = None) -> tuple[Note, ...]:
     """Write a robot file, whole or not at all; what the dialect cannot say is returned as warnings.
 
-    ``dialect`` is one of ``DIALECTS``; without it the file's ending decides: ``.urdf`` the native dialect, ``.xml`` and
-    ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.yaml`` Gepetto (with a ``.urdf`` of the same name beside it). A file beside
-    the one named is not replaced by other content.
+    ``dialect`` is ``native``, ``gepetto``, ``mjcf`` or ``sdf``; without it the file's ending decides: ``.urdf`` the
+    native dialect, ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.yaml`` Gepetto (with a ``.urdf`` of the same name
+    beside it). A file beside the one named is not replaced by other content.
 
     Raises
     ------
     BadRequest
         For an unknown dialect or ending; where the file cannot be written, or the mechanism not be said in the dialect.
     """
-    kind, files = _kind(Path(path), dialect), targets(path, dialect)
-    if kind == "native":
-        write_whole(path, native.write(mechanism).encode())
-        return ()
-    if kind == "gepetto":
-        from .writers import gepetto
-
-        tree, closures, lost = gepetto.write(mechanism)
-        contents = dict(zip(files, (tree.encode(), closures.encode()), strict=True))
-        for file in set(files) - {Path(path)}:
-            require_same(file, contents[file])
-        for file, content in contents.items():
-            write_whole(file, content)
-        return lost
-    from .writers import mjcf, sdf
-
-    text, lost = (mjcf if kind == "mjcf" else sdf).write(mechanism)
-    write_whole(path, text.encode())
-    return lost
+    chosen = _dialect(Path(path), dialect)
+    written = formats.write(mechanism, chosen.name)
+    contents = dict(zip(chosen.files(Path(path)), (text.encode() for text in written.texts), strict=True))
+    for file, content in contents.items():
+        if file != Path(path):
+            require_same(file, content)
+    for file, content in contents.items():
+        write_whole(file, content)
+    return written.lost
 
 
-def _kind(target: Path, dialect: str | None) -> str:
-    if dialect is None and target.suffix.lower() not in ENDINGS:
+def _dialect(target: Path, name: str | None) -> Dialect:
+    dialects = formats.writable()
+    endings = {ending: each.name for each in dialects for ending in each.endings}
+    if name is None and target.suffix.lower() not in endings:
         raise BadRequest("cannot write the file: its ending says no dialect", str(target),
-                         ", ".join(ENDINGS) + "; or the dialect given")
-    kind = dialect or ENDINGS[target.suffix.lower()]
-    if kind not in DIALECTS:
-        raise BadRequest("unknown dialect", kind, DIALECTS)
-    return kind
+                         ", ".join(endings) + "; or the dialect given")
+    wanted = name or endings[target.suffix.lower()]
+    found = next((each for each in dialects if each.name == wanted), None)
+    if found is None:
+        raise BadRequest("unknown dialect", wanted, tuple(each.name for each in dialects))
+    return found

@@ -25,6 +25,11 @@ from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor
 from ..tolerances import SAME_DIRECTION, SAME_POINT
 
 TIP = "__tip"
+CUT, WELD, END, SECOND = "__cut", "__weld", "__end", "__second"
+"""Ends of the names of what writers of foreign dialects add for a loop N: the link that one half of the cut joint
+carries, the closure in all six directions, the frame on the other link, the second point of a revolute joint."""
+WHOLES = {"RR": JointType.UNIVERSAL, "RRR": JointType.SPHERICAL, "PR": JointType.CYLINDRICAL, "PPR": JointType.PLANAR}
+"""The joint that joints of these types in a row may be."""
 _FIRST = re.compile(r"(?P<name>.+)__1", re.DOTALL)
 _R, _P = JointType.REVOLUTE, JointType.PRISMATIC
 
@@ -34,16 +39,25 @@ def part(name: str, number: int) -> str:
     return f"{name}__{number}"
 
 
+def part_names(name: str, count: int) -> list[str]:
+    """The names of the joints that a joint (or its motors) is written as: its own where it is one."""
+    return [name] if count <= 1 else [part(name, number + 1) for number in range(count)]
+
+
 def parts(kind: JointType, axes: Sequence[Array]) -> list[tuple[JointType, Array]]:
-    """The one-freedom joints, type and axis, that a tree joint is a chain of; empty where it needs none.
+    """The one-freedom joints, type and axis, that a joint is a chain of, one a freedom.
 
     ``axes`` are those of the joint in the frame of the first link of the chain, and so are the axes of the parts.
     """
     match kind:
+        case JointType.REVOLUTE | JointType.PRISMATIC:
+            return [(kind, axes[0])]
         case JointType.UNIVERSAL:
             return [(_R, axes[0]), (_R, axes[1])]
         case JointType.SPHERICAL:
             return [(_R, axis) for axis in np.eye(3)]
+        case JointType.FREE:
+            return [*((_P, axis) for axis in np.eye(3)), *((_R, axis) for axis in np.eye(3))]
         case JointType.CYLINDRICAL:
             return [(_P, axes[0]), (_R, axes[0])]
         case JointType.PLANAR:
@@ -52,7 +66,7 @@ def parts(kind: JointType, axes: Sequence[Array]) -> list[tuple[JointType, Array
     return []
 
 
-def merged(mechanism: Mechanism) -> Mechanism:
+def merge(mechanism: Mechanism) -> Mechanism:
     """The mechanism with every chain and every tip merged into one joint; what only looks like one stays as it is."""
     links, joints = dict(mechanism.links), dict(mechanism.joints)
     busy = {mechanism.base, mechanism.platform, mechanism.reference}
@@ -107,23 +121,25 @@ def _whole(name: str, chain: list[Joint], between: list[Link | None], length: fl
            or joint.limits != first.limits or joint.actuated != first.actuated or (joint.xml and joint is not first)
            for joint in chain):
         return None
-    axes = [joint.axis for joint in chain if joint.type in (_R, _P)]
-    gram = np.array([[a @ b for a in axes] for b in axes])
-    orthogonal = np.max(np.abs(gram - np.eye(len(axes)))) <= SAME_DIRECTION
-    link = between[0]
-    kind: JointType
-    match "".join(joint.type.value for joint in chain):
-        case "RR" if orthogonal:
-            kind, kept = JointType.UNIVERSAL, tuple(axes)
-        case "RRR" if link is not None and np.max(np.abs(np.array(axes).T - link.pose[:3, :3])) <= SAME_DIRECTION:
-            kind, kept = JointType.SPHERICAL, ()
-        case "PR" if np.linalg.norm(axes[0] - axes[1]) <= SAME_DIRECTION:
-            kind, kept = JointType.CYLINDRICAL, (axes[1],)
-        case "PPR" if orthogonal:
-            kind, kept = JointType.PLANAR, (axes[2],)
+    kind = WHOLES.get("".join(joint.type for joint in chain))
+    if kind is None:
+        return None
+    axes = [joint.axis for joint in chain]
+    match kind:
+        case JointType.SPHERICAL:
+            frame = None if between[0] is None else between[0].pose[:3, :3]
+            same = frame is not None and np.max(np.abs(np.array(axes).T - frame)) <= SAME_DIRECTION
+            axes = []
+        case JointType.CYLINDRICAL:
+            same = np.linalg.norm(axes[0] - axes[1]) <= SAME_DIRECTION
+            axes = axes[1:]
         case _:
-            return None
-    return replace(first, name=name, type=kind, successor=chain[-1].successor, axes=kept, motor=_motor(chain))
+            gram = np.array([[a @ b for a in axes] for b in axes])
+            same = np.max(np.abs(gram - np.eye(len(axes)))) <= SAME_DIRECTION
+            axes = axes if kind is JointType.UNIVERSAL else axes[2:]
+    if not same:
+        return None
+    return replace(first, name=name, type=kind, successor=chain[-1].successor, axes=tuple(axes), motor=_motor(chain))
 
 
 def _motor(chain: list[Joint]) -> Motor | None:

@@ -2,22 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..errors import Defect
+from ..errors import BadRobotFile, Defect
 from ..geometry.vectors import Array, unit
 from ..mechanism.model import JointType, Limits
 from . import numerals, xml
-from .draft import ORIGIN
+from .jointgraph import ORIGIN, Z
 
-_LIMITS = ("lower", "upper", "velocity", "effort")
+LIMITS = ("lower", "upper", "velocity", "effort")
+ZERO_LENGTH = 1e-9
+"""Length up to which a vector in a file has no direction."""
 
 
 @dataclass
-class Elements:
+class XmlReader:
     """A document and its defects; every reader of an XML dialect is one."""
 
     file: str
@@ -25,10 +27,16 @@ class Elements:
     defects: list[Defect] = field(default_factory=list)
 
     def defect(self, line: int | None, what: str, value: str | None = None, allowed: str | None = None) -> None:
+        """Record what is wrong in a line of the file (or of one that it includes)."""
         if value is not None and len(value) > 80:
             value = value[:77] + "..."
         file = line.file if isinstance(line, xml.Line) else self.file
         self.defects.append(Defect(file, line, what, value, allowed))
+
+    def require_sound(self) -> None:
+        """Raise :class:`BadRobotFile` with all defects found so far, where there are any."""
+        if self.defects:
+            raise BadRobotFile(self.defects)
 
     def attribute(self, element: xml.Element, name: str) -> str | None:
         """An attribute that must be there and not be empty."""
@@ -38,17 +46,20 @@ class Elements:
             return None
         return value
 
-    def numbers(self, element: xml.Element, name: str, default: Iterable[float]) -> Array:
-        """The numbers of an attribute, the default where it is not there or not right."""
+    def values(self, text: str | None, default: Iterable[float], line: int | None, what: str) -> Array:
+        """The numbers of a text, as many as the default has; the default where there is none, or it is not right."""
         fallback = np.array(list(default), dtype=float)
-        text = element.get(name)
         if text is None:
             return fallback
         try:
-            return numerals.parsed(text, len(fallback))
+            return numerals.parse(text, len(fallback))
         except ValueError as error:
-            self.defect(xml.line(element), f"{name} of <{element.tag}>", text, str(error))
+            self.defect(line, what, text, str(error))
             return fallback
+
+    def numbers(self, element: xml.Element, name: str, default: Iterable[float]) -> Array:
+        """The numbers of an attribute."""
+        return self.values(element.get(name), default, xml.line(element), f"{name} of <{element.tag}>")
 
     def only(self, element: xml.Element, tag: str) -> xml.Element | None:
         """The child element of that name; a second one is a defect."""
@@ -57,11 +68,38 @@ class Elements:
             self.defect(xml.line(extra), f"second <{tag}> in <{element.tag}>", element.get("name"))
         return found[0] if found else None
 
-    def origin(self, element: xml.Element) -> Array:
-        origin = self.only(element, "origin")
-        if origin is None:
+    def pose(self, element: xml.Element | None) -> Array:
+        """The pose (4, 4) that the attributes ``xyz`` and ``rpy`` of an element give."""
+        if element is None:
             return ORIGIN
-        return numerals.from_origin(self.numbers(origin, "xyz", (0, 0, 0)), self.numbers(origin, "rpy", (0, 0, 0)))
+        return numerals.from_origin(self.numbers(element, "xyz", (0, 0, 0)), self.numbers(element, "rpy", (0, 0, 0)))
+
+    def origin(self, element: xml.Element) -> Array:
+        """The pose that the ``<origin>`` of an element gives."""
+        return self.pose(self.only(element, "origin"))
+
+    def unit(self, values: Array, line: int | None, what: str, given: str | None = None, default: Array = Z) -> Array:
+        """The unit vector along ``values``; a zero vector is a defect."""
+        if np.linalg.norm(values) > ZERO_LENGTH:
+            return unit(values)
+        self.defect(line, what, given, "a non-zero vector")
+        return default
+
+    def direction(self, element: xml.Element, name: str, default: Iterable[float]) -> Array:
+        """The unit vector that an attribute gives."""
+        return self.unit(self.numbers(element, name, default), xml.line(element), f"{name} of <{element.tag}>",
+                         element.get(name), np.array([1.0, 0.0, 0.0]))
+
+    def rotation(self, element: xml.Element, quaternion: Array) -> Array:
+        """The rotation (3, 3) of a quaternion w x y z of any length but zero."""
+        size = float(np.linalg.norm(quaternion))
+        if not size > ZERO_LENGTH:
+            self.defect(xml.line(element), "a quaternion of length zero")
+            return np.eye(3)
+        w, x, y, z = quaternion / size
+        return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
 
     def axes(self, element: xml.Element, type_: JointType | None) -> tuple[Array, ...]:
         """The axes that the type needs, unit vectors; axes of types that need none are not looked at."""
@@ -73,33 +111,17 @@ class Elements:
             axes.append(np.array([1.0, 0.0, 0.0]) if axis is None else self.direction(axis, "xyz", (1, 0, 0)))
         return tuple(axes)
 
-    def direction(self, element: xml.Element, name: str, default: Iterable[float]) -> Array:
-        """A unit vector; a zero vector is a defect."""
-        values = self.numbers(element, name, default)
-        if not np.linalg.norm(values) > 1e-9:
-            self.defect(xml.line(element), f"{name} of <{element.tag}>", element.get(name), "a non-zero vector")
-            return np.array([1.0, 0.0, 0.0])
-        return unit(values)
 
-    def limits(self, element: xml.Element, kind: str | None) -> Limits | None:
-        limit = self.only(element, "limit")
-        if limit is None:
-            return None
-        free = limit.get("free", "").split()
-        values: dict[str, float] = {}
-        for key in _LIMITS:
-            if limit.get(key) is not None and key not in free:
-                values[key] = float(self.numbers(limit, key, (0,))[0])
-        for key in ("velocity", "effort"):
-            if values.get(key, 0.0) < 0:
-                self.defect(xml.line(limit), f"{key} of <limit>", limit.get(key), "no negative number")
-        if kind == "continuous":
-            values.pop("lower", None)
-            values.pop("upper", None)
-        elif element.tag == "joint" and kind in ("revolute", "prismatic") and {"lower", "upper"} & set(values):
-            for key in ("lower", "upper"):
-                if key not in free:
-                    values.setdefault(key, 0.0)
-        if values.get("lower", -np.inf) > values.get("upper", np.inf):
-            self.defect(xml.line(limit), "lower limit", f"{values['lower']:g}", f"up to {values['upper']:g}")
-        return Limits(**values) if values else None
+def sound_limits(text_of: Callable[[str], str | None], *, bounded: bool = True) -> Limits | None:
+    """The limits that are numbers in order; anything else is no limit. ``bounded``: whether there may be bounds."""
+    values: dict[str, float] = {}
+    for key in LIMITS:
+        try:
+            value = float(numerals.parse(text_of(key) or "", 1)[0])
+        except ValueError:
+            continue
+        if key in ("lower", "upper") or value >= 0:
+            values[key] = value
+    if not bounded or ("lower" in values and "upper" in values and not values["lower"] < values["upper"]):
+        values = {key: value for key, value in values.items() if key not in ("lower", "upper")}
+    return Limits(**values) if values else None

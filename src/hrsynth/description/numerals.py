@@ -18,11 +18,10 @@ from ..geometry.vectors import Array, pose, rotation_about, rotation_from_rpy
 ANGLE_DECIMALS = 13
 """Decimals of angles and of the components of axes."""
 
-
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 
 
-def parsed(text: str, count: int) -> Array:
+def parse(text: str, count: int) -> Array:
     """The ``count`` numbers of ``text``; shape (count,). Raises ``ValueError`` that says what was expected."""
     words = text.split()
     for word in words:
@@ -35,7 +34,7 @@ def parsed(text: str, count: int) -> Array:
     return np.array([float(word) for word in words])
 
 
-def printed(value: float, decimals: int) -> str:
+def decimal(value: float, decimals: int) -> str:
     """``value`` rounded to ``decimals``, at most 15 significant digits, in its shortest form; -0 is 0."""
     rounded = round(float(value), decimals)
     return f"{rounded:.15g}" if rounded else "0"
@@ -54,7 +53,7 @@ def length_decimals(scale: float) -> int:
 
 def vector(values: ArrayLike, decimals: int) -> str:
     """The numbers of a vector, each rounded to ``decimals``."""
-    return " ".join(printed(value, decimals) for value in np.asarray(values, dtype=float))
+    return " ".join(decimal(value, decimals) for value in np.asarray(values, dtype=float))
 
 
 def axis(direction: ArrayLike) -> str:
@@ -66,7 +65,7 @@ def axis(direction: ArrayLike) -> str:
     grid = [round(float(value), ANGLE_DECIMALS) for value in values]
     rest = sum(value**2 for index, value in enumerate(grid) if index != largest)
     grid[largest] = math.copysign(math.sqrt(max(0.0, 1.0 - rest)), values[largest])
-    return " ".join(printed(value, 15) for value in grid)
+    return " ".join(decimal(value, 15) for value in grid)
 
 
 def rpy(rotation: Array) -> tuple[float, float, float]:
@@ -96,10 +95,10 @@ def origin(X: Array, decimals: int) -> tuple[Array, dict[str, str]]:
     xyz = vector(X[:3, 3], decimals)
     if xyz != "0 0 0":
         attributes["xyz"] = xyz
-    angles = " ".join(printed(angle, ANGLE_DECIMALS) for angle in rpy(X[:3, :3]))
+    angles = " ".join(decimal(angle, ANGLE_DECIMALS) for angle in rpy(X[:3, :3]))
     if angles != "0 0 0":
         attributes["rpy"] = angles
-    return from_origin(parsed(xyz, 3), parsed(angles, 3)), attributes
+    return from_origin(parse(xyz, 3), parse(angles, 3)), attributes
 
 
 def from_origin(xyz: Array, angles: Array) -> Array:

@@ -35,7 +35,7 @@ def spanning(mechanism: Mechanism) -> Mechanism:
         Where a link hangs on nothing, or a joint between two links of the tree has all six freedoms.
     """
     mechanism = _in_base_frame(mechanism)
-    return chains.merged(mechanism if is_spanning(mechanism) else _cut(mechanism))
+    return chains.merge(mechanism if is_spanning(mechanism) else _cut(mechanism))
 
 
 def _cut(mechanism: Mechanism) -> Mechanism:
@@ -76,19 +76,15 @@ def is_spanning(mechanism: Mechanism) -> bool:
     return len(outward(mechanism)) == count
 
 
+def is_connected(mechanism: Mechanism) -> bool:
+    """Whether chains of joints join every link to the base."""
+    return len(graphs.component(mechanism.adjacency, mechanism.base)) == len(mechanism.links)
+
+
 def outward(mechanism: Mechanism) -> list[Joint]:
     """The tree joints that hang on the base, every joint after the one that carries its predecessor."""
-    hanging: dict[str, list[Joint]] = {}
-    for joint in mechanism.joints.values():
-        if joint.in_tree:
-            hanging.setdefault(joint.predecessor, []).append(joint)
-    order: list[Joint] = []
-    reached = [mechanism.base]
-    for link in reached:
-        for joint in hanging.pop(link, ()):
-            order.append(joint)
-            reached.append(joint.successor)
-    return order
+    tree = [joint for joint in mechanism.joints.values() if joint.in_tree]
+    return [joint for joint, _, _ in graphs.outward(mechanism.base, tree)]
 
 
 def _cost(joint: Joint) -> int:

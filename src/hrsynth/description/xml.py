@@ -105,7 +105,7 @@ def children(element: Element) -> list[Element]:
     return [child for child in element if isinstance(child.tag, str)]
 
 
-def kept(element: Element) -> str:
+def canonical(element: Element) -> str:
     """An element as one line of text that means the same; stable when written and read again."""
     copy = etree.fromstring(etree.tostring(element, with_tail=False, encoding="utf-8"), _parser())
     for part in copy.iter():
@@ -117,12 +117,19 @@ def kept(element: Element) -> str:
     return etree.tostring(copy, encoding="unicode")
 
 
+def new(tag: str, *children: Element, **attributes: str) -> Element:
+    """An element with its attributes and child elements."""
+    element = etree.Element(tag, attributes)
+    element.extend(children)
+    return element
+
+
 def unknown(element: Element, attributes: Iterable[str], tags: Iterable[str]) -> tuple[str, ...]:
     """What this project does not know of an element: ``@name=value`` for attributes, then child elements."""
     known_attributes, known_tags = set(attributes), set(tags)
     given = sorted((str(name), str(value)) for name, value in element.attrib.items())
     found = [f"@{name}={value}" for name, value in given if name not in known_attributes]
-    return (*found, *(kept(child) for child in children(element) if child.tag not in known_tags))
+    return (*found, *(canonical(child) for child in children(element) if child.tag not in known_tags))
 
 
 def restore(element: Element, fragments: Iterable[str]) -> None:
@@ -131,10 +138,10 @@ def restore(element: Element, fragments: Iterable[str]) -> None:
         if attribute := _ATTRIBUTE.fullmatch(fragment):
             element.set(attribute["name"], attribute["value"])
         else:
-            element.append(parsed(fragment))
+            element.append(parse_fragment(fragment))
 
 
-def parsed(fragment: str) -> Element:
+def parse_fragment(fragment: str) -> Element:
     """The element of a kept fragment; raises :class:`BadRequest` where it is none."""
     try:
         return etree.fromstring(fragment.encode(), _parser())

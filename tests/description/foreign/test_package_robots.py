@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.check import check
-from hrsynth.description import load
-from hrsynth.description.foreign.graph import Graph
-from hrsynth.description.foreign.reading import said
+from hrsynth.description import formats, load
+from hrsynth.description.jointgraph import JointGraph
+from hrsynth.description.reading import robot_file
 from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
@@ -34,9 +34,9 @@ pytestmark = pytest.mark.skipif(ROBOTS is None, reason="example-robot-data is no
 EMPTY = "ur3.urdf"  # macros alone, no links
 
 
-def read(path: Path) -> Graph:
-    found = said(path)
-    assert isinstance(found, Graph)
+def read(path: Path) -> JointGraph:
+    found = formats.read(robot_file(path))
+    assert isinstance(found, JointGraph)
     return found
 
 
@@ -50,9 +50,9 @@ def test_yourdfpy_agrees_on_every_tree(path: Path):
     theirs = yourdfpy.URDF.load(str(path), load_meshes=False, build_scene_graph=False).robot
     ours = read(path)
     assert set(ours.links) == {link.name for link in theirs.links}
-    assert set(ours.edges) == {joint.name for joint in theirs.joints}
+    assert set(ours.joints) == {joint.name for joint in theirs.joints}
     for joint in theirs.joints:
-        edge = ours.edges[joint.name]
+        edge = ours.joints[joint.name]
         assert edge.links == (joint.parent, joint.child)
         assert (edge.type is JointType.FIXED) == (joint.type == "fixed")
         origin = np.eye(4) if joint.origin is None else np.asarray(joint.origin)
@@ -61,10 +61,10 @@ def test_yourdfpy_agrees_on_every_tree(path: Path):
             assert np.linalg.norm(np.cross(edge.axes[0], joint.axis)) < 1e-9 * np.linalg.norm(joint.axis)
             assert edge.axes[0] @ joint.axis > 0
     gears = {(joint.name, joint.mimic.joint, joint.mimic.multiplier) for joint in theirs.joints
-             if joint.mimic is not None and joint.mimic.joint in ours.edges and joint.type != "fixed"}
+             if joint.mimic is not None and joint.mimic.joint in ours.joints and joint.type != "fixed"}
     assert {(gear.driven, gear.driver, gear.ratio) for gear in ours.gears} == {
         (driven, driver, 1.0 if ratio is None else ratio) for driven, driver, ratio in gears
-        if ours.edges[driver].type is not JointType.FIXED}
+        if ours.joints[driver].type is not JointType.FIXED}
 
 
 @pytest.mark.parametrize("path", FILES, ids=lambda path: path.name)
@@ -73,9 +73,9 @@ def test_every_tree_is_a_mechanism(path: Path):
     if path.name == EMPTY:
         pytest.skip("macros alone")
     graph = read(path)
-    carried = {edge.links[1] for edge in graph.edges.values()}
-    tips = [link for link in graph.links if link in carried and all(link != e.links[0] for e in graph.edges.values())]
-    if all(edge.type is JointType.FIXED for edge in graph.edges.values()):
+    carried = {edge.links[1] for edge in graph.joints.values()}
+    tips = [link for link in graph.links if link in carried and all(link != e.links[0] for e in graph.joints.values())]
+    if all(edge.type is JointType.FIXED for edge in graph.joints.values()):
         with pytest.raises(BadRequest, match="no link moves"):
             load(path)
         return

@@ -11,7 +11,7 @@ import pytest
 from description.foreign.test_traps import bars, full_mobility, origin, read
 from description.samples import every_joint
 from hrsynth.description import load, save, shipped, spanning
-from hrsynth.description.writers import mjcf
+from hrsynth.description.formats.mjcf.write import write
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.ranks import rank_of
 from hrsynth.mechanism import JointType, Mechanism
@@ -83,7 +83,7 @@ def test_an_unknown_dialect_is_refused_and_the_given_one_counts(tmp_path: Path):
 def test_mujoco_loads_what_is_written_and_counts_the_same_freedoms(name: str):
     mujoco = pytest.importorskip("mujoco")
     robot = load(name)
-    model = mujoco.MjModel.from_xml_string(mjcf.write(robot)[0])
+    model = mujoco.MjModel.from_xml_string(write(robot).texts[0])
     model.opt.jacobian = mujoco.mjtJacobian.mjJAC_DENSE
     data = mujoco.MjData(model)
     mujoco.mj_forward(model, data)

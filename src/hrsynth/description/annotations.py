@@ -1,0 +1,78 @@
+"""What our writers add to foreign files, and reading takes back: platform, camera, observed directions, the base."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import replace
+from urllib.parse import quote, unquote
+
+import numpy as np
+
+from ..geometry.vectors import frozen, inverse
+from ..mechanism.model import JointType, Mechanism, Motor
+from ..mechanism.observation import Direction
+from . import numerals
+from .elements import ZERO_LENGTH
+from .jointgraph import FrameSpec, JointGraph
+
+NAMESPACE = "urn:hrsynth"
+PREFIX = "hrsynth"
+
+
+def drop_world(graph: JointGraph) -> JointGraph:
+    """The graph, based on the one link that a fixed joint holds in the world where nothing else hangs on the world, or
+    only free joints do, which then hang on that link."""
+    at_world = [joint for joint in graph.joints.values() if graph.base in joint.links]
+    welds = [joint for joint in at_world if joint.type is JointType.FIXED]
+    floating = [joint for joint in at_world if joint.type is JointType.FREE]
+    if graph.base is None or len(welds) != 1 or len(at_world) != 1 + len(floating) or len(graph.links) <= 2:
+        return graph
+    weld, world = welds[0], graph.base
+    del graph.joints[weld.name], graph.links[world]
+    here = weld.links.index(world)
+    graph.base = weld.links[1 - here]
+    X_BW = weld.ends[1 - here].X @ inverse(weld.ends[here].X)
+    for joint in floating:
+        one, two = (FrameSpec(graph.base, frozen(X_BW @ end.X), end.line) if end.link == world else end
+                    for end in joint.ends)
+        graph.joints[joint.name] = replace(joint, ends=(one, two))
+    return graph
+
+
+def read_annotation(graph: JointGraph, key: str, text: str) -> str | None:
+    """Take back one annotation; what is wrong with it, or None."""
+    words = [unquote(word) for word in text.split()]
+    if key in ("platform", "camera") and len(words) == 1:
+        if words[0] not in graph.links:
+            return f"{key}: unknown link"
+        setattr(graph, key, words[0])
+    elif key == "motor" and len(words) == 2:
+        if words[1] not in graph.joints:
+            return "motor of an unknown joint"
+        graph.joints[words[1]] = replace(graph.joints[words[1]], motor=Motor(words[0]))
+    elif key == "observe" and len(words) == 5:
+        if words[1] not in graph.links:
+            return "observe: unknown link"
+        try:
+            direction = numerals.parse(" ".join(words[2:]), 3)
+        except ValueError as error:
+            return str(error)
+        if not np.linalg.norm(direction) > ZERO_LENGTH:
+            return "observe: a zero direction"
+        graph.observations.append(Direction(words[0], words[1], direction))
+    else:
+        return "unknown saying"
+    return None
+
+
+def annotations_of(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[str, str]]:
+    """Key and text of all that is added for a robot, in order."""
+    yield "platform", quote(robot.platform)
+    if robot.camera is not None:
+        yield "camera", quote(robot.camera)
+    for joint in robot.joints.values():
+        if motors and joint.motor is not None:
+            yield "motor", f"{quote(joint.motor.name)} {quote(joint.name)}"
+    for each in robot.observations:
+        if isinstance(each, Direction):
+            yield "observe", f"{quote(each.leg)} {quote(each.link)} {numerals.axis(each.direction)}"

@@ -1,0 +1,204 @@
+"""From a joint graph to a mechanism: closed, its geometry as it is meant, away from singular zero poses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ...errors import BadMechanism, BadRequest, LoopsNotClosed, RankUndecided
+from ...geometry.vectors import Array, inverse, unit
+from ...mechanism.model import Coupling, Joint, JointType, Mechanism, Note
+from ...tolerances import FAINT, NOISE, RANK_GAP, SAME_GEOMETRY
+from ..jointgraph import JointGraph, JointSpec, listed
+from ..overrides import Overrides
+from ..tree import spanning
+from . import closures, guess
+from .coordinates import mobility, without_coordinates
+from .loops import LoopAssembly, LoopSolution, Values, regular_values, solve
+from .relations import exact_geometry
+
+MOST_COORDINATES = 240
+"""Coordinates of joints in loops above which loops are not solved."""
+
+
+def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
+    """The mechanism that a foreign file and what the user says of it make.
+
+    Raises
+    ------
+    BadRequest
+        For names that there are not, and for a platform that has to be given.
+    LoopsNotClosed, RankUndecided
+        Where loops stay open, or where rounded numbers leave no gap between what is free and what is not.
+    """
+    closures.join_halves(graph)
+    overrides.apply(graph)
+    closures.merge_points(graph)
+    base = graph.base or guess.base(graph)
+    _prune(graph, base)
+    for role, link in (("base", overrides.base), ("platform", overrides.platform)):
+        if link is not None and link not in graph.links:
+            raise BadRequest(f"{graph.file}: no such {role} link", link, listed(graph.links))
+    platform = overrides.platform or graph.platform or guess.platform(graph, overrides.base or base)
+    if platform == base and overrides.base is None:
+        raise BadRequest(f"{graph.file}: the platform is the base", platform, "another link")
+    assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears)
+    if assembly.size > MOST_COORDINATES or len(assembly.loops) > MOST_COORDINATES:
+        raise BadRequest(f"{graph.file}: {len(assembly.loops)} loops through joints with {assembly.size} coordinates",
+                         None, f"up to {MOST_COORDINATES} of each")
+    solution = solve(assembly)
+    if not solution.residual <= NOISE:
+        raise LoopsNotClosed(graph.file, solution.residual, NOISE, assembly.worst(solution.values)[0])
+    _note_solution(graph, assembly, solution)
+    mechanism = closures.planar_points(_mechanism(graph, base, platform, assembly, solution.values))
+    if all(joint.in_tree for joint in mechanism.joints.values()):
+        return mechanism if graph.platform is not None else without_coordinates(mechanism)
+    regular = _away_from_singular(_as_meant(mechanism, solution.residual))
+    return _with_weighed_motors(regular if graph.platform is not None else without_coordinates(regular))
+
+
+def _prune(graph: JointGraph, base: str) -> None:
+    kept = graph.connected(base)
+    lost = [link for link in graph.links if link not in kept]
+    if lost:
+        graph.note("ignored", f"{len(lost)} links that no joint connects to the base {base!r}: "
+                              + listed(lost, 5))
+        graph.links = {name: link for name, link in graph.links.items() if name in kept}
+        graph.joints = {name: joint for name, joint in graph.joints.items() if set(joint.links) <= kept}
+        graph.gears = [gear for gear in graph.gears if {gear.driver, gear.driven} <= set(graph.joints)]
+
+
+def _note_solution(graph: JointGraph, assembly: LoopAssembly, solution: LoopSolution) -> None:
+    name, miss = assembly.worst(assembly.zero())
+    moves = _moves(assembly, solution.values)
+    if moves and miss > SAME_GEOMETRY:
+        pushed = ", after a random push out of a flat pose" if solution.pushed else ""
+        graph.note("solved", f"at the file's zero pose the loop {name!r} is open by {miss:.3g} (characteristic "
+                             f"lengths, radians); closed{pushed} with {moves}")
+
+
+def _moves(assembly: LoopAssembly, values: Values) -> str:
+    """The coordinates that differ from zero, in words."""
+    found = []
+    for joint in assembly.active:
+        value = values[joint.name]
+        for number, q in enumerate(value if value.ndim == 1 else value[:3, :3][[2, 0, 1], [1, 2, 0]]):
+            if abs(q) > NOISE:
+                suffix = f"[{number}]" if value.size > 1 else ""
+                found.append(f"{joint.name}{suffix} = {q * assembly.unit(joint):.6g}")
+    return listed(found)
+
+
+def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssembly, values: Values) -> Mechanism:
+    poses = assembly.poses(values)
+    tree = {joint.name for joint, _, _ in assembly.tree}
+    joints = {name: _joint(joint, poses, name in tree) for name, joint in graph.joints.items()}
+    links = {name: replace(link, pose=poses[name]) for name, link in graph.links.items()}
+    mechanism = Mechanism(graph.name, links, _with_limits(joints, assembly, values), base, platform,
+                          tuple(graph.observations), (), graph.camera, tuple(graph.rest), graph.file,
+                          tuple(graph.notes))
+    mechanism = spanning(mechanism)
+    return replace(mechanism, couplings=tuple(_couplings(graph, mechanism)))
+
+
+def _joint(joint: JointSpec, poses: Mapping[str, Array], in_tree: bool) -> Joint:
+    kind = joint.kind
+    X_P, X_S = joint.frames(poses)
+    axes: tuple[Array, ...] = ()
+    if kind is JointType.UNIVERSAL:
+        first, second = X_P[:3, :3] @ joint.axes[0], X_S[:3, :3] @ joint.axes[1]
+        axes = first, unit(second - first * float(first @ second))
+    elif kind.axes:
+        both = X_P[:3, :3] @ joint.axes[0], X_S[:3, :3] @ joint.axes[0]
+        axes = (both[0] if in_tree else unit(both[0] + both[1]),)
+    point = X_P[:3, 3] if in_tree or kind.slides or kind is JointType.PLANAR else (X_P[:3, 3] + X_S[:3, 3]) / 2
+    motor = None if kind is JointType.FIXED else joint.motor
+    return Joint(joint.name, kind, *joint.links, point, axes, motor, joint.limits, in_tree, joint.xml, joint.line)
+
+
+def _with_limits(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Values) -> dict[str, Joint]:
+    """The joints with the limits of R and P counted from where ``values`` put them."""
+    found = dict(joints)
+    for tree_joint, _, _ in assembly.tree:
+        joint = joints[tree_joint.name]
+        limits = joint.limits
+        if limits is not None and joint.type in (JointType.REVOLUTE, JointType.PRISMATIC):
+            q = float(values[joint.name][0]) * assembly.unit(tree_joint)
+            lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
+            found[joint.name] = replace(joint, limits=replace(limits, lower=lower, upper=upper))
+    return found
+
+
+def _couplings(graph: JointGraph, mechanism: Mechanism) -> list[Coupling]:
+    found = []
+    for gear in graph.gears:
+        ends = [mechanism.joints.get(name) for name in (gear.driver, gear.driven)]
+        joints = [joint for joint in ends if joint is not None and joint.in_tree and joint.type.freedoms == 1]
+        if len(joints) == 2:
+            found.append(Coupling(gear.name, joints[0].successor, joints[1].successor, gear.ratio, gear.line))
+        elif all(joint is None or joint.type is not JointType.FIXED for joint in
+                 (graph.joints.get(gear.driver), graph.joints.get(gear.driven))):
+            raise BadMechanism(f"{graph.file}: coupling {gear.name!r} of a joint that closes a loop", gear.driven,
+                               "joints of one freedom in the spanning tree")
+    return found
+
+
+def _as_meant(mechanism: Mechanism, residual: float) -> Mechanism:
+    """Geometry that nearly keeps relations keeps them; the gap of the singular values is the evidence."""
+    written = LoopAssembly.of(mechanism)
+    found = exact_geometry(mechanism)
+    if found is None:
+        if residual > SAME_GEOMETRY:
+            raise LoopsNotClosed(str(mechanism.file), residual, SAME_GEOMETRY, written.worst(written.zero())[0])
+        return mechanism
+    meant = LoopAssembly.of(found.mechanism)
+    rank = meant.rank(meant.zero())
+    before, loose = written.rank(written.zero()), written.rank(written.zero(), FAINT)
+    text = (f"{found.mended} relations of joints (parallel, perpendicular, meeting, equal) that hold to {NOISE:g} are "
+            f"made exact, largest change {found.change:.1e}")
+    if before.value != rank.value or residual > SAME_GEOMETRY:
+        if loose.value != rank.value or loose.gap < RANK_GAP:
+            raise RankUndecided(f"{mechanism.file}: loops with rounded numbers", loose.gap, RANK_GAP)
+        text += f"; the loops' singular values as written leave a gap of {loose.gap:.1e} (needed {RANK_GAP:g})"
+    return replace(found.mechanism, notes=(*mechanism.notes, Note("merged", text)))
+
+
+def _away_from_singular(mechanism: Mechanism) -> Mechanism:
+    """A zero pose at which the loops have more freedoms than nearby is left for one nearby."""
+    assembly = LoopAssembly.of(mechanism)
+    zero = assembly.zero()
+    there = regular_values(assembly, zero)
+    if there is None:
+        return mechanism
+    here, after = assembly.rank(zero), assembly.rank(there)
+    freedoms = [assembly.size - rank.value for rank in (here, after)]
+    why = (f"singular (its loops have {freedoms[0]} freedoms there, {freedoms[1]} nearby)" if freedoms[1] < freedoms[0]
+           else f"nearly singular (weakest singular value {here.weakest:.1e}, {after.weakest:.1e} nearby)")
+    note = Note("solved", f"the zero pose is {why}: moved to {_moves(assembly, there)}")
+    return replace(_moved(mechanism, assembly, there), notes=(*mechanism.notes, note))
+
+
+def _moved(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> Mechanism:
+    """The same mechanism with another closed configuration for its zero."""
+    poses = assembly.poses(values)
+    motion = {name: poses[name] @ inverse(link.pose) for name, link in mechanism.links.items()}
+    joints = {}
+    for joint in mechanism.joints.values():
+        X, Y = (motion[link] for link in joint.links)
+        axes = tuple(Z[:3, :3] @ axis for Z, axis in zip((X, Y), joint.axes, strict=False))
+        joints[joint.name] = replace(joint, point=X[:3, :3] @ joint.point + X[:3, 3], axes=axes)
+    links = {name: replace(link, pose=poses[name]) for name, link in mechanism.links.items()}
+    return replace(mechanism, links=links, joints=_with_limits(joints, assembly, values))
+
+
+def _with_weighed_motors(mechanism: Mechanism) -> Mechanism:
+    """A note where more coordinates are driven than there are freedoms: files put actuators on passive joints too."""
+    driven = sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.actuated)
+    if driven == 0 or all(joint.in_tree for joint in mechanism.joints.values()):
+        return mechanism
+    free = mobility(mechanism)
+    if driven <= free:
+        return mechanism
+    note = Note("open", f"{driven} coordinates are driven, but there are {free} freedoms: some motors may stand on "
+                        "passive joints (--motors JOINTS to name the driven ones)")
+    return replace(mechanism, notes=(*mechanism.notes, note))

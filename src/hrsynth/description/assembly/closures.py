@@ -1,0 +1,147 @@
+"""Closures read as the joints that they stand for: points on one axis, points in a plane, chains that a writer cut."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from ...geometry import lines
+from ...geometry.vectors import Array, frozen, inverse, perpendicular, pose, unit
+from ...mechanism import graphs
+from ...mechanism.model import Joint, JointType, Mechanism, Motor, Note
+from ...tolerances import NOISE
+from ..chains import CUT, END, SECOND, WHOLES, part
+from ..jointgraph import FrameSpec, JointGraph, JointSpec, Z
+
+
+def merge_points(graph: JointGraph) -> None:
+    """Two points in which the same two links are held together are a revolute joint through both; three are rigid."""
+    table: dict[frozenset[str], list[JointSpec]] = defaultdict(list)
+    for joint in graph.joints.values():
+        if joint.type is JointType.SPHERICAL and not joint.in_tree:
+            table[frozenset(joint.links)].append(joint)
+    for joints in table.values():
+        merged = _merged(joints) if len(joints) > 1 else None
+        if merged is None:
+            continue
+        for joint in joints:
+            del graph.joints[joint.name]
+        graph.joints[merged.name] = merged
+        if joints[1].name == merged.name + SECOND:
+            continue
+        what = "revolute joint" if merged.type is JointType.REVOLUTE else "rigid joint"
+        graph.note("merged", f"the points {', '.join(repr(joint.name) for joint in joints)} hold the same two links "
+                             f"together and are read as one {what}")
+
+
+def _merged(joints: list[JointSpec]) -> JointSpec | None:
+    first = joints[0]
+    points = np.array([[joint.ends[joint.links.index(link)].X[:3, 3] for joint in joints] for link in first.links])
+    arms = points[:, 1:] - points[:, :1]
+    sizes = np.linalg.norm(arms, axis=2)
+    size = float(np.max(sizes))
+    if size <= 0 or np.max(np.abs(sizes[0] - sizes[1])) > NOISE * size:
+        return None
+    k = int(np.argmax(sizes[0]))
+    far = [np.linalg.norm(np.cross(arm, arm[k]), axis=1) for arm in arms]
+    m = None if max(each.max() for each in far) <= NOISE * size**2 else int(np.argmax(far[0]))
+    kind = JointType.REVOLUTE if m is None else JointType.FIXED
+    one, two = (FrameSpec(end.link, pose(point[0], _frame(arm[k], None if m is None else arm[m])), end.line)
+                for end, point, arm in zip(first.ends, points, arms, strict=True))
+    return replace(first, type=kind, ends=(one, two), axes=(Z,) * kind.axes)
+
+
+def _frame(z: Array, near: Array | None) -> Array:
+    x = perpendicular(z, near)
+    return np.column_stack((x, np.cross(unit(z), x), unit(z)))
+
+
+def planar_points(mechanism: Mechanism) -> Mechanism:
+    """A point closure between two links that can only move in a plane is a revolute joint normal to it."""
+    joints, notes = dict(mechanism.joints), list(mechanism.notes)
+    for joint in [j for j in joints.values() if j.type is JointType.SPHERICAL and not j.in_tree]:
+        normal = _plane_of(joint, list(joints.values()))
+        if normal is not None:
+            joints[joint.name] = replace(joint, type=JointType.REVOLUTE, axes=(normal,))
+            notes.append(Note("merged", f"the point {joint.name!r} closes a planar loop: read as a revolute joint"))
+    return replace(mechanism, joints=joints, notes=tuple(notes))
+
+
+def _plane_of(joint: Joint, joints: list[Joint]) -> Array | None:
+    """The normal of the plane in which the joint's two links move relative to each other, or None."""
+    bonds = graphs.adjacency(joint.links, (j.links for j in joints if j.type is JointType.FIXED))
+    bodies = {link for end in joint.links for link in graphs.component(bonds, end)}
+    for candidate in [j for j in joints if j.type is JointType.REVOLUTE and bodies & set(j.links)]:
+        normal = candidate.axis
+        flat = graphs.adjacency(joint.links, (j.links for j in joints if j.name != joint.name and _flat(j, normal)))
+        if joint.links[1] in graphs.component(flat, joint.links[0]):
+            return normal
+    return None
+
+
+def _flat(joint: Joint, normal: Array) -> bool:
+    match joint.type:
+        case JointType.REVOLUTE | JointType.PLANAR:
+            return lines.parallel(joint.axis, normal)
+        case JointType.PRISMATIC:
+            return lines.perpendicular(joint.axis, normal)
+    return joint.type is JointType.FIXED
+
+
+def join_halves(graph: JointGraph) -> None:
+    """What our writers cut is whole again: frames of closures go, and the joint before a rigid closure closes the loop
+    itself."""
+    for name in [link for link in graph.links if link.endswith((CUT, END))]:
+        own = [joint for joint in graph.joints.values() if name in joint.links]
+        if len(own) == 2 and sum(not joint.in_tree for joint in own) == 1:
+            carrier, closure = sorted(own, key=lambda joint: not joint.in_tree)
+            if carrier.type is JointType.FIXED and carrier.links[1] == name:
+                del graph.joints[carrier.name], graph.links[name]
+                here = closure.links.index(name)
+                X = carrier.ends[0].X @ inverse(carrier.ends[1].X) @ closure.ends[here].X
+                graph.joints[closure.name] = _with_end(closure, here, carrier.links[0], X, closure.line)
+    for name in [link for link in graph.links if link.endswith(CUT)]:
+        _join(graph, name)
+
+
+def _join(graph: JointGraph, name: str) -> None:
+    """Let the joint that carries a cut half take the place of the rigid closure."""
+    own = [joint for joint in graph.joints.values() if name in joint.links]
+    welds = [joint for joint in own if joint.type is JointType.FIXED and not joint.in_tree]
+    stem = name.removesuffix(CUT)
+    chain = [graph.joints[key] for key in (stem, *(part(stem, k) for k in (1, 2, 3))) if key in graph.joints]
+    chain = [joint for joint in chain if joint not in welds]
+    if len(own) != 2 or len(welds) != 1 or not chain or chain[-1].links[1] != name:
+        return
+    whole = _whole(stem, chain)
+    if whole is None:
+        return
+    weld = welds[0]
+    here = weld.links.index(name)
+    X = weld.ends[1 - here].X @ inverse(weld.ends[here].X) @ chain[-1].ends[1].X
+    for joint in (*chain, weld):
+        del graph.joints[joint.name]
+    for link in (name, *(joint.links[1] for joint in chain[:-1])):
+        del graph.links[link]
+    graph.joints[stem] = replace(_with_end(whole, 1, weld.links[1 - here], X, weld.line), in_tree=False)
+
+
+def _whole(name: str, chain: list[JointSpec]) -> JointSpec | None:
+    """The joint that a chain of joints at one place is."""
+    if len(chain) == 1:
+        return chain[0]
+    kind = WHOLES.get("".join(str(joint.type) for joint in chain))
+    if kind is None or any(a.links[1] != b.links[0] for a, b in pairwise(chain)):
+        return None
+    axes = tuple(joint.axes[0] for joint in chain)
+    axes = axes if kind is JointType.UNIVERSAL else axes[-1:] if kind.axes else ()
+    motor = chain[0].motor and Motor(chain[0].motor.name.removesuffix("__1"))
+    return replace(chain[0], name=name, type=kind, axes=axes, motor=motor)
+
+
+def _with_end(joint: JointSpec, place: int, link: str, X: Array, line: int | None) -> JointSpec:
+    end = FrameSpec(link, frozen(X), line)
+    return replace(joint, ends=(end, joint.ends[1]) if place == 0 else (joint.ends[0], end))

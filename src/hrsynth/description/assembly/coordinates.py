@@ -1,0 +1,83 @@
+"""Chains of slides and turns that only place the platform: coordinates of a modelling tool, not a leg.
+
+Tools that build a tree of bodies give a platform its place by two slides and a hinge (in a plane) or by three slides
+and a ball (in space), and close the legs against it. Such a chain is passive and forbids nothing that the legs allow.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from ...mechanism import graphs
+from ...mechanism.model import Joint, JointType, Mechanism, Note
+from ...tolerances import SAME_DIRECTION, SAME_POINT
+from ..tree import is_connected, spanning
+from .loops import LoopAssembly
+
+_PLANE = re.compile("PPR|RPP|E")
+_SPACE = re.compile("PPP(S|RRR|UR|RU)|(S|RRR|UR|RU)PPP")
+"""The types of the joints of such a chain, from the base or from the platform."""
+
+
+def without_coordinates(mechanism: Mechanism) -> Mechanism:
+    """The mechanism with its only chain of coordinates from the base to the platform read as what it is: in space a
+    free joint, in a plane nothing."""
+    found = [chain for chain in _chains(mechanism) if _are_coordinates(mechanism, chain)]
+    if len(found) != 1:
+        return mechanism
+    (chain,) = found
+    names = [joint.name for joint in chain]
+    first, last = chain[0], chain[-1]
+    between = {link for one, two in pairwise(chain) for link in set(one.links) & set(two.links)}
+    rest = mechanism.changed(remove_joints=names, remove_links=between)
+    bodies = [link for joint in (first, last) for link in joint.links if link not in between]
+    in_space = sum(joint.type.freedoms for joint in chain) == 6
+    if not is_connected(rest) or mobility(rest) != mobility(mechanism):
+        return mechanism
+    if in_space:
+        rest = rest.changed(joints=[Joint(first.name, JointType.FREE, bodies[0], bodies[1],
+                                          mechanism.links[bodies[1]].pose[:3, 3])])
+    note = Note("merged", f"the joints {', '.join(names)} place the platform and forbid nothing: read as "
+                          + ("a free joint" if in_space else "no leg"))
+    return spanning(replace(rest, notes=(*mechanism.notes, note)))
+
+
+def mobility(mechanism: Mechanism) -> int:
+    """The freedoms of all joints together at the zero configuration."""
+    assembly = LoopAssembly.of(mechanism)
+    return sum(joint.kind.freedoms for joint, _, _ in assembly.tree) - assembly.rank(assembly.zero()).value
+
+
+def _chains(mechanism: Mechanism) -> list[list[Joint]]:
+    """The passive chains from the base's body to the platform's, through links that hold nothing else."""
+    bonds = graphs.adjacency(mechanism.links,
+                             (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED))
+    base, platform = (graphs.component(bonds, link) for link in (mechanism.base, mechanism.platform))
+    busy = {o.link for o in mechanism.observations} | {mechanism.reference}
+    busy |= {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
+    found = []
+    for start in base:
+        for joint in mechanism.joints_of(start):
+            chain, link = [joint], joint.other(start)
+            while link not in platform | base | busy and len(mechanism.joints_of(link)) == 2:
+                chain.append(next(j for j in mechanism.joints_of(link) if j is not chain[-1]))
+                link = chain[-1].other(link)
+            if link in platform and platform != base:
+                found.append(chain)
+    return found
+
+
+def _are_coordinates(mechanism: Mechanism, chain: Sequence[Joint]) -> bool:
+    """Whether joints are slides in independent directions and turns about one point, none of them driven."""
+    word = "".join(str(joint.type) for joint in chain)
+    if any(joint.actuated for joint in chain) or not (_PLANE.fullmatch(word) or _SPACE.fullmatch(word)):
+        return False
+    slides = [joint.axis for joint in chain if joint.type is JointType.PRISMATIC]
+    centres = np.array([joint.point for joint in chain if joint.type is not JointType.PRISMATIC])
+    return (not slides or bool(np.linalg.matrix_rank(np.array(slides), SAME_DIRECTION) == len(slides))) and bool(
+        np.max(np.abs(centres - centres[0])) <= SAME_POINT * mechanism.length)

@@ -1,0 +1,108 @@
+"""What a file leaves open, guessed by structure where that is safe: the base and the platform. Never by names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from ...budgets import LARGEST_GUESSED
+from ...errors import BadRequest
+from ...mechanism import graphs
+from ...mechanism.model import JointType
+from ..jointgraph import JointGraph, JointSpec
+
+
+def base(graph: JointGraph) -> str:
+    """The link that no joint carries, or the first of them in the file."""
+    carried = {joint.links[1] for joint in graph.joints.values() if joint.in_tree}
+    free = [link for link in graph.links if link not in carried] or list(graph.links)
+    if len(free) > 1:
+        graph.note("guess", f"the base is link {free[0]!r}, the first of {len(free)} that no joint carries "
+                            "(--base LINK to change it)")
+    return free[0]
+
+
+def platform(graph: JointGraph, base: str) -> str:
+    """The link that most ways join to the base; else the only frame on a fixed joint; else the link farthest away.
+
+    Raises ``BadRequest`` with the candidates where several are as good.
+    """
+    bodies = _RigidBodies(graph, base)
+    if len(bodies.members) == 1:
+        raise BadRequest(f"{graph.file}: no link moves relative to the base", base, "a joint that is not fixed")
+    body, why, rivals = bodies.platform()
+    if body is None:
+        names = [bodies.title(each) for each in rivals]
+        raise BadRequest(f"{graph.file}: the file does not say which link is the platform, and several could be",
+                         None, "--platform LINK, such as " + ", ".join(names[:12]) + (" …" if names[12:] else ""))
+    link = bodies.title(body)
+    graph.note("guess", f"the platform is link {link!r}, {why} (--platform LINK to change it)")
+    return link
+
+
+class _RigidBodies:
+    """Links held together by fixed joints are one body, named by its first link."""
+
+    def __init__(self, graph: JointGraph, base: str) -> None:
+        joints = list(graph.joints.values())
+        bonds = graphs.adjacency(graph.links, (j.links for j in joints if j.type is JointType.FIXED))
+        order = {link: i for i, link in enumerate(graph.links)}
+        groups = [sorted(group, key=order.__getitem__) for group in graphs.components(bonds)]
+        self.members = {group[0]: group for group in groups}
+        into = {link: group[0] for group in groups for link in group}
+        self.base = into[base]
+        pairs = [(into[a], into[b]) for a, b in (joint.links for joint in joints)]
+        self.near = graphs.adjacency(self.members, (pair for pair in pairs if pair[0] != pair[1]))
+        self.closing = graph.closing
+        self.joints: dict[str, list[JointSpec]] = {link: [] for link in graph.links}
+        for joint in joints:
+            for link in joint.links:
+                self.joints[link].append(joint)
+
+    def platform(self) -> tuple[str | None, str, Sequence[str]]:
+        """The platform's body and why, or None and the candidates."""
+        others = [body for body in self.near if body != self.base]
+        framed = [body for body in others if self._frames(body)]
+        parts = sum(1 for _ in graphs.components(self.near))
+        if sum(map(len, self.near.values())) == 2 * (len(self.near) - parts):  # a forest
+            tips = [body for body in others if len(self.near[body]) == 1]
+            if len(tips) == 1:
+                return tips[0], "the end of the chain", ()
+            return (framed[0], "the only frame on a fixed joint", ()) if len(framed) == 1 else (None, "", tips)
+        ways = {body: self._ways(body) for body in others if len(self.near[body]) >= 3}
+        most = max(ways.values(), default=0)
+        best = [body for body in others if ways.get(body) == most]
+        if most >= 3 and len(best) == 1:
+            return best[0], f"which {most} ways join to the base", ()
+        if len(framed) == 1:
+            return framed[0], "the only frame on a fixed joint", ()
+        distance = graphs.distances(self.near, self.base)
+        ends = [body for body in others if distance[body] == max(distance.values())]
+        return (ends[0], "the farthest from the base", ()) if len(ends) == 1 else (None, "", ends)
+
+    def title(self, body: str) -> str:
+        """The link that stands for a body: its only frame, else the link with most joints."""
+        frames = self._frames(body)
+        if len(frames) == 1:
+            return frames[0]
+        return max(self.members[body], key=lambda link: len(self.joints[link]))
+
+    def _ways(self, body: str) -> int:
+        """The number of ways from a body to the base that share no body; not counted where there are too many."""
+        import networkx as nx
+
+        if len(self.near) > LARGEST_GUESSED:
+            return 0
+        graph: nx.Graph[str] = nx.Graph((a, b) for a, ends in self.near.items() for b in ends)
+        direct = graph.has_edge(self.base, body)
+        if direct:
+            graph.remove_edge(self.base, body)
+        return direct + int(nx.node_connectivity(graph, self.base, body))
+
+    def _frames(self, body: str) -> list[str]:
+        """Links of a body that hang on one fixed joint and carry nothing."""
+        found = []
+        for link in [each for each in self.members[body] if each not in self.closing]:
+            own = self.joints[link]
+            if len(own) == 1 and own[0].type is JointType.FIXED and own[0].links[1] == link:
+                found.append(link)
+        return found

@@ -1,0 +1,280 @@
+"""Putting a joint graph together: tree joints moved until every other joint's two frames meet.
+
+Damped Gauss-Newton on the coordinates of the tree joints that lie in loops. Directions in which the loops hardly
+resist (redundant constraints, disturbed by rounded numbers) are not followed. Lengths in characteristic lengths.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...geometry.ranks import Rank, rank_of
+from ...geometry.vectors import Array, inverse, pose
+from ...mechanism.model import JointType, Mechanism
+from ...tolerances import FAINT, FIRM, NEARLY_SINGULAR, NEWTON_REACH, NOISE, RANK_CUTOFF, RANK_GAP, SOLVED
+from ..jointgraph import FrameSpec, GearSpec, JointSpec, TreeJoint, spanning_tree, zero_poses
+from ..jointmotion import displacement, opening, screws, step_along, zero
+
+STRIDE = 0.4
+"""Largest change of a coordinate in one step."""
+EFFORT = 100_000
+"""Joints visited (and their like) after which solving is given up: some seconds."""
+BETTER = 2.0
+"""Factor by which another pose must be firmer to take the place of a nearly singular one."""
+TRIES = 24
+"""Random pushes and steps before the best found has to do."""
+Values = dict[str, Array]
+"""The value of every tree joint."""
+
+
+class LoopAssembly:
+    """Tree, loops and gears of a joint graph, in which tree joints take values."""
+
+    def __init__(self, base: str, joints: Sequence[JointSpec], gears: Sequence[GearSpec] = ()) -> None:
+        self.base = base
+        tree = spanning_tree(base, joints)
+        self.length = _spread(base, tree)
+        self.tree = [(_scaled(joint, self.length), parent, child) for joint, parent, child in tree]
+        used = {joint.name for joint, _, _ in tree}
+        self._parent = {child: (joint, parent) for joint, parent, child in self.tree}
+        reached = {base, *self._parent}
+        self.loops = [_scaled(joint, self.length) for joint in joints
+                      if joint.name not in used and reached.issuperset(joint.links)]
+        units = {joint.name: self.unit(joint) for joint in joints}
+        self.gears = [replace(g, ratio=g.ratio * units[g.driver] / units[g.driven], offset=g.offset / units[g.driven])
+                      for g in gears if g.driver in used and g.driven in used]
+        self._ways = [(self._way(loop.links[0]), self._way(loop.links[1])) for loop in self.loops]
+        active = {name for one, two in self._ways for name in one ^ two}
+        active |= {name for gear in self.gears for name in (gear.driver, gear.driven)}
+        self.active = [joint for joint, _, _ in self.tree if joint.name in active]
+        self._columns: dict[str, slice] = {}
+        self.size = 0
+        for joint in self.active:
+            self._columns[joint.name] = slice(self.size, self.size + joint.kind.freedoms)
+            self.size += joint.kind.freedoms
+        self._effort = len(self.tree) + len(self.loops) + self.size**2 // 50
+        self._spent = 0
+
+    def _way(self, link: str) -> frozenset[str]:
+        names = set()
+        while link != self.base:
+            joint, link = self._parent[link]
+            names.add(joint.name)
+        return frozenset(names)
+
+    def zero(self) -> Values:
+        """All tree joints at zero."""
+        return {joint.name: zero(joint) for joint, _, _ in self.tree}
+
+    def unit(self, joint: JointSpec) -> float:
+        """Metres or radians in one unit of a joint's coordinate."""
+        return self.length if joint.type is JointType.PRISMATIC else 1.0
+
+    def _poses(self, values: Values) -> dict[str, Array]:
+        """The pose (4, 4) of every link in the base frame, lengths in characteristic lengths."""
+        X = {self.base: np.eye(4)}
+        for joint, parent, child in self.tree:
+            D, (one, two) = displacement(joint, values[joint.name]), joint.ends
+            if joint.links[0] == parent:
+                X[child] = X[parent] @ one.X @ D @ inverse(two.X)
+            else:
+                X[child] = X[parent] @ two.X @ inverse(D) @ inverse(one.X)
+        return X
+
+    def poses(self, values: Values) -> dict[str, Array]:
+        """The pose (4, 4) of every link in the base frame, in metres."""
+        return {link: _stretched(X, self.length) for link, X in self._poses(values).items()}
+
+    def system(self, values: Values) -> tuple[Array, Array]:
+        """What is open in all loops and gears (rows,), and its derivative by the active coordinates (rows, size)."""
+        self._spent += self._effort
+        X = self._poses(values)
+        twists = np.zeros((6, self.size))
+        for joint in self.active:
+            twists[:, self._columns[joint.name]] = np.array(screws(joint, *joint.frames(X))).reshape(-1, 6).T
+        errors, rows = [np.zeros(0)], [np.zeros((0, self.size))]
+        for loop, (before, after) in zip(self.loops, self._ways, strict=True):
+            error, by_twist = opening(loop, *loop.frames(X))
+            relative = np.zeros((6, self.size))
+            for link, sign, own in ((loop.links[1], 1.0, after - before), (loop.links[0], -1.0, before - after)):
+                while link != self.base:
+                    joint, parent = self._parent[link]
+                    if joint.name in own:
+                        columns = self._columns[joint.name]
+                        relative[:, columns] = (sign if joint.links[0] == parent else -sign) * twists[:, columns]
+                    link = parent
+            errors.append(error)
+            rows.append(by_twist @ relative)
+        for gear in self.gears:
+            row = np.zeros((1, self.size))
+            row[0, self._columns[gear.driven]] += 1.0
+            row[0, self._columns[gear.driver]] -= gear.ratio
+            errors.append(_slip(gear, values))
+            rows.append(row)
+        return np.concatenate(errors), np.vstack(rows)
+
+    def step(self, values: Values, step: Array) -> Values:
+        """The values that a step in the active coordinates leads to."""
+        X, after = self._poses(values), dict(values)
+        for joint in self.active:
+            R = joint.frames(X)[0][:3, :3]
+            after[joint.name] = step_along(joint, values[joint.name], step[self._columns[joint.name]], R)
+        return after
+
+    def close(self, values: Values, iterations: int = 60) -> tuple[Values, float]:
+        """The closed values that are reached from ``values``, and what is left open."""
+        error, J = self.system(values)
+        size, factor = float(np.linalg.norm(error)), 1.0
+        for _ in range(iterations):
+            if size <= SOLVED or factor > 1e6 or not self.size or self._spent > EFFORT:
+                break
+            trial = self.step(values, self._damped(error, J, size, factor))
+            trial_error, trial_J = self.system(trial)
+            trial_size = float(np.linalg.norm(trial_error))
+            if trial_size < size:
+                gain = size - trial_size
+                values, error, J, size = trial, trial_error, trial_J, trial_size
+                factor = max(0.1 * factor, 1e-3)
+                if gain < 1e-6 * size and size < NOISE:
+                    break
+            else:
+                factor *= 10.0
+        return self._polished(values, error, J, size) if SOLVED < size < NOISE else (values, size)
+
+    def _polished(self, values: Values, error: Array, J: Array, size: float) -> tuple[Values, float]:
+        """Plain Newton steps, faint directions too, as long as they are short for the residual that they remove."""
+        start = (values, size)
+        for _ in range(10):
+            step: Array = np.asarray(-np.linalg.lstsq(J, error, rcond=RANK_CUTOFF)[0], dtype=float)
+            if np.max(np.abs(step), initial=0.0) > NEWTON_REACH * size:
+                return start
+            values = self.step(values, step)
+            error, J = self.system(values)
+            size = float(np.linalg.norm(error))
+            if size <= SOLVED:
+                return values, size
+        return start
+
+    def _damped(self, error: Array, J: Array, size: float, factor: float) -> Array:
+        """The damped step, no longer than ``STRIDE``; near the solution the plain one without faint directions."""
+        U, s, Vt = np.linalg.svd(J, full_matrices=False)
+        if size < NOISE and factor <= 1.0:
+            kept = s > FAINT * s[0]
+            step = -(Vt[kept].T @ ((U.T @ error)[kept] / s[kept]))
+        else:
+            step = -(Vt.T @ (s / (s**2 + factor * max(size**2, 1e-12)) * (U.T @ error)))
+        largest = float(np.max(np.abs(step), initial=0.0))
+        return np.asarray(step * min(1.0, STRIDE / largest) if largest > 0 else step)
+
+    def rank(self, values: Values, cutoff: float = RANK_CUTOFF) -> Rank:
+        """The rank of the loops' and gears' constraints on the joints in loops."""
+        return rank_of(np.asarray(np.linalg.svd(self.system(values)[1], compute_uv=False)), cutoff=cutoff)
+
+    def freedoms(self, rank: Rank) -> int:
+        """The freedoms of the joints in loops that constraints of a rank leave."""
+        return self.size - rank.value
+
+    def kernel(self, values: Values) -> Array:
+        """A basis (size, freedoms) of the velocities that keep the loops closed."""
+        _, s, Vt = np.linalg.svd(self.system(values)[1], full_matrices=True)
+        return np.asarray(Vt[int(np.sum(s > RANK_CUTOFF * max(s, default=1.0))):].T)
+
+    def worst(self, values: Values) -> tuple[str, float]:
+        """The loop that is open most, and by how much."""
+        X = self._poses(values)
+        found = [(float(np.linalg.norm(opening(loop, *loop.frames(X))[0])), loop.name) for loop in self.loops]
+        found += [(abs(float(_slip(gear, values)[0])), gear.name) for gear in self.gears]
+        miss, name = max(found, default=(0.0, "none"))
+        return name, miss
+
+    @classmethod
+    def of(cls, mechanism: Mechanism) -> LoopAssembly:
+        """The assembly of a mechanism's own joints: closed at zero."""
+        joints = []
+        for joint in mechanism.joints.values():
+            one, two = (FrameSpec(link, inverse(mechanism.links[link].pose) @ pose(joint.point))
+                        for link in joint.links)
+            joints.append(JointSpec(joint.name, joint.type, (one, two), joint.axes, in_tree=joint.in_tree))
+        carrier = {joint.successor: joint.name for joint in mechanism.joints.values() if joint.in_tree}
+        gears = [GearSpec(each.name, carrier[each.predecessor], carrier[each.successor], each.ratio)
+                 for each in mechanism.couplings]
+        return cls(mechanism.base, joints, gears)
+
+
+@dataclass(frozen=True, eq=False)
+class LoopSolution:
+    """Closed values, what is left open with them, and whether a random push was needed to get there."""
+
+    values: Values
+    residual: float
+    pushed: bool = False
+
+
+def solve(assembly: LoopAssembly, seed: int = 0) -> LoopSolution:
+    """Close all loops from zero; where that stalls (flat and collinear poses), from randomly pushed values too."""
+    best = LoopSolution(*assembly.close(assembly.zero()))
+    rng = np.random.default_rng(seed)
+    for number in range(TRIES):
+        if best.residual <= NOISE:
+            break
+        amplitude = (0.1, 0.3, 0.6, 1.0)[min(3, number // 6)]
+        start = assembly.step(assembly.zero(), amplitude * rng.normal(size=assembly.size))
+        values, residual = assembly.close(start)
+        if residual < best.residual:
+            best = LoopSolution(values, residual, True)
+    return best
+
+
+def regular_values(assembly: LoopAssembly, values: Values, seed: int = 0) -> Values | None:
+    """Closed values near ``values`` with fewer freedoms, or with loops that resist much more firmly, where ``values``
+    are singular or nearly so; None where they are neither, or nothing better is found."""
+    here = assembly.rank(values)
+    if assembly.freedoms(here) == 0:
+        return None
+    rng = np.random.default_rng(seed)
+    best, found, origin = replace(here, weakest=BETTER * here.weakest), None, values
+    for number in range(TRIES):
+        if found is not None and best.weakest > FIRM:
+            break
+        if number >= 3 and found is None and here.weakest > NEARLY_SINGULAR:
+            break
+        kernel = assembly.kernel(origin)
+        step = kernel @ rng.normal(size=kernel.shape[1])
+        step *= (0.3, 0.15, 0.5)[number % 3] / float(np.max(np.abs(step), initial=1e-12))
+        there, residual = assembly.close(assembly.step(origin, step))
+        rank = assembly.rank(there)
+        if residual > 10 * SOLVED or rank.gap < RANK_GAP:
+            continue
+        firmer = rank.weakest > best.weakest and (found is not None or here.weakest <= NEARLY_SINGULAR)
+        if rank.value > best.value or (rank.value == best.value and firmer):
+            best, found, origin = rank, there, there
+    return found
+
+
+def _slip(gear: GearSpec, values: Values) -> Array:
+    """By how much a gear's two coordinates miss each other, (1,)."""
+    return values[gear.driven][:1] - gear.ratio * values[gear.driver][:1] - gear.offset
+
+
+def _scaled(joint: JointSpec, length: float) -> JointSpec:
+    one, two = (FrameSpec(end.link, _stretched(end.X, 1 / length), end.line) for end in joint.ends)
+    return replace(joint, ends=(one, two))
+
+
+def _stretched(X: Array, factor: float) -> Array:
+    scaled = X.copy()
+    scaled[:3, 3] *= factor
+    return scaled
+
+
+def _spread(base: str, tree: Sequence[TreeJoint]) -> float:
+    """The characteristic length (m): mean distance of the joints' centres from their centroid, all at zero."""
+    if not tree:
+        return 1.0
+    X = zero_poses(base, tree)
+    points = np.array([(X[parent] @ joint.ends[joint.links[0] != parent].X)[:3, 3] for joint, parent, _ in tree])
+    spread = float(np.mean(np.linalg.norm(points - np.mean(points, axis=0), axis=1)))
+    return spread if spread > 1e-9 else 1.0

@@ -1,0 +1,40 @@
+"""The dialects of robot files: a folder each, found by itself, with ``DIALECT``, ``read`` and ``write``."""
+
+from __future__ import annotations
+
+import pkgutil
+from functools import cache
+from importlib import import_module
+
+from ...mechanism.model import Mechanism
+from ..dialect import Dialect, Read, RobotFile, Write, Written
+from ..jointgraph import JointGraph
+
+NATIVE = "native"
+
+
+@cache
+def dialects() -> dict[str, Dialect]:
+    """All dialects by name, in the order in which a file is shown to them."""
+    folders = [each.name for each in pkgutil.iter_modules(__path__) if each.ispkg]
+    found: list[Dialect] = [import_module(f"{__name__}.{name}").DIALECT for name in folders]
+    return {each.name: each for each in sorted(found, key=lambda each: (each.rank, each.name))}
+
+
+def writable() -> list[Dialect]:
+    """The dialects that are written, the native one first."""
+    found = (each for each in dialects().values() if each.endings)
+    return sorted(found, key=lambda each: (each.name != NATIVE, each.name))
+
+
+def read(file: RobotFile) -> JointGraph | Mechanism:
+    """What a file says, in whatever dialect; one that none of them knows is refused as the native one refuses it."""
+    name = next((name for name, dialect in dialects().items() if dialect.knows(file)), NATIVE)
+    reader: Read = import_module(f"{__name__}.{name}.read").read
+    return reader(file)
+
+
+def write(mechanism: Mechanism, dialect: str) -> Written:
+    """The texts of a mechanism's files in a dialect."""
+    writer: Write = import_module(f"{__name__}.{dialect}.write").write
+    return writer(mechanism)

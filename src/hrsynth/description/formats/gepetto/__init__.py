@@ -1,0 +1,21 @@
+"""Gepetto's extended URDF: ``robot.urdf`` for the tree, ``robot.yaml`` for closures, motors and joint types."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...dialect import Dialect, RobotFile
+from .settings import settings_beside
+
+_YAML = (".yaml", ".yml")
+
+
+def _files(path: Path) -> tuple[Path, ...]:
+    return path.with_suffix(".urdf"), path if path.suffix.lower() in _YAML else path.with_suffix(".yaml")
+
+
+def _knows(file: RobotFile) -> bool:
+    return file.root is None or settings_beside(file) is not None
+
+
+DIALECT = Dialect("gepetto", _knows, _YAML, _files, rank=-1)

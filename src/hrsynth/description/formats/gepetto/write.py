@@ -1,0 +1,39 @@
+"""A mechanism as Gepetto's extended URDF: the tree as URDF, closures and motors as YAML."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+
+from ....geometry.vectors import pose
+from ....mechanism.model import Joint, JointType, Link, Mechanism
+from ...chains import CUT, END, WELD
+from ...dialect import Written
+from ...reduction import reduce
+from ..native.write import joint_names, text
+
+
+def write(mechanism: Mechanism) -> Written:
+    """The URDF text, the YAML text and warnings; a spherical loop is a ``3d`` closure, any other one is cut through its
+    joint and closed in ``6d``."""
+    robot, lost = reduce(mechanism, tuple(JointType), (JointType.SPHERICAL, JointType.FIXED))
+    links = dict(robot.links)
+    joints = {name: joint for name, joint in robot.joints.items() if joint.in_tree}
+    pairs, kinds = [], []
+    for joint in robot.joints.values():
+        if joint.in_tree:
+            continue
+        stem = joint.name.removesuffix(WELD)
+        frames = []
+        for link, suffix in zip(joint.links, (CUT, END), strict=True):
+            name = stem + suffix
+            if name not in links:
+                links[name] = Link(name, pose(joint.point))
+                joints[name] = Joint(name, JointType.FIXED, link, name, joint.point)
+            frames.append(name)
+        pairs.append(frames)
+        kinds.append("3d" if joint.type is JointType.SPHERICAL else "6d")
+    tree = replace(robot, links=links, joints=joints)
+    motors = [name for joint in joints.values() if joint.actuated for name in joint_names(joint)]
+    lines = [f"closed_loop: {json.dumps(pairs)}", f"type: {json.dumps(kinds)}", f"name_mot: {json.dumps(motors)}", ""]
+    return Written((text(tree), "\n".join(lines)), lost)

@@ -1,0 +1,7 @@
+"""MJCF, the dialect of MuJoCo: bodies and joints as a tree, equalities that close its loops."""
+
+from __future__ import annotations
+
+from ...dialect import Dialect
+
+DIALECT = Dialect("mjcf", lambda file: file.tag == "mujoco", (".xml", ".mjcf"))

@@ -1,0 +1,163 @@
+"""What a model says once for many elements: includes, default classes, the conventions of ``<compiler>``."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from ....errors import BadRobotFile, Defect
+from ....geometry.vectors import Array, pose, rotation_about
+from ... import xml
+from ...elements import XmlReader
+
+MOST_INCLUDES = 50
+"""Files that a model may include."""
+
+
+class Defaults:
+    """The attributes that each class gives to each kind of element; classes are nested and inherit."""
+
+    def __init__(self, reader: XmlReader) -> None:
+        self.reader = reader
+        self.classes: dict[str, dict[str, dict[str, str]]] = {"main": {}}
+        for element in reader.root.findall("default"):
+            self._read(element, {}, "main")
+
+    def _read(self, element: xml.Element, inherited: dict[str, dict[str, str]], name: str) -> None:
+        own = {tag: dict(values) for tag, values in inherited.items()}
+        for tag, values in self.classes.get(name, {}).items():
+            own.setdefault(tag, {}).update(values)
+        for child in xml.children(element):
+            if child.tag != "default":
+                own.setdefault(child.tag, {}).update(_attributes(child))
+        self.classes[name] = own
+        for child in element.findall("default"):
+            inner = child.get("class")
+            if inner is None:
+                self.reader.defect(xml.line(child), "<default> without class")
+            else:
+                self._read(child, own, inner)
+
+    def of(self, element: xml.Element, childclass: str | None, tag: str | None = None) -> dict[str, str]:
+        """The attributes of an element with those of its class, its own first."""
+        name = element.get("class") or childclass or "main"
+        if name not in self.classes:
+            self.reader.defect(xml.line(element), "unknown default class", name)
+            name = "main"
+        return {**self.classes[name].get(tag or str(element.tag), {}), **_attributes(element)}
+
+
+def _attributes(element: xml.Element) -> dict[str, str]:
+    return {str(key): str(value) for key, value in element.attrib.items()}
+
+
+@dataclass(frozen=True)
+class Compiler:
+    """What ``<compiler>`` says of angles, and the poses that elements then have."""
+
+    reader: XmlReader
+    degrees: bool = True
+    sequence: str = "xyz"
+
+    @classmethod
+    def of(cls, reader: XmlReader) -> Compiler:
+        """The settings of a document; the last one of each counts."""
+        found = cls(reader)
+        for element in reader.root.findall("compiler"):
+            unit, sequence = element.get("angle"), element.get("eulerseq", found.sequence)
+            if unit not in (None, "degree", "radian"):
+                reader.defect(xml.line(element), "angle of <compiler>", unit, "degree or radian")
+            if len(sequence) != 3 or set(sequence.lower()) - set("xyz"):
+                reader.defect(xml.line(element), "eulerseq of <compiler>", sequence, "three of x, y, z, X, Y, Z")
+                sequence = "xyz"
+            if element.get("coordinate", "local") != "local":
+                reader.defect(xml.line(element), "coordinate of <compiler>", element.get("coordinate"), "local")
+            found = cls(reader, found.degrees if unit is None else unit == "degree", sequence)
+        return found
+
+    def angle(self, value: float) -> float:
+        """An angle in radians."""
+        return float(np.radians(value)) if self.degrees else float(value)
+
+    def pose(self, element: xml.Element) -> Array:
+        """The pose (4, 4) of an element with ``pos`` and one of the ways to give an orientation."""
+        return pose(self.reader.numbers(element, "pos", (0, 0, 0)), self._orientation(element))
+
+    def _orientation(self, element: xml.Element) -> Array | None:
+        reader = self.reader
+        if element.get("quat") is not None:
+            return reader.rotation(element, reader.numbers(element, "quat", (1, 0, 0, 0)))
+        if element.get("axisangle") is not None:
+            values = reader.numbers(element, "axisangle", (0, 0, 1, 0))
+            return rotation_about(self._direction(element, values[:3]), self.angle(values[3]))
+        if element.get("xyaxes") is not None:
+            values = reader.numbers(element, "xyaxes", (1, 0, 0, 0, 1, 0))
+            x = self._direction(element, values[:3])
+            y = self._direction(element, values[3:] - x * float(x @ values[3:]))
+            return np.column_stack((x, y, np.cross(x, y)))
+        if element.get("zaxis") is not None:
+            return _least_turn(self._direction(element, reader.numbers(element, "zaxis", (0, 0, 1))))
+        if element.get("euler") is not None:
+            return self._euler([self.angle(v) for v in reader.numbers(element, "euler", (0, 0, 0))])
+        return None
+
+    def _direction(self, element: xml.Element, values: Array) -> Array:
+        return self.reader.unit(values, xml.line(element), "a direction of length zero")
+
+    def _euler(self, angles: list[float]) -> Array:
+        """Lower case turns about the axes as they have become, upper case about the fixed ones."""
+        R = np.eye(3)
+        for letter, angle in zip(self.sequence, angles, strict=True):
+            turn = rotation_about(np.eye(3)["xyz".index(letter.lower())], angle)
+            R = R @ turn if letter.islower() else turn @ R
+        return R
+
+
+def _least_turn(z: Array) -> Array:
+    """The smallest rotation that takes the z axis to ``z``."""
+    axis = np.cross([0.0, 0.0, 1.0], z)
+    sine = float(np.linalg.norm(axis))
+    if sine < 1e-12:
+        return np.eye(3) if z[2] > 0 else rotation_about((1, 0, 0), np.pi)
+    return rotation_about(axis, float(np.arctan2(sine, z[2])))
+
+
+def with_includes(root: xml.Element, file: str) -> xml.Element:
+    """The document with every ``<include>`` replaced by what the file holds; only files in the folder of the main one
+    and below it are read, none twice. Raises ``BadRobotFile``."""
+    folder = Path(file).resolve().parent
+    read = {Path(file).resolve()}
+    size = 0
+    while (element := next(root.iter("include"), None)) is not None:
+        name = element.get("file") or ""
+
+        def refuse(what: str, allowed: str, at: xml.Element = element, value: str = name) -> BadRobotFile:
+            return BadRobotFile([Defect(at.base or file, xml.line(at), what, value, allowed)])
+
+        try:
+            path = (folder / name).resolve()
+        except (OSError, ValueError):
+            raise refuse("an include that is no file", "a file in the model's folder") from None
+        if not name or not path.is_relative_to(folder):
+            raise refuse("an include outside of the model's folder", "a file in the model's folder")
+        if path in read or len(read) > MOST_INCLUDES:
+            raise refuse("a file that is included again, or too many of them", f"each once, up to {MOST_INCLUDES}")
+        read.add(path)
+        try:
+            content = xml.content(path)
+        except BadRobotFile as error:
+            raise refuse(f"an include of what is {error.defects[0].what}", "a file in the model's folder") from None
+        size += len(content)
+        if size > xml.LARGEST_FILE:
+            raise refuse("included files too large", f"up to {xml.LARGEST_FILE} bytes together")
+        parent, included = element.getparent(), xml.document(content, str(path))
+        if parent is None:
+            raise refuse("an include in place of the model", "<mujoco>")
+        place = parent.index(element)
+        parent.remove(element)
+        for child in reversed(xml.children(included)):
+            child.base = str(path)
+            parent.insert(place, child)
+    return root

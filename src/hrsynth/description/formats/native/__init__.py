@@ -1,0 +1,16 @@
+"""The native dialect: URDF for the spanning tree, ``<loop>`` and ``<hrsynth>`` elements for the rest."""
+
+from __future__ import annotations
+
+from ...dialect import Dialect, RobotFile
+from .read import parse
+from .write import text as write
+
+__all__ = ["DIALECT", "parse", "write"]
+
+
+def _knows(file: RobotFile) -> bool:
+    return file.tag == "robot" and file.strict and file.has("hrsynth")
+
+
+DIALECT = Dialect("native", _knows, (".urdf",), rank=1)

@@ -1,0 +1,227 @@
+"""From a robot file in the native dialect to a mechanism, or to all the defects of the file."""
+
+from __future__ import annotations
+
+import difflib
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from lxml import etree
+
+from ....errors import BadRobotFile
+from ....mechanism import graphs
+from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
+from ....mechanism.observation import Direction
+from ....tolerances import SAME_DIRECTION, SAME_GEOMETRY
+from ... import chains, xml
+from ...dialect import RobotFile
+from ...elements import LIMITS
+from ...jointgraph import JointSpec, TreeJoint, zero_poses
+from ...jointmotion import require_closed
+from ..urdf.elements import INTERFACE, UrdfReader, simple_transmission
+
+OWN_TAGS = ("platform", "camera", "observe")
+"""What an ``<hrsynth>`` element is read for; other children are kept, unless they look like one of these."""
+ELSEWHERE = ("link", "joint", "loop", "coupling", "transmission")
+"""Elements that belong directly into ``<robot>``."""
+
+
+def read(file: RobotFile) -> Mechanism:
+    """The mechanism that a robot file describes.
+
+    Raises
+    ------
+    BadRobotFile
+        With every defect of the file and its line.
+    LoopsNotClosed
+        Where a loop is open at the zero configuration.
+    """
+    return _NativeReader(str(file.path), file.document).mechanism()
+
+
+def parse(text: bytes | str, file: str = "<text>") -> Mechanism:
+    """The same for a text; ``file`` is what defects are reported under."""
+    return _NativeReader(file, xml.document(text, file)).mechanism()
+
+
+@dataclass
+class _NativeReader(UrdfReader):
+    observations: list[Direction] = field(default_factory=list)
+    platform: str | None = None
+    camera: str | None = None
+    serial: bool = False
+    rest: list[str] = field(default_factory=list)
+
+    def mechanism(self) -> Mechanism:
+        root = self.root
+        if root.tag != "robot":
+            self.defect(xml.line(root), "root element", str(root.tag), "robot")
+            raise BadRobotFile(self.defects)
+        name = self.attribute(root, "name") or "robot"
+        self.elements()
+        self.own(root.findall("hrsynth"))
+        self.rest[:0] = xml.unknown(root, ["name"], [*ELSEWHERE, "hrsynth"])
+        base = self.structure()
+        if self.defects or base is None or self.platform is None:
+            raise BadRobotFile(self.defects)
+        return self.assembled(name, base, self.platform)
+
+    def limits(self, element: xml.Element, kind: str | None) -> Limits | None:
+        limit = self.only(element, "limit")
+        if limit is None:
+            return None
+        free = limit.get("free", "").split()
+        values: dict[str, float] = {}
+        for key in LIMITS:
+            if limit.get(key) is not None and key not in free:
+                values[key] = float(self.numbers(limit, key, (0,))[0])
+        for key in ("velocity", "effort"):
+            if values.get(key, 0.0) < 0:
+                self.defect(xml.line(limit), f"{key} of <limit>", limit.get(key), "no negative number")
+        if kind == "continuous":
+            values.pop("lower", None)
+            values.pop("upper", None)
+        elif element.tag == "joint" and kind in ("revolute", "prismatic") and {"lower", "upper"} & set(values):
+            for key in ("lower", "upper"):
+                if key not in free:
+                    values.setdefault(key, 0.0)
+        if values.get("lower", -np.inf) > values.get("upper", np.inf):
+            self.defect(xml.line(limit), "lower limit", f"{values['lower']:g}", f"up to {values['upper']:g}")
+        return Limits(**values) if values else None
+
+    def transmission(self, element: xml.Element) -> None:
+        name = self.attribute(element, "name")
+        targets = element.findall("joint")
+        if not targets:
+            self.defect(xml.line(element), "transmission without <joint>", element.get("name"))
+        joints = self.joints
+        for joint in targets:
+            target = self.attribute(joint, "name")
+            if target is None:
+                continue
+            planar = self.planar_parts(target)
+            if not planar and not self.known(target, xml.line(joint), "transmission of an unknown joint", joints):
+                continue
+            for each in planar or [target]:
+                if joints[each].type is JointType.FIXED:
+                    self.defect(xml.line(joint), "transmission of a fixed joint", target)
+                elif each in self.motors:
+                    self.defect(xml.line(joint), "second transmission of a joint", target)
+                elif name is not None and planar:
+                    self.motors[each] = Motor(name + each.removeprefix(target))
+                elif name is not None:
+                    text = xml.canonical(element)
+                    simple = [xml.canonical(simple_transmission(name, target, each)) for each in (INTERFACE, None)]
+                    self.motors[each] = Motor(name, None if text in simple else text)
+
+    def own(self, elements: list[xml.Element]) -> None:
+        """The ``<hrsynth>`` element: platform, camera, observations."""
+        for extra in elements[1:]:
+            self.defect(xml.line(extra), "second <hrsynth>")
+        if not elements:
+            self.defect(xml.line(self.root), "no <hrsynth> element, so no <platform>")
+            return
+        element = elements[0]
+        self.serial = element.get("serial") == "true"
+        for role in ("platform", "camera"):
+            child = self.only(element, role)
+            if child is not None:
+                link = self.attribute(child, "link")
+                if self.known(link, xml.line(child), f"{role}: unknown link"):
+                    setattr(self, role, link)
+            elif role == "platform":
+                self.defect(xml.line(element), "no <platform>")
+        for observe in element.findall("observe"):
+            self.observe(observe)
+        for child in xml.children(element):
+            if child.tag not in OWN_TAGS and (
+                    child.tag in ELSEWHERE or difflib.get_close_matches(child.tag, OWN_TAGS, n=1, cutoff=0.75)):
+                self.defect(xml.line(child), "an element that has no meaning inside <hrsynth>", f"<{child.tag}>",
+                            ", ".join(f"<{tag}>" for tag in OWN_TAGS))
+        rest = xml.unknown(element, ["serial"], OWN_TAGS)
+        if rest:
+            bare = etree.Element("hrsynth")
+            xml.restore(bare, rest)
+            self.rest.append(xml.canonical(bare))
+
+    def observe(self, element: xml.Element) -> None:
+        """An ``<observe>``: a direction."""
+        leg, link = self.attribute(element, "leg"), self.attribute(element, "link")
+        self.known(link, xml.line(element), "observe: unknown link")
+        if leg is not None and (leg == "all" or "," in leg):
+            self.defect(xml.line(element), "observe: a leg's label that no list of legs could name", leg,
+                        "a label without commas, other than all")
+        if self.attribute(element, "axis") is None:
+            return
+        direction = self.direction(element, "axis", (0, 0, 1))
+        if leg is not None and link is not None:
+            self.observations.append(Direction(leg, link, direction, line=xml.line(element)))
+
+    def structure(self) -> str | None:
+        """The base; whatever keeps the tree joints from being one tree is a defect."""
+        root_line = xml.line(self.root)
+        if not self.links:
+            self.defect(root_line, "no links")
+            return None
+        self.check_ends()
+        if not self.loops and not self.root.findall("loop") and not self.serial:
+            self.defect(root_line, "no loop: not a parallel robot")
+        carriers: dict[str, JointSpec] = {}
+        for joint in self.tree.values():
+            child = joint.ends[1].link
+            if child is None or child == joint.ends[0].link:
+                continue
+            if child in carriers:
+                self.defect(joint.line, f"joint {joint.name!r}: its child has a parent already, by joint "
+                                        f"{carriers[child].name!r} (a loop is written as <loop>)", child)
+            else:
+                carriers[child] = joint
+        order = list(self.tree)
+        for ring in self.rings():
+            names = sorted((joint.name for joint in ring), key=order.index)
+            self.defect(self.tree[names[-1]].line, "tree joints that make a ring (a loop is written as <loop>)",
+                        " ".join(names))
+        roots = [name for name in self.links if name not in carriers]
+        for name in roots[1:]:
+            self.defect(self.links[name].line, f"second root beside {roots[0]!r}: no joint's child", name)
+        if not roots:
+            return None
+        self.check_platform(roots[0])
+        return roots[0]
+
+    def check_platform(self, base: str) -> None:
+        """The platform is another link than the base and hangs together with it."""
+        if self.platform is None:
+            return
+        line = next((xml.line(each) for each in self.root.iterfind("hrsynth/platform")), None)
+        whole = [joint.links for joint in self.joints.values() if None not in (joint.ends[0].link, joint.ends[1].link)]
+        if self.platform == base:
+            self.defect(line, "the platform is the base", base)
+        elif self.platform not in graphs.component(graphs.adjacency(self.links, whole), base):
+            self.defect(line, f"platform not reachable from the base {base!r}", self.platform)
+
+    def assembled(self, name: str, base: str, platform: str) -> Mechanism:
+        """The mechanism, all geometry in the base frame at the zero configuration; its loops must be closed there."""
+        tree: list[TreeJoint] = graphs.outward(base, self.tree.values())
+        poses = zero_poses(base, tree)
+        joints, loops = {}, []
+        for joint in self.joints.values():
+            X_P, X_S = joint.frames(poses)
+            if not joint.in_tree:
+                loops.append((joint, X_P, X_S))
+            axes = tuple(X[:3, :3] @ axis for X, axis in zip((X_P, X_S), joint.axes, strict=False))
+            joints[joint.name] = Joint(joint.name, joint.kind, *joint.links, X_P[:3, 3], axes,
+                                       self.motors.get(joint.name), joint.limits, joint.in_tree, joint.xml, joint.line)
+        links = {key: replace(link, pose=poses[key]) for key, link in self.links.items()}
+        mechanism = Mechanism(name, links, joints, base, platform, tuple(self.observations), tuple(self.couplings),
+                              self.camera, tuple(self.rest), self.file)
+        for joint, X_P, X_S in loops:
+            if joint.type is JointType.UNIVERSAL:
+                cosine = float(X_P[:3, :3] @ joint.axes[0] @ (X_S[:3, :3] @ joint.axes[1]))
+                gap = np.linalg.norm(X_S[:3, 3] - X_P[:3, 3])
+                if gap <= SAME_GEOMETRY * mechanism.length and not abs(cosine) <= SAME_DIRECTION:
+                    self.defect(joint.line, f"universal loop {joint.name!r}: cosine between axis and axis2",
+                                f"{cosine:.3g}", "0")
+        self.require_sound()
+        require_closed(self.file, loops, mechanism.length)
+        return chains.merge(mechanism)

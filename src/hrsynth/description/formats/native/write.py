@@ -1,0 +1,236 @@
+"""From a mechanism to the text of a robot file in the native dialect."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+import numpy as np
+from lxml import etree
+
+from ....budgets import LARGEST_NUMBER
+from ....errors import BadRequest
+from ....geometry.vectors import Array, inverse, pose, unit
+from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
+from ....mechanism.observation import Direction
+from ....tolerances import AT_ORIGIN, SAME_DIRECTION
+from ... import chains, numerals, xml
+from ...dialect import Written
+from ...jointgraph import LOOP_TYPES, ORIGIN
+from ...tree import outward, spanning
+from ..urdf.elements import simple_transmission
+
+_LOOP_NAMES = {kind: name for name, kind in LOOP_TYPES.items() if name != "continuous"}
+_OWN = re.compile(r"<hrsynth[\s/>]")
+_NO_LIMIT = {"lower": -1000.0, "upper": 1000.0, "effort": 1000.0, "velocity": 1000.0}
+
+
+def write(mechanism: Mechanism) -> Written:
+    """The robot file of a mechanism, in which nothing is lost."""
+    return Written((text(mechanism),))
+
+
+def text(mechanism: Mechanism) -> str:
+    """The text of that file: reading it gives ``spanning(mechanism)`` again, writing that the same text.
+
+    Raises
+    ------
+    BadRequest
+        For what the dialect cannot say: an observation that is no direction, a universal joint whose axes are not
+        perpendicular, a link that has the name of a link in between, numbers that are not finite.
+    """
+    return _NativeWriter(spanning(mechanism)).text()
+
+
+def joint_names(joint: Joint) -> list[str]:
+    """The names of the joints that the file has for a tree joint: one a freedom, but one of a free joint."""
+    return chains.part_names(joint.name, 1 if joint.type is JointType.FREE else joint.type.freedoms)
+
+
+class _NativeWriter:
+    """Writes link by link outward from the base; every pose is relative to what reading the file will give."""
+
+    def __init__(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        coordinates = [link.pose[:3, 3] for link in mechanism.links.values()]
+        coordinates += [joint.point for joint in mechanism.joints.values()]
+        scale = float(np.max(np.abs(coordinates)))
+        if not scale <= LARGEST_NUMBER:
+            raise BadRequest("coordinates of links and joints", scale,
+                             f"finite numbers up to {LARGEST_NUMBER:g}")
+        self.decimals = numerals.length_decimals(scale)
+        self.poses: dict[str, Array] = {mechanism.base: ORIGIN}
+
+    def text(self) -> str:
+        robot = self.mechanism
+        try:
+            written = {joint.name: self._tree_joint(joint) for joint in outward(robot)}
+            written |= {joint.name: [self._loop(joint)] for joint in robot.joints.values() if not joint.in_tree}
+            order = sorted(robot.joints.values(), key=lambda joint: not joint.in_tree)
+            root = xml.new("robot", name=robot.name)
+            for link in robot.links.values():
+                element = etree.SubElement(root, "link", name=link.name)
+                xml.restore(element, link.xml)
+            for joint in order:
+                root.extend(written[joint.name])
+            for each in robot.couplings:
+                ends = xml.new("predecessor", link=each.predecessor), xml.new("successor", link=each.successor)
+                ratio = xml.new("ratio", value=numerals.exact(each.ratio))
+                root.append(xml.new("coupling", *ends, ratio, name=each.name))
+            self._transmissions(root, order)
+            inner = [fragment for fragment in robot.xml if _OWN.match(fragment)]
+            xml.restore(root, [fragment for fragment in robot.xml if fragment not in inner])
+            root.append(self._own(inner))
+        except ValueError as error:  # lxml: characters that no XML document can hold
+            raise BadRequest("a name cannot be written", robot.name, str(error)) from None
+        return xml.text_of(root)
+
+    def _origin(self, parent: xml.Element, X: Array) -> Array:
+        """Append an ``<origin>`` unless it says nothing; the pose that reading it gives."""
+        read, attributes = numerals.origin(X, self.decimals)
+        if attributes:
+            etree.SubElement(parent, "origin", attributes)
+        return read
+
+    def _tree_joint(self, joint: Joint) -> list[xml.Element]:
+        """The chain of links and joints that a tree joint is written as."""
+        X_P, X_child = self.poses[joint.predecessor], self.mechanism.links[joint.successor].pose
+        tip = bool(np.linalg.norm(X_child[:3, 3] - joint.point) > AT_ORIGIN)
+        X_PJ, attributes = numerals.origin(inverse(X_P) @ pose(joint.point, X_child[:3, :3]), self.decimals)
+        X_J = X_P @ X_PJ if attributes else X_P
+        parts: list[tuple[JointType, Array | None]] = [(joint.type, None)]
+        if joint.type not in (JointType.FREE, JointType.FIXED):
+            parts = [*chains.parts(joint.type, _local_axes(joint, X_J))]
+        names = joint_names(joint)
+        links = [joint.predecessor, *names[:-1], joint.name + chains.TIP if tip else joint.successor]
+        elements = []
+        for number, (name, (kind, axis)) in enumerate(zip(names, parts, strict=True)):
+            if links[number + 1] != joint.successor:
+                elements.append(self._between(links[number + 1], joint))
+            element = _tree_element(name, _tree_type(kind, joint.limits), links[number], links[number + 1])
+            if attributes and number == 0:
+                etree.SubElement(element, "origin", attributes)
+            if axis is not None:
+                etree.SubElement(element, "axis", xyz=numerals.axis(axis))
+            _limit(element, kind, joint.limits)
+            if number == 0:
+                xml.restore(element, joint.xml)
+            elements.append(element)
+        if tip:
+            element = _tree_element(links[-1], "fixed", links[-1], joint.successor)
+            X_J = X_J @ self._origin(element, pose(X_J[:3, :3].T @ (X_child[:3, 3] - X_J[:3, 3])))
+            elements.append(element)
+        self.poses[joint.successor] = X_J
+        return elements
+
+    def _between(self, name: str, joint: Joint) -> xml.Element:
+        if name in self.mechanism.links or name in self.mechanism.joints:
+            raise BadRequest(f"a link in between of joint {joint.name!r} would take the name of another part", name)
+        return xml.new("link", name=name)
+
+    def _loop(self, joint: Joint) -> xml.Element:
+        X_P, X_S = self.poses[joint.predecessor], self.poses[joint.successor]
+        one, two = xml.new("predecessor", link=joint.predecessor), xml.new("successor", link=joint.successor)
+        X_J = X_P @ self._origin(one, pose(X_P[:3, :3].T @ (joint.point - X_P[:3, 3])))
+        X_K = X_S @ self._origin(two, inverse(X_S) @ X_J)
+        element = xml.new("loop", one, two, name=joint.name, type=_LOOP_NAMES[joint.type])
+        axes = [*_local_axes(joint, X_J)[:1], *_local_axes(joint, X_K)[1:]]
+        for tag, axis in zip(("axis", "axis2"), axes, strict=False):
+            etree.SubElement(element, tag, xyz=numerals.axis(axis))
+        if joint.limits is not None:
+            etree.SubElement(element, "limit", {k: numerals.exact(v) for k, v in _known(joint.limits).items()})
+        xml.restore(element, joint.xml)
+        return element
+
+    def _transmissions(self, root: xml.Element, order: Sequence[Joint]) -> None:
+        names = {joint.name: joint_names(joint) if joint.in_tree else [joint.name] for joint in order}
+        every = {name for own in names.values() for name in own}
+        shared: set[str] = set()
+        for joint in order:
+            for element in _motors(joint.motor, names[joint.name], every):
+                if len(element.findall("joint")) > 1:
+                    text = xml.canonical(element)
+                    if text in shared:
+                        continue
+                    shared.add(text)
+                root.append(element)
+
+    def _own(self, inner: Sequence[str]) -> xml.Element:
+        robot = self.mechanism
+        element = etree.Element("hrsynth")
+        if all(joint.in_tree for joint in robot.joints.values()):
+            element.set("serial", "true")
+        etree.SubElement(element, "platform", link=robot.platform)
+        if robot.camera is not None:
+            etree.SubElement(element, "camera", link=robot.camera)
+        for observation in robot.observations:
+            if type(observation) is not Direction:
+                raise BadRequest(f"observation of leg {observation.leg!r}", type(observation).__name__, "a direction")
+            etree.SubElement(element, "observe", leg=observation.leg, link=observation.link,
+                             axis=numerals.axis(observation.direction))
+        for fragment in inner:
+            whole = xml.parse_fragment(fragment)
+            for name, value in whole.attrib.items():
+                element.set(name, value)
+            element.extend(list(whole))
+        return element
+
+
+def _local_axes(joint: Joint, X_J: Array) -> list[Array]:
+    """The joint's axes in its frame, exactly as they will be read."""
+    if joint.type is JointType.UNIVERSAL:
+        cosine = float(joint.axes[0] @ joint.axes[1])
+        if not abs(cosine) <= SAME_DIRECTION:
+            raise BadRequest(f"cosine between the axes of the universal joint {joint.name!r}", cosine, "0")
+    return [unit(numerals.parse(numerals.axis(X_J[:3, :3].T @ axis), 3)) for axis in joint.axes]
+
+
+def _tree_element(name: str, kind: str, parent: str, child: str) -> xml.Element:
+    ends = xml.new("parent", link=parent), xml.new("child", link=child)
+    return xml.new("joint", *ends, name=name, type=kind)
+
+
+def _tree_type(kind: JointType, limits: Limits | None) -> str:
+    if kind is JointType.REVOLUTE:
+        bounded = limits is not None and (limits.lower is not None or limits.upper is not None)
+        return "revolute" if bounded else "continuous"
+    return {JointType.PRISMATIC: "prismatic", JointType.FREE: "floating"}.get(kind, "fixed")
+
+
+def _limit(element: xml.Element, kind: JointType, limits: Limits | None) -> None:
+    """Append a ``<limit>`` with all that URDF demands; ``free`` names the values that stand for no limit."""
+    known = {} if limits is None else _known(limits)
+    if kind is JointType.PRISMATIC or (kind is JointType.REVOLUTE and {"lower", "upper"} & set(known)):
+        needed = list(_NO_LIMIT)
+    elif known:
+        needed = ["effort", "velocity"]
+    else:
+        return
+    free = [key for key in needed if key not in known]
+    values = known | {key: _NO_LIMIT[key] for key in free}
+    attributes = {key: numerals.exact(values[key]) for key in _NO_LIMIT if key in values}
+    if free:
+        attributes["free"] = " ".join(free)
+    etree.SubElement(element, "limit", attributes)
+
+
+def _known(limits: Limits) -> dict[str, float]:
+    return {key: value for key in _NO_LIMIT if (value := getattr(limits, key)) is not None}
+
+
+def _motors(motor: Motor | None, names: Sequence[str], all_names: set[str]) -> list[xml.Element]:
+    """The transmissions of one motor: those of the file it came from where they still fit, else simple ones."""
+    if motor is None:
+        return []
+    titles = chains.part_names(motor.name, len(names))
+    if motor.xml is not None:
+        found = list(xml.parse_fragment(f"<motors>{motor.xml}</motors>"))
+        if len(found) == len(names) and all(len(element.findall("joint")) == 1 for element in found):
+            for element, title, name in zip(found, titles, names, strict=True):
+                element.set("name", title)
+                element.findall("joint")[0].set("name", name)
+            return found
+        named = {joint.get("name") for element in found for joint in element.findall("joint")}
+        if set(names) <= named <= all_names:
+            return found
+    return [simple_transmission(title, name) for title, name in zip(titles, names, strict=True)]

@@ -1,0 +1,156 @@
+"""A joint of SDFormat: where its frame is, in which frame its axes are given in which version, what its type means."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ....geometry.vectors import Array, pose, rotation_from_rpy
+from ....mechanism.model import JointType, Link, Motor
+from ....tolerances import NOISE
+from ... import xml
+from ...chains import part
+from ...elements import ZERO_LENGTH, XmlReader, sound_limits
+from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec
+
+TYPES = {"revolute": "R", "continuous": "R", "hinge": "R", "prismatic": "P", "ball": "S", "fixed": "F",
+         "universal": "U", "revolute2": "U", "screw": "H", "gearbox": "G", "piston": "C"}
+_AXES = {"R": ("axis",), "P": ("axis",), "H": ("axis",), "C": ("axis",), "U": ("axis", "axis2")}
+
+
+def text(element: xml.Element | None, tag: str) -> str | None:
+    """The text of a child element, None where it is empty or not there."""
+    return None if element is None else (element.findtext(tag) or "").strip() or None
+
+
+def numbers(reader: XmlReader, element: xml.Element | None, default: tuple[float, ...]) -> Array:
+    """The numbers that an element holds, as many as the default has, which stands where it holds none."""
+    if element is None:
+        return np.array(default, dtype=float)
+    return reader.values((element.text or "").strip() or None, default, xml.line(element), f"<{element.tag}>")
+
+
+def pose_of(reader: XmlReader, element: xml.Element | None) -> Array:
+    """The pose (4, 4) that a ``<pose>`` gives: x y z roll pitch yaw, degrees or a quaternion where it says so."""
+    if element is None:
+        return ORIGIN
+    if element.get("rotation_format") == "quat_xyzw":
+        values = numbers(reader, element, (0, 0, 0, 0, 0, 0, 1))
+        return pose(values[:3], reader.rotation(element, np.roll(values[3:], 1)))
+    values = numbers(reader, element, (0,) * 6)
+    angles = np.radians(values[3:]) if element.get("degrees") in ("true", "1") else values[3:]
+    return pose(values[:3], rotation_from_rpy(*angles)) if np.any(angles) else pose(values[:3])
+
+
+@dataclass(frozen=True, eq=False)
+class JointFrames:
+    """The joint's frame in the parent link, in the child link and in the model; the model's axes in the frame in which
+    axes "of the model" are given (3, 3); the pose of a named frame in the model, None for an unknown one."""
+
+    X_parent: Array
+    X_child: Array
+    X_model: Array
+    R_model: Array
+    named: Callable[[str], Array | None] = lambda name: None
+
+
+def add(reader: XmlReader, graph: JointGraph, element: xml.Element, links: tuple[str, str], frames: JointFrames,
+        version: tuple[int, int], *, in_tree: bool, prefix: str = "") -> None:
+    """Add what a ``<joint>`` means to the graph: one joint, or a chain of them, or a gear."""
+    line, bare, kind = xml.line(element), reader.attribute(element, "name"), TYPES.get(element.get("type", ""))
+    if kind is None:
+        reader.defect(line, "unknown joint type", element.get("type"), ", ".join(TYPES))
+    if bare is None or kind is None:
+        return
+    name = prefix + bare
+    if name in graph.joints:
+        reader.defect(line, "second joint of the same name", name)
+        return
+    axes = tuple(_axis(reader, graph, element, tag, frames, version, name) for tag in _AXES.get(kind, ()))
+    one, two = FrameSpec(links[0], frames.X_parent, line), FrameSpec(links[1], frames.X_child, line)
+    if kind == "G":
+        _add_gear(reader, graph, element, links, name)
+    elif kind == "H" or (kind == "U" and abs(float(axes[0] @ axes[1])) > NOISE):
+        link, first, second = graph.fresh(part(name, 1)), part(name, 1), part(name, 2)
+        between = FrameSpec(link, ORIGIN, line)
+        graph.links[link] = Link(link, line=line)
+        graph.joints[first] = JointSpec(first, JointType.REVOLUTE, (one, between), axes[:1], line=line)
+        kind_of_second = JointType.REVOLUTE if kind == "U" else JointType.PRISMATIC
+        graph.joints[second] = JointSpec(second, kind_of_second, (between, two), axes[-1:], line=line, in_tree=in_tree)
+        if kind == "H":
+            graph.gears.append(GearSpec(f"{name}__thread", first, second, _lead(reader, element, name), line=line))
+    else:
+        limit = element.find("axis/limit")
+        limits = sound_limits(lambda key: text(limit, key))
+        graph.joints[name] = JointSpec(name, JointType(kind), (one, two), axes, limits, (), line, None, in_tree)
+
+
+def _axis(reader: XmlReader, graph: JointGraph, joint: xml.Element, tag: str, frames: JointFrames,
+          version: tuple[int, int], name: str) -> Array:
+    """An axis in the joint's frame: up to 1.4 it is given in the model's, later in the joint's unless the file says."""
+    element, xyz = joint.find(tag), joint.find(f"{tag}/xyz")
+    if element is None:
+        graph.assumed.setdefault(f"<{tag}> 0 0 1 as the format's default, of joints that have none", []).append(name)
+    vector = reader.unit(numbers(reader, xyz, (0, 0, 1)), xml.line(joint), f"<{tag}> of joint {name!r}", "0 0 0")
+    frame = None if xyz is None else xyz.get("expressed_in")
+    of_model = text(element, "use_parent_model_frame") in ("1", "true")
+    if frame == "__model__" or of_model or (version <= (1, 4) and frame is None):
+        return np.asarray(frames.X_model[:3, :3].T @ frames.R_model @ vector)
+    if frame:
+        X = frames.named(frame)
+        if X is None:
+            reader.defect(xml.line(joint), f"axis of joint {name!r}: expressed in an unknown frame", frame)
+            return vector
+        return np.asarray(frames.X_model[:3, :3].T @ X[:3, :3] @ vector)
+    return vector
+
+
+def _lead(reader: XmlReader, element: xml.Element, name: str) -> float:
+    """Metres a radian: from metres a turn (right-handed), or from the older radians a metre (left-handed)."""
+    pitch = element.find("screw_thread_pitch")
+    if pitch is not None:
+        return float(numbers(reader, pitch, (1.0,))[0]) / (2 * np.pi)
+    old = float(numbers(reader, element.find("thread_pitch"), (1.0,))[0])
+    if not abs(old) > ZERO_LENGTH:
+        reader.defect(xml.line(element), f"thread_pitch of joint {name!r}", "0", "another number")
+        return 1.0
+    return -1.0 / old
+
+
+def _add_gear(reader: XmlReader, graph: JointGraph, element: xml.Element, links: tuple[str, str], name: str) -> None:
+    """A gearbox couples the two revolute joints on its reference body: θ₂ = −ratio θ₁."""
+    body = text(element, "gearbox_reference_body")
+    ratio = -float(numbers(reader, element.find("gearbox_ratio"), (1.0,))[0])
+    graph.gears.append(GearSpec(name, f"{body}\n{links[0]}", f"{body}\n{links[1]}", ratio, line=xml.line(element)))
+
+
+def name_gears(reader: XmlReader, graph: JointGraph) -> None:
+    """Put the joints' names where gearboxes name the links that they join."""
+    found = []
+    for gear in graph.gears:
+        names = []
+        for end in (gear.driver, gear.driven):
+            body, _, link = end.partition("\n")
+            own = [joint.name for joint in graph.joints.values() if joint.links == (body, link)
+                   and joint.type is JointType.REVOLUTE] if link else [body]
+            if len(own) != 1:
+                reader.defect(gear.line, f"gearbox {gear.name!r}: one revolute joint from its reference body", link)
+                break
+            names.append(own[0])
+        if len(names) == 2:
+            found.append(replace(gear, driver=names[0], driven=names[1]))
+    graph.gears = found
+
+
+def guess_motors(graph: JointGraph) -> None:
+    """Where some joints have the effort limit zero and others do not, the others are the motors."""
+    efforts = {name: joint.limits.effort for name, joint in graph.joints.items()
+               if joint.limits is not None and joint.limits.effort is not None}
+    driven = [name for name, effort in efforts.items() if effort > 0]
+    if driven and any(effort == 0 for effort in efforts.values()):
+        for name in driven:
+            graph.joints[name] = replace(graph.joints[name], motor=Motor(f"motor_{name}"))
+        graph.note("guess", "the motors are " + ", ".join(driven) + ": the joints whose effort limit is not zero "
+                            "(--motors to change them)")

@@ -1,0 +1,194 @@
+"""SDFormat 1.4 to 1.12: the joint graph itself, with frames, poses and axes in the conventions of each version."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ....errors import BadRobotFile
+from ....geometry.vectors import Array, inverse
+from ....mechanism.model import Link
+from ....tolerances import SAME_GEOMETRY
+from ... import xml
+from ...annotations import NAMESPACE, drop_world, read_annotation
+from ...dialect import RobotFile
+from ...elements import XmlReader
+from ...jointgraph import ORIGIN, JointGraph
+from .joint import JointFrames, add, guess_motors, name_gears, pose_of, text
+
+MODEL, WORLD = "__model__", "world"
+VERSIONS = "1.4 to 1.12"
+MOST_LEVELS = 20
+"""Models in models above which a file is refused."""
+
+
+def read(file: RobotFile) -> JointGraph:
+    """The joint graph of an SDFormat document; raises ``BadRobotFile`` with all its defects."""
+    return _SdfReader(str(file.path), file.document).graph()
+
+
+@dataclass(frozen=True, eq=False)
+class _FrameElement:
+    """A frame: the element that gives its pose, what the pose is relative to, the link or frame it is fixed to."""
+
+    element: xml.Element | None
+    relative_to: str
+    fixed_to: str | None = None
+    kind: str = "frame"
+
+
+@dataclass
+class _SdfReader(XmlReader):
+    """Links, frames and joints of one model, nested models included (their names are ``model::name``)."""
+
+    frames: dict[str, _FrameElement] = field(default_factory=dict)
+    joints: list[tuple[str, xml.Element]] = field(default_factory=list)
+    poses: dict[str, Array] = field(default_factory=dict)
+    carried: set[str] = field(default_factory=set)
+
+    def graph(self) -> JointGraph:
+        """The joint graph of the document's model."""
+        self.version = self._version()
+        model = self._model()
+        graph = self.result = JointGraph(model.get("name") or "robot", self.file, "SDF")
+        self.frames[MODEL] = _FrameElement(model.find("pose"), WORLD, WORLD, "model")
+        self._collect(model, "", 0)
+        if not graph.links:
+            self.defect(xml.line(model), "no links")
+        self.require_sound()
+        for prefix, element in self.joints:
+            self._joint(prefix, element)
+        graph.note_assumed()
+        name_gears(self, graph)
+        guess_motors(graph)
+        self.require_sound()
+        if any(WORLD in joint.links for joint in graph.joints.values()):
+            graph.links = {WORLD: Link(WORLD), **graph.links}
+            graph.base = WORLD
+        space = f"{{{NAMESPACE}}}"
+        for element in [each for each in xml.children(model) if each.tag.startswith(space)]:
+            wrong = read_annotation(graph, element.tag.removeprefix(space), element.text or "")
+            if wrong is not None:
+                self.defect(xml.line(element), wrong, element.text)
+        self.require_sound()
+        return drop_world(graph)
+
+    def _version(self) -> tuple[int, int]:
+        text = self.root.get("version", "1.6")
+        parts = text.split(".")
+        if len(parts) != 2 or not all(part.isascii() and part.isdigit() for part in parts) or len(text) > 8 or not (
+                (1, 4) <= (int(parts[0]), int(parts[1])) <= (1, 12)):
+            self.defect(xml.line(self.root), "version of <sdf>", text, VERSIONS)
+            raise BadRobotFile(self.defects)
+        return int(parts[0]), int(parts[1])
+
+    def _model(self) -> xml.Element:
+        models = [*self.root.findall("model"), *self.root.findall("world/model")]
+        jointed = [model for model in models if model.find(".//joint") is not None] or models
+        if len(jointed) != 1:
+            self.defect(xml.line(self.root), "number of models with joints", str(len(jointed)), "1")
+            raise BadRobotFile(self.defects)
+        return jointed[0]
+
+    def _collect(self, model: xml.Element, prefix: str, depth: int) -> None:
+        """The frames of a model and of those in it; ``prefix`` is what the names in it begin with."""
+        if depth > MOST_LEVELS:
+            self.defect(xml.line(model), "models nested too deeply", None, f"{MOST_LEVELS} levels")
+            return
+        for element in xml.children(model):
+            if element.tag == "include":
+                self.defect(xml.line(element), "an <include>: other files are not fetched", text(element, "uri"))
+            if element.tag not in ("link", "frame", "joint", "model"):
+                continue
+            bare = self.attribute(element, "name")
+            if bare is None:
+                continue
+            name = prefix + bare
+            fixed_to = None
+            if element.tag == "joint":
+                fixed_to = prefix + (text(element, "child") or "")
+                self.joints.append((prefix, element))
+            elif element.tag == "frame":
+                host = element.get("attached_to")
+                fixed_to = host if host == WORLD else prefix + (host or MODEL)
+            frame = _FrameElement(element.find("pose"), self._host(prefix, element) or fixed_to or prefix + MODEL,
+                                  fixed_to, str(element.tag))
+            if name in self.frames and not (element.tag == "joint" and self.frames[name].kind != "joint"):
+                self.defect(xml.line(element), f"second <{element.tag}> of the same name", name)
+                continue
+            if element.tag == "link":
+                self.result.links[name] = Link(name, line=xml.line(element))
+            if element.tag == "model":
+                self.frames[name + "::" + MODEL] = frame
+                self._collect(element, name + "::", depth + 1)
+            self.frames.setdefault(name, frame)
+
+    def _host(self, prefix: str, element: xml.Element) -> str | None:
+        """The frame that the pose of an element says it is relative to."""
+        position = element.find("pose")
+        given = None if position is None else position.get("relative_to") or position.get("frame")
+        return prefix + given if given and given != WORLD else given
+
+    def _pose(self, name: str, line: int | None) -> Array:
+        """X_WN of a frame (4, 4), by the chain of frames that it is relative to."""
+        chain: list[str] = []
+        while name != WORLD and name not in self.poses:
+            if name in chain or name not in self.frames:
+                what = "frames relative to each other in a ring" if name in chain else "unknown frame"
+                self.defect(line, what, name)
+                return ORIGIN
+            chain.append(name)
+            name = self.frames[name].relative_to
+        X = ORIGIN if name == WORLD else self.poses[name]
+        for each in reversed(chain):
+            X = X @ pose_of(self, self.frames[each].element)
+            self.poses[each] = X
+        return X
+
+    def _link(self, name: str, line: int | None) -> str | None:
+        """The link that a frame is fixed to."""
+        links, passed = self.result.links, set()
+        while name != WORLD and name not in links:
+            frame = self.frames.get(name)
+            if frame is None or name in passed:
+                self.defect(line, "unknown link or frame", name)
+                return None
+            passed.add(name)
+            if frame.kind == "model":
+                inner = name.removesuffix(MODEL).removesuffix("::")
+                name = next((link for link in links if link.startswith(f"{inner}::") or not inner), WORLD)
+            else:
+                name = frame.fixed_to or WORLD
+        return name
+
+    def _joint(self, prefix: str, element: xml.Element) -> None:
+        line, names = xml.line(element), []
+        for tag in ("parent", "child"):
+            name = text(element, tag)
+            if name is None:
+                self.defect(line, f"joint without <{tag}>", element.get("name"))
+                return
+            names.append(name if name == WORLD else prefix + name)
+        parent, child = (self._link(name, line) for name in names)
+        title = prefix + (element.get("name") or "")
+        if parent is None or child is None:
+            return
+        if parent == child:
+            self.defect(line, f"joint {title!r} joins a link to itself", parent)
+            return
+        X_J = self._pose(self._host(prefix, element) or names[1], line) @ pose_of(self, element.find("pose"))
+        X_PW, X_CW = inverse(self._pose(parent, line)), inverse(self._pose(child, line))
+        frames = JointFrames(X_PW @ X_J, X_CW @ X_J, X_J, self._pose(prefix + MODEL, line)[:3, :3],
+                             lambda name: self._pose(prefix + name, line) if prefix + name in self.frames else None)
+        explicit = self.frames.get(names[0])
+        if explicit is not None and explicit.kind == "frame":
+            X_F = self._pose(names[0], line)
+            if np.linalg.norm(X_F[:3, 3] - X_J[:3, 3]) > SAME_GEOMETRY:
+                self.result.assumed.setdefault("joints join the frames that they name, which do not coincide at the "
+                                               "file's pose", []).append(title)
+                frames = replace(frames, X_parent=X_PW @ X_F)
+        in_tree = child not in self.carried and element.get("type") != "gearbox"
+        if in_tree:
+            self.carried.add(child)
+        add(self, self.result, element, (parent, child), frames, self.version, in_tree=in_tree, prefix=prefix)

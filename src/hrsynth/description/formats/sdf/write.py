@@ -1,0 +1,73 @@
+"""A mechanism as SDFormat 1.9: its joint graph, axes in the model's frame."""
+
+from __future__ import annotations
+
+import numpy as np
+from lxml import etree
+
+from ....errors import BadRequest
+from ....geometry.so3 import quaternions
+from ....geometry.vectors import Array, inverse, pose
+from ....mechanism.model import Joint, JointType, Mechanism, Note
+from ... import numerals, xml
+from ...annotations import NAMESPACE, PREFIX, annotations_of
+from ...dialect import Written
+from ...reduction import reduce, require_free_world
+
+_NAMES = {JointType.REVOLUTE: "revolute", JointType.PRISMATIC: "prismatic", JointType.SPHERICAL: "ball",
+         JointType.UNIVERSAL: "universal", JointType.FIXED: "fixed"}
+WORLD = "world"
+
+
+def write(mechanism: Mechanism) -> Written:
+    """The SDFormat text of a mechanism, and warnings of what is lost."""
+    robot, lost = reduce(mechanism, tuple(_NAMES), tuple(_NAMES), tuple(_NAMES), content=False)
+    require_free_world(robot, WORLD, "SDFormat")
+    if robot.couplings:
+        lost = (*lost, Note("warning", "SDFormat has no coupling of joints on different bodies; not written: "
+                                       + ", ".join(coupling.name for coupling in robot.couplings)))
+    root = etree.Element("sdf", version="1.9")
+    model = etree.SubElement(root, "model", name=robot.name, nsmap={PREFIX: NAMESPACE})
+    for link in robot.links.values():
+        if link.name != WORLD:
+            element = etree.SubElement(model, "link", name=link.name)
+            _pose(element, link.pose)
+    if robot.base != WORLD:
+        weld = etree.SubElement(model, "joint", name=robot.fresh("to_world"), type="fixed")
+        etree.SubElement(weld, "parent").text = WORLD
+        etree.SubElement(weld, "child").text = robot.base
+    for joint in sorted(robot.joints.values(), key=lambda each: not each.in_tree):
+        _joint(model, robot, joint)
+    for key, text in annotations_of(robot, motors=True):
+        etree.SubElement(model, f"{{{NAMESPACE}}}{key}").text = text
+    return Written((xml.text_of(root),), lost)
+
+
+def _pose(parent: xml.Element, X: Array) -> None:
+    """Append a ``<pose>`` unless it says nothing."""
+    position = [numerals.exact(float(value)) for value in X[:3, 3]]
+    if not np.array_equal(X[:3, :3], np.eye(3)):
+        w, x, y, z = (numerals.exact(float(value)) for value in quaternions(X[:3, :3]))
+        etree.SubElement(parent, "pose", rotation_format="quat_xyzw").text = " ".join([*position, x, y, z, w])
+    elif np.any(X[:3, 3]):
+        etree.SubElement(parent, "pose").text = " ".join([*position, "0", "0", "0"])
+
+
+def _joint(model: xml.Element, robot: Mechanism, joint: Joint) -> None:
+    bounded = joint.limits is not None and (joint.limits.lower is not None or joint.limits.upper is not None)
+    kind = "continuous" if joint.type is JointType.REVOLUTE and not bounded else _NAMES[joint.type]
+    element = etree.SubElement(model, "joint", name=joint.name, type=kind)
+    etree.SubElement(element, "parent").text = joint.predecessor
+    if joint.successor == WORLD:
+        raise BadRequest(f"{robot.name}: joint {joint.name!r} has the world for its successor", WORLD, "a link")
+    etree.SubElement(element, "child").text = joint.successor
+    _pose(element, pose((inverse(robot.links[joint.successor].pose) @ np.append(joint.point, 1.0))[:3]))
+    for tag, axis in zip(("axis", "axis2"), joint.axes, strict=False):
+        part = etree.SubElement(element, tag)
+        etree.SubElement(part, "xyz", expressed_in="__model__").text = numerals.axis(axis)
+        if joint.limits is not None and tag == "axis":
+            limit = etree.SubElement(part, "limit")
+            for key in ("lower", "upper", "effort", "velocity"):
+                value = getattr(joint.limits, key)
+                if value is not None:
+                    etree.SubElement(limit, key).text = numerals.exact(value)

@@ -1,0 +1,161 @@
+"""How tools write the closures that URDF has no words for: each convention is a value that the reader is handed.
+
+A new convention is one more function and its line in ``CONVENTIONS``.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ....geometry.vectors import Array, frozen, inverse, perpendicular, pose
+from ....mechanism.model import JointType
+from ... import xml
+from ...jointgraph import LOOP_TYPES, FrameSpec, JointGraph, Z, spanning_tree, zero_poses
+from ..sdf import joint as sdf
+from .elements import UrdfReader
+
+Ends = tuple[FrameSpec, FrameSpec]
+
+
+@dataclass(frozen=True)
+class Convention:
+    """Who writes closures so, and what adds those of a document to its graph; ``tag``: the elements that state them,
+    None where links with certain names do (which counts only where loops are not given in other words)."""
+
+    tool: str
+    read: Callable[[UrdfReader, JointGraph], None]
+    tag: str | None = None
+
+
+def _joins(reader: UrdfReader, what: str, element: xml.Element, ends: Ends) -> bool:
+    """Whether the ends of a closure are two links that there are; what is wrong is a defect."""
+    if not all(reader.known(end.link, end.line, f"{what}: unknown link") for end in ends):
+        return False
+    if ends[0].link == ends[1].link:
+        reader.defect(xml.line(element), f"{what} joins a link to itself", ends[0].link)
+        return False
+    return True
+
+
+def gazebo(reader: UrdfReader, graph: JointGraph) -> None:
+    """``<gazebo><joint>``: a joint of SDFormat (in the conventions of 1.6) closes a loop where its child is at zero."""
+    found = [joint for element in reader.root.findall("gazebo") for joint in element.findall("joint")]
+    if not found:
+        return
+    carried = {joint.links[1] for joint in graph.joints.values()}
+    base = next((link for link in graph.links if link not in carried), next(iter(graph.links)))
+    poses = zero_poses(base, spanning_tree(base, (joint for joint in graph.joints.values() if joint.in_tree)))
+    for element in found:
+        parent, child = (sdf.text(element, tag) for tag in ("parent", "child"))
+        if parent is None or child is None or parent == child:
+            reader.defect(xml.line(element), "joint of <gazebo> without two links", element.get("name"))
+            continue
+        what = "joint of <gazebo>: unknown link"
+        if not all(reader.known(link, xml.line(element), what) for link in (parent, child)):
+            continue
+        if parent not in poses or child not in poses:
+            reader.defect(xml.line(element), "joint of <gazebo>: a link that hangs on nothing", element.get("name"))
+            continue
+        X_MJ = poses[child] @ sdf.pose_of(reader, element.find("pose"))
+        frames = sdf.JointFrames(inverse(poses[parent]) @ X_MJ, inverse(poses[child]) @ X_MJ, X_MJ, np.eye(3))
+        sdf.add(reader, graph, element, (parent, child), frames, (1, 6), in_tree=False)
+    sdf.name_gears(reader, graph)
+    graph.note_assumed()
+
+
+CONSTRAINTS = {**LOOP_TYPES, "ball": JointType.SPHERICAL, "weld": JointType.FIXED, "point": JointType.SPHERICAL}
+_SIDES = ("parent", "child")
+
+
+def constraint(reader: UrdfReader, graph: JointGraph) -> None:
+    """``<constraint name type>`` as proposed for urdfdom: parent and child, each with an origin and an axis of its
+    own."""
+    for element in reader.root.findall("constraint"):
+        name, kind = reader.attribute(element, "name"), CONSTRAINTS.get(element.get("type", ""))
+        if kind is None:
+            reader.defect(xml.line(element), "unknown constraint type", element.get("type"), ", ".join(CONSTRAINTS))
+            continue
+        one, two = (_constraint_end(reader, element, side, kind) for side in _SIDES)
+        if one.link is None or two.link is None:
+            reader.defect(xml.line(element), "constraint without two links", name)
+        elif name is not None and _joins(reader, "constraint", element, (one, two)):
+            axes = [Z] if kind.axes < 2 else [_constraint_axis(reader, element, side) for side in _SIDES]
+            graph.close(graph.fresh(name), kind, (one, two), axes, xml.line(element), reader.motors.get(name))
+
+
+def _constraint_end(reader: UrdfReader, element: xml.Element, side: str, kind: JointType) -> FrameSpec:
+    """The joint's frame on one link, its z axis along the axis that the element gives for it."""
+    link = element.find(side)
+    name = element.get(side) if link is None else link.get("link", link.text)
+    origin = element.find(f"{side}_origin")
+    if origin is None and link is not None:
+        origin = link.find("origin")
+    X = reader.pose(origin)
+    if kind.axes == 1:
+        z = _constraint_axis(reader, element, side)
+        x = perpendicular(z)
+        X = X @ pose(rotation=np.column_stack((x, np.cross(z, x), z)))
+    return FrameSpec(None if name is None else name.strip(), frozen(X), xml.line(element))
+
+
+def _constraint_axis(reader: UrdfReader, element: xml.Element, side: str) -> Array:
+    """The axis in the frame of one side: its own, else the common one, else x."""
+    own = element.find(f"{side}_axis")
+    axis = element.find("axis") if own is None else own
+    return np.array([1.0, 0.0, 0.0]) if axis is None else reader.direction(axis, "xyz", (1, 0, 0))
+
+
+def loop_joint(reader: UrdfReader, graph: JointGraph) -> None:
+    """``<loop_joint name type>`` of Isaac Sim: two ends with ``xyz`` and ``rpy`` (real files write two ``<link1>``)."""
+    for element in reader.root.findall("loop_joint"):
+        name = reader.attribute(element, "name")
+        kind = LOOP_TYPES.get(element.get("type", "spherical"))
+        if kind is None or kind.axes > 1:
+            reader.defect(xml.line(element), "unknown loop_joint type", element.get("type"),
+                          ", ".join(key for key in LOOP_TYPES if key != "universal"))
+            continue
+        found = [child for child in xml.children(element) if child.tag in ("link1", "link2", "link")]
+        if len(found) != 2:
+            reader.defect(xml.line(element), "loop_joint: number of links", str(len(found)), "2")
+            continue
+        frames = [reader.pose(child) for child in found]
+        one, two = (FrameSpec(reader.attribute(child, "link"), X, xml.line(child))
+                    for child, X in zip(found, frames, strict=True))
+        if name is not None and _joins(reader, "loop_joint", element, (one, two)):
+            axis = element.find("axis")
+            z = Z if axis is None else reader.direction(axis, "xyz", (0, 0, 1))
+            graph.close(graph.fresh(name), kind, (one, two), [z], xml.line(element), reader.motors.get(name))
+
+
+_CLOSING_FRAME = re.compile(r"closing_(?P<name>.+)_(?P<number>[12])")
+
+
+def closing_frames(reader: UrdfReader, graph: JointGraph) -> None:
+    """Frames ``closing_X_1`` and ``closing_X_2`` meet; with ``closing_X_1_z``, ``closing_X_2_z`` as well, in a hinge. A
+    frame without its partner is a defect."""
+    for link in list(graph.links):
+        match = _CLOSING_FRAME.fullmatch(link)
+        if match is None:
+            continue
+        partner = f"closing_{match['name']}_{3 - int(match['number'])}"
+        if partner not in graph.links:
+            reader.defect(graph.links[link].line, f"closing frame {link!r} without its partner", None,
+                          f"a link {partner!r} as well")
+        elif match["number"] == "1":
+            hinge = f"{link}_z" in graph.links and f"{partner}_z" in graph.links
+            kind = JointType.REVOLUTE if hinge else JointType.SPHERICAL
+            graph.close(graph.fresh(match["name"]), kind, (FrameSpec(link), FrameSpec(partner)))
+            graph.closing.update({link, partner, f"{link}_z", f"{partner}_z"})
+
+
+CONVENTIONS = (
+    Convention("Gazebo", gazebo, "gazebo"),
+    Convention("urdfdom (proposed)", constraint, "constraint"),
+    Convention("Isaac Sim", loop_joint, "loop_joint"),
+    Convention("onshape-to-robot", closing_frames),
+)
+"""All conventions, in the order in which their closures are added."""

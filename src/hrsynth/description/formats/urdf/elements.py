@@ -1,0 +1,206 @@
+"""The elements of URDF and its loops: links, joints, ``<loop>``, ``<transmission>``, ``<coupling>``."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+
+from lxml import etree
+
+from ....geometry.vectors import Array
+from ....mechanism.model import Coupling, JointType, Limits, Link, Motor
+from ... import chains, xml
+from ...elements import XmlReader
+from ...jointgraph import LOOP_TYPES, ORIGIN, FrameSpec, JointSpec
+
+TREE_TYPES = {
+    "revolute": JointType.REVOLUTE, "continuous": JointType.REVOLUTE, "prismatic": JointType.PRISMATIC,
+    "fixed": JointType.FIXED, "floating": JointType.FREE, "planar": JointType.PLANAR,
+}
+INTERFACE = "hardware_interface/VelocityJointInterface"
+_PLANAR = ("__x", "__y", "__turn")
+"""Ends of the names of the three joints that a planar one is."""
+
+
+@dataclass
+class UrdfReader(XmlReader):
+    """The joint graph of a URDF document."""
+
+    links: dict[str, Link] = field(default_factory=dict)
+    tree: dict[str, JointSpec] = field(default_factory=dict)
+    loops: dict[str, JointSpec] = field(default_factory=dict)
+    motors: dict[str, Motor] = field(default_factory=dict)
+    couplings: list[Coupling] = field(default_factory=list)
+
+    @property
+    def joints(self) -> dict[str, JointSpec]:
+        """Tree joints, then loops."""
+        return {**self.tree, **self.loops}
+
+    def elements(self) -> None:
+        """Read links, joints and loops, then what names them."""
+        for element in xml.children(self.root):
+            if element.tag == "link":
+                self.link(element)
+            elif element.tag == "joint":
+                self.joint(element)
+            elif element.tag == "loop":
+                ends = self.ends(element, ("predecessor", "successor"))
+                self.add(element, LOOP_TYPES, ends, ["predecessor", "successor"])
+        for element in self.root.findall("transmission"):
+            self.transmission(element)
+        names: set[str] = set()
+        for element in self.root.findall("coupling"):
+            self.coupling(element, names)
+
+    def known(self, link: str | None, line: int | None, what: str, names: Mapping[str, object] | None = None) -> bool:
+        """Whether a link (or another of ``names``) exists; None was reported before."""
+        table = self.links if names is None else names
+        if link is None:
+            return False
+        if link not in table:
+            close = difflib.get_close_matches(link, table, n=3) if len(table) < 1000 else []
+            self.defect(line, what, link, "a name that is there" + (", such as " + ", ".join(close) if close else ""))
+        return link in table
+
+    def link(self, element: xml.Element) -> None:
+        """A ``<link>``."""
+        name = self.attribute(element, "name")
+        if name is None:
+            return
+        if name in self.links:
+            self.defect(xml.line(element), "second link of the same name", name)
+            return
+        self.links[name] = Link(name, xml=xml.unknown(element, ["name"], []), line=xml.line(element))
+
+    def joint(self, element: xml.Element) -> None:
+        """A ``<joint>`` of the tree."""
+        for mimic in element.findall("mimic"):
+            self.defect(xml.line(mimic), "a <mimic> is a gear between two joints, which this dialect writes otherwise",
+                        element.get("name"), "a <coupling> with predecessor, successor and ratio")
+        self.add(element, TREE_TYPES, self.tree_ends(element), ["origin", "parent", "child"])
+
+    def tree_ends(self, element: xml.Element) -> tuple[FrameSpec, FrameSpec]:
+        """Parent and child of a ``<joint>``, whose frame is the child's."""
+        return self.ends(element, ("parent", "child"), (self.origin(element), ORIGIN))
+
+    def ends(self, element: xml.Element, tags: tuple[str, str], frames: Sequence[Array] = ()
+             ) -> tuple[FrameSpec, FrameSpec]:
+        """The two ends of a joint, each in a child element that names its link; the frames in them are ``frames``, or
+        what their ``<origin>`` says."""
+        found = []
+        for number, tag in enumerate(tags):
+            end = self.only(element, tag)
+            if end is None:
+                self.defect(xml.line(element), f"{element.tag} without <{tag}>", element.get("name"))
+                found.append(FrameSpec(None, ORIGIN, xml.line(element)))
+            else:
+                X = frames[number] if frames else self.origin(end)
+                found.append(FrameSpec(self.attribute(end, "link"), X, xml.line(end)))
+        return found[0], found[1]
+
+    def add(self, element: xml.Element, types: Mapping[str, JointType], ends: tuple[FrameSpec, FrameSpec],
+            tags: list[str]) -> None:
+        """What tree joints and loops have in common."""
+        name, kind = self.attribute(element, "name"), self.attribute(element, "type")
+        type_ = None if kind is None else types.get(kind)
+        if kind is not None and type_ is None:
+            self.defect(xml.line(element), f"unknown {element.tag} type", kind, ", ".join(types))
+        axes = self.axes(element, type_)
+        limits = self.limits(element, kind)
+        if name is None:
+            return
+        if name in self.tree or name in self.loops:
+            self.defect(xml.line(element), f"second joint or loop of the same name ({element.tag})", name)
+            return
+        rest = xml.unknown(element, ["name", "type"], [*tags, "axis", "axis2", "limit"])
+        joint = JointSpec(name, type_, ends, axes, limits, rest, xml.line(element), in_tree=element.tag == "joint")
+        if not joint.in_tree:
+            self.loops[name] = joint
+        elif type_ is JointType.PLANAR:
+            self.planar(joint)
+        else:
+            self.tree[name] = joint
+
+    def limits(self, element: xml.Element, kind: str | None) -> Limits | None:
+        """The ``<limit>`` of a joint of the type ``kind``."""
+        raise NotImplementedError
+
+    def transmission(self, element: xml.Element) -> None:
+        """A ``<transmission>``: its joints are motors."""
+        raise NotImplementedError
+
+    def planar(self, joint: JointSpec) -> None:
+        """URDF's planar joint is P, P, R through two links of its own."""
+        names = [joint.name + suffix for suffix in _PLANAR]
+        for name in names[:2]:
+            if name in self.links:
+                self.defect(joint.line, "a planar joint's own link takes the name of a link", name)
+            self.links.setdefault(name, Link(name, line=joint.line))
+        ends = [joint.ends[0], *(FrameSpec(name, ORIGIN, joint.line) for name in names[:2]), joint.ends[1]]
+        for number, (kind, axis) in enumerate(chains.parts(JointType.PLANAR, joint.axes)):
+            name = names[number]
+            if name in self.tree or name in self.loops:
+                self.defect(joint.line, "a planar joint's own joint takes the name of a joint", name)
+            self.tree[name] = JointSpec(name, kind, (ends[number], ends[number + 1]), (axis,), joint.limits,
+                                        joint.xml if number == 0 else (), joint.line)
+
+    def planar_parts(self, name: str) -> list[str]:
+        """The joints that the planar joint of that name is."""
+        parts = [name + suffix for suffix in _PLANAR]
+        return parts if name not in self.joints and all(part in self.tree for part in parts) else []
+
+    def coupling(self, element: xml.Element, names: set[str]) -> None:
+        """A ``<coupling>``; ``names`` are those of the ones before it."""
+        name = self.attribute(element, "name")
+        if name in names:
+            self.defect(xml.line(element), "second coupling of the same name", name)
+        names.add(name or "")
+        tags = ("predecessor", "successor")
+        one, two = self.ends(element, tags, (ORIGIN, ORIGIN))
+        for end, tag in zip((one, two), tags, strict=True):
+            self.known(end.link, end.line, f"{tag} of a coupling: unknown link")
+        ratio = self.only(element, "ratio")
+        if ratio is None:
+            self.defect(xml.line(element), "coupling without <ratio>", name)
+        elif self.attribute(ratio, "value") is not None:
+            value = float(self.numbers(ratio, "value", (1,))[0])
+            if name and one.link and two.link:
+                self.couplings.append(Coupling(name, one.link, two.link, value, xml.line(element)))
+
+    def check_ends(self, loop: str = "loop") -> None:
+        """A defect for every end on no link and every joint from a link to itself; loops are called ``loop``."""
+        for name, joint in self.joints.items():
+            for end in joint.ends:
+                self.known(end.link, end.line, f"{'joint' if joint.in_tree else loop} {name!r}: unknown link")
+            if joint.ends[0].link is not None and joint.ends[0].link == joint.ends[1].link:
+                self.defect(joint.line, f"{name!r} joins a link to itself", joint.ends[0].link)
+
+    def rings(self) -> Iterator[list[JointSpec]]:
+        """The tree joints that carry each other in a ring, each ring once, from the base's side outward."""
+        carrier: dict[str | None, JointSpec] = {}
+        for joint in self.tree.values():
+            if joint.ends[1].link not in (None, joint.ends[0].link):
+                carrier.setdefault(joint.ends[1].link, joint)
+        clear: set[str | None] = set()
+        for start in carrier:
+            way: list[str | None] = []
+            link = start
+            while link in carrier and link not in clear and link not in way:
+                way.append(link)
+                link = carrier[link].ends[0].link
+            if link in way:
+                yield [carrier[each] for each in reversed(way[way.index(link):])]
+            clear.update(way)
+
+
+def simple_transmission(title: str, joint: str, interface: str | None = INTERFACE) -> xml.Element:
+    """The transmission of a motor of which nothing is known but its name; other parsers demand an interface."""
+    element = etree.Element("transmission", name=title)
+    etree.SubElement(element, "type").text = "transmission_interface/SimpleTransmission"
+    target = etree.SubElement(element, "joint", name=joint)
+    if interface is not None:
+        etree.SubElement(target, "hardwareInterface").text = interface
+    etree.SubElement(element, "actuator", name=title)
+    return element

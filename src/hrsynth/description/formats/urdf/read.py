@@ -1,0 +1,132 @@
+"""URDF as the world writes it: URDF+ (``<loop>``, ``<coupling>``), ``<mimic>``, two joints with one child, closures of
+other tools; what does not concern kinematics may be wrong."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from ....mechanism.model import JointType, Limits, Motor
+from ....mechanism.observation import Direction
+from ... import xml
+from ...dialect import RobotFile
+from ...elements import sound_limits
+from ...jointgraph import GearSpec, JointGraph, JointSpec, listed
+from .conventions import CONVENTIONS
+from .elements import TREE_TYPES, UrdfReader
+
+TYPES = {**TREE_TYPES, "spherical": JointType.SPHERICAL, "ball": JointType.SPHERICAL}
+_KNOWN = ("link", "joint", "loop", "coupling", "transmission", "hrsynth",
+          *(convention.tag for convention in CONVENTIONS if convention.tag is not None))
+
+
+def read(file: RobotFile, *, frames: bool = True) -> JointGraph:
+    """The joint graph of a URDF document; raises ``BadRobotFile`` with all its defects.
+
+    ``frames`` says whether links may be closing frames by their names: not where loops are given in other words.
+    """
+    root = file.document
+    return _TolerantReader(str(file.path), root).graph(frames and root.find("hrsynth") is None)
+
+
+@dataclass
+class _TolerantReader(UrdfReader):
+    notes: list[tuple[str, str]] = field(default_factory=list)
+    mimics: list[GearSpec] = field(default_factory=list)
+    carried: set[str | None] = field(default_factory=set)
+
+    def graph(self, frames: bool) -> JointGraph:
+        """All links, joints and closures."""
+        self.elements()
+        self.check_structure()
+        graph = JointGraph(self.root.get("name") or "robot", self.file, "URDF", self.links)
+        for kind, text in self.notes:
+            graph.note(kind, text)
+        graph.joints = {name: replace(joint, motor=self.motors.get(name)) for name, joint in self.joints.items()}
+        graph.rest = list(xml.unknown(self.root, ["name"], _KNOWN))
+        self.add_gears(graph)
+        for convention in CONVENTIONS:
+            if convention.tag is not None or frames:
+                convention.read(self, graph)
+        self.own(graph)
+        self.require_sound()
+        return graph
+
+    def joint(self, element: xml.Element) -> None:
+        child = element.find("child")
+        link = None if child is None else child.get("link")
+        name = element.get("name")
+        self.add(element, TYPES, self.tree_ends(element), ["origin", "parent", "child", "mimic"])
+        if child is not None and link in self.carried and name in self.tree:
+            self.loops[name] = replace(self.tree.pop(name), in_tree=False)
+            self.notes.append(("merged", f"joint {name!r} is a second one with the child {link!r}: it closes a loop"))
+        elif child is not None:
+            self.carried.add(link)
+        for mimic in element.findall("mimic")[:1]:
+            driver = self.attribute(mimic, "joint")
+            ratio, offset = (float(self.numbers(mimic, key, (default,))[0]) for key, default in
+                             (("multiplier", 1.0), ("offset", 0.0)))
+            if name is not None and driver is not None:
+                self.mimics.append(GearSpec(f"mimic_{name}", driver, name, ratio, offset, xml.line(mimic)))
+
+    def limits(self, element: xml.Element, kind: str | None) -> Limits | None:
+        limit = element.find("limit")
+        if limit is None:
+            return None
+        free = limit.get("free", "").split()
+        return sound_limits(lambda key: None if key in free else limit.get(key), bounded=kind != "continuous")
+
+    def transmission(self, element: xml.Element) -> None:
+        name, joints = element.get("name") or "motor", self.joints
+        for joint in element.findall("joint"):
+            target = joint.get("name")
+            if target in joints and joints[target].type is not JointType.FIXED:
+                self.motors.setdefault(target, Motor(name))
+            elif target is not None:
+                self.notes.append(("ignored", f"transmission {name!r}: no joint {target!r} that moves"))
+
+    def check_structure(self) -> None:
+        """Every end of every joint is a link that is there, and no joints carry each other in a ring."""
+        if len(self.links) < len(self.root.findall("link")):
+            self.require_sound()
+        self.check_ends("joint")
+        if not self.links:
+            self.defect(xml.line(self.root), "no links")
+        for ring in self.rings():
+            self.defect(ring[0].line, "joints that carry each other in a ring", listed(str(each.name) for each in ring),
+                        "a tree that hangs on one link")
+        self.require_sound()
+
+    def add_gears(self, graph: JointGraph) -> None:
+        """Couplings name links, mimics name joints."""
+        carrier = {joint.links[1]: name for name, joint in graph.joints.items() if joint.in_tree}
+        for coupling in self.couplings:
+            ends = [carrier.get(link) for link in (coupling.predecessor, coupling.successor)]
+            if None in ends:
+                self.defect(coupling.line, f"coupling {coupling.name!r}: a link that no joint carries")
+            else:
+                graph.gears.append(GearSpec(coupling.name, str(ends[0]), str(ends[1]), coupling.ratio, 0.0,
+                                            coupling.line))
+        for gear in self.mimics:
+            if gear.driver not in graph.joints:
+                graph.note("ignored", f"the mimic of joint {gear.driven!r}: there is no joint {gear.driver!r}")
+            elif all(_is_single(graph.joints[name]) for name in (gear.driver, gear.driven)):
+                graph.gears.append(replace(gear, name=graph.fresh(gear.name)))
+
+    def own(self, graph: JointGraph) -> None:
+        """Platform, camera and observations where the file has an ``<hrsynth>`` element all the same."""
+        for own in self.root.findall("hrsynth")[:1]:
+            for tag in ("platform", "camera"):
+                element = own.find(tag)
+                if element is not None and self.known(element.get("link"), xml.line(element), f"{tag}: unknown link"):
+                    setattr(graph, tag, element.get("link"))
+            for element in own.findall("observe"):
+                link, leg = element.get("link"), element.get("leg")
+                if self.known(link, xml.line(element), "observe: unknown link") and leg and link:
+                    axis = self.direction(element, "axis", (0, 0, 1))
+                    graph.observations.append(Direction(leg, link, np.asarray(axis), line=xml.line(element)))
+
+
+def _is_single(joint: JointSpec) -> bool:
+    return joint.type in (JointType.REVOLUTE, JointType.PRISMATIC)

@@ -1,0 +1,160 @@
+"""What a robot file says before anything is put together: links, and joints with a frame on each of their two links."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..geometry.vectors import Array, frozen, inverse
+from ..mechanism import graphs
+from ..mechanism.model import JointType, Limits, Link, Motor, Note
+from ..mechanism.observation import Direction
+
+ORIGIN = frozen(np.eye(4))
+Z = frozen([0.0, 0.0, 1.0])
+LOOP_TYPES = {
+    "revolute": JointType.REVOLUTE, "continuous": JointType.REVOLUTE, "prismatic": JointType.PRISMATIC,
+    "cylindrical": JointType.CYLINDRICAL, "universal": JointType.UNIVERSAL, "spherical": JointType.SPHERICAL,
+    "planar": JointType.PLANAR, "fixed": JointType.FIXED,
+}
+"""The names that a ``<loop>`` has for joint types."""
+MOST_LINKS = 1000
+"""Links above which a foreign file is refused."""
+
+_COST = {JointType.FIXED: 0, JointType.REVOLUTE: 1, JointType.PRISMATIC: 1, JointType.UNIVERSAL: 2,
+         JointType.CYLINDRICAL: 2, JointType.PLANAR: 3, JointType.SPHERICAL: 3, JointType.FREE: 5}
+_OUTSIDE = 20
+"""Added to the cost of a joint that the file does not write as part of its tree."""
+
+
+@dataclass(frozen=True, eq=False)
+class FrameSpec:
+    """A joint's frame on one of its links: the link, the frame's pose in it (4, 4), the line."""
+
+    link: str | None
+    X: Array = field(default_factory=lambda: ORIGIN)
+    line: int | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class JointSpec:
+    """A joint as a file gives it; ``type`` None for an unknown type. The first axis is fixed in the predecessor's joint
+    frame (R, P, C, E: the same vector in both), the second (U) in the successor's."""
+
+    name: str
+    type: JointType | None
+    ends: tuple[FrameSpec, FrameSpec]
+    axes: tuple[Array, ...] = ()
+    limits: Limits | None = None
+    xml: tuple[str, ...] = ()
+    line: int | None = None
+    motor: Motor | None = None
+    in_tree: bool = True
+
+    @property
+    def kind(self) -> JointType:
+        """The type; a joint without one was a defect, so a whole graph has none."""
+        return self.type or JointType.FIXED
+
+    @property
+    def links(self) -> tuple[str, str]:
+        """Predecessor and successor."""
+        return str(self.ends[0].link), str(self.ends[1].link)
+
+    def frames(self, poses: Mapping[str, Array]) -> tuple[Array, Array]:
+        """The poses (4, 4) of both joint frames, where the links have ``poses``."""
+        one, two = self.ends
+        return poses[str(one.link)] @ one.X, poses[str(two.link)] @ two.X
+
+
+@dataclass(frozen=True)
+class GearSpec:
+    """A coupling as a file gives it: coordinate of joint ``driven`` = ratio × that of ``driver`` + offset."""
+
+    name: str
+    driver: str
+    driven: str
+    ratio: float
+    offset: float = 0.0
+    line: int | None = None
+
+
+@dataclass
+class JointGraph:
+    """What a foreign file says; with every tree joint at zero its frames on both links coincide."""
+
+    name: str
+    file: str
+    dialect: str
+    links: dict[str, Link] = field(default_factory=dict)
+    joints: dict[str, JointSpec] = field(default_factory=dict)
+    gears: list[GearSpec] = field(default_factory=list)
+    base: str | None = None
+    platform: str | None = None
+    camera: str | None = None
+    observations: list[Direction] = field(default_factory=list)
+    rest: list[str] = field(default_factory=list)
+    notes: list[Note] = field(default_factory=list)
+    closing: set[str] = field(default_factory=set)
+    """Frames that only tell where a loop closes."""
+    assumed: dict[str, list[str]] = field(default_factory=dict)
+    """Guesses of one kind about many joints: what, and which."""
+
+    def note(self, kind: str, text: str) -> None:
+        """Record what the file does not say."""
+        self.notes.append(Note(kind, text))
+
+    def note_assumed(self) -> None:
+        """Record the guesses about many joints, one note a kind."""
+        for what, names in self.assumed.items():
+            self.note("guess", f"{what}: {listed(names)}")
+        self.assumed.clear()
+
+    def fresh(self, name: str) -> str:
+        """``name``, or ``name_2``, ``name_3`` … if it is taken."""
+        taken, number = {*self.links, *self.joints}, 2
+        if name not in taken:
+            return name
+        while f"{name}_{number}" in taken:
+            number += 1
+        return f"{name}_{number}"
+
+    def close(self, name: str, kind: JointType, ends: tuple[FrameSpec, FrameSpec], axes: Sequence[Array] = (Z,),
+              line: int | None = None, motor: Motor | None = None) -> None:
+        """Add a joint that closes a loop; of ``axes`` it takes as many as its type has."""
+        self.joints[name] = JointSpec(name, kind, ends, tuple(axes[: kind.axes]), None, (), line, motor, in_tree=False)
+
+    def connected(self, base: str) -> set[str]:
+        """The links that chains of joints join to ``base``."""
+        return graphs.component(graphs.adjacency(self.links, (e.links for e in self.joints.values())), base)
+
+
+def listed(names: Iterable[str], most: int = 8) -> str:
+    """Names set apart by commas, the first of many."""
+    every = list(names)
+    return ", ".join(every[:most]) + (" …" if every[most:] else "")
+
+
+TreeJoint = tuple[JointSpec, str, str]
+"""A joint of a tree, the link nearer to the base, the link that it carries."""
+
+
+def spanning_tree(base: str, joints: Iterable[JointSpec]) -> list[TreeJoint]:
+    """The joints of a tree that hangs on ``base``, parents first; those that the file writes as tree joints before
+    others, few freedoms before many."""
+    bonds = list(joints)
+    links = dict.fromkeys([base, *(link for joint in bonds for link in joint.links)])
+    weights = [_COST[joint.kind] + (0 if joint.in_tree else _OUTSIDE) for joint in bonds]
+    return graphs.outward(base, graphs.spanning_forest(links, bonds, weights))
+
+
+def zero_poses(base: str, tree: Iterable[TreeJoint]) -> dict[str, Array]:
+    """The poses (4, 4) of a tree's links in the base frame, all joints at zero: their two frames coincide."""
+    X = {base: ORIGIN}
+    for joint, parent, child in tree:
+        near, far = joint.ends if joint.links[0] == parent else joint.ends[::-1]
+        X_J = X[parent] if near.X is ORIGIN else X[parent] @ near.X
+        X[child] = X_J if far.X is ORIGIN else X_J @ inverse(far.X)
+    return X

@@ -1,0 +1,128 @@
+"""What a joint does: the displacement between its two frames, its screws, and what is left where a loop is open.
+
+A *value* holds a joint's coordinates: an array for R, P, U, C, E, the displacement (4, 4) itself for S and free joints.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..errors import LoopsNotClosed
+from ..geometry.screws import rotation, translation
+from ..geometry.so3 import exponential, logarithm
+from ..geometry.vectors import Array, hat, perpendicular, pose, rotation_about
+from ..mechanism.model import JointType
+from ..tolerances import SAME_DIRECTION, SAME_GEOMETRY
+from . import chains
+from .jointgraph import JointSpec
+
+_MATRIX = (JointType.SPHERICAL, JointType.FREE)
+
+
+def zero(joint: JointSpec) -> Array:
+    """The value at which both frames coincide."""
+    return np.eye(4) if joint.kind in _MATRIX else np.zeros(joint.kind.freedoms)
+
+
+def displacement(joint: JointSpec, value: Array) -> Array:
+    """The pose (4, 4) of the successor's joint frame in the predecessor's: of one freedom after the other."""
+    if joint.kind in _MATRIX:
+        return value
+    X = np.eye(4)
+    for (kind, axis), q in zip(chains.parts(joint.kind, joint.axes), value, strict=True):
+        step = pose(axis * q) if kind is JointType.PRISMATIC else pose(rotation=rotation_about(axis, q))
+        X = X @ step
+    return X
+
+
+def step_along(joint: JointSpec, value: Array, step: Array, R_predecessor: Array) -> Array:
+    """The value after a step along the screws of :func:`screws`."""
+    if joint.kind not in _MATRIX:
+        return value + step
+    angular = R_predecessor.T @ step[-3:]
+    shift = R_predecessor.T @ step[:3] if joint.kind is JointType.FREE else np.zeros(3)
+    return pose(value[:3, 3] + shift, exponential(angular) @ value[:3, :3])
+
+
+def screws(joint: JointSpec, X_P: Array, X_S: Array) -> list[Array]:
+    """The twists (linear at the base origin, angular) of the successor relative to the predecessor, one a coordinate;
+    ``X_P`` and ``X_S`` are the poses of the joint's two frames."""
+    found = []
+    for number, (kind, axis) in enumerate(chains.parts(joint.kind, joint.axes)):
+        R = np.eye(3) if joint.kind in _MATRIX else X_P[:3, :3]
+        if joint.kind is JointType.UNIVERSAL and number == 1:
+            R = X_S[:3, :3]
+        found.append(translation(R @ axis) if kind is JointType.PRISMATIC else rotation(R @ axis, X_S[:3, 3]))
+    return found
+
+
+def opening(joint: JointSpec, X_P: Array, X_S: Array) -> tuple[Array, Array]:
+    """By how much a joint's two frames miss each other, (6 − freedoms,), and its derivative by the twist of the
+    successor relative to the predecessor, (6 − freedoms, 6)."""
+    gap, turn, rows = _misses(joint, X_P, X_S)
+    return np.concatenate([gap, turn]), rows
+
+
+def _misses(joint: JointSpec, X_P: Array, X_S: Array) -> tuple[Array, Array, Array]:
+    """The gap and the turn that the joint does not leave free, and the derivative of both."""
+    kind = joint.kind
+    if kind is JointType.FREE:
+        return np.zeros(0), np.zeros(0), np.zeros((0, 6))
+    R, p = X_P[:3, :3], X_S[:3, 3]
+    gap, D = R.T @ (p - X_P[:3, 3]), R.T @ X_S[:3, :3]
+    gap_rows = np.hstack([R.T, -R.T @ hat(p)])
+    turn_rows = np.hstack([np.zeros((3, 3)), R.T])
+    if kind in (JointType.PRISMATIC, JointType.FIXED):
+        turn = logarithm(D)
+    elif kind is JointType.SPHERICAL:
+        turn, turn_rows = np.zeros(0), np.zeros((0, 6))
+    elif kind is JointType.UNIVERSAL:
+        second = D @ joint.axes[1]
+        turn = np.array([joint.axes[0] @ second])
+        turn_rows = (joint.axes[0] @ -hat(second) @ turn_rows)[None]
+    else:
+        moving, across = D @ joint.axes[0], _across(joint.axes[0])
+        turn = _beyond(across @ moving) if joint.axes[0] @ moving < 0 else across @ moving
+        turn_rows = across @ -hat(moving) @ turn_rows
+    if kind.slides:
+        across = _across(joint.axes[0])
+        gap, gap_rows = across @ gap, across @ gap_rows
+    elif kind is JointType.PLANAR:
+        gap, gap_rows = joint.axes[:1] @ gap, joint.axes[:1] @ gap_rows
+    return gap, turn, np.vstack([gap_rows, turn_rows])
+
+
+def _across(axis: Array) -> Array:
+    """Two unit vectors normal to an axis and to each other, shape (2, 3)."""
+    x = perpendicular(axis)
+    return np.array([x, np.cross(axis, x)])
+
+
+def _beyond(turn: Array) -> Array:
+    """The error of an axis that points the opposite way: it grows with the angle, as it does on the near side."""
+    size = float(np.linalg.norm(turn))
+    return turn * ((2 - size) / size) if size > 1e-9 else np.array([2.0, 0.0])
+
+
+def residual(joint: JointSpec, X_P: Array, X_S: Array, length: float) -> float:
+    """By how much a loop misses: the larger of the gap (divided by ``length``) and the angle (radians)."""
+    gap, turn, _ = _misses(joint, X_P, X_S)
+    angle = float(np.linalg.norm(turn))
+    if joint.kind is JointType.UNIVERSAL:
+        angle = float(np.arcsin(min(angle, 1.0))) if angle > SAME_DIRECTION else 0.0
+    elif joint.kind not in (JointType.PRISMATIC, JointType.FIXED):
+        angle = float(np.arcsin(angle)) if angle <= 1 else float(np.pi - np.arcsin(2 - angle))
+    return max(float(np.linalg.norm(gap)) / length, angle)
+
+
+def require_closed(robot: str, loops: Sequence[tuple[JointSpec, Array, Array]], length: float) -> None:
+    """Raise :class:`LoopsNotClosed` for the loop that misses most, where one misses by more than numbers do; loops with
+    the poses of their two frames."""
+    misses = [residual(joint, X_P, X_S, length) for joint, X_P, X_S in loops]
+    if not all(miss <= SAME_GEOMETRY for miss in misses):
+        worst = int(np.argmax(misses))
+        joint = loops[worst][0]
+        where = robot if joint.line is None else f"{robot}:{joint.line}"
+        raise LoopsNotClosed(where, misses[worst], SAME_GEOMETRY, joint.name)

@@ -1,0 +1,70 @@
+"""From a path to a mechanism: the file is opened, shown to the dialects, and put together with what the user says."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from ..errors import BadRobotFile, Defect
+from ..mechanism.model import Mechanism
+from ..mechanism.part import between
+from . import formats, xml
+from .dialect import RobotFile
+from .formats.urdf import xacro
+from .jointgraph import MOST_LINKS, JointGraph
+from .overrides import Overrides, observing
+from .tree import spanning
+
+
+def read(path: Path, overrides: Overrides) -> Mechanism:
+    """The mechanism of a file in any dialect, or of a folder with a URDF and a YAML file.
+
+    Raises ``BadRobotFile`` for what is no robot, ``BadRequest`` for what has to be given, ``LoopsNotClosed`` and
+    ``RankUndecided`` where its loops stay open or undecided.
+    """
+    robot = formats.read(robot_file(path, strict=not overrides.any))
+    if isinstance(robot, JointGraph):
+        if len(robot.links) > MOST_LINKS or len(robot.joints) > 2 * MOST_LINKS:
+            raise _refused(path, f"{len(robot.links)} links and {len(robot.joints)} joints",
+                           f"up to {MOST_LINKS} links")
+        from .assembly.build import build
+
+        robot = build(robot, overrides)
+    if overrides.base is not None:
+        robot = spanning(between(robot, overrides.base, overrides.platform or robot.platform))
+    return robot if overrides.observe is None else observing(robot, overrides.observe)
+
+
+def robot_file(path: Path, *, strict: bool = True) -> RobotFile:
+    """A file, opened (a folder's robot.urdf, or its only robot file); ``strict``: nothing is given that changes it."""
+    if os.path.isdir(path):
+        path = _in_folder(path)
+    data = xml.content(path)
+    if path.suffix.lower() in (".yaml", ".yml") and not data.lstrip().startswith(b"<"):
+        return RobotFile(path, None, strict)
+    root = xml.document(data, str(path))
+    if not (strict and root.find("hrsynth") is not None):
+        _require_few(path, root)
+    return RobotFile(path, xacro.expanded(path) if xacro.is_needed(root) else root, strict)
+
+
+def _require_few(path: Path, root: xml.Element) -> None:
+    """Refuse what has too many links before any of them is read."""
+    for count, _ in enumerate(root.iter("link", "body", "model", "default", "frame"), 1):
+        if count > 2 * MOST_LINKS:
+            raise _refused(path, f"more than {2 * MOST_LINKS} links, bodies and frames", f"up to {MOST_LINKS} links")
+
+
+def _in_folder(path: Path) -> Path:
+    if (path / "robot.urdf").is_file():
+        return path / "robot.urdf"
+    files = sorted(each for pattern in ("*.urdf", "*.sdf", "*.xml", "*.mjcf", "*.xacro") for each in path.glob(pattern)
+                   if each.name not in ("package.xml", "model.config"))
+    if len(files) != 1:
+        raise _refused(path, "a folder of " + (f"{len(files)} robot files" if files else "no robot file"),
+                       "robot.urdf with robot.yaml, or one robot file")
+    return files[0]
+
+
+def _refused(path: Path, what: str, allowed: str) -> BadRobotFile:
+    return BadRobotFile([Defect(str(path), None, what, None, allowed)])

@@ -1,0 +1,89 @@
+"""A mechanism in the joints that a dialect has: other tree joints become chains, other loops are cut through the joint.
+
+A loop N that a dialect cannot say becomes the tree joint N, which carries a link N__cut of no size, and a rigid closure
+N__weld between that link and the successor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import replace
+
+from ..errors import BadRequest
+from ..geometry.vectors import pose
+from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor, Note
+from ..mechanism.observation import Direction
+from . import chains
+from .chains import CUT, WELD
+from .tree import is_connected, spanning
+
+
+def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[JointType],
+           driven: Collection[JointType] = (), *, content: bool = True) -> tuple[Mechanism, tuple[Note, ...]]:
+    """The mechanism with tree joints of types ``tree`` and loops of types ``loops`` (with a motor: ``driven``) only;
+    and what is lost.
+
+    ``content`` says whether the dialect keeps what links hold besides. Raises ``BadRequest`` where a link in between
+    would take the name of another.
+    """
+    given = spanning(_without_idle_joints(mechanism) if JointType.FREE not in tree else mechanism)
+    links, joints = dict(given.links), {}
+
+    def link(name: str, joint: Joint) -> str:
+        if name in links or name in given.joints:
+            raise BadRequest(f"a link in between of joint {joint.name!r} would take the name of another part", name)
+        links[name] = Link(name, pose(joint.point))
+        return name
+
+    def put(joint: Joint) -> None:
+        if joint.type in tree:
+            joints[joint.name] = joint
+            return
+        parts = chains.parts(joint.type, joint.axes)
+        before = joint.predecessor
+        for number, (kind, direction) in enumerate(parts, 1):
+            name = chains.part(joint.name, number)
+            after = joint.successor if number == len(parts) else link(name, joint)
+            motor = None if joint.motor is None else Motor(chains.part(joint.motor.name, number))
+            joints[name] = Joint(name, kind, before, after, joint.point, (direction,), motor, joint.limits)
+            before = after
+
+    for joint in given.joints.values():
+        if joint.in_tree:
+            put(joint)
+    for joint in given.joints.values():
+        if joint.in_tree:
+            continue
+        if joint.type in (driven if joint.actuated else loops):
+            joints[joint.name] = joint
+            continue
+        name = link(joint.name + CUT, joint)
+        put(replace(joint, successor=name, in_tree=True))
+        weld = Joint(joint.name + WELD, JointType.FIXED, name, joint.successor, joint.point, in_tree=False)
+        joints[weld.name] = weld
+    return replace(given, links=links, joints=joints), tuple(_lost(given, content))
+
+
+def _without_idle_joints(mechanism: Mechanism) -> Mechanism:
+    """Without the free joints of links that other joints hold: they say nothing."""
+    for joint in [each for each in mechanism.joints.values() if each.type is JointType.FREE]:
+        rest = mechanism.changed(remove_joints=[joint.name])
+        mechanism = rest if is_connected(rest) else mechanism
+    return mechanism
+
+
+def _lost(mechanism: Mechanism, content: bool) -> list[Note]:
+    found = []
+    other = [o.leg for o in mechanism.observations if type(o) is not Direction]
+    if other:
+        found.append(Note("warning", "observations that are no directions are not written: legs " + ", ".join(other)))
+    if not content and (mechanism.xml or any(link.xml for link in mechanism.links.values())
+                        or any(joint.xml for joint in mechanism.joints.values())):
+        found.append(Note("warning", "geometry, inertia and other content of links and joints is not written"))
+    return found
+
+
+def require_free_world(robot: Mechanism, world: str, dialect: str) -> None:
+    """Raise ``BadRequest`` where a link has the name that a dialect keeps for the base."""
+    if world in robot.links and robot.base != world:
+        raise BadRequest(f"{robot.name}: {dialect} keeps this name for the base", world, "another link name")

@@ -1,1 +1,0 @@
-"""Writers of foreign dialects: a mechanism in joints that the dialect can say, then its text."""
