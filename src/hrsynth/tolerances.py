@@ -61,6 +61,12 @@ points that coincide, equal rods) counts as meant and is made exact: printed dig
 EXACT = 1e-11
 """Deviation (characteristic lengths, radians) below which such a relation holds as well as numbers allow."""
 
+WITHOUT_DIRECTION = 1e-9
+"""Length up to which a vector in a file has no direction."""
+
+COMPLEX_STEP = 1e-20
+"""Imaginary step over which the slope of a polynomial is taken: nothing cancels, so that it is exact."""
+
 FAINT = 1e-3
 """Singular value of a file's loops, as part of the largest, below which a direction is held by rounding alone."""
 

@@ -11,8 +11,8 @@ import numpy as np
 from ..geometry.vectors import frozen, inverse
 from ..mechanism.model import JointType, Mechanism, Motor
 from ..mechanism.observation import Direction
+from ..tolerances import WITHOUT_DIRECTION
 from . import numerals
-from .elements import ZERO_LENGTH
 from .jointgraph import FrameSpec, JointGraph
 
 NAMESPACE = "urn:hrsynth"
@@ -57,7 +57,7 @@ def read_annotation(graph: JointGraph, key: str, text: str) -> str | None:
             direction = numerals.parse(" ".join(words[2:]), 3)
         except ValueError as error:
             return str(error)
-        if not np.linalg.norm(direction) > ZERO_LENGTH:
+        if not np.linalg.norm(direction) > WITHOUT_DIRECTION:
             return "observe: a zero direction"
         graph.observations.append(Direction(words[0], words[1], direction))
     else:

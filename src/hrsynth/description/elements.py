@@ -10,12 +10,11 @@ import numpy as np
 from ..errors import BadRobotFile, Defect
 from ..geometry.vectors import Array, unit
 from ..mechanism.model import JointType, Limits
+from ..tolerances import WITHOUT_DIRECTION
 from . import numerals, xml
 from .jointgraph import ORIGIN, Z
 
 LIMITS = ("lower", "upper", "velocity", "effort")
-ZERO_LENGTH = 1e-9
-"""Length up to which a vector in a file has no direction."""
 
 
 @dataclass
@@ -80,7 +79,7 @@ class XmlReader:
 
     def unit(self, values: Array, line: int | None, what: str, given: str | None = None, default: Array = Z) -> Array:
         """The unit vector along ``values``; a zero vector is a defect."""
-        if np.linalg.norm(values) > ZERO_LENGTH:
+        if np.linalg.norm(values) > WITHOUT_DIRECTION:
             return unit(values)
         self.defect(line, what, given, "a non-zero vector")
         return default
@@ -93,7 +92,7 @@ class XmlReader:
     def rotation(self, element: xml.Element, quaternion: Array) -> Array:
         """The rotation (3, 3) of a quaternion w x y z of any length but zero."""
         size = float(np.linalg.norm(quaternion))
-        if not size > ZERO_LENGTH:
+        if not size > WITHOUT_DIRECTION:
             self.defect(xml.line(element), "a quaternion of length zero")
             return np.eye(3)
         w, x, y, z = quaternion / size

@@ -14,7 +14,7 @@ from ..geometry.screws import rotation, translation
 from ..geometry.so3 import exponential, logarithm
 from ..geometry.vectors import Array, hat, perpendicular, pose, rotation_about
 from ..mechanism.model import JointType
-from ..tolerances import SAME_DIRECTION, SAME_GEOMETRY
+from ..tolerances import SAME_DIRECTION, SAME_GEOMETRY, WITHOUT_DIRECTION
 from . import chains
 from .jointgraph import JointSpec
 
@@ -103,7 +103,7 @@ def _across(axis: Array) -> Array:
 def _beyond(turn: Array) -> Array:
     """The error of an axis that points the opposite way: it grows with the angle, as it does on the near side."""
     size = float(np.linalg.norm(turn))
-    return turn * ((2 - size) / size) if size > 1e-9 else np.array([2.0, 0.0])
+    return turn * ((2 - size) / size) if size > WITHOUT_DIRECTION else np.array([2.0, 0.0])
 
 
 def residual(joint: JointSpec, X_P: Array, X_S: Array, length: float) -> float:

@@ -20,7 +20,7 @@ from ...budgets import LARGEST_RELATED
 from ...geometry.vectors import Array
 from ...mechanism import graphs
 from ...mechanism.model import Joint, JointType, Mechanism
-from ...tolerances import EXACT, NOISE
+from ...tolerances import COMPLEX_STEP, EXACT, NOISE
 
 _LINES = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 _BALLS = (JointType.SPHERICAL, JointType.UNIVERSAL)
@@ -41,7 +41,7 @@ class ExactGeometry:
     change: float
 
 
-class Relation:
+class GeometricRelation:
     """An equation f(v₁, v₂, …) = 0 of centres and axes; f is a polynomial, (..., 3) → (..., m), real or complex."""
 
     def __init__(self, function: Callable[..., Vectors], *at: int) -> None:
@@ -55,15 +55,12 @@ class Relation:
     def gradient(self, x: Array) -> Array:
         """Its derivative (m, len(x)), by a complex step: Im f(x + ih e) / h, which takes no differences."""
         count = 3 * len(self.at)
-        steps = np.array([x[i : i + 3] for i in self.at]) + 1j * _STEP * np.eye(count).reshape(count, -1, 3)
-        by_coordinate = self.function(*np.moveaxis(steps, 1, 0)).imag.T / _STEP
+        steps = np.array([x[i : i + 3] for i in self.at]) + 1j * COMPLEX_STEP * np.eye(count).reshape(count, -1, 3)
+        by_coordinate = self.function(*np.moveaxis(steps, 1, 0)).imag.T / COMPLEX_STEP
         J = np.zeros((len(by_coordinate), len(x)))
         for number, start in enumerate(self.at):
             J[:, start : start + 3] += by_coordinate[:, 3 * number : 3 * number + 3]
         return J
-
-
-_STEP = 1e-20
 
 
 def _normal(u: Vectors, v: Vectors) -> Vectors:
@@ -131,7 +128,7 @@ def exact_geometry(mechanism: Mechanism) -> ExactGeometry | None:
     mended = sum(EXACT < miss <= NOISE for _, miss in misses)
     if not mended:
         return None
-    held += [Relation(_length, i) for own in coordinates.axes.values() for i in own]
+    held += [GeometricRelation(_length, i) for own in coordinates.axes.values() for i in own]
     for _ in range(8):
         error = np.concatenate([relation.value(x) for relation in held])
         if np.max(np.abs(error)) <= 1e-15:
@@ -144,7 +141,7 @@ def exact_geometry(mechanism: Mechanism) -> ExactGeometry | None:
     return ExactGeometry(coordinates.mechanism_of(x), mended, change)
 
 
-def _relations(mechanism: Mechanism, at: _JointCoordinates) -> Iterator[Relation]:
+def _relations(mechanism: Mechanism, at: _JointCoordinates) -> Iterator[GeometricRelation]:
     """Relations that links could be meant to have, held or not."""
     bonds = graphs.adjacency(mechanism.links, (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED))
     body = {link: number for number, group in enumerate(graphs.components(bonds)) for link in group}
@@ -155,34 +152,34 @@ def _relations(mechanism: Mechanism, at: _JointCoordinates) -> Iterator[Relation
                 on[body[link]].append(joint)
     for joint in mechanism.joints.values():
         if joint.type is JointType.UNIVERSAL:
-            yield Relation(_normal, *at.axes[joint.name])
+            yield GeometricRelation(_normal, *at.axes[joint.name])
     for joints in on.values():
         if len(joints) <= MOST_ON_A_LINK:
             yield from _within(joints, at)
     yield from _rods(body, on, at)
 
 
-def _within(joints: list[Joint], at: _JointCoordinates) -> Iterator[Relation]:
+def _within(joints: list[Joint], at: _JointCoordinates) -> Iterator[GeometricRelation]:
     for one, two in combinations(joints, 2):
         centres = at.point[one.name], at.point[two.name]
         for a in at.axes[one.name]:
             for b in at.axes[two.name]:
-                yield Relation(np.cross, a, b)
-                yield Relation(_normal, a, b)
+                yield GeometricRelation(np.cross, a, b)
+                yield GeometricRelation(_normal, a, b)
         if one.type in _BALLS and two.type in _BALLS:
-            yield Relation(np.subtract, *centres)
+            yield GeometricRelation(np.subtract, *centres)
             for other in joints:
                 for axis in at.axes[other.name]:
-                    yield Relation(_along, *centres, axis)
+                    yield GeometricRelation(_along, *centres, axis)
         elif one.type in _LINES and two.type in _LINES:
-            yield Relation(_meeting, *centres, at.axes[one.name][0], at.axes[two.name][0])
-            yield Relation(_coaxial, *centres, at.axes[one.name][0], at.axes[two.name][0])
+            yield GeometricRelation(_meeting, *centres, at.axes[one.name][0], at.axes[two.name][0])
+            yield GeometricRelation(_coaxial, *centres, at.axes[one.name][0], at.axes[two.name][0])
         elif {one.type, two.type} <= {*_LINES, *_BALLS}:
             line = one if one.type in _LINES else two
-            yield Relation(_along, *centres, at.axes[line.name][0])
+            yield GeometricRelation(_along, *centres, at.axes[line.name][0])
 
 
-def _rods(body: dict[str, int], on: dict[int, list[Joint]], at: _JointCoordinates) -> Iterator[Relation]:
+def _rods(body: dict[str, int], on: dict[int, list[Joint]], at: _JointCoordinates) -> Iterator[GeometricRelation]:
     """Two links of two joints each between the same two bodies: equal from centre to centre."""
     table: dict[frozenset[int], list[Sequence[Joint]]] = defaultdict(list)
     for own, joints in on.items():
@@ -195,6 +192,6 @@ def _rods(body: dict[str, int], on: dict[int, list[Joint]], at: _JointCoordinate
             joints = [*one, *two]
             points = [at.point[joint.name] for joint in joints]
             if all(joint.type in _BALLS for joint in joints):
-                yield Relation(_equal, *points)
+                yield GeometricRelation(_equal, *points)
             elif all(joint.type is JointType.REVOLUTE for joint in joints):
-                yield Relation(_equal_across, *points, at.axes[joints[0].name][0])
+                yield GeometricRelation(_equal_across, *points, at.axes[joints[0].name][0])

@@ -9,10 +9,10 @@ import numpy as np
 
 from ....geometry.vectors import Array, pose, rotation_from_rpy
 from ....mechanism.model import JointType, Link, Motor
-from ....tolerances import NOISE
+from ....tolerances import NOISE, WITHOUT_DIRECTION
 from ... import xml
 from ...chains import part
-from ...elements import ZERO_LENGTH, XmlReader, sound_limits
+from ...elements import XmlReader, sound_limits
 from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec
 
 TYPES = {"revolute": "R", "continuous": "R", "hinge": "R", "prismatic": "P", "ball": "S", "fixed": "F",
@@ -113,7 +113,7 @@ def _lead(reader: XmlReader, element: xml.Element, name: str) -> float:
     if pitch is not None:
         return float(numbers(reader, pitch, (1.0,))[0]) / (2 * np.pi)
     old = float(numbers(reader, element.find("thread_pitch"), (1.0,))[0])
-    if not abs(old) > ZERO_LENGTH:
+    if not abs(old) > WITHOUT_DIRECTION:
         reader.defect(xml.line(element), f"thread_pitch of joint {name!r}", "0", "another number")
         return 1.0
     return -1.0 / old
