@@ -26,8 +26,8 @@ demo: setup  ## derive the hidden robot of a Quattro of which legs 1 and 4 are o
 test: setup-dev  ## the tests, without the slow ones
 	@$(PYTEST) -m "not slow and not long and not browser" tests
 
-test-all: setup-all setup-browser  ## all tests but the longest
-	@$(PYTEST) -m "not long" tests
+test-all: setup-all setup-browser  ## all tests but the longest (AFTER_TEST=1: those that `make test` left out)
+	@$(PYTEST) -m "$(if $(AFTER_TEST),(slow or browser) and )not long" tests
 
 test-long: setup-all  ## the longest tests: many instances, all robots; more than an hour
 	@$(PYTEST) -m long tests
