@@ -25,8 +25,9 @@ from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet, PoseNotReached
 from hrsynth.geometry.vectors import Array, rotation_from_rpy
-from hrsynth.kinematics.configuration import ClosedConfiguration, Target
+from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.steps import led
+from hrsynth.kinematics.tasks import Target
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.pose import Grid, Pose
 from hrsynth.selection import select as selections

@@ -15,8 +15,9 @@ from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.so3 import logarithm, turn_about
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.configuration import ClosedConfiguration, closed
+from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.platform_motion import PlatformMotion
+from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.pose import Grid, Pose
 from hrsynth.tolerances import CLOSED
 from kinematics.robots import ROBOTS, setting_of, state_of
@@ -139,7 +140,7 @@ def test_free_parts_are_nearest_to_zero(robot: str, text: str) -> None:
     least, compared = distance(at.q), 0
     for _ in range(20):
         kernel, _ = at.kernel()
-        q, residual = closed(twin, twin.moved(at.q, 1e-2 * kernel @ rng.normal(size=kernel.shape[1])), goal)
+        q, residual = solve(twin, twin.moved(at.q, 1e-2 * kernel @ rng.normal(size=kernel.shape[1])), goal)
         if residual <= CLOSED:
             compared += 1
             assert distance(q) >= least - 1e-9

@@ -10,10 +10,11 @@ from hypothesis import strategies as st
 from hrsynth.errors import BadMechanism, LoopsNotClosed, RankUndecided
 from hrsynth.geometry.ranks import CLEAN, Rank, kernel_basis, largest_angle, range_basis, rank_of
 from hrsynth.geometry.vectors import rotation_about
-from hrsynth.kinematics.configuration import ClosedConfiguration, closed
+from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import Measurement
 from hrsynth.kinematics.sampling import draw
+from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.builder import Builder
 from hrsynth.tolerances import CLOSED, RANK_GAP
 from kinematics.robots import setting_of
@@ -163,7 +164,7 @@ def test_configurations_are_read_only() -> None:
 @pytest.mark.parametrize("robot", ["delta", "quattro", "hexa", "3puu"])
 def test_open_loops_nearby_are_closed(robot: str) -> None:
     twin = setting_of(robot).everything.twin
-    q, residual = closed(twin, twin.moved(twin.q0, np.random.default_rng(3).normal(scale=0.02, size=twin.nv)))
+    q, residual = solve(twin, twin.moved(twin.q0, np.random.default_rng(3).normal(scale=0.02, size=twin.nv)))
     assert residual < CLOSED
     assert ClosedConfiguration.of(twin, q).residual < CLOSED
     assert np.max(np.abs(q - twin.q0)) > 1e-3
@@ -177,7 +178,7 @@ def test_targets_are_reached(robot: str) -> None:
     target = everything.members[0].way[-1]
     q, residual = everything.twin.q0, 1.0
     for each in everything.members[0].way:
-        q, residual = closed(everything.twin, q, each, iterations=100)
+        q, residual = solve(everything.twin, q, each, iterations=100)
     assert residual < CLOSED
     reached = ClosedConfiguration.of(everything.twin, q)
     for observation, wanted in target.measured:

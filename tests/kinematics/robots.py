@@ -11,9 +11,10 @@ from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.analysis.observed import ObservedRobot, prepare
 from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.configuration import ClosedConfiguration, Target, closed
+from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import Measurement
+from hrsynth.kinematics.tasks import Target, solve
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.mechanism.observation import Observation
 from oracle import Oracle, span
@@ -46,7 +47,7 @@ def walked(twin: PinocchioModel, seed: int = 0, steps: int = 4, size: float = 0.
     at = ClosedConfiguration.of(twin, twin.q0)
     for _ in range(steps):
         kernel, _ = at.kernel()
-        q, _ = closed(twin, twin.moved(at.q, size * kernel @ rng.normal(size=kernel.shape[1])), tolerance=1e-13)
+        q, _ = solve(twin, twin.moved(at.q, size * kernel @ rng.normal(size=kernel.shape[1])), tolerance=1e-13)
         at = ClosedConfiguration.of(twin, q)
     return at
 

@@ -8,9 +8,10 @@ import numpy as np
 import pytest
 
 from hrsynth.geometry.vectors import Array, hat
-from hrsynth.kinematics.configuration import ClosedConfiguration, closed
+from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction
 from hrsynth.kinematics.relation import relation
+from hrsynth.kinematics.tasks import solve
 from hrsynth.simulation.law import Law, directions, inverted
 from hrsynth.tolerances import DAMPED, SOLVED
 from simulation.scenes import CONTROLLABLE, few_first, home, regular, setting
@@ -55,7 +56,7 @@ def test_the_error_falls_as_its_projection_says(name: str):
     command = law.at(start, (desired, 0 * desired))
 
     def error(sign: float) -> Array:
-        q, _ = closed(twin, twin.moved(start.q, sign * step * command.velocity), tolerance=SOLVED)
+        q, _ = solve(twin, twin.moved(start.q, sign * step * command.velocity), tolerance=SOLVED)
         return np.cross(seen(ClosedConfiguration.of(twin, q), law), desired).ravel()
 
     rate = (error(1.0) - error(-1.0)) / (2 * step)

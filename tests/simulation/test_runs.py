@@ -14,7 +14,8 @@ from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.ranks import range_basis
-from hrsynth.kinematics.configuration import ClosedConfiguration, closed
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.model import Limits
 from hrsynth.simulation.ending import BOUNDARY, GOAL, MODE
 from hrsynth.simulation.servo import servo
@@ -32,7 +33,7 @@ def near(name: str) -> tuple[ClosedConfiguration, ClosedConfiguration]:
     kernel, _ = goal.kernel()
     moves = range_basis((found.everything.question.rows(goal) @ kernel).T, 1.0)[0]
     step = kernel @ moves @ np.full(moves.shape[1], 0.05 / np.sqrt(moves.shape[1]))
-    q, _ = closed(goal.twin, goal.twin.moved(goal.q, step), tolerance=1e-12)
+    q, _ = solve(goal.twin, goal.twin.moved(goal.q, step), tolerance=1e-12)
     return ClosedConfiguration.of(goal.twin, q), goal
 
 

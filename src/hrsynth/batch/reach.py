@@ -11,11 +11,11 @@ from ..budgets import FIRST_CELLS, SWEEP_HALVINGS
 from ..errors import PoseNotReached
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.leg_reach import worst_leg
+from ..kinematics.limits import at_end, wrists_beyond
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..kinematics.relation import Measurement
 from ..kinematics.sampling import wander
 from ..kinematics.steps import HALVINGS, led, nearest
-from ..kinematics.wrists import at_end, beyond
 from ..mechanism.pose import Grid, Pose
 from ..tolerances import AS_PRINTED
 from .grids import ready
@@ -50,7 +50,7 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
 
 def _arrived(at: ClosedConfiguration, goal: Goal) -> bool:
     """Whether a configuration is at the wanted pose, by its matrix, and no wrist is beyond its interval."""
-    return goal.met(at.pose(goal.link), AS_PRINTED * max(1.0, at.twin.length)) and not beyond(at.twin, at.q)
+    return goal.met(at.pose(goal.link), AS_PRINTED * max(1.0, at.twin.length)) and not wrists_beyond(at.twin, at.q)
 
 
 def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion: PlatformMotion | None = None,

@@ -10,7 +10,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
-from typing import Any
 
 import numpy as np
 
@@ -19,13 +18,14 @@ from ..errors import LoopsNotClosed
 from ..geometry.vectors import Array, inverse
 from ..mechanism import Joint, JointType, Mechanism, Observation
 from ..mechanism.legs import Leg, LegDecomposition
-from ..tolerances import CLOSED, SAME_POINT, SOLVED
-from . import wrists
+from ..tolerances import CLOSED, SOLVED
+from . import limits
 from .closures import UNDECIDED, Closures, End, Miss, leg_closures
-from .configuration import ClosedConfiguration, Target, closed
+from .configuration import ClosedConfiguration
 from .leg_reach import alone
 from .locked import placed
 from .pinocchio_model import PinocchioModel
+from .tasks import Target, solve
 from .ways import Part, ways
 
 STARTS = 24
@@ -102,7 +102,7 @@ class Assembler:
         target = _Poses(tuple(bodies.items()))
         residual = np.inf
         for start in _starts(twin):
-            q, residual = closed(twin, start, target, tolerance=SOLVED, iterations=60)
+            q, residual = solve(twin, start, target, tolerance=SOLVED, iterations=60)
             if residual <= CLOSED and all(_turned_as(twin.pose(q, body), X) for body, X in bodies.items()):
                 return {link: twin.pose(q, link) for link in self.anatomy.platform}
         raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, "inside the platform")
@@ -127,7 +127,7 @@ class Assembler:
                 continue
             twin, q = closing.found
             poses.update({link: twin.pose(q, link) for link in leg.links if link not in poses})
-            beyond += outside(twin, q, leg.joints)
+            beyond += limits.outside(twin, q, leg.joints)
             held |= closing.held
         if missing:
             return Assembly(None, tuple(missing), (), platform, tuple(misses))
@@ -141,27 +141,26 @@ class Assembler:
         twin = self._twins[leg.label]
         target = Target(leg.attach, X, self.anatomy.point, self.reference, tuple(measured))
         first = self._closed(twin, twin.q0, target)
-        if first is not None and not outside(twin, first, leg.joints):
+        if first is not None and not limits.outside(twin, first, leg.joints):
             return _Closing((twin, first))
         zero = self.anatomy.mechanism.links[leg.attach].pose
         end = End(X @ inverse(zero), self.length, within, target.point is None)
         known = leg_closures(self._ways[leg.label], end)
         if known.miss is not None:
             return _Closing(None, known.miss)
-        limited = twin.mechanism.joints
-        held = (any(_never(limited[joint], values) for joint, values in known.values)
-                or any(wrists.never(way, dict(known.values), end.D, within, len(self._ways[leg.label]) == 1)
+        held = (any(limits.all_excluded(twin.mechanism, joint, values) for joint, values in known.values)
+                or any(limits.never(way, dict(known.values), end.D, within, len(self._ways[leg.label]) == 1)
                        for way in self._ways[leg.label]))
         for start in () if held and first is not None else _starts(twin, known):
             q = self._closed(twin, start, target)
-            if q is not None and (held or not outside(twin, q, leg.joints)):
+            if q is not None and (held or not limits.outside(twin, q, leg.joints)):
                 return _Closing((twin, q), None, held)
             first = q if first is None else first
         return _Closing(None if first is None else (twin, first), None, held)
 
     def _closed(self, twin: PinocchioModel, start: Array, target: Target) -> Array | None:
         """The closed configuration that a start leads to."""
-        q, residual = closed(twin, start, target, tolerance=SOLVED, iterations=LEG_ITERATIONS)
+        q, residual = solve(twin, start, target, tolerance=SOLVED, iterations=LEG_ITERATIONS)
         turned = target.point is not None or _turned_as(twin.pose(q, target.link), target.pose)
         return q if residual <= CLOSED and turned else None
 
@@ -206,36 +205,3 @@ def _starts(twin: PinocchioModel, known: Closures = UNDECIDED) -> Iterator[Array
                 for (place,), value in zip(joints, combination, strict=True):
                     step[place] = value
             yield twin.moved(twin.q0, step)
-
-
-def outside(twin: PinocchioModel, q: Array, joints: Sequence[str]) -> list[str]:
-    """Those joints, turning or sliding about one axis, whose coordinates are outside their limits (turns count
-    modulo 2π), and the wrists beyond their intervals."""
-    moved = twin.difference(twin.q0, q)
-    found = [name for name in wrists.beyond(twin, q) if name in joints]
-    for name in joints:
-        joint, at = twin.mechanism.joints.get(name), twin.coordinates.get(name)
-        if joint is None or at is None or len(at) != 1:
-            continue
-        value = float(moved[at[0]]) * (twin.length if joint.type is JointType.PRISMATIC else 1.0)
-        if _beyond(joint, value, value):
-            found.append(name)
-    return found
-
-
-def _beyond(joint: Joint, low: float, high: float) -> bool:
-    """Whether no coordinate from ``low`` to ``high`` is within a joint's limits."""
-    if joint.limits is None:
-        return False
-    lower, upper = (-np.inf if joint.limits.lower is None else joint.limits.lower - SAME_POINT,
-                    np.inf if joint.limits.upper is None else joint.limits.upper + SAME_POINT)
-    if joint.type is not JointType.REVOLUTE:
-        return high < lower or low > upper
-    # the smallest turn 2πk that brings ``high`` to the lower limit must take ``low`` beyond the upper one
-    turns = np.ceil((lower - high) / (2 * np.pi)) if np.isfinite(lower) else -np.inf
-    return bool(low + 2 * np.pi * turns > upper)
-
-
-def _never(joint: Joint, values: Sequence[Any]) -> bool:
-    """Whether all values of a list, as balls, are outside a joint's limits."""
-    return all(value.is_finite() and _beyond(joint, float(value.lower()), float(value.upper())) for value in values)

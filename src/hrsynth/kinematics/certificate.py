@@ -14,10 +14,11 @@ from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from ..results import Result
 from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
-from .configuration import ClosedConfiguration, Target
+from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation
 from .sampling import Samples, followed
+from .tasks import Target
 
 
 @dataclass(frozen=True, eq=False)

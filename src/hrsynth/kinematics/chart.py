@@ -15,9 +15,10 @@ from ..errors import LoopsNotClosed
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
 from ..tolerances import CLOSED, SOLVED
-from .configuration import ClosedConfiguration, closed
+from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement
+from .tasks import solve
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +52,7 @@ class Chart:
         """The configuration with the coordinates y that lies next to the configuration ``near`` (nq,); raises
         ``LoopsNotClosed``."""
         twin = self.centre.twin
-        q, residual = closed(twin, near, _Coordinates(self, y), tolerance=SOLVED, iterations=15)
+        q, residual = solve(twin, near, _Coordinates(self, y), tolerance=SOLVED, iterations=15)
         if not residual <= CLOSED:
             raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, twin.worst_loop(q)[0])
         return ClosedConfiguration.of(twin, q)

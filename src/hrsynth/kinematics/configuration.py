@@ -1,22 +1,18 @@
-"""Closed configurations: a type that exists only if its loops are closed.
+"""Closed configurations: a type that exists only if its loops are closed; what is measured at one.
 
-Solved by damped Gauss-Newton from a nearby configuration; targets (a platform pose, measured values) are solved along
-with the loops.
+They are found by :func:`.tasks.solve`.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
-from typing import Protocol
 
 import numpy as np
 
 from ..errors import LoopsNotClosed
 from ..geometry.ranks import Rank, Spectrum, spectrum
-from ..geometry.so3 import logarithm
 from ..geometry.vectors import Array, frozen, hat
 from ..mechanism.observation import Observation
 from ..tolerances import CLOSED
@@ -61,47 +57,6 @@ class ClosedConfiguration:
     def strengths(self) -> Array:
         """The singular values of the constraints that count, descending, (rank,)."""
         return self.loops.values
-
-
-class Wanted(Protocol):
-    """What a configuration is to reach besides closed loops."""
-
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        """Error (reached − wanted) and its Jacobian."""
-
-
-class Aim(Wanted, Protocol):
-    """What a platform is led to along a way."""
-
-    def towards(self, X: Array, fraction: float) -> Aim:
-        """What lies ``fraction`` of the way from the pose X (4, 4) to it."""
-
-
-@dataclass(frozen=True, eq=False)
-class Target:
-    """What a configuration is to reach besides closed loops: the pose X_BP of ``link`` (only the position of ``point``,
-    given in the link's frame, where there is one), and measured values."""
-
-    link: str
-    pose: Array
-    point: Array | None
-    reference: str
-    measured: tuple[tuple[Observation, Array], ...]
-
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        """Error (reached − wanted) and its Jacobian."""
-        observations = tuple(o for o, _ in self.measured)
-        frames, velocities, values, rates = measure(twin, q, self.reference, observations, (self.link,))
-        X, V = frames[0], velocities[0]
-        if self.point is not None:
-            errors = [(X[:3, :3] @ self.point + X[:3, 3] - self.pose[:3, :3] @ self.point - self.pose[:3, 3])
-                      / twin.length]
-            blocks = [point_velocity(V, X, self.point, twin.length)]
-        else:
-            errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length, logarithm(X[:3, :3] @ self.pose[:3, :3].T)]
-            blocks = [V]
-        errors += [o.apart(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True)]
-        return np.concatenate(errors), np.concatenate([*blocks, *rates])
 
 
 def measure(twin: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation],
@@ -155,45 +110,3 @@ def _grouped(reference: str, observations: tuple[Observation, ...], links: tuple
 def point_velocity(V: Array, X: Array, point: Array, length: float) -> Array:
     """The linear rows of V moved from a link frame's origin to ``point`` (3,) in that frame; X is the link's pose."""
     return V[:3] - hat(X[:3, :3] @ point / length) @ V[3:]
-
-
-def closed(twin: PinocchioModel, q: Array, target: Wanted | None = None, *, tolerance: float = CLOSED,
-           iterations: int = 30) -> tuple[Array, float]:
-    """Damped Gauss-Newton from ``q``: the configuration reached and the residual left (loops and target).
-
-    The damping is the square of the residual: off closure a redundant or idle direction has singular values of the
-    residual's own size, which must not be followed; near closure the convergence stays fast.
-    """
-    error, J = system(twin, q, target)
-    size = math.sqrt(error @ error)
-    factor = 1.0
-    for _ in range(iterations):
-        if size <= tolerance or factor > 1e8:
-            break
-        normal = J.T @ J
-        normal.flat[:: twin.nv + 1] += max(factor * size**2, 1e-14)
-        step: Array = np.asarray(np.linalg.solve(normal, -(J.T @ error)), dtype=float)
-        trial = twin.moved(q, limited(step, 0.5))
-        trial_error, trial_J = system(twin, trial, target)
-        trial_size = math.sqrt(trial_error @ trial_error)
-        if trial_size < size:
-            q, error, J, size = trial, trial_error, trial_J, trial_size
-            factor = max(0.1 * factor, 0.1)
-        else:
-            factor *= 10.0
-    return q, size
-
-
-def limited(step: Array, longest: float) -> Array:
-    """A step (nv,), shortened where a coordinate would change by more than ``longest``."""
-    largest = float(np.abs(step).max(initial=0.0))
-    return step * (longest / largest) if largest > longest else step
-
-
-def system(twin: PinocchioModel, q: Array, target: Wanted | None) -> tuple[Array, Array]:
-    """Error and Jacobian of the loops and, below them, of the target."""
-    error, J = twin.residual(q), twin.jacobian(q)
-    if target is None:
-        return error, J
-    extra, rows = target.rows(twin, q)
-    return np.concatenate([error, extra]), np.concatenate([J, rows])

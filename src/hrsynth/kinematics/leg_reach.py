@@ -5,17 +5,20 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import HrsynthError
+from ..geometry.gauss_newton import Damping, descend
 from ..geometry.ranks import kernel_basis
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from ..mechanism.legs import Leg, LegDecomposition, decompose
 from ..tolerances import CLOSED, FOLLOWED, RANK_CUTOFF, SOLVED
-from .configuration import ClosedConfiguration, closed
+from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .platform_motion import Goal, PlatformMotion
+from .tasks import solve
 
 WAY = 10
 """Points of the way at which a leg alone is led towards a pose, so that it keeps its working mode."""
+DAMPING = Damping(start=1e-3, eased=0.2, least=1e-12, most=1e7)
 
 
 def worst_leg(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> tuple[str | None, float, float]:
@@ -58,22 +61,21 @@ def _miss(twin: PinocchioModel, motion: PlatformMotion, goal: Goal) -> Array:
 def _approached(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: int) -> ClosedConfiguration:
     """Minimise a goal's error with the loops closed and ``manner`` kept: damped Gauss-Newton in the tangent space."""
     twin = at.twin
-    damping = 1e-3
-    error, rows = goal.rows(twin, at.q)
-    for _ in range(iterations):
-        kernel, _ = kernel_basis(np.vstack([twin.jacobian(at.q), manner.rows(twin, at.q)[1]]), 1.0)
-        free = rows @ kernel
-        gradient = free.T @ error
-        if np.linalg.norm(error) <= SOLVED or np.linalg.norm(gradient) <= RANK_CUTOFF * np.linalg.norm(error):
-            break
-        step = kernel @ np.linalg.solve(free.T @ free + damping * np.eye(free.shape[1]), -gradient)
-        q, residual = closed(twin, twin.moved(at.q, step), manner, tolerance=SOLVED)
-        trial, trial_rows = goal.rows(twin, q)
-        if residual <= CLOSED and np.linalg.norm(trial) < np.linalg.norm(error):
-            at, error, rows = ClosedConfiguration.of(twin, q), trial, trial_rows
-            damping = max(0.2 * damping, 1e-12)
-        elif damping > 1e6:
-            break
-        else:
-            damping *= 10
-    return at
+
+    def tangent(at: ClosedConfiguration) -> tuple[ClosedConfiguration, Array]:
+        return at, kernel_basis(np.vstack([twin.jacobian(at.q), manner.rows(twin, at.q)[1]]), 1.0)[0]
+
+    def evaluate(here: tuple[ClosedConfiguration, Array]) -> tuple[Array, Array]:
+        error, rows = goal.rows(twin, here[0].q)
+        return error, rows @ here[1]
+
+    def advance(here: tuple[ClosedConfiguration, Array], error: Array, J: Array, factor: float
+                ) -> tuple[ClosedConfiguration, Array] | None:
+        step = here[1] @ np.linalg.solve(J.T @ J + factor * np.eye(J.shape[1]), -(J.T @ error))
+        q, residual = solve(twin, twin.moved(here[0].q, step), manner, tolerance=SOLVED)
+        return tangent(ClosedConfiguration.of(twin, q)) if residual <= CLOSED else None
+
+    def content(error: Array, J: Array, size: float) -> bool:
+        return size <= SOLVED or bool(np.linalg.norm(J.T @ error) <= RANK_CUTOFF * size)
+
+    return descend(tangent(at), evaluate, advance, DAMPING, iterations, content)[0][0]

@@ -11,7 +11,8 @@ from ..geometry.ranks import Rank, kernel_basis, range_basis
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..tolerances import INVERTED
-from .configuration import ClosedConfiguration, Target, measure, point_velocity
+from .configuration import ClosedConfiguration, measure, point_velocity
+from .tasks import Target
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,10 +20,11 @@ from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..tolerances import CLOSED, EXACT, FOLLOWED, INVERTED, NUDGE, PASSED_BY, RANK_GAP, SHARP, SOLVED, STEADY_TANGENT
 from .branch import CORRECTED, follows
-from .configuration import ClosedConfiguration, Target, closed, limited
+from .configuration import ClosedConfiguration
 from .operation import OperationMode, Signature, grouped
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation
+from .tasks import Target, shortened, solve
 
 STEP = 0.11
 """Length of a step: the norm of (t, u̇), in characteristic lengths and radians."""
@@ -270,7 +271,7 @@ def _steady(here: ClosedConfiguration) -> ClosedConfiguration | None:
     if here.residual <= STEADY_TANGENT * here.kernel()[1].weakest ** 2:
         return here
     twin = here.twin
-    here = ClosedConfiguration.of(twin, closed(twin, here.q, tolerance=SHARP, iterations=5)[0])
+    here = ClosedConfiguration.of(twin, solve(twin, here.q, tolerance=SHARP, iterations=5)[0])
     aside, _ = kernel_basis(twin.jacobian(twin.moved(here.q, NUDGE * here.loops.right[:, -1])))
     turn = largest_angle(here.kernel()[0], aside) / NUDGE  # radians for each unit of the weakest direction
     return here if turn * max(here.residual, SHARP) / here.strengths[-1] <= STEADY_TANGENT else None
@@ -281,9 +282,9 @@ def _moved(here: ClosedConfiguration, velocity: Array, part: float = 1.0,
     """The configuration a ``part`` of a step along ``velocity`` leads to; None where it does not close near its
     prediction, or does not follow the branch: what it closes to goes to ``beyond`` then. ``leaving`` a singular
     configuration, any branch will do."""
-    step = part * limited(STEP * velocity, 3 * STEP)
+    step = part * shortened(STEP * velocity, 3 * STEP)
     predicted = here.twin.moved(here.q, step)
-    q, residual = closed(here.twin, predicted, tolerance=SOLVED)
+    q, residual = solve(here.twin, predicted, tolerance=SOLVED)
     if not residual <= CLOSED:
         return None
     there, length = ClosedConfiguration.of(here.twin, q), float(np.linalg.norm(step))
@@ -340,5 +341,5 @@ def followed(twin: PinocchioModel, way: Sequence[Target], iterations: int = 120)
     q, residual = twin.q0, 0.0
     for target in way:
         exact = target is way[-1]
-        q, residual = closed(twin, q, target, tolerance=SOLVED if exact else PASSED_BY, iterations=iterations)
+        q, residual = solve(twin, q, target, tolerance=SOLVED if exact else PASSED_BY, iterations=iterations)
     return q, residual

@@ -11,10 +11,11 @@ from ..geometry.ranks import kernel_basis, range_basis
 from ..geometry.vectors import Array
 from ..tolerances import AS_PRINTED, CLOSED, EASY_RANK, FOLLOWED, NEAR_FOLD, NEAREST, PASSED_BY, RANK_CUTOFF, SOLVED
 from .branch import follows, nears
-from .configuration import Aim, ClosedConfiguration, closed, limited, system
+from .configuration import ClosedConfiguration
+from .limits import wrists_beyond
 from .pinocchio_model import PinocchioModel
 from .platform_motion import Goal, PlatformMotion
-from .wrists import beyond
+from .tasks import GuidedTask, Task, shortened, solve, system
 
 STRIDE = 0.1
 """Longest step along the way to a pose (characteristic lengths, radians)."""
@@ -26,7 +27,7 @@ EASING = 30
 """Further steps at a goal's own place where the way to it was not straight."""
 
 
-def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Aim,
+def led(here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask,
         halvings: int = HALVINGS) -> tuple[ClosedConfiguration, float]:
     """Lead a configuration to a goal by small steps: where it comes to, and the part of the way that it came (1: all of
     it). A goal of more parts than there are freedoms is met where it is missed by no more than printed digits."""
@@ -56,25 +57,21 @@ def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Aim,
     return here, 1.0
 
 
-def _eased(here: ClosedConfiguration, goal: Aim, X: Array, stride: float) -> ClosedConfiguration:
+def _eased(here: ClosedConfiguration, goal: GuidedTask, X: Array, stride: float) -> ClosedConfiguration:
     """As near as steps with closed loops come to a goal of more parts than the platform has freedoms: the straight way
     from the pose X need not be one that it can go."""
-    twin = here.twin
-    fractions = [*np.arange(stride, 1, stride), *[1.0] * EASING]
-    for fraction in fractions:
-        kernel, _ = here.kernel()
-        error, rows = goal.towards(X, float(fraction)).rows(twin, here.q)
-        if fraction == 1 and np.linalg.norm(error) <= SOLVED:
+    for fraction in (*np.arange(stride, 1, stride), *[1.0] * EASING):
+        ahead = goal.towards(X, float(fraction))
+        if fraction == 1 and np.linalg.norm(ahead.rows(here.twin, here.q)[0]) <= SOLVED:
             break
-        step = kernel @ np.linalg.lstsq(rows @ kernel, -error, rcond=EASY_RANK)[0]
-        there = next(_shrinking(here, limited(step, 3 * STRIDE), None), None)
+        there = next(_nearer(here, ahead, None, EASY_RANK, 3 * STRIDE), None)
         if there is None:
             break
         here = there
     return here
 
 
-def _stepped(here: ClosedConfiguration, goal: Aim, home: Goal) -> ClosedConfiguration | None:
+def _stepped(here: ClosedConfiguration, goal: GuidedTask, home: Goal) -> ClosedConfiguration | None:
     """The configuration at a goal nearby, moved towards ``home`` where parts are free; None where it jumps or lies
     beyond a fold, in another working mode."""
     twin = here.twin
@@ -97,20 +94,20 @@ def _beyond(before: Array, after: Array) -> bool:
     return bool(np.linalg.svd(span.T @ after, compute_uv=False)[-1] > NEAR_FOLD)
 
 
-def _corrected(here: ClosedConfiguration, step: Array, goal: Aim | None) -> ClosedConfiguration | None:
+def _corrected(here: ClosedConfiguration, step: Array, goal: GuidedTask | None) -> ClosedConfiguration | None:
     """The closed configuration at the goal after a step; None where there is none, the correction is a jump, the step
     does not follow the branch, or a wrist cannot make the turn."""
     twin = here.twin
     predicted = twin.moved(here.q, step)
-    q, residual = closed(twin, predicted, goal, tolerance=SOLVED, iterations=15)
+    q, residual = solve(twin, predicted, goal, tolerance=SOLVED, iterations=15)
     allowed = max(0.5 * float(np.linalg.norm(step)), JUMP)
-    if not residual <= CLOSED or np.linalg.norm(q - predicted) > allowed or beyond(twin, q):
+    if not residual <= CLOSED or np.linalg.norm(q - predicted) > allowed or wrists_beyond(twin, q):
         return None
     there = ClosedConfiguration.of(twin, q)
     return there if follows(here, step, there) or nears(here, step, there) else None
 
 
-def nearest(here: ClosedConfiguration, goal: Aim, home: Goal) -> ClosedConfiguration:
+def nearest(here: ClosedConfiguration, goal: GuidedTask, home: Goal) -> ClosedConfiguration:
     """The configuration at ``goal`` whose platform pose is nearest to ``home``: the projected gradient vanishes, the
     loops are closed as well as floating point can; ``here`` itself where the goal is met but for its printed digits."""
     if np.linalg.norm(goal.rows(here.twin, here.q)[0]) > SOLVED:
@@ -118,33 +115,37 @@ def nearest(here: ClosedConfiguration, goal: Aim, home: Goal) -> ClosedConfigura
     return polished(_drawn_home(here, goal, home, 100), goal)
 
 
-def _drawn_home(here: ClosedConfiguration, goal: Aim, home: Goal, iterations: int) -> ClosedConfiguration:
-    """Gauss-Newton in the tangent space: minimise |home's error| with the goal held."""
-    twin = here.twin
+def _drawn_home(here: ClosedConfiguration, goal: GuidedTask, home: Goal, iterations: int) -> ClosedConfiguration:
+    """Minimise |home's error| with the goal held."""
     for _ in range(iterations):
-        kernel, _ = kernel_basis(np.vstack([twin.jacobian(here.q), goal.rows(twin, here.q)[1]]))
-        error, rows = home.rows(twin, here.q)
-        free = rows @ kernel
-        if np.linalg.norm(error @ free) <= NEAREST:
+        size = np.linalg.norm(home.rows(here.twin, here.q)[0]) + SOLVED
+        there = next((each for each in _nearer(here, home, goal, RANK_CUTOFF, STRIDE, NEAREST)
+                      if np.linalg.norm(home.rows(here.twin, each.q)[0]) <= size), None)
+        if there is None:
             break
-        step = kernel @ np.linalg.lstsq(free, -error, rcond=RANK_CUTOFF)[0]
-        for there in _shrinking(here, limited(step, STRIDE), goal):
-            if np.linalg.norm(home.rows(twin, there.q)[0]) <= np.linalg.norm(error) + SOLVED:
-                here = there
-                break
-        else:
-            break
+        here = there
     return here
 
 
-def _shrinking(here: ClosedConfiguration, step: Array, goal: Aim | None) -> Iterator[ClosedConfiguration]:
-    for shrink in (1.0, 0.5, 0.25, 0.1, 0.02):
-        there = _corrected(here, shrink * step, goal)
+def _nearer(here: ClosedConfiguration, task: Task, held: GuidedTask | None, cutoff: float, longest: float,
+            least: float = 0.0) -> Iterator[ClosedConfiguration]:
+    """Where a Gauss-Newton step on a task's error leads, in the tangent space of the loops and of what is ``held``, and
+    ever smaller parts of it; nothing where the projected gradient is no more than ``least``."""
+    kernel = here.kernel()[0]
+    if held is not None:
+        kernel, _ = kernel_basis(np.vstack([here.twin.jacobian(here.q), held.rows(here.twin, here.q)[1]]))
+    error, rows = task.rows(here.twin, here.q)
+    free = rows @ kernel
+    if np.linalg.norm(error @ free) <= least:
+        return
+    step = shortened(kernel @ np.linalg.lstsq(free, -error, rcond=cutoff)[0], longest)
+    for part in (1.0, 0.5, 0.25, 0.1, 0.02):
+        there = _corrected(here, part * step, held)
         if there is not None:
             yield there
 
 
-def polished(here: ClosedConfiguration, goal: Aim) -> ClosedConfiguration:
+def polished(here: ClosedConfiguration, goal: GuidedTask) -> ClosedConfiguration:
     """Newton steps of minimum norm until the residual no longer falls: on the edge of the workspace a configuration
     is only as exact as the square root of its residual."""
     twin, q = here.twin, here.q
@@ -159,7 +160,7 @@ def polished(here: ClosedConfiguration, goal: Aim) -> ClosedConfiguration:
     return ClosedConfiguration.of(twin, _on_fold(twin, q, goal))
 
 
-def _on_fold(twin: PinocchioModel, q: Array, goal: Aim) -> Array:
+def _on_fold(twin: PinocchioModel, q: Array, goal: GuidedTask) -> Array:
     """The configuration on a fold of the way (the edge of the workspace) where ``q`` cannot be told from it: where the
     weak singular value of loops and goal vanishes, if the residual stays within ``SOLVED`` there."""
     rows = system(twin, q, goal)[1]

@@ -238,6 +238,14 @@ class Mechanism(Result):
         return adjacency(self.links, (joint.links for joint in self.joints.values()))
 
     @cached_property
+    def limited(self) -> dict[str, tuple[float, float]]:
+        """The joints whose coordinates are limited: lower and upper limit (m, rad), infinite where there is none."""
+        given = {name: (joint.limits.lower, joint.limits.upper) for name, joint in self.joints.items()
+                 if joint.limits is not None and (joint.limits.lower, joint.limits.upper) != (None, None)}
+        return {name: (-np.inf if lower is None else lower, np.inf if upper is None else upper)
+                for name, (lower, upper) in given.items()}
+
+    @cached_property
     def wrists(self) -> dict[str, Wrist]:
         """The spherical joints that cannot make every turn."""
         return {name: joint.wrist for name, joint in self.joints.items() if joint.wrist is not None}

@@ -10,9 +10,10 @@ import numpy as np
 
 from ..geometry.ranks import kernel_basis
 from ..geometry.vectors import Array, unit
-from ..kinematics.configuration import ClosedConfiguration, closed
+from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.sampling import Samples
+from ..kinematics.tasks import solve
 from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..mechanism.composites import Edge, WordGraph
 from ..mechanism.legs import LegDecomposition
@@ -210,7 +211,7 @@ def _moved(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequen
         else:
             for _ in range(4):
                 kernel, _ = ClosedConfiguration.of(twin, q).kernel()
-                q, _ = closed(twin, twin.moved(q, 0.12 * kernel @ rng.normal(size=kernel.shape[1])), tolerance=SOLVED)
+                q, _ = solve(twin, twin.moved(q, 0.12 * kernel @ rng.normal(size=kernel.shape[1])), tolerance=SOLVED)
         X = twin.pose(q, before)
         rotations.append(X[:3, :3] @ home[:3, :3].T)
         anchors.append(X[:3, :3] @ local + X[:3, 3])

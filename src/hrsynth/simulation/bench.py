@@ -16,10 +16,11 @@ from ..analysis.observed import ObservedRobot, motors
 from ..errors import BadRequest, LoopsNotClosed, MissingExtra
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
-from ..kinematics.configuration import ClosedConfiguration, closed
+from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezeroed
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.relation import relation
+from ..kinematics.tasks import solve
 from ..mechanism import Mechanism
 from ..tolerances import BENCH_SETTLED, BENCH_STEADY, CLOSED, SOLVED
 from .law import Command, Poses
@@ -149,7 +150,7 @@ def encoded(at: ClosedConfiguration, places: list[int], values: Array) -> Closed
     """The configuration next to another with these coordinates of the motors; None where there is none."""
     twin = at.twin
     free, _ = range_basis(at.kernel()[0][places], 1.0)
-    found, residual = closed(twin, at.q, _Coordinates(places, values, free), tolerance=SOLVED)
+    found, residual = solve(twin, at.q, _Coordinates(places, values, free), tolerance=SOLVED)
     if residual > CLOSED:
         return None
     try:

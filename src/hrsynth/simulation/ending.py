@@ -13,9 +13,10 @@ from ..budgets import RUN_EVALUATIONS
 from ..errors import HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.limits import margins
 from ..tolerances import DAMPED, SAME_RELATION
 from .law import Command
-from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, SERVED_AT, Run, margins
+from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, SERVED_AT, Run
 
 GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME = "goal", "mode", "antipodal", "local minimum", "boundary", "time"
 UNDECIDED = "undecided"
@@ -55,7 +56,7 @@ class Referee:
             loose = "" if run.stopped == REST else "; that this rest draws the state to itself was not found"
             return replace(ending, reason=ending.reason + loose)
         if run.stopped == LIMIT:
-            joint, _ = min(margins(run.last).items(), key=lambda item: item[1])
+            joint, _ = min(margins(run.last.twin, run.last.q).items(), key=lambda item: item[1])
             return Ending(BOUNDARY, f"joint {joint} is at its limit")
         if run.stopped == OPEN:
             return Ending(BOUNDARY, "the loops lose their rank here, and the integrator found no way on")

@@ -10,11 +10,10 @@ import numpy as np
 from ..budgets import RUN_AWAY, RUN_EVALUATIONS, WIDEST_CHART
 from ..errors import LoopsNotClosed
 from ..geometry.vectors import Array
-from ..kinematics import wrists
 from ..kinematics.chart import Chart
 from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.limits import margins
 from ..kinematics.relation import Measurement
-from ..mechanism import JointType, Mechanism
 from ..tolerances import (
     ARRIVED,
     AT_REST,
@@ -196,30 +195,6 @@ def _loose(at: ClosedConfiguration, start: ClosedConfiguration) -> bool:
     return at.kernel()[1].weakest < LOOPS_LOST * start.kernel()[1].weakest
 
 
-def limited(mechanism: Mechanism) -> list[tuple[str, float, float]]:
-    """The joints about or along one axis that have limits: name, lower and upper (m, rad)."""
-    found = []
-    for joint in mechanism.joints.values():
-        if joint.limits is None or joint.type not in (JointType.REVOLUTE, JointType.PRISMATIC):
-            continue
-        lower, upper = joint.limits.lower, joint.limits.upper
-        if lower is not None or upper is not None:
-            found.append((joint.name, -np.inf if lower is None else lower, np.inf if upper is None else upper))
-    return found
-
-
-def margins(at: ClosedConfiguration) -> dict[str, float]:
-    """How far each joint that has limits, or is a wrist, is from the nearer one (m, rad); negative beyond it."""
-    twin = at.twin
-    moved = twin.difference(twin.q0, at.q)
-    found = {}
-    for name, lower, upper in limited(twin.mechanism):
-        slides = twin.mechanism.joints[name].type is JointType.PRISMATIC
-        value = float(moved[twin.coordinates[name][0]]) * (twin.length if slides else 1.0)
-        found[name] = min(value - lower, upper - value)
-    return found | wrists.margins(twin, at.q)
-
-
 def clearance(at: ClosedConfiguration) -> float:
     """The smallest of :func:`margins`, infinite where no joint has limits."""
-    return min(margins(at).values(), default=np.inf)
+    return min(margins(at.twin, at.q).values(), default=np.inf)

@@ -18,7 +18,8 @@ from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.errors import HrsynthError
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.configuration import ClosedConfiguration, closed
+from hrsynth.kinematics.configuration import ClosedConfiguration
+from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.pose import Pose
 from hrsynth.simulation.desired import Step
 from hrsynth.simulation.law import Law
@@ -120,7 +121,7 @@ def check_fit(setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fi
     rng = np.random.default_rng(0)
     for _ in range(10):
         kernel, _ = there.kernel()
-        q, residual = closed(there.twin, there.twin.moved(there.q, 1e-3 * kernel @ rng.normal(size=kernel.shape[1])))
+        q, residual = solve(there.twin, there.twin.moved(there.q, 1e-3 * kernel @ rng.normal(size=kernel.shape[1])))
         if residual < 1e-10:
             assert size(ClosedConfiguration.of(there.twin, q)) >= size(there) - 1e-12
     run = Loop(Law(question, setting.dof, 0.8), setting.everything.question, Step(wanted)).simulate(at, 200.0)

@@ -10,7 +10,8 @@ from hrsynth.analysis.aspects.path import Aspects
 from hrsynth.analysis.singularity.agreement import smallest_of, weakest
 from hrsynth.constraints.condition import Condition
 from hrsynth.constraints.named_vectors import unit_rows
-from hrsynth.kinematics.configuration import ClosedConfiguration, Target, closed, measure
+from hrsynth.kinematics.configuration import ClosedConfiguration, measure
+from hrsynth.kinematics.tasks import Target, solve
 from hrsynth.tolerances import CLOSED, RANK_CUTOFF
 
 FEWEST = 25
@@ -39,7 +40,7 @@ def followed(aspects: Aspects, answer: PathAnswer, points: int) -> list[ClosedCo
             point = None if carriage.turning else carriage.motion.point
             target = Target(carriage.motion.link, carriage.frame(place, turn) if carriage.turning else X, point,
                             question.reference, measured)
-            q, residual = closed(here.twin, here.q, target, tolerance=1e-12)
+            q, residual = solve(here.twin, here.q, target, tolerance=1e-12)
             assert residual <= CLOSED, "a leg does not reach"
             here = ClosedConfiguration.of(here.twin, q)
             found.append(here)

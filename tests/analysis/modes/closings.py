@@ -13,9 +13,10 @@ import numpy as np
 from hrsynth.analysis.modes.modes import AssemblyMode, AssemblyModes
 from hrsynth.analysis.observed import motors
 from hrsynth.geometry.vectors import Array, inverse
-from hrsynth.kinematics.configuration import ClosedConfiguration, closed, measure
+from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import Measurement
+from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism import Mechanism, Observation
 
 SAME = 1e-6
@@ -52,7 +53,7 @@ def closings(listed: AssemblyModes, starts: int, seed: int = 0) -> list[ClosedCo
     for number in range(starts):
         spread = SPREADS[number % len(SPREADS)]
         start = goal.twin.moved(goal.q, rng.uniform(-spread, spread, goal.twin.nv))
-        q, residual = closed(goal.twin, start, held, tolerance=1e-13, iterations=40)
+        q, residual = solve(goal.twin, start, held, tolerance=1e-13, iterations=40)
         if residual < 1e-11:
             found.append(ClosedConfiguration.of(goal.twin, q))
     return found

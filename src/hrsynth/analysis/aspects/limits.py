@@ -13,7 +13,7 @@ from ...constraints.named_vectors import axis_of
 from ...geometry.balls import Field
 from ...geometry.so3 import wrapped
 from ...geometry.vectors import Array, cross, dot
-from ...mechanism import Joint, JointType, Limits, Mechanism
+from ...mechanism import Joint, JointType
 from ...tolerances import FOLLOWED, SAME_RELATION, TURNING_ARM
 from .sources import NoChart, Source
 
@@ -74,19 +74,13 @@ class Slide:
 Bound = Turn | Slide
 
 
-def limited(robot: Mechanism) -> dict[str, Limits]:
-    """Joints whose coordinates are limited."""
-    return {joint.name: joint.limits for joint in robot.joints.values()
-            if joint.limits is not None and (joint.limits.lower, joint.limits.upper) != (None, None)}
-
-
 def bounds(sight: Sight, source: Callable[..., Source]) -> Iterator[Bound]:
     """The limits of joints that can be told from the pose."""
-    for name, limits in limited(sight.mechanism).items():
-        joint = sight.mechanism.joints[name]
-        if limits.lower is None or limits.upper is None or not limits.lower < limits.upper:
+    for name, (lower, upper) in sight.mechanism.limited.items():
+        if not -np.inf < lower < upper < np.inf:
             continue
-        found = _bound(sight, source, joint, (limits.lower + limits.upper) / 2, (limits.upper - limits.lower) / 2)
+        joint = sight.mechanism.joints[name]
+        found = _bound(sight, source, joint, (lower + upper) / 2, (upper - lower) / 2)
         if found is not None:
             yield found
 

@@ -22,7 +22,6 @@ from ..singularity.agreement import smallest_of
 from .answer import SAME, SEPARATED, UNDECIDED, End, PathAnswer, between
 from .carriage import Place, carriages
 from .crossing import Crossing
-from .limits import limited
 from .pattern import Pattern, pattern
 from .plan import Plan, plan
 from .proof import Reading, Way, enclosed, sign_of
@@ -142,7 +141,7 @@ class Aspects:
         """The answer with a plan's ways, and the joints whose limits these keep."""
         kept = tuple(bound.joint for bound in known.bounds)
         answer = replace(answer, boxes=found.boxes, limits=kept,
-                         unlimited=(*(name for name in limited(self.setting.robot) if name not in kept),
+                         unlimited=(*(name for name in self.setting.robot.limited if name not in kept),
                                     *self.setting.mechanism.wrists))
         if not found.ways:
             return answer

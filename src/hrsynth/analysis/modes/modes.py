@@ -12,10 +12,12 @@ from ...batch.reach import reach
 from ...errors import BadRequest
 from ...geometry.ranks import range_basis
 from ...geometry.vectors import Array
-from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, outside
+from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly
 from ...kinematics.closures import Miss
-from ...kinematics.configuration import ClosedConfiguration, Wanted, measure, system
+from ...kinematics.configuration import ClosedConfiguration, measure
+from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement
+from ...kinematics.tasks import Task, system
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...results import Result
@@ -174,7 +176,7 @@ def modes_with(setting: ObservedRobot, at: Pose | str | None = None, *, real: bo
     return modes_at(setting, goal, wanted, real=real, as_written=as_written, progress=progress)
 
 
-def modes_at(setting: ObservedRobot, goal: ClosedConfiguration, wanted: Wanted | None = None, *, real: bool = False,
+def modes_at(setting: ObservedRobot, goal: ClosedConfiguration, wanted: Task | None = None, *, real: bool = False,
              as_written: bool = False, progress: Callable[[str], None] = silent) -> AssemblyModes:
     """All assembly modes with the measurements of a configuration of a setting, as :func:`modes`; ``wanted`` is the
     pose that the configuration was asked for."""
@@ -270,7 +272,7 @@ LEVER = 2.0
 """Least lever (characteristic lengths) of a turn: directions are compared with the size of the tips' curves."""
 
 
-def drift(goal: ClosedConfiguration, pose: Wanted | None = None) -> float:
+def drift(goal: ClosedConfiguration, pose: Task | None = None) -> float:
     """How far a point of a link can be from where it is at the exact goal (m), within the robot's extent; infinite
     where that is not proved.
 

@@ -19,11 +19,12 @@ from ...constraints.pattern import ConstraintPattern, LockedLeg
 from ...errors import NotConfined
 from ...geometry.ranks import kernel_basis
 from ...geometry.vectors import Array
-from ...kinematics.configuration import ClosedConfiguration, closed, measure
+from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.leg_reach import alone
 from ...kinematics.locked import moved, rezeroed
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.relation import Measurement
+from ...kinematics.tasks import solve
 from ...mechanism import Observation
 from ...mechanism.composites import WordGraph
 from ...mechanism.legs import LegDecomposition, decompose
@@ -201,7 +202,7 @@ def _slide(anatomy: LegDecomposition, pattern: ConstraintPattern, goal: ClosedCo
     second = _opposite(first, at)
     kernel, _ = goal.kernel()
     step = kernel @ np.linalg.svd(moving @ kernel)[2][0]
-    nearby, _ = closed(goal.twin, goal.twin.moved(goal.q, MOVES[-1] * step), tolerance=SOLVED)
+    nearby, _ = solve(goal.twin, goal.twin.moved(goal.q, MOVES[-1] * step), tolerance=SOLVED)
     there, _ = _apart(pattern, goal, nearby)
     circle = min((first, second), key=lambda circle: float(np.linalg.norm(circle.miss(there))))
     return circle, f"no parallelogram joins {one} and {other}"
@@ -245,7 +246,7 @@ def _held_paths(anatomy: LegDecomposition, own: Sequence[Observation], reference
         directions = np.vstack([directions, mixed / np.linalg.norm(mixed, axis=1, keepdims=True)])
     for direction in directions:
         for size in MOVES:
-            q, residual = closed(twin, twin.moved(start.q, size * direction), held, tolerance=SOLVED)
+            q, residual = solve(twin, twin.moved(start.q, size * direction), held, tolerance=SOLVED)
             X = twin.pose(q, leg.body)
             if residual <= CLOSED:
                 found.append(X[:3, :3] @ place + X[:3, 3])

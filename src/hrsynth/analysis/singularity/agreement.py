@@ -19,9 +19,10 @@ from ...constraints.pattern import ConstraintPattern, PatternValues
 from ...errors import Disagreement
 from ...geometry.ranks import kernel_basis, range_basis
 from ...geometry.vectors import Array
-from ...kinematics.configuration import ClosedConfiguration, closed
+from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.sampling import WEAKEST, wander
+from ...kinematics.tasks import solve
 from ...tolerances import CLOSED, FOLLOWED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT, SHARP
 from .batch_spectrum import SPOTS, Quick
 
@@ -242,7 +243,7 @@ def _crossings(walk: Sequence[ClosedConfiguration], signs: Sequence[float], patt
 
 def _stepped(here: ClosedConfiguration, step: Array) -> ClosedConfiguration:
     """Where a step (nv,) leads, closed as sharply as it can be; that it is closed its residual tells."""
-    q, residual = closed(here.twin, here.twin.moved(here.q, step), tolerance=SHARP)
+    q, residual = solve(here.twin, here.twin.moved(here.q, step), tolerance=SHARP)
     return ClosedConfiguration(here.twin, q, residual)
 
 

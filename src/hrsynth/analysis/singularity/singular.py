@@ -10,8 +10,9 @@ from ...budgets import NEIGHBOUR_STEP
 from ...constraints.condition import Condition, always
 from ...constraints.pattern import ConstraintPattern
 from ...errors import BadRequest
-from ...kinematics.configuration import ClosedConfiguration, closed
+from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
+from ...kinematics.tasks import solve
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...results import Result
@@ -157,7 +158,7 @@ def neighbours(at: ClosedConfiguration, question: Measurement, distance: float) 
     motion = platform_motions(at, question)
     found = []
     for column in (*motion.T, *-motion.T):
-        q, residual = closed(at.twin, at.twin.moved(at.q, column * distance / at.twin.length), tolerance=SOLVED)
+        q, residual = solve(at.twin, at.twin.moved(at.q, column * distance / at.twin.length), tolerance=SOLVED)
         if residual <= 10 * SOLVED:
             found.append(ClosedConfiguration.of(at.twin, q))
     return found

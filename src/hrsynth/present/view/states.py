@@ -14,10 +14,11 @@ import numpy as np
 from ...analysis.observed import ObservedRobot
 from ...analysis.posture import Examiner
 from ...geometry.vectors import Array, inverse
-from ...kinematics.configuration import ClosedConfiguration, Target, closed
+from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.steps import led
+from ...kinematics.tasks import Target, solve
 from ...mechanism import Mechanism
 from ...tolerances import FOLLOWED, SOLVED
 from .shapes import FINE
@@ -141,7 +142,7 @@ class Mover:
         q = start.hidden
         for at in way:
             if self.hidden is not None and q is not None:
-                q, residual = closed(self.hidden, q, self._target(at), tolerance=SOLVED, iterations=EASY)
+                q, residual = solve(self.hidden, q, self._target(at), tolerance=SOLVED, iterations=EASY)
                 if not residual <= FOLLOWED:
                     break
             found.append(Posed(at, q))

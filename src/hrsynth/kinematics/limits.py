@@ -1,5 +1,5 @@
-"""Spherical joints that stand for several R (:mod:`mechanism.wrist`): whether a configuration asks for a turn that
-those R cannot make, and the proof that every closure of a leg does."""
+"""Limits of joints, and of spherical joints that stand for several R (:mod:`mechanism.wrist`): whether a configuration
+asks for a coordinate or a turn beyond them, and the proof that every closure of a leg does."""
 
 from __future__ import annotations
 
@@ -11,17 +11,34 @@ import numpy as np
 
 from ..geometry.balls import Field, around
 from ..geometry.vectors import Array, cross, dot
+from ..mechanism import JointType, Mechanism
 from ..mechanism.wrist import Wrist
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY, SAME_POINT
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .ways import Part
 
+SINGLE = (JointType.REVOLUTE, JointType.PRISMATIC)
+"""Joints with one coordinate that may have limits."""
 AT_END = 1e-2
 """Angle (rad) from the end of a wrist's interval within which it is named where a way ends."""
 
 
 def margins(twin: PinocchioModel, q: Array) -> dict[str, float]:
+    """How far each R or P that has limits, and each wrist, is from the nearer one (m, rad); negative beyond it."""
+    found = {name: min(value - lower, upper - value) for name, value in coordinates(twin, q).items()
+             for lower, upper in (twin.mechanism.limited[name],)}
+    return found | wrist_margins(twin, q)
+
+
+def coordinates(twin: PinocchioModel, q: Array) -> dict[str, float]:
+    """The coordinate (m, rad) of each R or P that has limits."""
+    step, joints = twin.difference(twin.q0, q), twin.mechanism.joints
+    return {name: float(step[twin.coordinates[name][0]]) * (twin.length if joints[name].type.slides else 1.0)
+            for name in twin.mechanism.limited if name in twin.coordinates and joints[name].type in SINGLE}
+
+
+def wrist_margins(twin: PinocchioModel, q: Array) -> dict[str, float]:
     """How far each wrist is from the nearer end of its interval (rad); negative beyond it."""
     mechanism = twin.mechanism
     found = {}
@@ -32,14 +49,41 @@ def margins(twin: PinocchioModel, q: Array) -> dict[str, float]:
     return found
 
 
-def beyond(twin: PinocchioModel, q: Array) -> list[str]:
+def wrists_beyond(twin: PinocchioModel, q: Array) -> list[str]:
     """The wrists that would have to make a turn that they cannot."""
-    return [name for name, margin in margins(twin, q).items() if margin < -SAME_POINT]
+    return [name for name, margin in wrist_margins(twin, q).items() if margin < -SAME_POINT]
+
+
+def outside(twin: PinocchioModel, q: Array, joints: Sequence[str]) -> list[str]:
+    """Those joints, turning or sliding about one axis, whose coordinates are outside their limits (turns count
+    modulo 2π), and the wrists beyond their intervals."""
+    values = coordinates(twin, q)
+    return ([name for name in wrists_beyond(twin, q) if name in joints]
+            + [name for name in joints
+               if name in values and excluded(twin.mechanism, name, values[name], values[name])])
+
+
+def excluded(mechanism: Mechanism, joint: str, low: float, high: float) -> bool:
+    """Whether no coordinate from ``low`` to ``high`` is within a joint's limits, turns modulo 2π."""
+    if joint not in mechanism.limited:
+        return False
+    lower, upper = mechanism.limited[joint][0] - SAME_POINT, mechanism.limited[joint][1] + SAME_POINT
+    if mechanism.joints[joint].type is not JointType.REVOLUTE:
+        return high < lower or low > upper
+    # the smallest turn 2πk that brings ``high`` to the lower limit must take ``low`` beyond the upper one
+    turns = np.ceil((lower - high) / (2 * np.pi)) if np.isfinite(lower) else -np.inf
+    return bool(low + 2 * np.pi * turns > upper)
+
+
+def all_excluded(mechanism: Mechanism, joint: str, values: Sequence[Any]) -> bool:
+    """Whether all values of a list, as balls, are outside a joint's limits."""
+    return all(value.is_finite() and excluded(mechanism, joint, float(value.lower()), float(value.upper()))
+               for value in values)
 
 
 def at_end(at: ClosedConfiguration) -> str | None:
     """The wrist nearest to an end of its interval, where it is there."""
-    name, margin = min(margins(at.twin, at.q).items(), key=lambda item: item[1], default=(None, np.inf))
+    name, margin = min(wrist_margins(at.twin, at.q).items(), key=lambda item: item[1], default=(None, np.inf))
     return name if margin < AT_END else None
 
 
