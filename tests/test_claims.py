@@ -59,7 +59,7 @@ def patterns() -> dict[str, tuple[str, ...]]:
 def test_every_word_of_certainty_is_in_the_table():
     known = re.compile("|".join(f"(?:{text})" for group in patterns().values() for text in group), re.IGNORECASE)
     loose = [f"{where}: {text!r}" for where, text in texts() if not known.search(text)]
-    assert not loose, "not in src/hrsynth/claims.py:\n" + "\n".join(loose)
+    assert not loose, "not in src/hrsynth/claims.toml:\n" + "\n".join(loose)
 
 
 @pytest.mark.parametrize("phrase", patterns())
