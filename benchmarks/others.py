@@ -29,7 +29,7 @@ from hrsynth.description.formats.mjcf.write import write
 from hrsynth.errors import HrsynthError
 from hrsynth.geometry.ranks import kernel_basis, largest_angle, range_basis
 from hrsynth.geometry.vectors import Array
-from hrsynth.kinematics.locked import rezeroed
+from hrsynth.kinematics.locked import rezero
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 
 SYSTEMS, EXTERNAL = 12, 3
@@ -78,7 +78,7 @@ def jacobians() -> Iterator[Row]:
     except ImportError:
         return
     for robot in ("quattro", "gough_stewart", "delta"):
-        here = rezeroed(prepare(load(robot), samples=3).configurations[0])
+        here = rezero(prepare(load(robot), samples=3).configurations[0])
         twin = PinocchioModel(here)
         model = mujoco.MjModel.from_xml_string(write(here).texts[0])
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT

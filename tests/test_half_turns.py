@@ -26,7 +26,7 @@ from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet, PoseNotReached
 from hrsynth.geometry.vectors import Array, rotation_from_rpy
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.steps import led
+from hrsynth.kinematics.steps import track
 from hrsynth.kinematics.tasks import Target
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.pose import Grid, Pose
@@ -128,7 +128,7 @@ def led_whole(case: Case, pose: Pose) -> Answer:
     """Led to the whole pose, as trajectories are."""
     X = np.eye(4)
     X[:3, :3], X[:3, 3] = pose.rotation, [pose.x, pose.y, pose.z]
-    at, came = led(case.setting.everything.start, case.setting.motion, whole(case.setting.motion, X))
+    at, came = track(case.setting.everything.start, case.setting.motion, whole(case.setting.motion, X))
     if came < 1:
         raise PoseNotReached(case.robot.name, str(pose), came, "")
     return [at]

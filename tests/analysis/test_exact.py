@@ -28,7 +28,7 @@ from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Coupling
 from hrsynth.mechanism.observation import Direction, Observation
-from hrsynth.mechanism.relations import Relations, Sight
+from hrsynth.mechanism.relations import DirectionSource, Relations
 from hrsynth.mechanism.sensors import encoders
 from hrsynth.present.text import verdicts as text
 from kinematics.robots import ROBOTS, setting_of
@@ -138,12 +138,12 @@ def test_directions_that_follow_from_axes_and_centres() -> None:
                      np.array([instances._numbers(3, rng) for _ in range(2)]))
     a, b = drawn.directions
     between = drawn.centres[1] - drawn.centres[0]
-    foot = seen(Sight("foot", (0, 1), (0,)), drawn)
+    foot = seen(DirectionSource("foot", (0, 1), (0,)), drawn)
     assert foot @ a == 0
     assert rank(np.array([foot, between, a])) == rank(np.array([between, a])) == 2
-    normal = seen(Sight("normal", (), (0, 1)), drawn)
+    normal = seen(DirectionSource("normal", (), (0, 1)), drawn)
     assert normal @ a == normal @ b == 0
-    assert rank(np.array([seen(Sight("between", (0, 1)), drawn), between])) == 1
+    assert rank(np.array([seen(DirectionSource("between", (0, 1)), drawn), between])) == 1
 
 
 def test_a_mechanism_without_centres() -> None:

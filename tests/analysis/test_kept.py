@@ -25,7 +25,7 @@ from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.carried import carried, ties
+from hrsynth.mechanism.carried import carried_by_joints, ties
 from hrsynth.mechanism.relations import Relations
 from kinematics.robots import ROBOTS, setting_of
 from mechanism.relating import miss, observed, recognised, walked
@@ -92,7 +92,7 @@ def test_what_holds_at_zero_by_accident_is_not_kept(robot: str) -> None:
     answers = kept(every, here.relations, instance(here.mechanism, here.relations, here.observations,
                                                    draw(here.relations, random.Random(0))))
     assert not all(answers)
-    known = carried(here.mechanism, here.relations, every)
+    known = carried_by_joints(here.mechanism, here.relations, every)
     assert all(keeps for keeps, holds in zip(answers, known, strict=True) if holds)
     verdict = here.verdict(here.observations)
     assert not verdict.proved
@@ -110,7 +110,8 @@ def test_what_is_carried_is_kept(seed: int) -> None:
         relations = recognised(robot, walked(robot, 0, seed))
         every = ties(relations)
         answers = kept(every, relations, one_of(robot, relations))
-        assert all(keeps for keeps, holds in zip(answers, carried(robot, relations, every), strict=True) if holds)
+        known = carried_by_joints(robot, relations, every)
+        assert all(keeps for keeps, holds in zip(answers, known, strict=True) if holds)
 
 
 @pytest.mark.parametrize("robot", ROBOTS)
@@ -176,7 +177,7 @@ def test_robots_without_axes_or_without_centres() -> None:
         every = ties(relations)
         assert every
         assert all(kept(every, relations, one_of(robot, relations)))
-        assert all(carried(robot, relations, every))
+        assert all(carried_by_joints(robot, relations, every))
 
 
 @pytest.mark.parametrize("robot", ["3upu", "delta", "quattro", "3rps", "hexaglide"])

@@ -18,7 +18,7 @@ from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.relation import relation
-from hrsynth.kinematics.sampling import wander
+from hrsynth.kinematics.sampling import random_walk
 from kinematics.robots import ROBOTS
 from strategies import parallel_robots
 
@@ -59,7 +59,7 @@ def check_law(setting: ObservedRobot, legs: Sequence[str], count: int, seed: int
     everything = setting.everything
     watched = tuple(o for o in everything.question.observations[: setting.defaults] if o.leg in legs)
     question = replace(everything.question, observations=watched)
-    walk = list(wander(everything.start, count, seed=seed, steps=4))
+    walk = list(random_walk(everything.start, count, seed=seed, steps=4))
     found = batch.evaluate([at.pose(question.platform) for at in walk], [o.leg for o in watched])
     compared = 0
     for i, at in enumerate(walk):

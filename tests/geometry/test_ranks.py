@@ -13,7 +13,7 @@ from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import Measurement
-from hrsynth.kinematics.sampling import draw
+from hrsynth.kinematics.sampling import sample
 from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.builder import Builder
 from hrsynth.tolerances import CLOSED, RANK_GAP
@@ -192,7 +192,7 @@ def test_targets_are_reached(robot: str) -> None:
 
 def test_samples_are_the_same_for_the_same_seed() -> None:
     everything = setting_of("3rrr_m1").everything
-    one, two, other = (draw(everything.twin, everything.question, 2, seed) for seed in (7, 7, 8))
+    one, two, other = (sample(everything.twin, everything.question, 2, seed) for seed in (7, 7, 8))
     for a, b, c in zip(one.members, two.members, other.members, strict=True):
         np.testing.assert_array_equal(a.configuration.q, b.configuration.q)
         assert np.max(np.abs(a.configuration.q - c.configuration.q)) > 1e-3
@@ -209,4 +209,4 @@ def test_nothing_to_sample() -> None:
     builder.observe("1", "left", (1, 1, 0))
     mechanism = builder.build(platform="right")
     with pytest.raises(BadMechanism, match="can move"):
-        draw(PinocchioModel(mechanism), Measurement("right", None, "base", mechanism.observations), 2)
+        sample(PinocchioModel(mechanism), Measurement("right", None, "base", mechanism.observations), 2)

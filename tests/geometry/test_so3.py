@@ -16,7 +16,7 @@ from hrsynth.geometry.so3 import (
     logarithm_rate,
     quaternions,
     turn_about,
-    wrapped,
+    wrap_angle,
 )
 from hrsynth.geometry.vectors import Array, hat, rotation_from_rpy
 from hrsynth.mechanism.pose import Pose, rpy_of
@@ -99,7 +99,7 @@ def test_the_smallest_turn_between_two_directions(a: Array, b: Array) -> None:
 @given(axes, st.floats(-np.pi, np.pi))
 def test_the_turn_about_an_axis_is_found_whole(axis: Array, angle: float) -> None:
     found = turn_about(axis, exponential(angle * axis))[0]
-    assert abs(wrapped(found - angle)) < NEAR
+    assert abs(wrap_angle(found - angle)) < NEAR
 
 
 def test_a_swing_of_half_a_turn_has_no_twist() -> None:

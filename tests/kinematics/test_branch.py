@@ -20,7 +20,7 @@ from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import Measurement, relation
-from hrsynth.kinematics.sampling import draw, wander
+from hrsynth.kinematics.sampling import random_walk, sample
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.pose import Pose
@@ -56,8 +56,8 @@ def test_a_parallelogram_does_not_cross_over(angle: float, normal: tuple[float, 
     question = Measurement("coupler", None, "base", robot.observations)
     home = twin.pose(twin.q0, "coupler")[:3, :3]
     start = ClosedConfiguration.of(twin, twin.q0)
-    drawn = draw(twin, question, 10)
-    met = [*(member.configuration for member in drawn.members), *wander(start, 300, steps=60)]
+    drawn = sample(twin, question, 10)
+    met = [*(member.configuration for member in drawn.members), *random_walk(start, 300, steps=60)]
     assert max(float(np.abs(at.pose("coupler")[:3, :3] - home).max()) for at in met) < 1e-8
     assert max(float(np.linalg.norm(twin.difference(start.q, at.q))) for at in met) > 0.1
 
@@ -67,7 +67,7 @@ def test_a_flat_parallelogram_belongs_to_two_modes(angle: float) -> None:
     """Both ways out are told, and no verdict is given."""
     robot = parallelogram(angle)
     with pytest.raises(BranchPoint) as caught:
-        draw(PinocchioModel(robot), Measurement("coupler", None, "base", robot.observations), 5)
+        sample(PinocchioModel(robot), Measurement("coupler", None, "base", robot.observations), 5)
     assert len(caught.value.modes) == 2
     assert any("1T" in mode for mode in caught.value.modes)
     assert any("1R" in mode for mode in caught.value.modes)
@@ -107,7 +107,7 @@ def test_a_cure_cures_on_the_whole_branch() -> None:
     advice = advised(setting)
     assert advice.cured
     assert (len(advice.sets), advice.undecided) == (18, 0)
-    places = list(wander(setting.everything.start, 24, seed=5, steps=6))[3::4]
+    places = list(random_walk(setting.everything.start, 24, seed=5, steps=6))[3::4]
     for cure in advice.sets:
         watched = (*setting.observed, *(each.observation for each in cure.measurements))
         question = replace(setting.everything.question, observations=watched)

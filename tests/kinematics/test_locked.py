@@ -12,7 +12,7 @@ from hrsynth.geometry.vectors import Array, hat, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction, leg_twists, split
 from hrsynth.kinematics.relation import Measurement, relation
-from hrsynth.kinematics.sampling import WEAKEST, wander
+from hrsynth.kinematics.sampling import WEAKEST, random_walk
 from hrsynth.mechanism.legs import Leg
 from hrsynth.mechanism.observation import Direction
 from hrsynth.tolerances import CLOSED
@@ -122,7 +122,7 @@ def test_split(translations: int, rotations: int, screws: int) -> None:
 def test_wander(robot: str) -> None:
     """Closed, off the start, in small steps, on the branch; the same for a seed, another for another."""
     samples = setting_of(robot).samples
-    met = list(wander(samples.start, 30, seed=3))
+    met = list(random_walk(samples.start, 30, seed=3))
     assert len(met) == 30
     twin, generic = samples.twin, samples.mobility
     weakest = WEAKEST * samples.start.kernel()[1].weakest
@@ -135,6 +135,6 @@ def test_wander(robot: str) -> None:
     assert np.median(steps) < 0.5
     platform = [at.pose(twin.mechanism.platform) for at in met]
     assert max(np.linalg.norm(X - samples.start.pose(twin.mechanism.platform)) for X in platform) > 0.1 * twin.length
-    again = [at.q for at in wander(samples.start, 30, seed=3)]
+    again = [at.q for at in random_walk(samples.start, 30, seed=3)]
     assert all(np.array_equal(a.q, q) for a, q in zip(met, again, strict=True))
-    assert not np.array_equal(met[0].q, next(wander(samples.start, 1, seed=4)).q)
+    assert not np.array_equal(met[0].q, next(random_walk(samples.start, 1, seed=4)).q)

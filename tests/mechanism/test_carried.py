@@ -14,7 +14,7 @@ from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.carried import Tie, carried, ties
+from hrsynth.mechanism.carried import Tie, carried_by_joints, ties
 from hrsynth.mechanism.relations import Relations
 from mechanism.relating import miss, observed, recognised, walked
 from oracle import NotAssembled, Oracle, Undecided
@@ -41,7 +41,7 @@ def scattered(mechanism: Mechanism, tries: int, seed: int) -> Iterator[Array]:
 
 def by_the_file(mechanism: Mechanism, relations: Relations) -> list[Tie]:
     every = ties(relations)
-    return [tie for tie, holds in zip(every, carried(mechanism, relations, every), strict=True) if holds]
+    return [tie for tie, holds in zip(every, carried_by_joints(mechanism, relations, every), strict=True) if holds]
 
 
 def check(mechanism: Mechanism, seed: int, tries: int) -> int:
@@ -84,7 +84,7 @@ def test_planar_and_spherical_robots_are_carried_whole() -> None:
         rng = np.random.default_rng(seed)
         for robot in (planar(["RRR", "RPR", "PRR"], rng, [{0}] * 3), spherical(rng)):
             relations = recognised(robot, walked(robot, 2, seed))
-            assert all(carried(robot, relations, ties(relations)))
+            assert all(carried_by_joints(robot, relations, ties(relations)))
 
 
 def test_a_relation_across_a_joint_that_breaks_it_is_not_carried() -> None:
@@ -100,7 +100,7 @@ def test_a_relation_across_a_joint_that_breaks_it_is_not_carried() -> None:
         robot = builder.build(platform="link_3")
         relations = recognised(robot, walked(robot, 0, seed=0))
         every = ties(relations)
-        same = [(tie, holds) for tie, holds in zip(every, carried(robot, relations, every), strict=True)
+        same = [(tie, holds) for tie, holds in zip(every, carried_by_joints(robot, relations, every), strict=True)
                 if tie.kind == "same"]
         across = [known for tie, known in same if {"link_0", "link_3"} & set(tie.links)]
         assert relations.axes["joint_0"] == relations.axes["joint_2"]
@@ -121,5 +121,5 @@ def test_a_watched_link_is_kept_with_its_relation() -> None:
     relations = recognised(robot, walked(robot, 2, seed=1))
     assert relations.watched == tuple(o.link for o in robot.observations)
     tie = Tie("seen", links=("platform",), sight=relations.sights[0])
-    assert not carried(robot, relations, [tie])[0]
-    assert carried(robot, relations, [replace(tie, links=(relations.watched[0],))])[0]
+    assert not carried_by_joints(robot, relations, [tie])[0]
+    assert carried_by_joints(robot, relations, [replace(tie, links=(relations.watched[0],))])[0]

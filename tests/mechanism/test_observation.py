@@ -15,7 +15,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Direction, Joint, JointType, Observation
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.observation import Angle, LinePosition, Slide
+from hrsynth.mechanism.observation import AngleEncoder, LinePosition, SlideEncoder
 from hrsynth.mechanism.sensors import encoders, line_position
 from kinematics.robots import ROBOTS, setting_of, walked
 from oracle import exponential
@@ -29,9 +29,9 @@ def kinds(rng: np.random.Generator) -> list[Observation]:
     (u, a, m), p = (random_direction(rng) for _ in range(3)), rng.normal(size=3)
     start = random_rotation(rng) @ perpendicular(a)
     return [Direction("1", "l", u), LinePosition("1", "l", u, p),
-            Angle("1", "l", "j", a, m, rng.normal(size=3), seen_from="c"),
-            Angle("1", "l", "j", a, perpendicular(a), start, seen_from="c"),
-            Slide("1", "l", "j", a, p, m, seen_from="c")]
+            AngleEncoder("1", "l", "j", a, m, rng.normal(size=3), seen_from="c"),
+            AngleEncoder("1", "l", "j", a, perpendicular(a), start, seen_from="c"),
+            SlideEncoder("1", "l", "j", a, p, m, seen_from="c")]
 
 
 def random_pose(rng: np.random.Generator) -> Array:

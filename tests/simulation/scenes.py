@@ -16,7 +16,7 @@ from hrsynth.batch.reach import reach
 from hrsynth.description import load, shipped
 from hrsynth.errors import PoseNotReached
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.sampling import wander
+from hrsynth.kinematics.sampling import random_walk
 from hrsynth.simulation.scene import Scene
 
 CONTROLLABLE = [
@@ -56,7 +56,7 @@ def regular(name: str, seed: int, distance: float, steps: int = 12, apart: int =
     examiner = Examiner(found)
     question, start = found.everything.question, found.everything.start
     usual = np.median([examiner.glance(at).distances.type2 or 0.0 for at in found.configurations])
-    for at in islice(wander(start, tried, seed=seed, steps=steps), apart - 1, None, apart):
+    for at in islice(random_walk(start, tried, seed=seed, steps=steps), apart - 1, None, apart):
         posture = examiner.glance(at)
         if posture.hidden.state != REGULAR or (posture.distances.type2 or 0.0) < distance * usual:
             continue

@@ -39,7 +39,7 @@ from ..budgets import LARGEST_RANDOM
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Measurement, Relation
 from ..mechanism import Mechanism, Observation
-from ..mechanism.carried import Tie, carried, ties
+from ..mechanism.carried import Tie, carried_by_joints, ties
 from ..mechanism.model import JointType
 from ..mechanism.observation import Direction, labels_of
 from ..mechanism.relations import Relations, recognise
@@ -171,7 +171,7 @@ class ExactArchitecture:
     def basis(self) -> Basis:
         """What the relations rest on; raises ``NotRecognised`` where the robot is no regular member of its family."""
         every = ties(self.relations)
-        known = carried(self.mechanism, self.relations, every)
+        known = carried_by_joints(self.mechanism, self.relations, every)
         left = [tie for tie, holds in zip(every, known, strict=True) if not holds]
         regular = self._regular()
         if left and not (regular and self.start == self.instance(0).mobility and self._all_kept(every)):

@@ -23,7 +23,7 @@ from ..geometry.screws import normals
 from ..geometry.vectors import Numbers, cross
 from ..mechanism import Joint, Mechanism, graphs
 from ..mechanism.observation import Direction
-from ..mechanism.relations import Relations, Sight
+from ..mechanism.relations import DirectionSource, Relations
 from ..mechanism.screws import allowed
 from ..tolerances import RANK_CUTOFF, RANK_GAP
 
@@ -207,7 +207,7 @@ def _normals(incidence: Incidence, directions: Sequence[Numbers]) -> Sequence[It
             return [directions[incidence.classes[0]]]
 
 
-def seen(sight: Sight, drawn: Geometry) -> Numbers:
+def seen(sight: DirectionSource, drawn: Geometry) -> Numbers:
     """An observed direction, of any length."""
     axes = [drawn.directions[c] for c in sight.classes]
     match sight.kind:

@@ -12,11 +12,11 @@ import numpy as np
 from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled, PoseNotReached
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.locked import rezeroed
+from ..kinematics.locked import rezero
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.platform_motion import PlatformMotion
 from ..kinematics.relation import Measurement, Relation, relation
-from ..kinematics.sampling import Sample, Samples, draw
+from ..kinematics.sampling import Sample, Samples, sample
 from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import LegDecomposition, decompose, default_observation, observation_of
 from ..mechanism.normal import NormalForm, normal_form
@@ -131,7 +131,7 @@ class ObservedRobot:
             return self.mobility
         question = replace(self.everything.question, observations=tuple(
             o for o in self.segments if o.link in self.robot.links))
-        written = draw(PinocchioModel(self.robot, self.mechanism.length), question, 3, seed=1)
+        written = sample(PinocchioModel(self.robot, self.mechanism.length), question, 3, seed=1)
         total = written.mobility
         return Mobility(total, total - (self.mobility.total - self.mobility.idle))
 
@@ -171,7 +171,7 @@ def started(robot: Mechanism, at: Pose | str, seed: int = 0) -> Mechanism:
     refused: HrsynthError | None = None
     for start in (drawn.start, *(mode.at for mode in drawn.met)):
         try:
-            return replace(rezeroed(reach(start, drawn.question, wanted)), file=robot.file)
+            return replace(rezero(reach(start, drawn.question, wanted)), file=robot.file)
         except (BadRequest, PoseNotReached) as error:
             refused = refused or error
     assert refused is not None
@@ -214,7 +214,7 @@ def _prepared(robot: Mechanism, observe: Sequence[str] | str | None, camera: str
     extra = tuple(o for o in observed if o.key not in known)
     question = Measurement(normal.mechanism.platform, anatomy.point, normal.mechanism.reference,
                         (*defaults.values(), *extra))
-    drawn = draw(PinocchioModel(normal.mechanism), question, samples, seed, led_by=observed, progress=progress)
+    drawn = sample(PinocchioModel(normal.mechanism), question, samples, seed, led_by=observed, progress=progress)
     return ObservedRobot(robot, normal, anatomy, observed, drawn, len(defaults))
 
 

@@ -14,8 +14,8 @@ from ..kinematics.leg_reach import worst_leg
 from ..kinematics.limits import at_end, wrists_beyond
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..kinematics.relation import Measurement
-from ..kinematics.sampling import wander
-from ..kinematics.steps import HALVINGS, led, nearest
+from ..kinematics.sampling import random_walk
+from ..kinematics.steps import HALVINGS, nearest, track
 from ..mechanism.pose import Grid, Pose
 from ..tolerances import AS_PRINTED
 from .grids import ready
@@ -24,7 +24,7 @@ from .placing import Placer
 
 def generic_motion(start: ClosedConfiguration, question: Measurement) -> PlatformMotion:
     """What the platform generically does, from a few random configurations."""
-    return PlatformMotion.of(wander(start, 4, steps=2), question)
+    return PlatformMotion.of(random_walk(start, 4, steps=2), question)
 
 
 def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
@@ -38,7 +38,7 @@ def reach(start: ClosedConfiguration, question: Measurement, pose: Pose,
     motion = motion or generic_motion(start, question)
     robot = start.twin.mechanism.name
     goal = motion.goal(pose, robot)
-    here, came = led(start, motion, goal)
+    here, came = track(start, motion, goal)
     found = nearest(here, goal, motion.at_home()) if came == 1 else here
     if came < 1 or not _arrived(found, goal):
         leg, lengths, angles = worst_leg(start.twin, motion, goal)
@@ -71,7 +71,7 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
     def settle(cell: int, origin: ClosedConfiguration, halvings: int) -> None:
         if cell in hopeless:
             return
-        there, came = (at_once[cell], 1.0) if cell in at_once else led(origin, motion, goals[cell], halvings)
+        there, came = (at_once[cell], 1.0) if cell in at_once else track(origin, motion, goals[cell], halvings)
         if came == 1:
             there = there if cell in at_once else nearest(there, goals[cell], home)
         if came == 1 and _arrived(there, goals[cell]):

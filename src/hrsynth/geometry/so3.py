@@ -68,10 +68,10 @@ def turn_about(normal: Array, R: Array) -> tuple[float, Array]:
     both = w * w + along * along
     if both == 0.0:
         return math.nan, np.zeros(3)
-    return wrapped(2 * math.atan2(along, w)), (w * w * normal + w * np.cross(v, normal) + along * v) / both
+    return wrap_angle(2 * math.atan2(along, w)), (w * w * normal + w * np.cross(v, normal) + along * v) / both
 
 
-def wrapped(angle: float) -> float:
+def wrap_angle(angle: float) -> float:
     """An angle modulo 2π, in (−π, π]."""
     return angle if -np.pi < angle <= np.pi else float(-((np.pi - angle) % (2 * np.pi)) + np.pi)
 

@@ -20,10 +20,10 @@ from ..mechanism import Joint, JointType, Mechanism, Observation
 from ..mechanism.legs import Leg, LegDecomposition
 from ..tolerances import CLOSED, SOLVED
 from . import limits
-from .closures import UNDECIDED, Closures, End, Miss, leg_closures
+from .closures import UNDECIDED, Closures, LegEnd, Miss, leg_closures
 from .configuration import ClosedConfiguration
 from .leg_reach import alone
-from .locked import placed
+from .locked import zeroed_at
 from .pinocchio_model import PinocchioModel
 from .tasks import Target, solve
 from .ways import Part, ways
@@ -98,7 +98,7 @@ class Assembler:
         displacement = bodies[body] @ inverse(mechanism.links[body].pose)
         poses = {link: displacement @ mechanism.links[link].pose for link in self.anatomy.platform}
         base = mechanism.links[mechanism.base].pose
-        twin = PinocchioModel(placed(mechanism, {mechanism.base: base, **poses}), self.length)
+        twin = PinocchioModel(zeroed_at(mechanism, {mechanism.base: base, **poses}), self.length)
         target = _Poses(tuple(bodies.items()))
         residual = np.inf
         for start in _starts(twin):
@@ -133,7 +133,7 @@ class Assembler:
             return Assembly(None, tuple(missing), (), platform, tuple(misses))
         mechanism = self.anatomy.mechanism
         base = mechanism.links[mechanism.base].pose
-        whole = PinocchioModel(placed(mechanism, {mechanism.base: base, **poses}), self.length)
+        whole = PinocchioModel(zeroed_at(mechanism, {mechanism.base: base, **poses}), self.length)
         return Assembly(ClosedConfiguration.of(whole, whole.q0), (), tuple(beyond), platform, (), held)
 
     def _leg(self, leg: Leg, X: Array, measured: Sequence[tuple[Observation, Array]], within: float) -> _Closing:
@@ -144,7 +144,7 @@ class Assembler:
         if first is not None and not limits.outside(twin, first, leg.joints):
             return _Closing((twin, first))
         zero = self.anatomy.mechanism.links[leg.attach].pose
-        end = End(X @ inverse(zero), self.length, within, target.point is None)
+        end = LegEnd(X @ inverse(zero), self.length, within, target.point is None)
         known = leg_closures(self._ways[leg.label], end)
         if known.miss is not None:
             return _Closing(None, known.miss)

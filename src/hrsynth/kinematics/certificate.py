@@ -17,7 +17,7 @@ from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation
-from .sampling import Samples, followed
+from .sampling import Samples, track_path
 from .tasks import Target
 
 
@@ -87,7 +87,7 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         return verdict(f"not assembled at the zero configuration (loop {twin.worst_loop(twin.q0)[0]!r} misses)")
     for member in members:
         way = member.way if complete else member.way[1::2]
-        q, residual = followed(twin, [_visible(target, blind) for target in way])
+        q, residual = track_path(twin, [_visible(target, blind) for target in way])
         worst = max(worst, residual)
         if not residual <= FOLLOWED:
             angle = np.pi / 2

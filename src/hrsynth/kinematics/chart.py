@@ -25,7 +25,7 @@ from .tasks import solve
 class _Coordinates:
     """The coordinates y that are wanted."""
 
-    chart: Chart
+    chart: TangentChart
     y: Array
 
     def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
@@ -35,14 +35,14 @@ class _Coordinates:
 
 
 @dataclass(frozen=True, eq=False)
-class Chart:
+class TangentChart:
     """Coordinates y (n,) around ``centre``; ``basis`` is B (nv, n)."""
 
     centre: ClosedConfiguration
     basis: Array
 
     @classmethod
-    def around(cls, centre: ClosedConfiguration, question: Measurement) -> Chart:
+    def around(cls, centre: ClosedConfiguration, question: Measurement) -> TangentChart:
         """The chart whose directions are those that move the platform or anything that is observed."""
         kernel, _ = centre.kernel()
         image = question.rows(centre) @ kernel

@@ -55,7 +55,7 @@ UNDECIDED = Closures()
 
 
 @dataclass(frozen=True, eq=False)
-class End:
+class LegEnd:
     """Where a way ends: displaced from zero by D (4, 4); every number of D is known to ``within`` (characteristic
     lengths, of ``length`` m; pure numbers). ``turns``: whether its turn counts, else the position of its last part."""
 
@@ -74,7 +74,7 @@ class End:
         return around(x, SAME_GEOMETRY * self.length)
 
 
-def closures(way: Sequence[Part], end: End) -> Closures:
+def closures(way: Sequence[Part], end: LegEnd) -> Closures:
     """All closures of a way, seen from the base or, where the end's turn counts, from the end."""
     turning = [part for part in way if not part.slides]
     if end.turns and len(turning) == 1 and turning[0].joint is not None:
@@ -87,7 +87,7 @@ def closures(way: Sequence[Part], end: End) -> Closures:
     return found
 
 
-def leg_closures(several: Sequence[Sequence[Part]], end: End) -> Closures:
+def leg_closures(several: Sequence[Sequence[Part]], end: LegEnd) -> Closures:
     """What all ways of a leg together allow: a miss of one, or values of one joint that all of them share."""
     known: dict[str, tuple[Any, ...]] = {}
     for way in several if np.isfinite(end.within) else ():
@@ -115,7 +115,7 @@ def _apart(one: Any, other: Any, slides: bool) -> float:
     return float(gap.abs_lower()) if gap.is_finite() else 0.0
 
 
-def _closures(way: Sequence[Part], end: End) -> Closures:
+def _closures(way: Sequence[Part], end: LegEnd) -> Closures:
     """The closures of a way seen from its first part."""
     if len(way) not in (2, 3) or way[-1].slides:
         return UNDECIDED
@@ -196,7 +196,7 @@ class _Law:
         return [half - self.alpha / 2, -half - self.alpha / 2]
 
 
-def _kept(first: Part, moving: Part | None, last: Part, x: Array, target: Field, end: End) -> list[_Law]:
+def _kept(first: Part, moving: Part | None, last: Part, x: Array, target: Field, end: LegEnd) -> list[_Law]:
     """What the first part keeps of a point x of the last that ``moving`` moves to the target."""
     if first.axis is not None and first.slides:
         n = perpendicular(first.axis)
@@ -243,7 +243,7 @@ def _circle(turning: Part, x: Field) -> tuple[Field, Field, Field]:
     return turning.point + along, v, cross(axis, v)
 
 
-def _solved(laws: Sequence[_Law], first: Part | None, moving: Part | None, x: Array, target: Field, end: End,
+def _solved(laws: Sequence[_Law], first: Part | None, moving: Part | None, x: Array, target: Field, end: LegEnd,
             more: Callable[[Any], list[Miss]] = lambda q: []) -> Closures:
     """All values of the moving part by laws that hold together and by what ``more`` refuses, and of the first part's
     joint with each."""

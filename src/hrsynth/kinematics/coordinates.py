@@ -12,14 +12,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..budgets import SLIDER_PART
-from ..geometry.so3 import logarithm, logarithm_rate, turn_about, wrapped
+from ..geometry.so3 import logarithm, logarithm_rate, turn_about, wrap_angle
 from ..geometry.vectors import Array
 from ..tolerances import NO_SLIDER, SAME_DIRECTION
 from .configuration import ClosedConfiguration, point_velocity
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion
 from .relation import Measurement, relation
-from .steps import led
+from .steps import track
 
 NAMES = ("x", "y", "z", "turn about x", "turn about y", "turn about z")
 INDEPENDENT = 0.1
@@ -73,7 +73,7 @@ class Coordinates:
         the same after a whole one."""
         found = self.read(X) - self.values
         if self.motion.spins.shape[1] == 1:
-            found = np.array([wrapped(x) if place == 3 else x for x, place in zip(found, self.places, strict=True)])
+            found = np.array([wrap_angle(x) if place == 3 else x for x, place in zip(found, self.places, strict=True)])
         return found
 
     def _turn(self, X: Array) -> tuple[Array, Array]:
@@ -108,13 +108,13 @@ class Coordinates:
     def _out(self, start: ClosedConfiguration, index: int, span: float, count: int
              ) -> Iterator[tuple[float, ClosedConfiguration]]:
         end = self._changed(index, self.values[index] + span)
-        came = led(start, self.motion, end, HALVINGS)[1] if span else 0.0
+        came = track(start, self.motion, end, HALVINGS)[1] if span else 0.0
         if came < 1:
             came *= SLIDER_PART
         here = start
         for step in range(1, count + 1) if came > NO_SLIDER else ():
             aim = self._changed(index, self.values[index] + came * span * step / count)
-            here, arrived = led(here, self.motion, aim, HALVINGS)
+            here, arrived = track(here, self.motion, aim, HALVINGS)
             if arrived < 1:
                 return
             yield float(aim.values[index]), here

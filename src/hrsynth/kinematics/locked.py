@@ -27,7 +27,7 @@ class _Bodies:
     def __init__(self, at: ClosedConfiguration, links: Sequence[str], joints: Sequence[Joint]) -> None:
         self.at = at
         self.place = {link: i for i, link in enumerate(links)}
-        self.A = constraints(joints, self.place, lambda joint: moved(at, joint))
+        self.A = constraints(joints, self.place, lambda joint: joint_at(at, joint))
 
     def pose(self, link: str) -> Array:
         """X_BL with the position in characteristic lengths."""
@@ -85,13 +85,13 @@ def interaction(at: ClosedConfiguration, question: Measurement) -> Array:
     return found - hidden @ (hidden.T @ found)
 
 
-def moved(at: ClosedConfiguration, joint: Joint) -> tuple[Array, list[Array]]:
+def joint_at(at: ClosedConfiguration, joint: Joint) -> tuple[Array, list[Array]]:
     """Centre (characteristic lengths) and axes of a joint where a configuration has them."""
-    point, axes = carried(at.twin.mechanism, joint, at.pose)
+    point, axes = carry_joint(at.twin.mechanism, joint, at.pose)
     return point / at.twin.length, axes
 
 
-def carried(mechanism: Mechanism, joint: Joint, pose: Callable[[str], Array]) -> tuple[Array, list[Array]]:
+def carry_joint(mechanism: Mechanism, joint: Joint, pose: Callable[[str], Array]) -> tuple[Array, list[Array]]:
     """Centre (m) and axes of a joint, carried by links that are at these poses (4, 4)."""
 
     def displacement(link: str) -> Array:
@@ -103,17 +103,17 @@ def carried(mechanism: Mechanism, joint: Joint, pose: Callable[[str], Array]) ->
     return D[:3, :3] @ joint.point + D[:3, 3], axes
 
 
-def rezeroed(at: ClosedConfiguration) -> Mechanism:
+def rezero(at: ClosedConfiguration) -> Mechanism:
     """The same mechanism with ``at`` as its zero configuration."""
     mechanism = at.twin.mechanism
-    return placed(mechanism, {name: at.pose(name) for name in mechanism.links})
+    return zeroed_at(mechanism, {name: at.pose(name) for name in mechanism.links})
 
 
-def placed(mechanism: Mechanism, poses: Mapping[str, Array]) -> Mechanism:
+def zeroed_at(mechanism: Mechanism, poses: Mapping[str, Array]) -> Mechanism:
     """The same mechanism with its links, all of them, at these poses (4, 4) as its zero configuration."""
     joints = []
     for joint in mechanism.joints.values():
-        point, axes = carried(mechanism, joint, poses.__getitem__)
+        point, axes = carry_joint(mechanism, joint, poses.__getitem__)
         wrist = None if joint.wrist is None else joint.wrist.carried(
             *(poses[link][:3, :3] @ mechanism.links[link].pose[:3, :3].T for link in joint.links))
         joints.append(replace(joint, point=point, axes=tuple(axes), wrist=wrist))

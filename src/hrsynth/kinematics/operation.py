@@ -83,7 +83,7 @@ class OperationMode:
         return f"{text}, legs {', '.join(labels[i] for i in places)} see {seen} of {own.dof}"
 
 
-def grouped(found: Sequence[OperationMode]) -> list[list[OperationMode]]:
+def group_modes(found: Sequence[OperationMode]) -> list[list[OperationMode]]:
     """The configurations, those together whose signatures agree, the largest group first."""
     groups: list[list[OperationMode]] = []
     for each in found:

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..errors import BadRequest
 from ..geometry.ranks import range_basis
-from ..geometry.so3 import between, exponential, logarithm, turn_about, wrapped
+from ..geometry.so3 import between, exponential, logarithm, turn_about, wrap_angle
 from ..geometry.vectors import Array
 from ..mechanism.pose import Pose
 from ..tolerances import AS_PRINTED, RANK_CUTOFF
@@ -46,7 +46,7 @@ class Goal:
         blocks = [self.directions @ point_velocity(V, X, self.point, twin.length)]
         if self.phi is not None:
             angle, row = turn_about(self.normal, R @ self.zero.T)
-            errors.append(np.array([wrapped(angle - self.phi)]))
+            errors.append(np.array([wrap_angle(angle - self.phi)]))
             blocks.append(row[None] @ V[3:])
         if self.rotation is not None:
             errors.append(logarithm(R @ self.rotation.T))

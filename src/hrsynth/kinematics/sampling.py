@@ -21,7 +21,7 @@ from ..mechanism.observation import Observation
 from ..tolerances import CLOSED, EXACT, FOLLOWED, INVERTED, NUDGE, PASSED_BY, RANK_GAP, SHARP, SOLVED, STEADY_TANGENT
 from .branch import CORRECTED, follows
 from .configuration import ClosedConfiguration
-from .operation import OperationMode, Signature, grouped
+from .operation import OperationMode, Signature, group_modes
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation
 from .tasks import Target, shortened, solve
@@ -80,7 +80,7 @@ class Samples:
         return Signature.of(self.members[0].relation)
 
 
-def draw(twin: PinocchioModel, question: Measurement, count: int, seed: int = 0, *,
+def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 0, *,
          led_by: Sequence[Observation] | None = None, progress: Callable[[], None] | None = None) -> Samples:
     """``count`` random samples of one operation mode; raises ``NotSampled`` where too few can be reached,
     ``BranchPoint`` where the zero configuration belongs to several.
@@ -97,13 +97,13 @@ def draw(twin: PinocchioModel, question: Measurement, count: int, seed: int = 0,
     roots = [start] if _regular(start, rng) else _ways_out(start, question, rng)
     for freely in (False, True):
         walks = _Walks(question, leading, np.random.default_rng(seed), freely)
-        members, discarded, led = walks.draw(roots, count, progress)
+        members, discarded, led = walks.sample(roots, count, progress)
         if freely or not (far := _far(roots[0])):
             break
         probe = _mode(_firmest(far), question)
         if probe is None or probe.signature.agrees(Signature.of(members[0].relation)):
             break
-    groups = grouped([OperationMode(Signature.of(m.relation), m.configuration) for m in members])
+    groups = group_modes([OperationMode(Signature.of(m.relation), m.configuration) for m in members])
     _require_one(groups, question, "the configurations reached differ as only those of several operation modes do")
     own = groups[0][0].signature
     return Samples(question, twin, start, tuple(members), discarded, _others(walks.beyond, own, question), led)
@@ -113,7 +113,7 @@ def _others(beyond: Sequence[ClosedConfiguration], own: Signature, question: Mea
     """The operation modes other than one's own to which configurations belong, each confirmed by walks from there."""
     some = beyond[:: max(1, len(beyond) // ASKED)]
     strange = [at for at in some if (each := _mode(at, question)) and not each.signature.agrees(own)]
-    found = grouped([each for at in strange[:MET]
+    found = group_modes([each for at in strange[:MET]
                      if (far := _far(at, BEYOND)) and (each := _mode(_firmest(far), question))])
     return tuple(group[0] for group in found if not group[0].signature.agrees(own))
 
@@ -133,7 +133,7 @@ def _ways_out(start: ClosedConfiguration, question: Measurement, rng: np.random.
              and (each := _mode(beside, question)) is not None]
     if not found:
         raise NotSampled(start.twin.mechanism.name, 0, 1)
-    groups = grouped(found)
+    groups = group_modes(found)
     _require_one(groups, question, "several operation modes meet at the zero configuration (its loops have mobility "
                                    f"{start.kernel()[0].shape[1]} there)")
     return [each.at for each in found]
@@ -172,7 +172,7 @@ def _velocity(at: ClosedConfiguration, question: Measurement, wish: Array | None
 def _far(start: ClosedConfiguration, steps: int = STEPS) -> list[ClosedConfiguration]:
     """The configurations of two random walks in all of the mechanism's freedoms, the second half of each."""
     try:
-        walk = list(wander(start, 2 * steps, steps=steps))
+        walk = list(random_walk(start, 2 * steps, steps=steps))
     except NotSampled:
         return []
     return [at for number, at in enumerate(walk) if number % steps >= steps // 2]
@@ -192,7 +192,7 @@ class _Walks:
         self.question, self.leading, self.rng, self.freely = question, leading, rng, freely
         self.beyond: list[ClosedConfiguration] = []
 
-    def draw(self, roots: Sequence[ClosedConfiguration], count: int, progress: Callable[[], None] | None
+    def sample(self, roots: Sequence[ClosedConfiguration], count: int, progress: Callable[[], None] | None
              ) -> tuple[list[Sample], int, bool]:
         """So many samples, how many were discarded, and whether the robot finds all of them again; raises
         ``NotSampled``."""
@@ -215,7 +215,7 @@ class _Walks:
     def _found_again(self, sample: Sample) -> bool:
         led = [replace(t, measured=tuple(pair for pair in t.measured if pair[0].key in self.leading))
                for t in sample.way]
-        return followed(sample.configuration.twin, led, iterations=EASY_ITERATIONS)[1] <= FOLLOWED
+        return track_path(sample.configuration.twin, led, iterations=EASY_ITERATIONS)[1] <= FOLLOWED
 
     def walk(self, start: ClosedConfiguration) -> Sample | None:
         """The sample at the end of a random walk; None where it is blocked, or its ranks are not clear."""
@@ -311,9 +311,10 @@ def _anywhere(at: ClosedConfiguration, rng: np.random.Generator) -> Array:
     return velocity / np.linalg.norm(velocity)
 
 
-def wander(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40) -> Iterator[ClosedConfiguration]:
+def random_walk(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 40
+                ) -> Iterator[ClosedConfiguration]:
     """``count`` random configurations on the component of ``start``: walks of up to ``steps`` small steps in the
-    mechanism's own freedoms, each checked as those of :func:`draw` are; a walk that ends early is begun again."""
+    mechanism's own freedoms, each checked as those of :func:`sample` are; a walk that ends early is begun again."""
     rng = np.random.default_rng(seed)
     weakest = WEAKEST * start.kernel()[1].weakest
     given = failed = 0
@@ -336,7 +337,7 @@ def wander(start: ClosedConfiguration, count: int, seed: int = 0, steps: int = 4
             raise NotSampled(start.twin.mechanism.name, given, count)
 
 
-def followed(twin: PinocchioModel, way: Sequence[Target], iterations: int = 120) -> tuple[Array, float]:
+def track_path(twin: PinocchioModel, way: Sequence[Target], iterations: int = 120) -> tuple[Array, float]:
     """The configuration a twin reaches when it is led from its zero configuration along a way, and the residual."""
     q, residual = twin.q0, 0.0
     for target in way:

@@ -27,7 +27,7 @@ EASING = 30
 """Further steps at a goal's own place where the way to it was not straight."""
 
 
-def led(here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask,
+def track(here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask,
         halvings: int = HALVINGS) -> tuple[ClosedConfiguration, float]:
     """Lead a configuration to a goal by small steps: where it comes to, and the part of the way that it came (1: all of
     it). A goal of more parts than there are freedoms is met where it is missed by no more than printed digits."""

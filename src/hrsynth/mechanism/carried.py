@@ -14,7 +14,7 @@ from typing import Literal
 
 from . import graphs
 from .model import Joint, JointType, Mechanism
-from .relations import Relations, Sight
+from .relations import DirectionSource, Relations
 
 Kind = Literal["same", "square", "plane", "zero", "parallel", "normal", "seen"]
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL, JointType.PLANAR)
@@ -34,7 +34,7 @@ class Tie:
     classes: tuple[int, ...] = ()
     terms: tuple[tuple[int, int], ...] = ()
     links: tuple[str, ...] = ()
-    sight: Sight | None = None
+    sight: DirectionSource | None = None
 
     def words(self, relations: Relations) -> str:
         """The relation in words."""
@@ -71,7 +71,7 @@ def ties(relations: Relations) -> tuple[Tie, ...]:
     return tuple(found)
 
 
-def carried(mechanism: Mechanism, relations: Relations, every: Iterable[Tie]) -> list[bool]:
+def carried_by_joints(mechanism: Mechanism, relations: Relations, every: Iterable[Tie]) -> list[bool]:
     """Which of the relations hold by the file."""
     known = _Carried(mechanism, relations)
     return [known.holds(tie) for tie in every]

@@ -22,7 +22,7 @@ from .notation import Bar, Carrier, Letter, Rods, Word
 
 
 @dataclass(frozen=True)
-class Edge:
+class WordEdge:
     """What stands between two links: ``word`` read from ``tail`` to ``head``, the joints and the links inside."""
 
     tail: str
@@ -41,7 +41,7 @@ class Edge:
 
 
 @dataclass(frozen=True)
-class Rod:
+class BinaryLink:
     """A link with a ball (or universal) joint at each end, from ``near`` to ``far`` (joint names)."""
 
     link: str
@@ -56,21 +56,21 @@ class WordGraph:
         self.mechanism = mechanism
         self.kept = set(kept)
         inside = set(mechanism.links if links is None else links)
-        self._at: dict[str, dict[int, Edge]] = {name: {} for name in mechanism.links if name in inside}
+        self._at: dict[str, dict[int, WordEdge]] = {name: {} for name in mechanism.links if name in inside}
         self._links = inside
         self._number = 0
-        self._carriers: list[Edge] = []
+        self._carriers: list[WordEdge] = []
         for joint in mechanism.joints.values():
             if joint.type is not JointType.FREE and set(joint.links) <= inside:
                 letter = Letter(joint.type.value, joint.actuated)
-                self._add(Edge(joint.predecessor, joint.successor, Word((letter,)), (joint.name,)))
+                self._add(WordEdge(joint.predecessor, joint.successor, Word((letter,)), (joint.name,)))
 
-    def _add(self, edge: Edge) -> None:
+    def _add(self, edge: WordEdge) -> None:
         self._number += 1
         for link in (edge.tail, edge.head):
             self._at[link][self._number] = edge
 
-    def _remove(self, key: int, edge: Edge) -> None:
+    def _remove(self, key: int, edge: WordEdge) -> None:
         for link in (edge.tail, edge.head):
             del self._at[link][key]
 
@@ -84,16 +84,16 @@ class WordGraph:
         """The number of links that are left."""
         return len(self._at)
 
-    def edges_at(self, link: str) -> list[tuple[int, Edge]]:
+    def edges_at(self, link: str) -> list[tuple[int, WordEdge]]:
         """Keys and edges at a link, oldest first."""
         return list(self._at[link].items())
 
-    def edges(self) -> list[Edge]:
+    def edges(self) -> list[WordEdge]:
         """All edges, oldest first."""
         table = {key: edge for edges in self._at.values() for key, edge in edges.items()}
         return [table[key] for key in sorted(table)]
 
-    def between(self, a: str, b: str) -> list[tuple[int, Edge]]:
+    def between(self, a: str, b: str) -> list[tuple[int, WordEdge]]:
         """Keys and edges between two links."""
         return [(key, edge) for key, edge in self.edges_at(a) if edge.other(a) == b] if a in self._at else []
 
@@ -135,16 +135,16 @@ class WordGraph:
             if not (self._series() or self._carrier() or self._parallel()):
                 return self
 
-    def _binary(self) -> Iterator[tuple[str, Edge, Edge]]:
+    def _binary(self) -> Iterator[tuple[str, WordEdge, WordEdge]]:
         for link in self.mechanism.links:
             if link in self._at and link not in self.kept:
                 edges = self.edges_at(link)
                 if len(edges) == 2 and edges[0][1].other(link) != edges[1][1].other(link):
                     yield link, edges[0][1], edges[1][1]
 
-    def _groups(self, letters: set[str]) -> Iterator[tuple[str, str, list[Rod]]]:
+    def _groups(self, letters: set[str]) -> Iterator[tuple[str, str, list[BinaryLink]]]:
         """Binary links whose two joints are single joints of the given types, grouped by the pair they join."""
-        table: dict[frozenset[str], list[tuple[str, Edge, Edge]]] = {}
+        table: dict[frozenset[str], list[tuple[str, WordEdge, WordEdge]]] = {}
         for link, first, second in self._binary():
             if all(len(edge.joints) == 1 and self.mechanism.joints[edge.joints[0]].type.value in letters
                    for edge in (first, second)):
@@ -157,14 +157,14 @@ class WordGraph:
             rods = []
             for link, first, second in members:
                 near, far = (first, second) if first.other(link) == tail else (second, first)
-                rods.append(Rod(link, near.joints[0], far.joints[0]))
+                rods.append(BinaryLink(link, near.joints[0], far.joints[0]))
             yield tail, head, rods
 
-    def _vector(self, rod: Rod) -> tuple[Array, Array]:
+    def _vector(self, rod: BinaryLink) -> tuple[Array, Array]:
         near, far = centre_pair(self.mechanism.joints[rod.near], self.mechanism.joints[rod.far])
         return near, far - near
 
-    def _rods(self) -> Iterator[tuple[Edge, list[str]]]:
+    def _rods(self) -> Iterator[tuple[WordEdge, list[str]]]:
         tolerance = SAME_POINT * self.mechanism.length
         for tail, head, rods in self._groups({"S", "U"}):
             for rod in rods:
@@ -182,17 +182,17 @@ class WordGraph:
                     word = max(words, key=lambda w: sum(letter.actuated for letter in w.items))  # type: ignore[union-attr]
                     joints = tuple(name for each in same for name in (each.near, each.far))
                     links = [each.link for each in same]
-                    yield Edge(tail, head, Word((Rods(len(same), word),)), joints, tuple(links)), links
+                    yield WordEdge(tail, head, Word((Rods(len(same), word),)), joints, tuple(links)), links
                     break
 
-    def _rod_word(self, rod: Rod) -> Word:
+    def _rod_word(self, rod: BinaryLink) -> Word:
         return Word(tuple(Letter(self.mechanism.joints[name].type.value, self.mechanism.joints[name].actuated)
                           for name in (rod.near, rod.far)))
 
-    def _shape(self, rod: Rod) -> str:
+    def _shape(self, rod: BinaryLink) -> str:
         return self.mechanism.joints[rod.near].type.value + self.mechanism.joints[rod.far].type.value
 
-    def _parallelograms(self) -> Iterator[tuple[Edge, list[str]]]:
+    def _parallelograms(self) -> Iterator[tuple[WordEdge, list[str]]]:
         joints = self.mechanism.joints
         tolerance = SAME_POINT * self.mechanism.length
         for tail, head, cranks in self._groups({"R"}):
@@ -208,7 +208,7 @@ class WordGraph:
                     motor = any(joints[n].actuated for c in (one, two) for n in (c.near, c.far))
                     names = tuple(n for c in (one, two) for n in (c.near, c.far))
                     links = [one.link, two.link]
-                    yield Edge(tail, head, Word((Letter("Pi", motor),)), names, tuple(links)), links
+                    yield WordEdge(tail, head, Word((Letter("Pi", motor),)), names, tuple(links)), links
 
     def _series(self) -> bool:
         """All links in series: what is contracted has several joints, so no rod or crank is made or lost by it."""
@@ -216,7 +216,7 @@ class WordGraph:
         for link, first, second in self._binary():
             self._remove_links((link,))
             a, b = first.other(link), second.other(link)
-            self._add(Edge(a, b, first.word_from(a) + second.word_from(link), first.joints + second.joints,
+            self._add(WordEdge(a, b, first.word_from(a) + second.word_from(link), first.joints + second.joints,
                            (*first.inside, link, *second.inside)))
             found = True
         return found
@@ -232,7 +232,7 @@ class WordGraph:
                     word = edge.word_from(tail)
                     bar = word.items[0]
                     branches.extend(bar.branches if isinstance(bar, Bar) and len(word.items) == 1 else (word,))
-                self._add(Edge(tail, head, Word((Bar(tuple(branches)),)),
+                self._add(WordEdge(tail, head, Word((Bar(tuple(branches)),)),
                                tuple(n for _, edge in edges for n in edge.joints),
                                tuple(n for _, edge in edges for n in edge.inside)))
                 return True
@@ -258,7 +258,7 @@ class WordGraph:
                             and not follower.actuated and len(self.edges_at(link)) >= 3):
                         self._remove(key, sliders)
                         self._remove(other, chain)
-                        self._carriers.append(Edge(foot, link, Word((Carrier(Word(path.items[:-1]), word),)),
+                        self._carriers.append(WordEdge(foot, link, Word((Carrier(Word(path.items[:-1]), word),)),
                                                    chain.joints + sliders.joints, chain.inside + sliders.inside))
                         self._add(self._carriers[-1])
                         return True

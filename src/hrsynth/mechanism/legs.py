@@ -19,7 +19,7 @@ from ..geometry import lines
 from ..geometry.vectors import Array, unit
 from ..tolerances import SAME_POINT
 from . import graphs
-from .composites import Edge, WordGraph
+from .composites import WordEdge, WordGraph
 from .model import Joint, JointType, Mechanism
 from .normal import centre_pair
 from .notation import Architecture, Bar, Carrier, Letter, Word
@@ -123,7 +123,7 @@ class LegDecomposition:
                 return first + Word(second.items[:-1]).reversed()
         return None
 
-    def path(self, leg: Leg) -> list[Edge]:
+    def path(self, leg: Leg) -> list[WordEdge]:
         """The shortest chain of edges from the base to the leg's end, composites contracted."""
         mechanism = self.mechanism
         graph = WordGraph(mechanism, {mechanism.base, leg.attach}, {mechanism.base, leg.attach, *leg.links})
@@ -324,11 +324,11 @@ def observation_of(anatomy: LegDecomposition, link: str) -> Direction:
     return _segment(mechanism, leg, link)
 
 
-def _single(mechanism: Mechanism, edge: Edge) -> Joint | None:
+def _single(mechanism: Mechanism, edge: WordEdge) -> Joint | None:
     return mechanism.joints[edge.joints[0]] if len(edge.joints) == 1 else None
 
 
-def _edge_centre(mechanism: Mechanism, edge: Edge, at: str) -> Joint | Array:
+def _edge_centre(mechanism: Mechanism, edge: WordEdge, at: str) -> Joint | Array:
     """The joint that the edge is, or the mean of the centres of its joints on the link ``at``."""
     joint = _single(mechanism, edge)
     if joint is not None:
@@ -336,7 +336,7 @@ def _edge_centre(mechanism: Mechanism, edge: Edge, at: str) -> Joint | Array:
     return np.mean([mechanism.joints[n].point for n in edge.joints if at in mechanism.joints[n].links], axis=0)
 
 
-def _centres(mechanism: Mechanism, leg: Leg, link: str, before: Edge, after: Edge) -> Direction:
+def _centres(mechanism: Mechanism, leg: Leg, link: str, before: WordEdge, after: WordEdge) -> Direction:
     a, b = _edge_centre(mechanism, before, link), _edge_centre(mechanism, after, link)
     if isinstance(a, Joint) and isinstance(b, Joint):
         start, end = centre_pair(a, b)
@@ -369,7 +369,8 @@ def _segment(mechanism: Mechanism, leg: Leg, link: str) -> Direction:
     return _direction(mechanism, leg, link, end - start)
 
 
-def _axis_direction(mechanism: Mechanism, leg: Leg, link: str, joint: Joint, path: list[Edge], index: int) -> Direction:
+def _axis_direction(mechanism: Mechanism, leg: Leg, link: str, joint: Joint, path: list[WordEdge], index: int
+                    ) -> Direction:
     """Along the P's axis, from the base side to the platform side."""
     before = mechanism.joints[path[index - 1].joints[0]].point if index else joint.point
     after = (mechanism.joints[path[index + 1].joints[0]].point if index + 1 < len(path)

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from ..errors import BadMechanism
-from ..geometry.so3 import wrapped
+from ..geometry.so3 import wrap_angle
 from ..geometry.vectors import Array, frozen, hat, unit
 
 
@@ -177,7 +177,7 @@ class Encoder(Observation):
 
 
 @dataclass(frozen=True, eq=False)
-class Angle(Encoder):
+class AngleEncoder(Encoder):
     """The angle by which a direction fixed in the link has turned about the axis since the zero configuration.
 
     ``mark`` is that direction in the link's frame, ``start`` the same at zero in the frame of ``seen_from``, both (3,)
@@ -195,7 +195,7 @@ class Angle(Encoder):
 
     def apart(self, value: Array, wanted: Array) -> Array:
         """The difference without whole turns: at half a turn the angle is π as well as −π."""
-        return np.array([wrapped(float(value[0] - wanted[0]))])
+        return np.array([wrap_angle(float(value[0] - wanted[0]))])
 
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
         """a* · (ω_ℓ − ω_c), shape (1, n); a* = (a − c m) / (1 − c²), c = a · m: dual to the axis a and the mark m."""
@@ -205,7 +205,7 @@ class Angle(Encoder):
 
 
 @dataclass(frozen=True, eq=False)
-class Slide(Encoder):
+class SlideEncoder(Encoder):
     """The length by which the link has slid along the axis since the zero configuration.
 
     ``point`` is the joint's centre in the link's frame, ``start`` the same at zero in the frame of ``seen_from``, (3,).

@@ -32,7 +32,7 @@ CENTRED = (*AXIAL, JointType.UNIVERSAL, JointType.SPHERICAL)
 
 
 @dataclass(frozen=True)
-class Sight:
+class DirectionSource:
     """Where an observed direction comes from: a ``class`` of directions; ``between`` two centres; the ``foot``: between
     two centres, normal to a class; the common ``normal`` of two classes."""
 
@@ -56,7 +56,7 @@ class Relations:
     count: int
     """Number of all centres: of joints, of points where axes meet, the platform's point."""
     incidences: tuple[Incidence, ...]
-    sights: tuple[Sight, ...]
+    sights: tuple[DirectionSource, ...]
     """One for each observation."""
     hosts: tuple[str, ...]
     """The link in which each centre is fixed (that of a C: its predecessor)."""
@@ -93,14 +93,14 @@ def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Se
     for name, numbers in axes.items():
         for number, link in zip(numbers, mechanism.joints[name].links, strict=False):
             fixed[number].append(link)
-    sights: list[Sight] = []
+    sights: list[DirectionSource] = []
     for observation in observations:
         u = drawn.turned(observation)
         own = [i for i, links in enumerate(drawn.hosts) if observation.link in links]
         near = sorted({c for joint in mechanism.joints_of(observation.link) for c in axes[joint.name]})
         sight = _sight(u, classes, points, own, near)
         if sight is None:
-            sight = Sight("class", classes=(len(classes),))
+            sight = DirectionSource("class", classes=(len(classes),))
             classes = np.concatenate([classes, u[None]])
             fixed.append([])
         if sight.kind == "class":
@@ -260,7 +260,7 @@ def _number(normal: Array, known: list[Array]) -> int:
     return len(known) - 1
 
 
-def _sight(u: Array, classes: Array, points: Array, own: Sequence[int], near: Sequence[int]) -> Sight | None:
+def _sight(u: Array, classes: Array, points: Array, own: Sequence[int], near: Sequence[int]) -> DirectionSource | None:
     """What the observed direction (configurations, 3) is parallel to, of what its link offers."""
     def along(vectors: Array) -> bool:
         sizes = np.linalg.norm(vectors, axis=1)
@@ -269,15 +269,15 @@ def _sight(u: Array, classes: Array, points: Array, own: Sequence[int], near: Se
 
     for c, direction in enumerate(classes):
         if along(direction):
-            return Sight("class", classes=(c,))
+            return DirectionSource("class", classes=(c,))
     for j, k in combinations(own, 2):
         between = points[k] - points[j]
         if along(between):
-            return Sight("between", (j, k))
+            return DirectionSource("between", (j, k))
         for c in near:
             if along(between - classes[c] * np.sum(between * classes[c], axis=1, keepdims=True)):
-                return Sight("foot", (j, k), (c,))
+                return DirectionSource("foot", (j, k), (c,))
     for a, b in combinations(near, 2):
         if along(cross(classes[a], classes[b])):
-            return Sight("normal", classes=(a, b))
+            return DirectionSource("normal", classes=(a, b))
     return None

@@ -6,7 +6,7 @@ from ..geometry.vectors import Array, frozen, perpendicular
 from .legs import LegDecomposition
 from .model import Joint, JointType, Mechanism
 from .normal import centre_pair
-from .observation import Angle, Direction, Encoder, LinePosition, Slide
+from .observation import AngleEncoder, Direction, Encoder, LinePosition, SlideEncoder
 
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 
@@ -23,16 +23,16 @@ def encoders(mechanism: Mechanism, joint: Joint, leg: str = "") -> tuple[Encoder
     return tuple(found)
 
 
-def _angle(mechanism: Mechanism, joint: Joint, leg: str, mark: Array) -> Angle:
+def _angle(mechanism: Mechanism, joint: Joint, leg: str, mark: Array) -> AngleEncoder:
     """The turn about the first axis, fixed in the predecessor, of a direction ``mark`` fixed in the successor."""
     before, after = (mechanism.links[link].pose[:3, :3].T for link in joint.links)
-    return Angle(leg, joint.successor, joint.name, frozen(before @ joint.axis), frozen(after @ mark),
+    return AngleEncoder(leg, joint.successor, joint.name, frozen(before @ joint.axis), frozen(after @ mark),
                  frozen(before @ mark), seen_from=joint.predecessor)
 
 
-def _slide(mechanism: Mechanism, joint: Joint, leg: str) -> Slide:
+def _slide(mechanism: Mechanism, joint: Joint, leg: str) -> SlideEncoder:
     before, after = (mechanism.links[link].pose for link in joint.links)
-    return Slide(leg, joint.successor, joint.name, frozen(before[:3, :3].T @ joint.axis),
+    return SlideEncoder(leg, joint.successor, joint.name, frozen(before[:3, :3].T @ joint.axis),
                  frozen(after[:3, :3].T @ (joint.point - after[:3, 3])),
                  frozen(before[:3, :3].T @ (joint.point - before[:3, 3])), seen_from=joint.predecessor)
 

@@ -15,7 +15,7 @@ from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.sampling import Samples
 from ..kinematics.tasks import solve
 from ..mechanism import Joint, JointType, Mechanism, graphs
-from ..mechanism.composites import Edge, WordGraph
+from ..mechanism.composites import WordEdge, WordGraph
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.normal import centre_pair
 from ..tolerances import LOCUS, SOLVED
@@ -167,7 +167,7 @@ class Evidence:
         return ()
 
     @cached_property
-    def _composites(self) -> tuple[Edge, ...]:
+    def _composites(self) -> tuple[WordEdge, ...]:
         """The joints of the real robot with its composite elements recognised."""
         mechanism = self.mechanism
         return tuple(WordGraph(mechanism, {mechanism.base, mechanism.platform}).recognise().edges())

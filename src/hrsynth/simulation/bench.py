@@ -17,7 +17,7 @@ from ..errors import BadRequest, LoopsNotClosed, MissingExtra
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.locked import rezeroed
+from ..kinematics.locked import rezero
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.relation import relation
 from ..kinematics.tasks import solve
@@ -60,7 +60,7 @@ class Bench:
     @cached_property
     def mechanism(self) -> Mechanism:
         """The robot with the start as its zero configuration."""
-        return rezeroed(self.start)
+        return rezero(self.start)
 
     @cached_property
     def _model(self) -> Any:

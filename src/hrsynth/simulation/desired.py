@@ -13,7 +13,7 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..kinematics.relation import Measurement
-from ..kinematics.steps import led, nearest
+from ..kinematics.steps import nearest, track
 from ..tolerances import NEAREST
 from .law import directions
 
@@ -80,7 +80,7 @@ def _towards(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last
     """The configuration at a goal of the whole pose nearby, and whether it was reached: where parts of the pose depend
     on each other the nearest one, which is to be the goal's only at the ``last``."""
     if motion.dof >= motion.shifts.shape[1] + motion.spins.shape[1]:
-        there, came = led(here, motion, goal)
+        there, came = track(here, motion, goal)
         return there, came == 1
     there = nearest(here, replace(goal, directions=np.zeros((0, 3)), values=np.zeros(0), rotation=None), goal)
     return there, not last or float(np.linalg.norm(goal.rows(there.twin, there.q)[0])) < NEAREST

@@ -10,7 +10,7 @@ import numpy as np
 from ..budgets import RUN_AWAY, RUN_EVALUATIONS, WIDEST_CHART
 from ..errors import LoopsNotClosed
 from ..geometry.vectors import Array
-from ..kinematics.chart import Chart
+from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.limits import margins
 from ..kinematics.relation import Measurement
@@ -74,7 +74,7 @@ class Loop:
         stopped, left, longest = None, RUN_EVALUATIONS, np.inf
         patience = Patience(1 / self.law.gain, 0.0, found[0][1].size)
         while stopped is None:
-            stretch = _Stretch(self, Chart.around(found[-1][0], self.moving), found[-1][0], left, patience)
+            stretch = _Stretch(self, TangentChart.around(found[-1][0], self.moving), found[-1][0], left, patience)
             reached, states, stopped = stretch.integrate(times[-1], horizon, longest)
             left = stretch.left
             times += reached
@@ -102,7 +102,8 @@ class Loop:
 class _Stretch:
     """One stretch of a run, in one chart; configurations are remembered while the integrator works around them."""
 
-    def __init__(self, loop: Loop, chart: Chart, start: ClosedConfiguration, left: int, patience: Patience) -> None:
+    def __init__(self, loop: Loop, chart: TangentChart, start: ClosedConfiguration, left: int, patience: Patience
+                 ) -> None:
         self.loop, self.chart, self.near, self.left, self.patience = loop, chart, start.q, left, patience
         self.margin = clearance(start)
         self._memory: dict[tuple[float, bytes], State] = {}

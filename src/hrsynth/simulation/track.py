@@ -16,7 +16,7 @@ import numpy as np
 
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
-from ..kinematics.chart import Chart
+from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Measurement
 from ..tolerances import DAMPED, INVERTED
@@ -104,7 +104,7 @@ def tracked(configurations: Sequence[ClosedConfiguration], question: Measurement
 
 
 def _mark(at: ClosedConfiguration, question: Measurement, moving: Measurement) -> _Mark:
-    basis = Chart.around(at, moving).basis
+    basis = TangentChart.around(at, moving).basis
     rows = question.rows(at) @ basis
     loops = at.twin.jacobian(at.q)
     return _Mark(basis, rows[question.twist_rows :], rows[: question.twist_rows], loops, range_basis(loops)[0],

@@ -125,9 +125,9 @@ def rows_of(case: Case, measured: object, at: object) -> np.ndarray | None:
     a = frames[0][:, robot.number(seen_from)] @ axis
     masks = robot.carried[robot.number(link)].astype(float) - robot.carried[robot.number(seen_from)]
     twist = frames[2] * masks[None, :, None]
-    if kind == "Angle":
+    if kind == "AngleEncoder":
         return (np.einsum("nki,ni->nk", twist[..., :3], a) * metric)[:, None]
-    if kind == "Slide":
+    if kind == "SlideEncoder":
         point = robot.items(things(robot, [(link, measured.point, True)]), frames)[0][:, 0]  # type: ignore[attr-defined]
         slip = twist[..., 3:] + np.cross(twist[..., :3], point[:, None])
         return (np.einsum("nki,ni->nk", slip, a) * metric / robot.length)[:, None]

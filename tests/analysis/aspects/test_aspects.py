@@ -28,7 +28,7 @@ from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.balls import balls, below, centred, jets
 from hrsynth.geometry.vectors import cross, dot, triple
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.sampling import wander
+from hrsynth.kinematics.sampling import random_walk
 from strategies import planar
 
 # Robots whose legs can be closed by hand: planar, five bars, translating, with six freedoms, with two halves.
@@ -48,7 +48,7 @@ def aspects_of(robot: str, observe: str | None = None) -> Aspects:
 def walk(robot: str, observe: str | None, count: int = 24, seed: int = 0) -> tuple[ClosedConfiguration, ...]:
     """Random configurations in the working mode of the first of them."""
     aspects = aspects_of(robot, observe)
-    found = tuple(wander(aspects.setting.samples.start, count, seed))
+    found = tuple(random_walk(aspects.setting.samples.start, count, seed))
     modes = aspects.reading(found[0]).chart.modes
     return tuple(at for at in found if aspects.reading(at).chart.modes == modes)
 
@@ -215,7 +215,7 @@ def test_a_way_that_leaves_the_workspace_is_never_proved(robot: str, observe: st
 @pytest.mark.parametrize("robot", ["3puu", "3ruu"])
 def test_a_path_crosses_the_limit_of_a_leg_into_its_other_working_mode(robot: str):
     aspects = aspects_of(robot)
-    places = list(wander(aspects.setting.samples.start, 150, 0))
+    places = list(random_walk(aspects.setting.samples.start, 150, 0))
     modes = [aspects.reading(at).chart.modes for at in places]
     others = [at for at, mode in zip(places, modes, strict=True) if mode != modes[0]]
     assert others
@@ -260,7 +260,7 @@ def test_a_crossing_leads_from_one_working_mode_to_the_other():
 def test_random_planar_robots(words: list[str], seed: int):
     aspects = Aspects.of(planar(words, np.random.default_rng(seed), [{0}] * 3))
     assert isinstance(aspects.pattern, Pattern)
-    places = list(wander(aspects.setting.samples.start, 4, seed))
+    places = list(random_walk(aspects.setting.samples.start, 4, seed))
     for start, goal in pairwise(places):
         answer, sides = aspects.join(start, goal), signs(aspects, start, goal)
         same = aspects.reading(start).chart.modes == aspects.reading(goal).chart.modes
@@ -308,14 +308,14 @@ def test_the_mean_value_form_holds_all_values_and_is_sharper_on_short_intervals(
 
 def test_reasons_why_nothing_is_decided():
     lost = aspects_of("prrrp_parallel")
-    places = list(wander(lost.setting.samples.start, 2))
+    places = list(random_walk(lost.setting.samples.start, 2))
     answer = lost.join(*places)
     assert (answer.verdict, answer.certified) == (UNDECIDED, False)
     assert "never seen: translation along y" in answer.reason
 
     parasitic = aspects_of("3rps")
     verdicts = set()
-    places = list(wander(parasitic.setting.samples.start, 30))
+    places = list(random_walk(parasitic.setting.samples.start, 30))
     for start, goal in pairwise(places):
         answer = parasitic.join(start, goal)
         assert not answer.certified

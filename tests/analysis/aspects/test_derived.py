@@ -15,7 +15,7 @@ from hrsynth.analysis.aspects.path import Aspects, leads
 from hrsynth.analysis.aspects.pattern import Pattern
 from hrsynth.description import load
 from hrsynth.geometry.balls import balls
-from hrsynth.kinematics.sampling import wander
+from hrsynth.kinematics.sampling import random_walk
 from strategies import deltas, planar, pods
 
 SHIPPED = ("3rrr_m1", "3rpr_m1", "3prr_m1", "rrrrr_m1", "rprpr_m1", "prrrp_m1", "gough_stewart", "quattro",
@@ -47,7 +47,7 @@ def test_forms_are_read_from_the_joints_and_hold_at_other_poses(name: str):
     aspects = aspects_of(name)
     pattern = known(aspects)
     assert pattern.fitted == ()
-    for at in wander(aspects.setting.samples.start, 5, 77):
+    for at in random_walk(aspects.setting.samples.start, 5, 77):
         p, R = pattern.carriage.of([at])
         chart = pattern.chart(at)
         for limb, feature in zip(chart.limbs, pattern.carried, strict=True):
@@ -69,7 +69,7 @@ def test_what_is_fitted_is_not_certified(name: str):
     fitted = replace(pattern, limbs=tuple(replace(limb, fitted=limb.leg == "2") for limb in pattern.limbs))
     aspects.__dict__["pattern"] = fitted
     met = set()
-    for start, goal in pairwise(list(wander(free.setting.samples.start, 12, 3))):
+    for start, goal in pairwise(list(random_walk(free.setting.samples.start, 12, 3))):
         told, less = free.join(start, goal), aspects.join(start, goal)
         assert told.verdict == less.verdict
         assert not less.certified
@@ -83,7 +83,7 @@ def test_what_is_fitted_is_not_certified(name: str):
 def test_ways_with_a_gap_lead_nowhere():
     """A path must begin and end at the poses asked for, in their working modes, without a gap between its parts."""
     aspects, joined = aspects_of("RRR"), 0
-    for start, goal in pairwise(list(wander(aspects.setting.samples.start, 8, 5))):
+    for start, goal in pairwise(list(random_walk(aspects.setting.samples.start, 8, 5))):
         answer = aspects.join(start, goal)
         if answer.verdict != SAME:
             continue

@@ -16,7 +16,7 @@ from hrsynth.analysis.aspects.path import Aspects
 from hrsynth.analysis.aspects.pattern import Pattern
 from hrsynth.description import load
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.kinematics.sampling import wander
+from hrsynth.kinematics.sampling import random_walk
 from hrsynth.mechanism import JointType, Limits, Mechanism
 from strategies import planar
 
@@ -56,7 +56,7 @@ def test_a_reserve_tells_how_far_a_coordinate_is_from_its_limits(robot: str, obs
     assert isinstance(aspects.pattern, Pattern)
     assert {bound.joint for bound in aspects.pattern.bounds} == set(single(aspects.setting.mechanism))
     beyond = 0
-    for at in wander(aspects.setting.samples.start, 12, 1):
+    for at in random_walk(aspects.setting.samples.start, 12, 1):
         chart = aspects.reading(at).chart
         reserves = chart.at(*aspects.pattern.carriage.of([at])).reserves[0, len(chart.limbs) :]
         for bound, reserve in zip(chart.bounds, reserves, strict=True):
@@ -89,7 +89,7 @@ def furthest(path: list[ClosedConfiguration], joints: list[str]) -> tuple[str, f
 def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
     """Limits that a path without them leaves: another path keeps to them, or none is found."""
     free = Aspects.of(robot)
-    places = list(wander(free.setting.samples.start, 40, 2))
+    places = list(random_walk(free.setting.samples.start, 40, 2))
     led = []
     for one, other in zip(places[:20:2], places[::-3], strict=False):
         plain = free.join(one, other)
@@ -112,7 +112,7 @@ def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
 def test_a_pose_beyond_a_limit_is_named_and_still_separated():
     robot = load("3rrr_m1")
     free = Aspects.of(robot)
-    places = list(wander(free.setting.samples.start, 120, 0))
+    places = list(random_walk(free.setting.samples.start, 120, 0))
     values = [coordinates(at, "elbow_1") for at in places]
     low, high = np.quantile(values, [0.2, 0.8])
     aspects = Aspects.of(with_limits(robot, {"elbow_1": Limits(low, high)}))
@@ -131,7 +131,7 @@ def test_a_pose_beyond_a_limit_is_named_and_still_separated():
 @pytest.mark.parametrize("limits", [Limits(-4.0, 4.0), Limits(lower=-1.0)])
 def test_limits_that_are_not_considered_are_named(limits: Limits):
     aspects = Aspects.of(with_limits(load("3rrr_m1"), {"elbow_1": limits, "elbow_2": Limits(-3.0, 3.0)}))
-    places = list(wander(aspects.setting.samples.start, 2, 0))
+    places = list(random_walk(aspects.setting.samples.start, 2, 0))
     answer = aspects.join(places[0], places[0])
     assert (answer.verdict, answer.limits) == (SAME, ("elbow_2",))
     assert answer.not_proved.startswith("limits of joints elbow_1; ")

@@ -14,7 +14,7 @@ from hrsynth.analysis.observed import motors, prepare
 from hrsynth.constraints.pattern import recognise
 from hrsynth.description import load, shipped
 from hrsynth.errors import NotConfined
-from hrsynth.kinematics.locked import moved
+from hrsynth.kinematics.locked import joint_at
 from hrsynth.mechanism.legs import decompose
 
 HIDDEN = {"3rrr_m1": Circle, "3rpr_m2": Line, "3prr_m1": Line, "gough_stewart": Line, "hexa": Circle, "6pus": Line,
@@ -70,7 +70,7 @@ def test_spheres_have_the_length_of_the_rods():
     ends = {leg.label: leg.joints for leg in decompose(found.goal.twin.mechanism).legs}
     poses = {body: found.goal.pose(body) for body in found.bodies}
     for tip in found.tips:
-        centres = [moved(found.goal, found.goal.twin.mechanism.joints[name])[0] for name in ends[tip.leg]]
+        centres = [joint_at(found.goal, found.goal.twin.mechanism.joints[name])[0] for name in ends[tip.leg]]
         rod = max(np.linalg.norm(a - b) for a in centres for b in centres) * found.goal.twin.length
         assert tip.curve.radius == pytest.approx(rod, abs=1e-9)
         end = (poses[tip.body] @ np.append(tip.place, 1.0))[:3]

@@ -11,7 +11,7 @@ from analysis.singularity.found import found
 from hrsynth.analysis.singularity.agreement import weakest
 from hrsynth.analysis.singularity.singular import Singularity, singular
 from hrsynth.geometry.vectors import Array, frozen, inverse
-from hrsynth.kinematics.sampling import wander
+from hrsynth.kinematics.sampling import random_walk
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.present.text.singularity import singularity
 from strategies import deltas
@@ -40,7 +40,7 @@ def tangents(answer: Singularity) -> tuple[Array, Array, Array]:
     elbow, centre = robot.joints["elbow_2a"].point, robot.joints["motor_joint_2"].point
     arm = "arm_2"
     back = inverse(start.pose(arm)) @ np.append(elbow, 1.0)
-    places = [(at.pose(arm) @ back)[:3] for at in wander(start, 80, seed=3)]
+    places = [(at.pose(arm) @ back)[:3] for at in random_walk(start, 80, seed=3)]
     tau = np.cross(a, np.array(places) - centre)
     return p, a, tau / np.linalg.norm(tau, axis=1, keepdims=True)
 
@@ -54,7 +54,7 @@ def test_a_rail_that_is_not_normal_to_a_cranks_axis_is_never_parallel_to_its_tan
     assert answer.condition.never
     p, a, tau = tangents(answer)
     assert np.linalg.norm(np.cross(tau, p), axis=1).min() >= abs(p @ a) - 1e-9
-    sizes = [weakest(at, answer.question) for at in wander(answer.setting.everything.start, 40, seed=5)]
+    sizes = [weakest(at, answer.question) for at in random_walk(answer.setting.everything.start, 40, seed=5)]
     assert min(sizes) > 0
 
 

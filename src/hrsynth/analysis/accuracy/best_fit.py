@@ -18,7 +18,7 @@ import numpy as np
 from ...budgets import BEST_FIT_FIRST_STEP, BEST_FIT_SHORTEST_STEP, BEST_FIT_STEPS
 from ...errors import LoopsNotClosed
 from ...geometry.vectors import Array, hat
-from ...kinematics.chart import Chart
+from ...kinematics.chart import TangentChart
 from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.relation import Measurement, relation
 from ...tolerances import FLAT_CURVATURE, FOLLOWED, HESSIAN_CHANGE, HESSIAN_STEP, INVERTED
@@ -54,8 +54,8 @@ class _Bowl:
     question: Measurement
 
     @cached_property
-    def chart(self) -> Chart:
-        return Chart.around(self.at, self.question)
+    def chart(self) -> TangentChart:
+        return TangentChart.around(self.at, self.question)
 
     def slope(self, at: ClosedConfiguration, wanted: Array) -> Array:
         """∇F (n,) in y at a configuration."""

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.steps import led
+from ...kinematics.steps import track
 from ...mechanism.pose import Pose
 from ...results import Result
 from ..observed import ObservedRobot
@@ -118,4 +118,4 @@ def _led(here: ClosedConfiguration, carriage: Carriage, p: Array) -> ClosedConfi
     """The configuration with the carriage's point at ``p``."""
     motion = carriage.motion
     goal = replace(motion.at_home(), directions=motion.shifts.T, values=carriage.length * motion.shifts.T @ p)
-    return led(here, motion, goal)[0]
+    return track(here, motion, goal)[0]

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...constraints.named_vectors import axis_of
 from ...geometry.balls import Field
-from ...geometry.so3 import wrapped
+from ...geometry.so3 import wrap_angle
 from ...geometry.vectors import Array, cross, dot
 from ...mechanism import Joint, JointType
 from ...tolerances import FOLLOWED, SAME_RELATION, TURNING_ARM
@@ -105,9 +105,9 @@ def _bound(sight: Sight, source: Callable[..., Source], joint: Joint, middle: fl
     elif joint.type is JointType.REVOLUTE and half < np.pi:
         for (one, first), (two, second) in product(known.arms(joint.predecessor), known.arms(joint.successor)):
             cosine, sine = _turned(one, two, along)
-            offsets = [wrapped(float(x)) for x in np.arctan2(sine, cosine) - coordinates]
+            offsets = [wrap_angle(float(x)) for x in np.arctan2(sine, cosine) - coordinates]
             size = np.hypot(cosine, sine)
-            apart = [wrapped(x - offsets[0]) for x in offsets]
+            apart = [wrap_angle(x - offsets[0]) for x in offsets]
             if np.max(np.abs(apart)) < SAME_RELATION and np.ptp(size) < FOLLOWED < TURNING_ARM**2 < size[0]:
                 return Turn(joint.name, axis, first, second, middle + offsets[0], half, float(size[0]))
     return None

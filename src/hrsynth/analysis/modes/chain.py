@@ -18,9 +18,9 @@ from ...geometry import lines
 from ...geometry.screws import normals
 from ...geometry.vectors import Array, unit
 from ...kinematics.configuration import ClosedConfiguration
-from ...kinematics.locked import carried
+from ...kinematics.locked import carry_joint
 from ...mechanism import Joint, JointType, Observation
-from ...mechanism.composites import Edge
+from ...mechanism.composites import WordEdge
 from ...mechanism.legs import Leg, LegDecomposition
 from ...mechanism.notation import Rods
 from ...mechanism.observation import Direction, Encoder
@@ -135,7 +135,7 @@ class _Walk:
 
     def _geometry(self, joint: Joint, at: str) -> tuple[Array, list[Array]]:
         """Centre (m) and axes of a joint, in the order in which they are met from the link ``at``."""
-        point, axes = carried(self.anatomy.mechanism, joint, self.goal.pose)
+        point, axes = carry_joint(self.anatomy.mechanism, joint, self.goal.pose)
         return point, axes if joint.predecessor == at else axes[::-1]
 
     def _joint(self, found: list[ChainBody], joint: Joint, at: str) -> None:
@@ -198,7 +198,7 @@ class _Walk:
                     new.append(joint.other(at))
         return found
 
-    def _parallelogram(self, found: list[ChainBody], edge: Edge, at: str) -> None:
+    def _parallelogram(self, found: list[ChainBody], edge: WordEdge, at: str) -> None:
         """Both cranks are one: they stay parallel (a parallelogram is not crossed)."""
         joints = [self.anatomy.mechanism.joints[name] for name in edge.joints]
         near, far = joints[:2] if edge.tail == at else joints[1::-1]
@@ -209,7 +209,7 @@ class _Walk:
         crank = Crank(axis, way - axis * float(axis @ way), watched, held)
         found[-1] = replace(found[-1], cranks=(*found[-1].cranks, crank))
 
-    def _rods(self, found: list[ChainBody], edge: Edge, at: str) -> None:
+    def _rods(self, found: list[ChainBody], edge: WordEdge, at: str) -> None:
         """The rod that is watched, or the first: all have one direction."""
         if any(name in self.coordinates for name in edge.joints):
             raise Underived("a motor holds a rod")

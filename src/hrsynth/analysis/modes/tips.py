@@ -21,7 +21,7 @@ from ...geometry.ranks import kernel_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.leg_reach import alone
-from ...kinematics.locked import moved, rezeroed
+from ...kinematics.locked import joint_at, rezero
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.relation import Measurement
 from ...kinematics.tasks import solve
@@ -160,7 +160,7 @@ def _candidates(anatomy: LegDecomposition, leg: LockedLeg, tip: Array, goal: Clo
 def _rods(anatomy: LegDecomposition, leg: LockedLeg, along: Array, goal: ClosedConfiguration) -> list[Array]:
     """From joint centre to joint centre (m) of a leg, where that is parallel to a direction."""
     joints = [anatomy.mechanism.joints[name] for name in anatomy.leg(leg.label).joints]
-    centres = [moved(goal, joint)[0] * goal.twin.length for joint in joints]
+    centres = [joint_at(goal, joint)[0] * goal.twin.length for joint in joints]
     between = [other - one for one, other in combinations(centres, 2)]
     small = SAME_POINT * goal.twin.length
     return [rod for rod in between if np.linalg.norm(rod) > small
@@ -194,7 +194,7 @@ def _slide(anatomy: LegDecomposition, pattern: ConstraintPattern, goal: ClosedCo
         if len(edge.joints) == 4:
             joints = [anatomy.mechanism.joints[name] for name in edge.joints[:2]]
             near, far = joints if edge.tail == one else joints[::-1]
-            (start, axes), (end, _) = moved(goal, near), moved(goal, far)
+            (start, axes), (end, _) = joint_at(goal, near), joint_at(goal, far)
             spoke = (end - start - axes[0] * float(axes[0] @ (end - start))) * goal.twin.length
             return Circle(at - spoke, axes[0], float(np.linalg.norm(spoke)), spoke), None
     assert isinstance(pattern.slide, Tangent)
@@ -233,7 +233,7 @@ def _held_paths(anatomy: LegDecomposition, own: Sequence[Observation], reference
                 goal: ClosedConfiguration, place: Array) -> list[Array]:
     """Positions of a tip when its leg alone, with what is measured held, is moved along each of its freedoms, and along
     some random combinations of them."""
-    rest = decompose(rezeroed(goal))
+    rest = decompose(rezero(goal))
     twin = PinocchioModel(alone(rest, rest.leg(leg.label)), goal.twin.length)
     values = measure(twin, twin.q0, reference, own)[2] if own else []
     held = _Held(reference, tuple(zip(own, values, strict=True)))

@@ -21,7 +21,7 @@ from ...geometry.ranks import kernel_basis, range_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
-from ...kinematics.sampling import WEAKEST, wander
+from ...kinematics.sampling import WEAKEST, random_walk
 from ...kinematics.tasks import solve
 from ...tolerances import CLOSED, FOLLOWED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT, SHARP
 from .batch_spectrum import SPOTS, Quick
@@ -76,7 +76,7 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
     low: list[tuple[float, ClosedConfiguration]] = []
     parts: list[tuple[float, ClosedConfiguration]] = []
     quick = Quick.of(placer, question)
-    walks = wander(start, count, seed) if quick is None else quick.placer.wander(count, seed)
+    walks = random_walk(start, count, seed) if quick is None else quick.placer.wander(count, seed)
     for number, chunk in enumerate(_chunks(walks)):
         here = pattern.values_at(chunk)
         if quick is None:

@@ -17,7 +17,7 @@ from ...geometry.vectors import Array, inverse
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.pinocchio_model import PinocchioModel
-from ...kinematics.steps import led
+from ...kinematics.steps import track
 from ...kinematics.tasks import Target, solve
 from ...mechanism import Mechanism
 from ...tolerances import FOLLOWED, SOLVED
@@ -110,7 +110,7 @@ class Mover:
     def sent(self, here: Posed, values: Array) -> tuple[Posed, Array]:
         """Where the robot comes to from ``here`` when the platform is sent to coordinates (n,), and those there."""
         aim = Coordinates(self.setting.motion, self.coordinates.places, values)
-        there, _ = led(here.real, self.setting.motion, aim)
+        there, _ = track(here.real, self.setting.motion, aim)
         followed = self._followed(here, [there])
         found = followed[-1] if followed else here
         return found, values + aim.apart(found.real.pose(self.setting.motion.link))
