@@ -11,6 +11,8 @@ import pytest
 import hrsynth
 from hrsynth.geometry.vectors import inverse, rotation_about, unit
 from hrsynth.kinematics.assembly import ASSEMBLED, BEYOND, IMPOSSIBLE, NOT_FOUND, Assembler, Assembly
+from hrsynth.kinematics.closures import End, closures
+from hrsynth.kinematics.ways import Part
 from hrsynth.mechanism import Joint, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.legs import decompose
@@ -107,6 +109,45 @@ def violation(joint: Joint, moved: dict[str, np.ndarray]) -> float:
 
 def _at(D: np.ndarray, x: np.ndarray) -> np.ndarray:
     return np.asarray(D[:3, :3] @ x + D[:3, 3])
+
+
+def shifted(part: Part, q: float) -> np.ndarray:
+    """The displacement (4, 4) by a part with the value q."""
+    D = np.eye(4)
+    if part.slides:
+        D[:3, 3] = q * part.axis
+    else:
+        D[:3, :3] = rotation_about(part.axis, q)
+        D[:3, 3] = part.point - D[:3, :3] @ part.point
+    return D
+
+
+@pytest.mark.parametrize("last", ["S", "R"])
+@pytest.mark.parametrize("second", ["R", "P"])
+@pytest.mark.parametrize("first", ["R", "P", "S"])
+def test_values_that_close_a_skew_leg_are_among_those_told(first: str, second: str, last: str):
+    """Of a leg with axes of any direction, led to where random values of its joints bring it."""
+    told = 0
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+
+        def part(kind: str, rng: np.random.Generator = rng) -> Part:
+            axis = None if kind == "S" else random_direction(rng)
+            return Part(kind == "P", rng.normal(size=3), axis, (f"joint_{rng.integers(1 << 30)}",))
+
+        way = [part(first), part(second), part(last)]
+        q = [rng.uniform(-0.5, 0.5) if each.slides else rng.uniform(-np.pi, np.pi) for each in way]
+        values = {each.joint: value for each, value in zip(way, q, strict=True)}
+        free = replace(way[0], axis=random_direction(rng)) if first == "S" else way[0]
+        D = shifted(free, q[0]) @ shifted(way[1], q[1]) @ (np.eye(4) if last == "S" else shifted(way[2], q[2]))
+        found = closures(way, End(D, 1.0, 1e-12, last != "S"))
+        assert found.miss is None, found.miss
+        told += bool(found.values)
+        for joint, several in found.values:
+            gaps = [abs(float(each.mid()) - values[joint]) for each in several]
+            turning = not next(each for each in way if each.joint == joint).slides
+            assert min(min(gap % (2 * np.pi), -gap % (2 * np.pi)) if turning else gap for gap in gaps) < 1e-3
+    assert told or (second, last) == ("P", "R")
 
 
 @pytest.mark.slow

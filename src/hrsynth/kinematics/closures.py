@@ -52,6 +52,7 @@ class Closures:
 
 
 UNDECIDED = Closures()
+ORIGIN = np.zeros(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -206,7 +207,7 @@ def _kept(first: Part, moving: Part | None, last: Part, x: Array, target: Field,
     laws = [_distance(moving, end.ball(x), end.ball(first.point), square, _far(first, last))]
     if first.axis is not None:
         words = f"{_name(last)} would be at {{sought}} along the axis of {_name(first)}, and reaches {{span}}"
-        laws.append(_height(moving, end.ball(x) - first.point, first.axis, target - first.point, words))
+        laws.append(_height(moving, end.ball(x), first.axis, target, words, first.point))
     return laws
 
 
@@ -222,16 +223,16 @@ def _distance(moving: Part | None, x: Field, A: Field, square: Any, words: str) 
     return _Law(_square(C) + _square(v), 2 * _dot(C, v), 2 * _dot(C, w), square, True, True, words)
 
 
-def _height(moving: Part | None, x: Field, n: Array, target: Field, words: str) -> _Law:
-    """n·x(q) = n·target."""
+def _height(moving: Part | None, x: Field, n: Array, target: Field, words: str, A: Array = ORIGIN) -> _Law:
+    """n·(x(q) − A) = n·(target − A)."""
     from flint import arb
 
-    wanted = _dot(target, n)
+    wanted = _dot(target - A, n)
     if moving is None or moving.slides:
         along = 0.0 if moving is None or moving.axis is None else float(n @ moving.axis)
-        return _Law(_dot(x, n), arb(along, SAME_GEOMETRY), arb(0), wanted, False, False, words)
+        return _Law(_dot(x - A, n), arb(along, SAME_GEOMETRY), arb(0), wanted, False, False, words)
     centre, v, w = _circle(moving, x)
-    return _Law(_dot(centre, n), _dot(v, n), _dot(w, n), wanted, True, False, words)
+    return _Law(_dot(centre - A, n), _dot(v, n), _dot(w, n), wanted, True, False, words)
 
 
 def _circle(turning: Part, x: Field) -> tuple[Field, Field, Field]:

@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from adversary.case import HELD, UNCLEAR, WRONG, Case
+from adversary.case import HELD, SILENT, UNCLEAR, WRONG, Case
 from adversary.claims.verdicts import generic
 from adversary.robot import Array, Robot, State, things
-from adversary.search import Study, polished, solve
+from adversary.search import Study, polished, scattered, solve
 
 SAME = 1e-5
 
@@ -47,7 +47,14 @@ def judge(case: Case, told: Any, path: Path) -> None:
         case.say("hidden robot", UNCLEAR, "a measurement is no direction of a link")
         return
     walked, _ = case.walked
-    for at in (case.robot.zero(), *(walked[[k]] for k in range(min(2, len(walked))))):
+    generic = [relation(case.study, case.robot, mine, walked[[k]]) for k in range(min(2, len(walked)))]
+    zero = relation(case.study, case.robot, mine, case.robot.zero())
+    if zero is not None and any(each is not None and each.shape != zero.shape for each in generic):
+        case.say("hidden robot", SILENT, "zero is a special pose, of which the certificate says nothing")
+        start = []
+    else:
+        start = [case.robot.zero()]
+    for at in (*start, *(walked[[k]] for k in range(min(2, len(walked))))):
         there = follow(case, hidden, study, items, mine, at)
         if there is None:
             case.say("hidden robot", WRONG, "it cannot follow the real one")
@@ -76,9 +83,13 @@ def follow(case: Case, hidden: Robot, study: Study, items: Any, mine: Any, at: S
     for part in (0.0, 0.25, 0.5, 0.75, 1.0):
         values = [*(u0 + part * (u - u0)), x0 + part * (x - x0), *((R0 + part * (R - R0)).T if frame else ())]
         here, size = solve(hidden, hidden.held(held, np.array(values)), here)
-    if size[0] > 1e-8:
-        return None
-    return polished(hidden, hidden.held(held, np.array(values)), here)[0]
+    rows = hidden.held(held, np.array(values))
+    if size[0] > 1e-8:  # between the two poses there may be none that it reaches
+        many, size = solve(hidden, rows, scattered(hidden, case.rng, 60, here))
+        if size.min() > 1e-8:
+            return None
+        here = many[[int(np.argmin(size))]]
+    return polished(hidden, rows, here)[0]
 
 
 def relation(study: Study, robot: Robot, items: Any, at: State) -> Array | None:
