@@ -2,6 +2,8 @@
 
 from typing import TYPE_CHECKING
 
+from .results import Result
+
 if TYPE_CHECKING:
     from . import catalog
     from .analysis.accuracy.accuracy import accuracy
@@ -57,3 +59,7 @@ def __getattr__(name: str) -> object:
 
 def __dir__() -> list[str]:
     return sorted({*globals(), *__all__})
+
+
+Result.public = staticmethod(__getattr__)
+"""How results find what shows them, without an import of what stands above them."""

@@ -2,13 +2,25 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any, ClassVar
+
 
 class Result:
     """An answer: its ``repr`` is one line, its ``str`` the text of the command line, in a notebook the same as HTML.
 
-    How an answer looks is not its own matter: it asks the package for ``hrsynth.text`` and ``hrsynth.html``, public
-    names of the folder that renders, which is loaded when something is shown.
+    ``shown_as`` names its outputs in the table of ``present/outputs.py``. What shows them stands above all questions:
+    the package sets ``public``, which gives its public functions ``text`` and ``html`` and loads them when something is
+    shown.
     """
+
+    shown_as: ClassVar[str]
+    public: ClassVar[Callable[[str], Any]]
+
+    def __init_subclass__(cls, shown_as: str | None = None, **more: Any) -> None:
+        super().__init_subclass__(**more)
+        if shown_as is not None:
+            cls.shown_as = shown_as
 
     def headline(self) -> str:
         """What is said in one line."""
@@ -18,11 +30,7 @@ class Result:
         return f"<{type(self).__name__}: {self.headline()}>"
 
     def __str__(self) -> str:
-        import hrsynth
-
-        return hrsynth.text(self)
+        return str(Result.public("text")(self))
 
     def _repr_html_(self) -> str:
-        import hrsynth
-
-        return hrsynth.html(self)
+        return str(Result.public("html")(self))

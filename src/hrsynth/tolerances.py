@@ -249,3 +249,18 @@ on."""
 
 RUN_SHORTEST_STEP = 1e-9
 """Longest step (time constants) with which a servo run that cannot go on has been tried."""
+
+DISTANCE_FLOOR = 1e-3
+"""Part of the largest distance to a singularity on a map below which all share one colour."""
+
+DARKEST_DISTANCE = 1e-6
+"""Singular value below which all share the darkest grey behind a locus."""
+
+UNMOVED = 1e-9
+"""Metres, radians below which a platform has not moved along an axis, or not turned, in the picture of a run."""
+
+REST_OF_RUN = 1e-3
+"""Part of the largest error below which the rest of a run is not drawn."""
+
+SLIDER_ARRIVED = 1e-6
+"""Difference (metres, radians) within which the platform has come to where a slider sent it."""

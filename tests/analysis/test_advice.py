@@ -23,7 +23,7 @@ from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.geometry.vectors import Array, unit
 from hrsynth.mechanism import Mechanism, Observation
 from hrsynth.mechanism.builder import Builder
-from hrsynth.present.text import advice as text
+from hrsynth.present.text import robots as text
 from hrsynth.tolerances import RANK_GAP
 from kinematics.robots import ROBOTS, setting_of
 from oracle import NotAssembled, Oracle, Undecided

@@ -30,7 +30,7 @@ from hrsynth.mechanism.model import Coupling
 from hrsynth.mechanism.observation import Direction, Observation
 from hrsynth.mechanism.relations import DirectionSource, Relations
 from hrsynth.mechanism.sensors import encoders
-from hrsynth.present.text import verdicts as text
+from hrsynth.present.text import robots as text
 from kinematics.robots import ROBOTS, setting_of
 from oracle import Oracle
 from strategies import parallel_robots, planar, random_rotation, spherical, transformed

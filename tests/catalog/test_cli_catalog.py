@@ -18,7 +18,7 @@ from hrsynth.catalog.build import build
 from hrsynth.catalog.drawing import drawing
 from hrsynth.catalog.words import parse
 from hrsynth.cli import execute
-from hrsynth.cli.progress import Meter
+from hrsynth.cli.progress import Progress
 
 
 @pytest.fixture
@@ -169,14 +169,14 @@ def test_without_a_command_it_tells_which_there_are(run):
 def test_the_meter_tells_the_time_left_on_a_terminal(monkeypatch: pytest.MonkeyPatch,
                                                      capsys: pytest.CaptureFixture[str]):
     monkeypatch.setattr("sys.stderr.isatty", lambda: True, raising=False)
-    with Meter(wait=-1.0) as meter:
-        meter.tell("c", 2, 10)
-        meter.tell("d", 0, 5)
+    with Progress(wait=-1.0, counted=True) as meter:
+        meter.count("c", 2, 10)
+        meter.count("d", 0, 5)
         for done in range(3, 11):
-            meter.tell("c", done, 10)
+            meter.count("c", done, 10)
             time.sleep(0.03)
     shown = re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", capsys.readouterr().err)
     assert re.search(r"c .*\b10/15\b.*\b0:00:0[01]\b.* left", shown), shown
-    with Meter() as meter:
-        meter.tell("c", 2, 10)
+    with Progress(counted=True) as meter:
+        meter.count("c", 2, 10)
     assert capsys.readouterr().err == ""

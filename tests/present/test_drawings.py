@@ -20,7 +20,7 @@ from hrsynth.mechanism.legs import decompose, default_observation
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.present.drawings import svg
 from hrsynth.present.drawings.graph import graph_svg
-from hrsynth.present.drawings.plan import Plan, plan
+from hrsynth.present.drawings.plan import Layout, plan
 from hrsynth.present.drawings.schematic import leg_svg, robot_svg
 
 Draw = Callable[..., str]
@@ -76,7 +76,7 @@ def assert_coloured(root: Any, mechanism: Mechanism, virtual: set[str]) -> None:
         assert svg.MOTOR in [element.get("fill") for element in group.iter()]
 
 
-def runs(found: Plan) -> Iterator[tuple[int, float, float]]:
+def runs(found: Layout) -> Iterator[tuple[int, float, float]]:
     """Lane, start and end of each straight piece."""
     for net in found.nets:
         for way in net.ways:
@@ -84,7 +84,7 @@ def runs(found: Plan) -> Iterator[tuple[int, float, float]]:
                 yield lane, min(x, u), max(x, u)
 
 
-def assert_free(found: Plan) -> None:
+def assert_free(found: Layout) -> None:
     """Boxes stand apart, no line runs through one, no two links share a piece of a lane or bar, bars meet no box."""
     places = [(spot.x, spot.lane) for spot in found.spots]
     assert len(set(places)) == len(places)

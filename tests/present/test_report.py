@@ -34,7 +34,7 @@ CSS = (files("hrsynth.present.report") / "style.css.j2").read_text()
 def made(name: str, legs: str | None) -> tuple[Derivation, str]:
     observe = None if legs is None else legs.split(",")
     found = derive(load(name), observe)
-    return found, report(found, observe)
+    return found, report(found)
 
 
 def read(page: str) -> Any:

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import html
 import re
+from collections.abc import Iterator
 from functools import cache
+from inspect import signature
 from pathlib import Path
 from xml.etree import ElementTree
 
@@ -13,8 +15,9 @@ import pytest
 import hrsynth
 from hrsynth import load
 from hrsynth.cli import execute
+from hrsynth.cli.questions import QUESTIONS
 from hrsynth.errors import BadRequest
-from hrsynth.present import show
+from hrsynth.present.outputs import OUTPUTS, function
 from hrsynth.results import Result
 
 GOAL, OTHER = "x=0.05,y=0.3", "x=0.06,y=0.3"
@@ -39,13 +42,35 @@ def answer(command: str) -> Result:
     return ASKED[command][0](load("rrrrr_m1"))
 
 
-def every_result() -> set[str]:
-    texts = [path.read_text(encoding="utf-8") for path in Path(hrsynth.__file__).parent.rglob("*.py")]
-    return {name for text in texts for name in re.findall(r"^class (\w+)\(Result\):", text, re.MULTILINE)}
+def every_result() -> Iterator[tuple[str, str]]:
+    """The name of each class of results and what it is shown as."""
+    for path in Path(hrsynth.__file__).parent.rglob("*.py"):
+        yield from re.findall(r"^class (\w+)\(Result(.*)\):", path.read_text(encoding="utf-8"), re.MULTILINE)
 
 
-def test_every_kind_of_result_has_a_text():
-    assert every_result() == set(show._TEXTS)
+def test_every_kind_of_result_has_its_outputs():
+    kinds = [re.fullmatch(r', shown_as="(\w+)"', kind)[1] for _, kind in every_result()]
+    assert sorted(kinds) == sorted(OUTPUTS)
+
+
+def test_what_makes_an_output_is_there():
+    for outputs in OUTPUTS.values():
+        names = [outputs.text]
+        for file in outputs.files:
+            names += [*file.makers.values(), *filter(None, (file.computed, file.nothing, *(file.installed or ())[1:]))]
+        assert all(callable(function(name)) for name in names)
+
+
+@pytest.mark.parametrize("question", QUESTIONS, ids=lambda question: question.name)
+def test_each_option_goes_somewhere(question):
+    """To the function of the command, to a file, or to what shows and ends it; nothing is dropped without a word."""
+    files = OUTPUTS[question.name].files
+    known = {*signature(getattr(hrsynth, question.name)).parameters, *(file.option for file in files),
+             *(name for file in files for name in file.takes)}
+    for extra in (question.shows, question.after):
+        known |= set() if extra is None else set(signature(extra).parameters)
+    assert {option.name for option in question.options} <= known
+    assert {name for file in files for name in (*file.needs, *file.takes)} <= {each.name for each in question.options}
 
 
 @pytest.mark.parametrize("command", ASKED)

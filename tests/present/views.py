@@ -13,7 +13,7 @@ import numpy as np
 from hrsynth import load, view
 from hrsynth.mechanism import Joint, JointType, Mechanism
 from hrsynth.present.view.server import Server, serve
-from hrsynth.present.view.states import State
+from hrsynth.present.view.states import ViewState
 from hrsynth.present.view.view import Machine, View
 
 WATCHED = {"gough_stewart": "1,3,5", "quattro": "1,4"}
@@ -47,7 +47,7 @@ def mechanism_of(found: View, machine: Machine) -> Mechanism:
     return found.derivation.hidden
 
 
-def states(found: View) -> list[State]:
+def states(found: View) -> list[ViewState]:
     """All states that the page can show."""
     return [found.home, *(state for slider in found.sliders for state in slider.states)]
 

@@ -11,16 +11,17 @@ import pytest
 
 import hrsynth
 from hrsynth.errors import BadRequest
-from hrsynth.present import runs
-from hrsynth.present.animations import FRAMES, film
+from hrsynth.present.animations import FRAMES, animation
+from hrsynth.present.outputs import OUTPUTS
 
 
 def test_unknown_endings_and_folders_are_refused(tmp_path: Path):
+    (file,) = OUTPUTS["servo"].files
     with pytest.raises(BadRequest, match=r"\.gif"):
-        runs.writable(str(tmp_path / "run.mp4"))
+        file.require(str(tmp_path / "run.mp4"), {})
     with pytest.raises(BadRequest):
-        runs.writable(str(tmp_path / "nowhere" / "run.png"))
-    runs.writable(str(tmp_path / "run.png"))
+        file.require(str(tmp_path / "nowhere" / "run.png"), {})
+    file.require(str(tmp_path / "run.png"), {})
 
 
 @pytest.mark.slow
@@ -31,7 +32,7 @@ def test_a_film_ends_with_the_watched_leg_over_its_wanted_place():
     found = hrsynth.servo(hrsynth.load("3rpr_m1"), start="x=0,y=0,phi=0", goal="x=0.03,y=0.02,phi=0.1")
     assert found.ended == "goal"
     try:
-        image = image_of.open(io.BytesIO(film(found)))
+        image = image_of.open(io.BytesIO(animation(found)))
     except hrsynth.errors.NotRendered:
         pytest.skip("nothing can be rendered here")
 

@@ -122,7 +122,7 @@ class Cure:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Advice(Result):
+class Advice(Result, shown_as="advise"):
     """What is missing. ``now`` is the verdict as it stands; ``sets`` are all the smallest sets of the best rank within
     reach, empty where nothing is missing or nothing helps."""
 

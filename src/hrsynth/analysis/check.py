@@ -48,7 +48,7 @@ class GridCheck:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Check(Result):
+class Check(Result, shown_as="check"):
     """What is observed, the postures at the poses asked for, the loop constraints that are always redundant."""
 
     setting: ObservedRobot

@@ -31,7 +31,7 @@ LARGEST_COMPLETE = 10
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Verdict(Result):
+class Verdict(Result, shown_as="verdict"):
     """What one set of observed legs sees of the platform, at generic configurations."""
 
     legs: tuple[str, ...]
@@ -70,7 +70,7 @@ class Verdict(Result):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Legs(Result):
+class Legs(Result, shown_as="legs"):
     """The verdict of every set of observed legs, and the smallest sets of the best rank."""
 
     setting: ObservedRobot

@@ -55,7 +55,7 @@ class PaperForm:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Derivation(Result):
+class Derivation(Result, shown_as="derive"):
     """A robot, what is observed, its hidden robot (None where every leg is blind), how it came about, and the proof."""
 
     robot: Mechanism

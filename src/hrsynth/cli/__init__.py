@@ -9,19 +9,17 @@ from typing import Annotated
 
 import typer
 
-from . import derivations, files, loop, poses
+from . import files
 from .catalog import catalog
-from .options import unfolded
-
-COMMANDS = (derivations.derive, derivations.legs, poses.check, poses.singular, derivations.advise, poses.modes,
-            poses.path, loop.servo, loop.accuracy, loop.select, files.view, files.robots, files.convert)
+from .questions import QUESTIONS
 
 app = typer.Typer(
     name="hrsynth", invoke_without_command=True, add_completion=False, rich_markup_mode=None,
     pretty_exceptions_enable=False,
     help="Hidden robots of parallel robots that are controlled by watching the directions of their legs.")
-for command in COMMANDS:
-    app.command()(unfolded(command))
+for question in QUESTIONS:
+    question.add(app)
+files.add(app)
 app.add_typer(catalog)
 
 
@@ -66,10 +64,10 @@ def execute(arguments: list[str] | None = None) -> int:
     except KeyboardInterrupt:
         return 130
     except Exception as error:
-        return _told(error)
+        return _report_failure(error)
 
 
-def _told(error: Exception) -> int:
+def _report_failure(error: Exception) -> int:
     """Say what went wrong; the exit status."""
     from ..errors import HrsynthError
 

@@ -8,21 +8,31 @@ Their records, besides ``command`` ("catalog build" …) and ``version``: ``buil
 
 from __future__ import annotations
 
+import json as javascript
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Any
 
 import typer
 
-from .options import Filter, Json, unfolded
-from .progress import Meter
+from .options import JSON, NEEDED, Option, add_command, flag, output, warn
+from .progress import Progress
 
 catalog = typer.Typer(name="catalog", invoke_without_command=True, rich_markup_mode=None,
                       help="The catalog of architectures: what can be controlled by watching legs.")
-
-Kept = Annotated[str | None, typer.Option("--catalog", metavar="PATH", help="A folder or SQLite file (default: what is "
-                                          "shipped).")]
-
-Workers = Annotated[int, typer.Option(min=1, help="Processes that share the work.")]
+KEPT = Option("kept", "A folder or SQLite file (default: what is shipped).", "PATH", flags=("--catalog",))
+WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
+ANEW = flag("anew", "Forget what a build that was broken off has made.")
+FILTER = (
+    Option("legs", "Number of legs, or a pattern of the notation or of one leg's chain: 3-R*, PUS.", "LEGS"),
+    Option("dof", "Freedoms of the platform.", kind=int),
+    Option("motion", "Its translations and turns, as 3T or 2T1R."),
+    Option("verdict", "controllable, partially controllable, uncontrollable."),
+    Option("group", "planar, pods, deltas, spatial."),
+    Option("base_motors", "All motors on the base, or not.", kind=bool, flags=("--base-motors/--moving-motors",)),
+    Option("fewest", "Legs to watch to see all that can be seen.", kind=int),
+    Option("text", "What occurs in any field."),
+)
+"""Which architectures are asked for."""
 
 
 @catalog.callback()
@@ -31,100 +41,60 @@ def _alone(context: typer.Context) -> None:
         typer.echo(context.get_help())
 
 
-@catalog.command()
-def build(
-    groups: Annotated[list[str] | None, typer.Argument(metavar="[GROUP]...", help="Groups (default: all).")] = None,
-    output: Annotated[str | None, typer.Option("-o", "--output", metavar="PATH", help="A folder, or a file that ends "
-                                               "in .sqlite (default: catalog/ of the checkout).")] = None,
-    workers: Workers = 1,
-    cluster: Annotated[str | None, typer.Option(metavar="ADDRESS", help="A dask cluster that shares it.")] = None,
-    check: Annotated[bool, typer.Option("--check", help="Build nothing: compare what is stored (default: what is "
-                                        "shipped) with what would be built; exit 3 if it is stale.")] = False,
-    sample: Annotated[int | None, typer.Option(min=0, metavar="N", help="With --check: compare so many records of each "
-                                               "group, drawn at random, and all words.")] = None,
-    limit: Annotated[int | None, typer.Option(min=0, metavar="N", help="Make so many new records and stop; the same "
-                                              "command goes on.")] = None,
-    anew: Annotated[bool, typer.Option("--anew", help="Forget what a build that was broken off has made.")] = False,
-    json: Json = False,
-    seed: Annotated[int, typer.Option("--seed", min=0, help="Seed of --sample.")] = 0,
-) -> None:
-    """Build the catalog, or go on where a build was broken off; the bytes do not depend on who builds."""
-    _require_together(check, {"--sample": sample is not None}, {"--limit": limit is not None, "--anew": anew})
+def _say(command: str, fields: dict[str, Any], text: str, json: bool) -> None:
+    from ..present.show import record
+
+    typer.echo(record(f"catalog {command}", None, fields) if json else text)
+
+
+def build(groups: list[str] | None, output: str | None, workers: int, cluster: str | None, check: bool,
+          sample: int | None, limit: int | None, anew: bool, json: bool, seed: int) -> None:
+    """Build the catalog or (``check``) compare what is stored with what would be built."""
+    from ..errors import BadRequest, CatalogStale
+
+    senseless = {"--limit": limit is not None, "--anew": anew} if check else {"--sample": sample is not None}
+    for option, given in senseless.items():
+        if given:
+            raise BadRequest(f"{option} {'with' if check else 'without'} --check", None)
     if check:
-        _check(groups or [], output, workers, cluster, sample, seed, json)
+        from ..catalog.check import check as run
+        from ..catalog.store import shipped
+
+        with Progress(counted=True) as progress:
+            stale = run(output or shipped(), groups or [], workers=workers, cluster=cluster, sample=sample, seed=seed,
+                        tell=progress.count)
+        if json or not stale:
+            _say("build", {"stale": stale}, "not stale", json)
+        if stale:
+            raise CatalogStale(stale)
         return
-    from ..catalog.build import build as run
-    from ..present import records
+    from ..catalog.build import build as make
     from ..present.text.catalog import built
 
     target = _target(output)
-    with Meter() as meter:
-        done = [each.to_dict() for each in run(target, groups or [], workers=workers, cluster=cluster, limit=limit,
-                                               anew=anew, tell=meter.tell)]
-    typer.echo(records.record("catalog build", None, {"groups": done}) if json else built(done))
+    with Progress(counted=True) as progress:
+        done = [each.to_dict() for each in make(target, groups or [], workers=workers, cluster=cluster, limit=limit,
+                                                anew=anew, tell=progress.count)]
+    _say("build", {"groups": done}, built(done), json)
 
 
-def _require_together(check: bool, with_it: dict[str, bool], without: dict[str, bool]) -> None:
-    """Raise ``BadRequest`` for options that mean nothing with, or without, ``--check``."""
-    from ..errors import BadRequest
-
-    for option, given in (without if check else with_it).items():
-        if given:
-            raise BadRequest(f"{option} {'with' if check else 'without'} --check", None)
-
-
-def _check(groups: list[str], target: str | None, workers: int, cluster: str | None, sample: int | None, seed: int,
-           json: bool) -> None:
-    from ..catalog.check import check
-    from ..catalog.store import shipped
-    from ..errors import CatalogStale
-    from ..present import records
-
-    with Meter() as meter:
-        stale = check(target or shipped(), groups, workers=workers, cluster=cluster, sample=sample, seed=seed,
-                      tell=meter.tell)
-    if json:
-        typer.echo(records.record("catalog build", None, {"stale": stale}))
-    if stale:
-        raise CatalogStale(stale)
-    if not json:
-        typer.echo("not stale")
-
-
-@catalog.command("list")
-@unfolded
-def list_(
-    fits: Filter,
-    kept: Kept = None,
-    json: Json = False,
-) -> None:
-    """The architectures that fit."""
+def entries(kept: str | None, json: bool, **asked: Any) -> None:
+    """List the architectures that fit."""
     from ..catalog import load
-    from ..present import records
-    from ..present.text.catalog import entries
+    from ..present.text.catalog import entries as written
 
     every = load(kept)
-    found = every.where(**fits.asked())
-    if json:
-        fields = {"total": len(every), "entries": [dict(each) for each in found]}
-        typer.echo(records.record("catalog list", None, fields))
-    else:
-        typer.echo(entries(found.records, len(every)))
+    found = every.where(**asked)
+    _say("list", {"total": len(every), "entries": [dict(each) for each in found]}, written(found.records, len(every)),
+         json)
 
 
-@catalog.command()
-def show(
-    word: Annotated[str, typer.Argument(metavar="WORD", help="An architecture, as '3(Rz*-Rz-Rz)'.")],
-    output: Annotated[str | None, typer.Option("-o", "--output", metavar="FILE", help="Write a robot of this "
-                                               "architecture (.urdf, or another dialect).")] = None,
-    kept: Kept = None,
-    json: Json = False,
-) -> None:
-    """One architecture, drawn and in full; one that is not in the catalog is studied now."""
+def show(word: str, output: str | None, kept: str | None, json: bool) -> None:
+    """Show one architecture."""
     from ..catalog.drawing import drawing
+    from ..catalog.geometry import mechanism
     from ..catalog.words import parse
     from ..description import save, targets
-    from ..present import records
     from ..present.text.catalog import entry
 
     architecture = parse(word)
@@ -132,43 +102,27 @@ def show(
         targets(output)
     record, note = _known(str(architecture), kept)
     if output is not None:
-        from ..catalog.geometry import mechanism
-
         for warning in save(mechanism(architecture, record.get("attempt", 0)), output):
-            typer.echo(f"hrsynth: {warning}", err=True)
+            warn(str(warning))
     drawn = drawing(architecture)
-    if json:
-        fields = {"entry": dict(record), "drawing": drawn.splitlines(), "note": note or None, "file": output}
-        typer.echo(records.record("catalog show", None, fields))
-    else:
-        typer.echo(entry(record, drawn, note, output))
+    _say("show", {"entry": dict(record), "drawing": drawn.splitlines(), "note": note or None, "file": output},
+         entry(record, drawn, note, output), json)
 
 
-@catalog.command()
-@unfolded
-def site(
-    output: Annotated[str, typer.Option("-o", "--output", metavar="DIR", help="A new or empty folder, or an older "
-                                        "site, which is replaced.")],
-    fits: Filter,
-    workers: Workers = 1,
-    anew: Annotated[bool, typer.Option("--anew", help="Forget what a build that was broken off has made.")] = False,
-    kept: Kept = None,
-    json: Json = False,
-) -> None:
-    """Pages of the architectures that fit: a list that filters, drawings, derivations, robot files; needs no server."""
+def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **asked: Any) -> None:
+    """Write the pages of the architectures that fit."""
     from ..catalog import load
     from ..catalog.site import site as run
-    from ..present import records
     from ..present.text.catalog import sited
 
-    found = load(kept, **fits.asked())
-    with Meter() as meter:
-        done = run(found, output, workers=workers, anew=anew, tell=meter.tell)
+    found = load(kept, **asked)
+    with Progress(counted=True) as progress:
+        done = run(found, output, workers=workers, anew=anew, tell=progress.count)
     if done.differ:
         word, derived = done.differ[0]
-        typer.echo(f"hrsynth: {len(done.differ)} derivations do not end in what the catalog says, the first: {word}, "
-                   f"derived {derived}", err=True)
-    typer.echo(records.record("catalog site", None, done.to_dict()) if json else sited(done.to_dict()))
+        warn(f"{len(done.differ)} derivations do not end in what the catalog says, the first: {word}, "
+             f"derived {derived}")
+    _say("site", done.to_dict(), sited(done.to_dict()), json)
 
 
 def _known(word: str, kept: str | None) -> tuple[Any, str]:
@@ -183,11 +137,8 @@ def _known(word: str, kept: str | None) -> tuple[Any, str]:
         found = load(kept)
         if word in found:
             return found[word], ""
-    import json
-
-    source = architectures()
-    ((_, line),) = made(source.entry, group(parse(word)), [word])
-    return json.loads(line), "not in the catalog, studied now"
+    ((_, line),) = made(architectures().entry, group(parse(word)), [word])
+    return javascript.loads(line), "not in the catalog, studied now"
 
 
 def _target(output: str | None) -> Path:
@@ -203,3 +154,27 @@ def _target(output: str | None) -> Path:
     if target.resolve().is_relative_to(package):
         raise BadRequest("cannot build into the package", str(target), "another folder")
     return target
+
+
+COMMANDS = (
+    ("build", "Build the catalog, or go on where a build was broken off; the bytes do not depend on who builds.", build,
+     (Option("groups", "Groups (default: all).", "[GROUP]...", list[str], argument=True),
+      output("A folder, or a file that ends in .sqlite (default: catalog/ of the checkout).", "PATH"), WORKERS,
+      Option("cluster", "A dask cluster that shares it.", "ADDRESS"),
+      flag("check", "Build nothing: compare what is stored (default: what is shipped) with what would be built; exit 3 "
+           "if it is stale."),
+      Option("sample", "With --check: compare so many records of each group, drawn at random, and all words.", "N", int,
+             low=0),
+      Option("limit", "Make so many new records and stop; the same command goes on.", "N", int, low=0), ANEW, JSON,
+      Option("seed", "Seed of --sample.", None, int, 0, low=0))),
+    ("list", "The architectures that fit.", entries, (*FILTER, KEPT, JSON)),
+    ("show", "One architecture, drawn and in full; one that is not in the catalog is studied now.", show,
+     (Option("word", "An architecture, as '3(Rz*-Rz-Rz)'.", "WORD", default=NEEDED, argument=True),
+      output("Write a robot of this architecture (.urdf, or another dialect)."), KEPT, JSON)),
+    ("site", "Pages of the architectures that fit: a list that filters, drawings, derivations, robot files; needs no "
+     "server.", site,
+     (output("A new or empty folder, or an older site, which is replaced.", "DIR", NEEDED), *FILTER, WORKERS, ANEW,
+      KEPT, JSON)),
+)
+for name, words, run, options in COMMANDS:
+    add_command(catalog, name, words, options, run)

@@ -1,106 +1,104 @@
-"""Options that several commands share: a robot, what is watched, which architectures of the catalog."""
+"""Options as data: each is declared once, the commands' tables put them together, typer reads them."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, fields, is_dataclass
-from typing import TYPE_CHECKING, Annotated, Any, get_type_hints
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
 
-Json = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object.")]
-Observe = Annotated[str, typer.Option("--observe", metavar="LEGS", help="Legs to watch (1,4), links, or all.")]
-Camera = Annotated[str | None, typer.Option("--camera", metavar="LINK", help="The link that carries the camera.")]
-Start = Annotated[str, typer.Option("--from", metavar="POSE", help="Where it starts, as x=0.02,y=0.1,z=-0.7.")]
-Seed = Annotated[int, typer.Option("--seed", min=0, help="Seed of the random configurations.")]
+NEEDED: Any = inspect.Parameter.empty
+"""The default of what must be given."""
 
 
 @dataclass(frozen=True)
-class Source:
-    """A robot as the command line names it, with what its file does not say."""
+class Option:
+    """One option or (``argument``) one word of the command line; ``flags`` are its names, by default its own."""
 
-    robot: Annotated[str, typer.Argument(metavar="ROBOT", help="A robot file in any dialect, or the name of a shipped "
-                                         "robot.")]
-    base: Annotated[str | None, typer.Option(metavar="LINK", help="Look only at what lies between this link and the "
-                                             "platform.")] = None
-    platform: Annotated[str | None, typer.Option(metavar="LINK", help="The platform, where the file names "
-                                                 "none.")] = None
-    motors: Annotated[str | None, typer.Option(metavar="JOINTS", help="The driven joints, where the file names "
-                                               "none.")] = None
-    close: Annotated[list[str] | None, typer.Option(metavar="A:B[:TYPE]", help="A closure: the frames of two links "
-                                                    "meet (default: in a point); again for more.")] = None
-    freeze: Annotated[str, typer.Option(metavar="JOINTS", help="Joints to hold at zero.")] = ""
+    name: str
+    help: str
+    metavar: str | None = None
+    kind: Any = str
+    default: Any = None
+    flags: tuple[str, ...] = ()
+    low: float | None = None
+    high: float | None = None
+    argument: bool = False
 
-    def load(self) -> Mechanism:
-        """The mechanism; what was guessed or solved goes to standard error, a line each."""
-        from ..description import load
-
-        frozen = [name for name in self.freeze.split(",") if name]
-        mechanism = load(self.robot, base=self.base, platform=self.platform, motors=self.motors,
-                         close=self.close or (), freeze=frozen)
-        for note in mechanism.notes:
-            typer.echo(f"hrsynth: {note}", err=True)
-        return mechanism
-
-    def require_other(self, mechanism: Mechanism, *files: str) -> None:
-        """Refuse to write over a file that is read."""
-        from ..description.files import require_other
-
-        for file in files:
-            require_other(file, self.robot, mechanism.file)
+    def parameter(self) -> inspect.Parameter:
+        """As typer reads it from a signature."""
+        kind = self.kind if self.default is not None else self.kind | None
+        told: Any
+        if self.argument:
+            told = typer.Argument(metavar=self.metavar, help=self.help)
+        else:
+            flags = self.flags or (f"--{self.name.replace('_', '-')}",)
+            told = typer.Option(*flags, metavar=self.metavar, help=self.help, min=self.low, max=self.high)
+        return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=self.default,
+                                 annotation=Annotated[kind, told])
 
 
-@dataclass(frozen=True)
-class Filter:
-    """Which architectures of the catalog are asked for."""
-
-    legs: Annotated[str | None, typer.Option(metavar="LEGS", help="Number of legs, or a pattern of the notation or of "
-                                             "one leg's chain: 3-R*, PUS.")] = None
-    dof: Annotated[int | None, typer.Option(help="Freedoms of the platform.")] = None
-    motion: Annotated[str | None, typer.Option(help="Its translations and turns, as 3T or 2T1R.")] = None
-    verdict: Annotated[str | None, typer.Option(help="controllable, partially controllable, uncontrollable.")] = None
-    group: Annotated[str | None, typer.Option(help="planar, pods, deltas, spatial.")] = None
-    base_motors: Annotated[bool | None, typer.Option("--base-motors/--moving-motors", help="All motors on the base, or "
-                                                     "not.")] = None
-    fewest: Annotated[int | None, typer.Option(help="Legs to watch to see all that can be seen.")] = None
-    text: Annotated[str | None, typer.Option(help="What occurs in any field.")] = None
-
-    def asked(self) -> dict[str, Any]:
-        """As the catalog takes it."""
-        return asdict(self)
+def flag(name: str, help: str) -> Option:
+    """An option that is given or not."""
+    return Option(name, help, kind=bool, default=False)
 
 
-def unfolded(command: Callable[..., None]) -> Callable[..., None]:
-    """A command in which each parameter that is a dataclass gives way to the dataclass's fields; what must be given
-    comes first."""
-    signature = inspect.signature(command, eval_str=True)
-    given = signature.parameters.items()
-    groups: dict[str, Any] = {name: each.annotation for name, each in given if is_dataclass(each.annotation)}
-    parameters = []
-    for name, each in given:
-        parameters += _fields(groups[name]) if name in groups else [each]
-    parameters.sort(key=lambda each: each.default is not each.empty)
-
-    def run(**values: Any) -> None:
-        for name, group in groups.items():
-            values[name] = group(**{each.name: values.pop(each.name) for each in fields(group)})
-        command(**values)
-
-    run.__name__, run.__doc__ = command.__name__, command.__doc__
-    run.__signature__ = signature.replace(  # type: ignore[attr-defined]
-        parameters=[each.replace(kind=inspect.Parameter.KEYWORD_ONLY) for each in parameters])
-    run.__annotations__ = {each.name: each.annotation for each in parameters}
-    return run
+def output(help: str, metavar: str = "FILE", default: Any = None) -> Option:
+    """What is written with ``-o``."""
+    return Option("output", help, metavar, default=default, flags=("-o", "--output"))
 
 
-def _fields(group: Any) -> list[inspect.Parameter]:
-    """The fields of a dataclass as parameters, their annotations evaluated."""
-    hints = get_type_hints(group, include_extras=True)
-    return [each.replace(annotation=hints[name]) for name, each in inspect.signature(group).parameters.items()]
+JSON = flag("json", "Print the result as one JSON object.")
+OBSERVE = Option("observe", "Legs to watch (1,4), links, or all.", "LEGS", default="all")
+CAMERA = Option("camera", "The link that carries the camera.", "LINK")
+WATCHED = (OBSERVE, CAMERA)
+SEED = Option("seed", "Seed of the random configurations.", kind=int, default=0, low=0)
+SOURCE = (
+    Option("robot", "A robot file in any dialect, or the name of a shipped robot.", "ROBOT", default=NEEDED,
+           argument=True),
+    Option("base", "Look only at what lies between this link and the platform.", "LINK"),
+    Option("platform", "The platform, where the file names none.", "LINK"),
+    Option("motors", "The driven joints, where the file names none.", "JOINTS"),
+    Option("close", "A closure: the frames of two links meet (default: in a point); again for more.", "A:B[:TYPE]",
+           kind=list[str]),
+    Option("freeze", "Joints to hold at zero.", "JOINTS", default=""),
+)
+"""A robot as the command line names it, with what its file does not say."""
+
+
+def add_command(app: typer.Typer, name: str, help: str, options: Sequence[Option], run: Callable[..., None]) -> None:
+    """Add a command: what must be given comes first, ``run`` is called with all by name."""
+    parameters = sorted((each.parameter() for each in options), key=lambda each: each.default is not NEEDED)
+
+    def called(**values: Any) -> None:
+        run(**values)
+
+    called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
+    called.__annotations__ = {each.name: each.annotation for each in parameters}
+    app.command(name, help=help)(called)
+
+
+def robot_of(values: dict[str, Any]) -> Mechanism:
+    """The mechanism that the options of ``SOURCE`` name, which are taken out of ``values``; what was guessed or solved
+    goes to standard error, a line each."""
+    from ..description import load
+
+    given = {option.name: values.pop(option.name) for option in SOURCE}
+    given["freeze"] = [name for name in given["freeze"].split(",") if name]
+    mechanism = load(given.pop("robot"), **{**given, "close": given["close"] or ()})
+    for note in mechanism.notes:
+        warn(str(note))
+    return mechanism
+
+
+def warn(text: str) -> None:
+    """Say something beside the answer."""
+    typer.echo(f"hrsynth: {text}", err=True)
 
 
 def listed(text: str) -> list[str]:

@@ -31,7 +31,7 @@ class Mismatch:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Certificate(Result):
+class Certificate(Result, shown_as="certificate"):
     """What was compared: configurations, the largest angle between ρ and ρ_H, the smallest rank gap, the largest
     residual at which the hidden robot follows; ``reason`` says why it did not pass."""
 

@@ -174,7 +174,7 @@ class Note:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Mechanism(Result):
+class Mechanism(Result, shown_as="robot"):
     """Links, joints, a base, a platform, observations: a frozen value; every change returns a new one."""
 
     name: str

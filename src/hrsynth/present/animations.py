@@ -24,7 +24,7 @@ WANTED = 0.45
 """How bright what the camera is to see is beneath what it sees."""
 
 
-def film(found: Servo) -> bytes:
+def animation(found: Servo) -> bytes:
     """The run as GIF, at equal parts of its way; raises ``MissingExtra``, ``NotRendered``."""
     from PIL import Image
 

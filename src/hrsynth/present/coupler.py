@@ -11,7 +11,7 @@ from ..geometry.vectors import Array, perpendicular, unit
 
 STEPS = 1440
 """Places on the first curve at which the bar is tried, to find where it reaches the second."""
-LONGEST = 12.0
+LINE_FOLLOWED = 12.0
 """A line is followed over this many lengths of the bar and radii at most."""
 
 Chain = tuple[Array, Array]
@@ -135,8 +135,8 @@ def _range(one: Curve, other: Curve, length: float) -> tuple[float, float]:
         return middle - reach, middle + reach
     cosine = float(one.direction @ other.direction)
     sine = np.sqrt(max(1.0 - cosine**2, 0.0))
-    if sine < 1.0 / LONGEST:
-        return middle - LONGEST * length, middle + LONGEST * length
+    if sine < 1.0 / LINE_FOLLOWED:
+        return middle - LINE_FOLLOWED * length, middle + LINE_FOLLOWED * length
     middle = float(between @ (one.direction - cosine * other.direction)) / sine**2
     return middle - 1.01 * length / sine, middle + 1.01 * length / sine
 

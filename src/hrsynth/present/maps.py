@@ -1,38 +1,137 @@
-"""A grid of checked poses → a picture or a table."""
+"""Values over a line, plane or box of poses → pictures and tables: how far a singularity is, where a freedom is lost,
+how large errors are (MMT Figs. 19-21)."""
 
 from __future__ import annotations
 
 import csv
 import io
-from pathlib import Path
+from collections.abc import Callable, Iterator
+from itertools import product
+from typing import TYPE_CHECKING, Any
 
-from ..analysis.check import MEASURES, Check, GridCheck
-from ..description.files import require_folder, write_whole
+import numpy as np
+from numpy.typing import NDArray
+
+from ..analysis.check import MEASURES, UNREACHABLE
+from ..analysis.posture import CONSTRAINT, UNDECIDED
 from ..errors import BadRequest
+from ..geometry.vectors import Array
 from ..mechanism.pose import PARTS
-from .plots import distance_map
+from ..tolerances import DARKEST_DISTANCE, DISTANCE_FLOOR
+from . import plots
+from .plots import MapPlane, along, cell_edges, entry, heading, missing_entry, panels, png, tick_values
 
-FORMATS = (".png", ".csv")
+if TYPE_CHECKING:
+    from ..analysis.accuracy.accuracy import Accuracy
+    from ..analysis.accuracy.field import Field as ErrorField
+    from ..analysis.check import Check, GridCheck
+    from ..analysis.singularity.locus import Locus, SingularityMap
+    from ..analysis.singularity.singular import Singularity
+    from ..mechanism.pose import Pose
+
+MARKS = {"type1": ("^", "Type 1"), "type2": ("o", "Type 2"), "type3": ("D", "Type 3"),
+         CONSTRAINT: ("s", "constraint singularity"), UNDECIDED: ("X", "not decided")}
+"""Marks of singular poses by their state."""
+VALUE = "smallest singular value of $M^T$"
+LOCI = {"hidden robot": ("crimson", "solid", "o"), "real robot": ("royalblue", "dashed", "s")}
+NEAR_TYPE_1 = 0.5
+"""Fraction of its median to which the distance to Type 1 falls at a boundary of that kind."""
+ERRORS = "cividis"
+"""A scale that readers with any colour vision see in the same order."""
+HIGHEST = 30.0
+"""Multiple of the median error at which the scale ends."""
 
 
-def writable(path: str, grid: str | None) -> None:
-    """Raise ``BadRequest`` where there is nothing to write, or the ending of the name is no format."""
-    if grid is None:
-        raise BadRequest("only a grid of poses is written", path, "--output together with --grid")
-    if Path(path).suffix.lower() not in FORMATS:
-        raise BadRequest("cannot write the grid: unknown ending", path, FORMATS)
-    require_folder(path)
+def distance_map(found: Check) -> bytes:
+    """The distance to Type 2 singularities over a grid: a curve for a line of poses, a colour map for a plane, one map
+    for each value of the third part for a box. Raises ``BadRequest`` where Mᵀ exists nowhere."""
+    grid = found.grid
+    assert grid is not None
+    if all(value is None for value in grid.values("type2")):
+        what = "no pose of the grid is reached" if set(grid.states) == {UNREACHABLE} else "Mᵀ exists nowhere"
+        raise BadRequest(f"{found.setting.robot.name}: there is nothing to draw: {what}", None,
+                         "another grid, or a table (.csv)")
+    numbers = np.array([np.nan if value is None else value for value in grid.values("type2")]).reshape(grid.grid.shape)
+    states = np.array(grid.states).reshape(grid.grid.shape)
+    figure = (_distance_curve if grid.grid.ndim == 1 else _distance_maps)(grid, numbers, states)
+    entries = [missing_entry()] if UNREACHABLE in grid.states else []
+    entries += [entry(label, linestyle="", marker=mark, color="red", markeredgecolor="white")
+                for state, (mark, label) in MARKS.items() if state in grid.states]
+    plots.legend(figure, entries, len(entries))
+    heading(figure, f"{found.setting.robot.name}: distance to Type 2 singularities, legs "
+            f"{', '.join(found.setting.labels)} observed", grid.grid.fixed)
+    return png(figure)
 
 
-def write(found: Check, path: str) -> None:
-    """Write the grid of a check, whole or not at all; raises ``BadRequest``."""
-    assert found.grid is not None
-    write_whole(path, distance_map(found) if Path(path).suffix.lower() == ".png" else table(found.grid).encode())
+def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_]) -> Any:
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm
+
+    pname, ps = (*grid.grid.axes, ("", np.zeros(1)))[2]
+    shape = (*grid.grid.shape[:2], -1)
+    numbers, states = numbers.reshape(shape), states.reshape(shape)
+    columns = min(len(ps), 4)
+    rows = -(-len(ps) // columns)
+    size = 3.6 if columns > 1 else 5.6
+    plane = MapPlane.of(grid.grid.axes, 0.3, 2.0)
+    figure, axes = panels(rows, columns, size * columns + 1.4, (size * plane.tall + 0.7) * rows + 0.8)
+    low, high, ticks = _scale(numbers)
+    norm = LogNorm(low, high)
+    for k, place in enumerate(axes[: len(ps)]):
+        _distances(place, plane, np.maximum(numbers[..., k], low), states[..., k], norm)
+        plane.finish(place)
+        if pname:
+            plots.layer_title(place, pname, tick_values(pname, ps)[k])
+    for place in axes[len(ps):]:
+        place.set_visible(False)
+    below = "min" if np.nanmin(numbers) < low else "neither"
+    bar = figure.colorbar(ScalarMappable(norm, "viridis"), ax=list(axes), label=f"{VALUE} (logarithmic)", extend=below)
+    bar.set_ticks(list(ticks), labels=[f"{value:.2g}" for value in ticks])
+    bar.minorticks_off()
+    return figure
 
 
-def table(grid: GridCheck) -> str:
+def _distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray[np.str_], norm: Any) -> None:
+    """One plane: colours, white where there is no Mᵀ, marks on singular cells."""
+    plane.cells(place, numbers, norm=norm, cmap="viridis")
+    blank = (states != UNREACHABLE) & ~np.isfinite(numbers)
+    place.pcolormesh(cell_edges(plane.x), cell_edges(plane.y), np.ma.masked_where(~blank.T, blank.T), cmap="gray",
+                     vmin=0, vmax=1)
+    for state, (mark, _) in MARKS.items():
+        i, j = np.nonzero(states == state)
+        place.scatter(plane.x[i], plane.y[j], marker=mark, s=26, color="red", edgecolor="white", linewidth=0.6)
+
+
+def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_]) -> Any:
+    ((name, values),) = grid.grid.axes
+    x = tick_values(name, values)
+    figure, (place,) = panels(1, 1, 7.0, 4.6)
+    low, high, ticks = _scale(numbers)
+    floor = low / (high / low) ** 0.1 if np.nanmin(numbers) < low else low
+    place.semilogy(x, np.where(numbers < low, np.nan, numbers), ".-", color="C0")
+    place.minorticks_off()
+    place.set_yticks(list(ticks), labels=[f"{value:.2g}" for value in ticks])
+    for state, (mark, _) in MARKS.items():
+        hit = states == state
+        place.scatter(x[hit], np.fmax(numbers[hit], floor), marker=mark, s=36, color="red",
+                      edgecolor="white", linewidth=0.6, zorder=3)
+    along(place, name, x, states == UNREACHABLE, VALUE)
+    return figure
+
+
+def _scale(numbers: Array) -> tuple[float, float, Array]:
+    """The ends of a logarithmic scale for values that may be zero, and places for its ticks."""
+    high = float(np.nanmax(numbers)) or 1.0
+    regular = numbers[numbers > DISTANCE_FLOOR * high]
+    low = float(regular.min()) if regular.size else DISTANCE_FLOOR * high
+    low = low if low < 0.9 * high else 0.5 * high
+    return low, high, np.geomspace(low, high, 6)
+
+
+def check_table(found: Check) -> bytes:
     """Comma-separated values: a line a pose (metres, radians), its state, and what was measured there."""
-    stream = io.StringIO()
+    assert found.grid is not None
+    grid, stream = found.grid, io.StringIO()
     given = [name for name in PARTS if grid.grid.poses()[0].given.get(name)]
     lines = csv.writer(stream, lineterminator="\n")
     lines.writerow([*given, "state", *MEASURES])
@@ -40,4 +139,184 @@ def table(grid: GridCheck) -> str:
     for i, (pose, state) in enumerate(zip(grid.grid.poses(), grid.states, strict=True)):
         values = ["/".join(map(repr, pose.given[name])) for name in given]
         lines.writerow([*values, state, *("" if column[i] is None else repr(column[i]) for column in columns)])
-    return stream.getvalue()
+    return stream.getvalue().encode()
+
+
+def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int,
+          progress: Callable[[str], None] | None) -> Locus:
+    """Where a freedom is lost over a plane of poses."""
+    from ..analysis.singularity.singular import locus_of
+
+    return locus_of(found.setting, plane=plane, steps=steps, progress=progress)
+
+
+def locus_map(found: Singularity, drawn: Locus) -> bytes:
+    """Type 2 loci of the hidden and the real robot over a plane, the Type 1 boundary and what is not reached (PNG)."""
+    plane = MapPlane.of(drawn.grid.axes, 0.4, 1.6)
+    figure, (place,) = panels(1, 1, 7.2, 6.0 * plane.tall + 1.6)
+    shade = np.log10(np.maximum(drawn.hidden.type2, DARKEST_DISTANCE))
+    plane.cells(place, np.where(np.isfinite(drawn.hidden.type2), shade, np.nan), cmap="Greys_r",
+                vmin=np.nanmin(shade), vmax=np.nanmax(shade) + 1.0)
+    _boundary(place, plane, drawn)
+    entries: list[Any] = []
+    for name, field in (("real robot", drawn.real), ("hidden robot", drawn.hidden)):
+        if field is not None:
+            entries.insert(0, _drawn_locus(place, plane, field, name))
+    plane.finish(place, xlim=plane.x[[0, -1]], ylim=plane.y[[0, -1]])
+    entries += [entry("Type 1 boundary", linestyle="", marker="o", markersize=4, color="darkorange"),
+                entry("other limit of reach", linestyle="", marker="o", markersize=4, color="black"), missing_entry()]
+    plots.legend(figure, entries, 3, fontsize=9)
+    heading(figure, f"{found.setting.robot.name}: Type 2 singularities, legs {', '.join(found.setting.labels)} "
+            "observed", drawn.grid.fixed)
+    return png(figure)
+
+
+def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) -> Any:
+    """Draw where a freedom is lost, as a curve or as points; its entry in the legend."""
+    colour, style, mark = LOCI[name]
+    met = field.signed and plane.sign_change(place, field.value, colour, 2.0, style)
+    for x, y in field.spots:
+        place.plot(*(tick_values(part, np.array([v])) for part, v in zip(plane.names, (x, y), strict=True)), mark,
+                   color=colour, markeredgecolor="white", markersize=9)
+    shape = {"linestyle": style} if field.signed else {"linestyle": "", "marker": mark}
+    return entry(f"{name}: Type 2{'' if met or len(field.spots) else ' (none here)'}", color=colour, linewidth=2.0,
+                 **shape)
+
+
+def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> None:
+    """The reached poses at the border, those near a Type 1 singularity in orange."""
+    reached = np.isfinite(drawn.hidden.type2)
+    padded = np.pad(reached, 1)
+    inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
+    border = reached & ~inside
+    near = np.zeros_like(reached)
+    for field in (drawn.hidden, drawn.real):
+        if field is not None:
+            padded = np.pad(np.where(reached, field.type1, np.inf), 2, constant_values=np.inf)
+            around = [padded[i : i + reached.shape[0], j : j + reached.shape[1]] for i in range(5) for j in range(5)]
+            near |= np.min(around, axis=0) < NEAR_TYPE_1 * np.nanmedian(field.type1)
+    for cells, colour in ((border & near, "darkorange"), (border & ~near, "black")):
+        i, j = np.nonzero(cells)
+        place.scatter(plane.x[i], plane.y[j], s=9, color=colour, marker="o", linewidth=0)
+
+
+def error_map(found: Accuracy) -> bytes:
+    """Position and orientation errors (the latter where there are any): maps with the singular locus and the border of
+    what is reached drawn over for a plane, a row of maps for a box, curves for a line (PNG)."""
+    field = found.field
+    assert field is not None
+    shown = [(1e3 * field.position, "largest position error (mm)"),
+             (np.degrees(field.orientation), "largest orientation error (degrees)")]
+    shown = [(values, label) for values, label in shown if np.nanmax(values, initial=0.0) > 0]
+    if not shown:
+        raise BadRequest("there is nothing to draw", str(field.grid.fixed), "a robot whose platform has errors")
+    figure, locus = _error_curves(field, shown) if field.grid.ndim == 1 else _error_maps(field, shown)
+    plots.legend(figure, _error_entries(field, locus), 3 if figure.get_figwidth() > 8 else 1, fontsize=9)
+    legs = ", ".join(f"{o.leg} within {np.degrees(cone):.3g}°"
+                     for o, cone in zip(found.setting.observed, found.cones, strict=True))
+    heading(figure, f"{found.setting.robot.name}: largest errors\nobserved legs: {legs}", field.grid.fixed, "; ")
+    return png(figure)
+
+
+def _error_maps(field: ErrorField, shown: list[tuple[Array, str]]) -> tuple[Any, bool]:
+    """The figure, and whether a place where a freedom is lost is in it."""
+    from matplotlib.cm import ScalarMappable
+    from matplotlib.colors import LogNorm
+
+    pname, ps = (*field.grid.axes, ("", np.zeros(1)))[2]
+    flat = field.grid.ndim == 2
+    plane = MapPlane.of(field.grid.axes, 0.4, 1.6)
+    rows, columns = (1, len(shown)) if flat else (len(shown), len(ps))
+    size = 5.0 if flat else 3.0
+    figure, axes = panels(rows, columns, size * columns + (1.4 * len(shown) if flat else 1.4),
+                          (size * plane.tall + 0.8) * rows + (0.5 if flat else 0.0))
+    locus = False
+    for number, (values, label) in enumerate(shown):
+        low, high = _ends(values)
+        norm = LogNorm(low, high)
+        places = axes[number : number + 1] if flat else axes[number * columns : (number + 1) * columns]
+        for k, place in enumerate(places):
+            layer = values if flat else values[..., k]
+            plane.cells(place, np.where(np.isinf(layer), high, layer), norm=norm, cmap=ERRORS)
+            missing = np.isnan(layer)
+            if missing.any() and not missing.all():
+                place.contour(plane.x, plane.y, missing.T.astype(float), levels=[0.5], colors=["black"],
+                              linewidths=1.6)
+            if not flat and field.determinant is not None:
+                locus |= _lost(place, plane, field.determinant[..., k])
+            plane.finish(place, xlim=cell_edges(plane.x)[[0, -1]], ylim=cell_edges(plane.y)[[0, -1]])
+            if pname:
+                plots.layer_title(place, pname, tick_values(pname, ps)[k])
+        bar = figure.colorbar(ScalarMappable(norm, ERRORS), ax=list(places), label=f"{label}, logarithmic",
+                              extend="max" if np.nanmax(values) > high else "neither", shrink=0.9)
+        ticks = np.geomspace(low, high, 6) if high > 1.3 * low else np.array([np.nanmin(values)])
+        bar.set_ticks(list(ticks), labels=[np.format_float_positional(value, 2, fractional=False, trim="-")
+                                         for value in ticks])
+        bar.minorticks_off()
+    return figure, (flat and _locus(field, axes[: len(shown)], plane)) or locus
+
+
+def _ends(values: Array) -> tuple[float, float]:
+    """The ends of a logarithmic scale: the smallest error, and the largest unless that is far above the median."""
+    finite = values[np.isfinite(values) & (values > 0)]
+    low, high = float(finite.min()), float(min(finite.max(), HIGHEST * np.median(finite)))
+    return (low, high) if high > 1.01 * low else (0.9 * low, 1.1 * low)
+
+
+def _locus(field: ErrorField, places: Any, plane: MapPlane) -> bool:
+    """Draw where a freedom is lost, white on black; whether there is such a pose."""
+    from ..analysis.accuracy.singular_search import singular_poses
+
+    if field.determinant is not None:
+        return all([_lost(place, plane, field.determinant) for place in places])
+    spots = singular_poses(field)
+    for place in places if len(spots) else ():
+        columns = [tick_values(name, spots[:, k]) for k, name in enumerate(field.grid.names)]
+        place.plot(*columns, "o", color="white", markeredgecolor="black", markersize=3.2, markeredgewidth=0.7)
+    return len(spots) > 0
+
+
+def _lost(place: Any, plane: MapPlane, determinant: Array) -> bool:
+    """Draw where a determinant changes its sign, white on black; whether it does."""
+    strokes = (("black", 3.4), ("white", 1.6))
+    return all([plane.sign_change(place, determinant, colour, width) for colour, width in strokes])
+
+
+def _error_curves(field: ErrorField, shown: list[tuple[Array, str]]) -> tuple[Any, bool]:
+    ((name, values),) = field.grid.axes
+    x = tick_values(name, values)
+    figure, axes = panels(len(shown), 1, 7.0, 3.0 * len(shown) + 1.2)
+    for place, (errors, label) in zip(axes, shown, strict=True):
+        place.semilogy(x, np.where(np.isfinite(errors), errors, np.nan), ".-", color="C0")
+        along(place, name, x, np.isnan(errors), label, which="both")
+    return figure, False
+
+
+def _error_entries(field: ErrorField, locus: bool) -> list[Any]:
+    """What white lines or points, black lines and hatching mean, of those that occur."""
+    from matplotlib.patheffects import Normal, Stroke
+
+    entries: list[Any] = []
+    if locus:
+        outlined = [Stroke(linewidth=3.4, foreground="black"), Normal()]
+        mark = {"marker": "o", "linestyle": ""} if field.determinant is None else {"path_effects": outlined}
+        entries.append(entry("Type 2 singularities of the hidden robot", color="white", linewidth=1.6,
+                             markeredgecolor="black", **mark))
+    if not field.reached.all():
+        if field.grid.ndim > 1:
+            entries.append(entry("border of what is reached", color="black", linewidth=1.6))
+        entries.append(missing_entry())
+    return entries
+
+
+def error_table(found: Accuracy) -> Iterator[bytes]:
+    """Comma-separated values: a line a pose (metres, radians), empty where it is not reached, inf where a freedom is
+    lost."""
+    field = found.field
+    assert field is not None
+    yield ",".join((*field.grid.names, "position_mm", "orientation_deg")).encode() + b"\n"
+    columns = 1e3 * field.position.ravel(), np.degrees(field.orientation.ravel())
+    for place, *errors in zip(product(*(values.tolist() for _, values in field.grid.axes)),
+                              *(column.tolist() for column in columns), strict=True):
+        cells = [*map(repr, place), *("" if error != error else repr(error) for error in errors)]
+        yield ",".join(cells).encode() + b"\n"

@@ -5,16 +5,15 @@ from __future__ import annotations
 import io
 import json
 from collections.abc import Iterator
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ..analysis.modes.modes import AssemblyModes
-from ..description.files import require_folder, write_whole
 from ..errors import BadRequest
 from ..geometry.vectors import Array
-from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, Placed, Scene, scene
+from .plots import empty_figure, entry
+from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, ModesScene, Placed, scene
 from .sketch import Box, Sketch
 
 MARKS = {GOAL: ("*", 15.0, "the pose itself"), CLOSES: ("o", 8.0, "mode, robot can be assembled"),
@@ -33,20 +32,6 @@ SIDE, LEFT, GAP, BELOW, ABOVE, TITLE = 5.2, 0.8, 0.3, 1.05, 0.9, 0.25
 
 WIDEST, SIGN = 112, 6
 """Letters of a legend in one row at most, and what the sign of an entry takes of them."""
-
-
-def writable(output: str | None) -> None:
-    """Raise ``BadRequest`` where the file's ending is no format, or its folder is not there."""
-    if output is None:
-        return
-    if Path(output).suffix.lower() != ".png":
-        raise BadRequest("cannot draw the modes: unknown ending", output, ".png")
-    require_folder(output)
-
-
-def write(found: AssemblyModes, file: str) -> None:
-    """Draw the modes in a file, whole or not at all; raises ``BadRequest`` where there is nothing to draw."""
-    write_whole(file, picture(found))
 
 
 def picture(found: AssemblyModes) -> bytes:
@@ -71,7 +56,7 @@ def nothing(found: AssemblyModes) -> str | None:
     return None
 
 
-def shown(found: AssemblyModes) -> Scene:
+def shown(found: AssemblyModes) -> ModesScene:
     """What there is to draw; raises ``BadRequest`` where there is nothing."""
     why = nothing(found)
     if why is not None:
@@ -79,24 +64,20 @@ def shown(found: AssemblyModes) -> Scene:
     return scene(found)
 
 
-def described(found: AssemblyModes, drawn: Scene) -> dict[str, Any]:
+def described(found: AssemblyModes, drawn: ModesScene) -> dict[str, Any]:
     """What was asked for and what is drawn, in a few numbers: enough to tell whether a picture is out of date."""
     return {"robot": found.setting.robot.name, "observe": list(found.setting.labels), "real": found.kind == "real",
             "at": str(found.pose), "complex": found.found.complex, **drawn.to_dict()}
 
 
-def figure(found: AssemblyModes, drawn: Scene) -> Any:
+def figure(found: AssemblyModes, drawn: ModesScene) -> Any:
     """The picture as a matplotlib figure."""
-    from matplotlib.backends.backend_agg import FigureCanvasAgg
-    from matplotlib.figure import Figure
-
     placed = drawn.placed[:MOST]
     columns, rows = _grid(len(placed))
     cell = SIDE / rows
     top = BELOW + (SIDE + cell * -(-len(placed) // columns)) / 2
     page = np.array([LEFT + SIDE + GAP + columns * cell, BELOW + SIDE + ABOVE])
-    whole = Figure(figsize=tuple(page), dpi=DPI)
-    FigureCanvasAgg(whole)
+    whole = empty_figure(*page, dpi=DPI)
     lines = [trace.points for trace in drawn.traces if trace.points.ndim == 2 and not trace.moving]
     sketch = Sketch.of(drawn.normal, np.array([each.at for each in drawn.placed]), lines)
     _curves(sketch, whole, _box(page, 0.0 if drawn.normal is None else LEFT, BELOW, LEFT + SIDE, BELOW + SIDE), drawn)
@@ -129,7 +110,7 @@ def _colour(k: int) -> str:
     return COLOURS[k % len(COLOURS)]
 
 
-def _curves(sketch: Sketch, whole: Any, box: Box, drawn: Scene) -> None:
+def _curves(sketch: Sketch, whole: Any, box: Box, drawn: ModesScene) -> None:
     """What decides the modes, the platform at each (in a plane the robot), and their numbers."""
     few = len(drawn.placed) <= FEW
     legs = [each.strokes if few and sketch.flat else () for each in drawn.placed]
@@ -161,7 +142,7 @@ def _mark(sketch: Sketch, place: Any, each: Placed, k: int, scale: float) -> Non
                   markeredgecolor="black", markeredgewidth=0.7, zorder=6)
 
 
-def _robot(sketch: Sketch, place: Any, drawn: Scene, each: Placed, k: int) -> None:
+def _robot(sketch: Sketch, place: Any, drawn: ModesScene, each: Placed, k: int) -> None:
     """The robot at one mode; its platform alone where the robot does not close."""
     for stroke in each.strokes:
         sketch.stroke(place, stroke, color="0.35", linewidth=1.2, marker="o", markersize=2.4, zorder=3)
@@ -171,7 +152,7 @@ def _robot(sketch: Sketch, place: Any, drawn: Scene, each: Placed, k: int) -> No
     _mark(sketch, place, each, k, 0.8)
 
 
-def _heading(whole: Any, found: AssemblyModes, drawn: Scene) -> None:
+def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> None:
     setting, count = found.setting, found.found
     held = f"directions of legs {', '.join(setting.labels)}" if found.kind == "hidden" else "motor coordinates"
     many = f"{len(found.modes)} real of {count.complex} complex" + ("" if count.complete else ", not proved to be all")
@@ -184,7 +165,7 @@ def _heading(whole: Any, found: AssemblyModes, drawn: Scene) -> None:
     whole.suptitle(title, fontsize=12, y=0.985, va="top")
 
 
-def _colours(drawn: Scene) -> Iterator[str]:
+def _colours(drawn: ModesScene) -> Iterator[str]:
     """A colour for each trace: one for what the platform traces, others for the reach of each leg."""
     k = 0
     for trace in drawn.traces:
@@ -192,18 +173,17 @@ def _colours(drawn: Scene) -> Iterator[str]:
         k += not trace.moving
 
 
-def _legend(whole: Any, drawn: Scene) -> None:
-    from matplotlib.lines import Line2D
+def _legend(whole: Any, drawn: ModesScene) -> None:
     from matplotlib.patches import Patch
 
     entries: dict[str, Any] = {}
     for trace, colour in zip(drawn.traces, _colours(drawn), strict=True):
         entries.setdefault(trace.words, Patch(facecolor=colour, alpha=0.4) if trace.points.ndim == 3
-                           else Line2D([], [], color=colour, linewidth=1.8))
+                           else entry("", color=colour, linewidth=1.8))
     for state in dict.fromkeys(each.state for each in drawn.placed):
         mark, size, words = MARKS[state]
-        entries[words] = Line2D([], [], linestyle="", marker=mark, markersize=0.8 * size, color="0.6",
-                                markeredgecolor="black")
+        entries[words] = entry("", linestyle="", marker=mark, markersize=0.8 * size, color="0.6",
+                               markeredgecolor="black")
     long = sum(len(words) + SIGN for words in entries) > WIDEST
     columns = -(-len(entries) // 2) if long else len(entries)
     whole.legend(list(entries.values()), list(entries), loc="lower center", ncols=columns, frameon=False, fontsize=9)

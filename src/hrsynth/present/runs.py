@@ -2,43 +2,18 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..description.files import require_folder, write_whole
-from ..errors import BadRequest
 from ..geometry.vectors import Array
-from ..simulation.pictures import drawing
 from ..simulation.result import Servo
-from .animations import film
+from ..tolerances import REST_OF_RUN, UNMOVED
 from .plots import panels, png
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Colours that colour-blind readers tell apart."""
 STYLES = ("solid", "dashed", "dashdot", "dotted", "solid", "dashed")
-FLAT = 1e-9
-"""Metres, radians below which the platform has not moved along an axis, or not turned."""
-SHOWN = 1e-3
-"""Part of the largest error below which the rest of a run is not drawn."""
-
-
-def writable(output: str | None) -> None:
-    """Raise ``BadRequest`` where the file's ending is no format, or its folder is not there, and ``MissingExtra``."""
-    if output is None:
-        return
-    ending = Path(output).suffix.lower()
-    if ending not in (".png", ".gif"):
-        raise BadRequest("cannot draw the run: unknown ending", output, ".png (curves) or .gif (what a camera sees)")
-    if ending == ".gif":
-        drawing()
-    require_folder(output)
-
-
-def write(found: Servo, file: str) -> None:
-    """Draw the run in a file, whole or not at all: curves (.png), or what a camera sees (.gif)."""
-    write_whole(file, film(found) if Path(file).suffix.lower() == ".gif" else picture(found))
 
 
 def picture(found: Servo) -> bytes:
@@ -51,12 +26,12 @@ def picture(found: Servo) -> bytes:
     errors.set(ylabel=r"error of the direction $\|e_i\|$", ylim=(0, None))
     errors.legend(frameon=False)
     path, goal = found.way, found.goal_position
-    moved = [i for i in range(3) if np.ptp(path[:, i]) > FLAT or abs(path[-1, i] - goal[i]) > FLAT] or [0]
+    moved = [i for i in range(3) if np.ptp(path[:, i]) > UNMOVED or abs(path[-1, i] - goal[i]) > UNMOVED] or [0]
     for i in moved:
         places.plot(times, path[:, i] - goal[i], color=COLOURS[i], linestyle=STYLES[i], label="xyz"[i])
     places.set(ylabel="position minus that of the goal (m)")
     places.legend(frameon=False)
-    if found.turns.max() > FLAT:
+    if found.turns.max() > UNMOVED:
         turns.plot(times, np.degrees(found.turns), color=COLOURS[0])
         turns.set(ylabel="turn away from the goal (degrees)", ylim=(0, max(1.0, 1.1 * np.degrees(found.turns.max()))))
     else:
@@ -65,7 +40,7 @@ def picture(found: Servo) -> bytes:
     for place in (errors, places, turns):
         place.axhline(0, color="0.6", linewidth=0.8)
         place.set(xlabel="time (s)", xlim=(0, _until(found) or 1.0))
-    _drawn(way, found, path, goal)
+    _draw_way(way, found, path, goal)
     legs = ", ".join(found.setting.labels)
     figure.suptitle(f"{found.setting.robot.name}, legs {legs} observed: ended at {_ENDS[found.ended]}\n"
                     f"from {found.start} to {found.goal}", fontsize=10)
@@ -80,11 +55,11 @@ _ENDS = {"goal": "the goal", "mode": "another assembly mode", "antipodal": "an a
 def _until(found: Servo) -> float:
     """The time (s) after which nothing is left to be seen."""
     sizes = found.errors.max(axis=1)
-    late = np.nonzero(sizes > SHOWN * sizes.max())[0]
+    late = np.nonzero(sizes > REST_OF_RUN * sizes.max())[0]
     return float(found.run.times[min(late[-1] + 1, len(sizes) - 1)]) if len(late) else float(found.run.times[-1])
 
 
-def _drawn(way: Any, found: Servo, path: Array, goal: Array) -> None:
+def _draw_way(way: Any, found: Servo, path: Array, goal: Array) -> None:
     """The way in the plane of the two coordinates that change most, with start, goal, end, and the other modes."""
     modes = [] if found.ending.modes is None else [mode for mode in found.ending.modes.modes if not mode.goal]
     ends = np.array([[getattr(mode.pose, name) for name in "xyz"] for mode in modes]).reshape(-1, 3)

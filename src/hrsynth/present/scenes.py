@@ -51,7 +51,7 @@ class Placed:
 
 
 @dataclass(frozen=True, eq=False)
-class Scene:
+class ModesScene:
     """What is drawn. ``normal`` (3,) is that of the plane in which everything moves, None in space; ``ground``
     (n, 3) are the centres of the base's joints; ``rest`` the legs whose curves are not drawn, though they count."""
 
@@ -85,7 +85,7 @@ class _Plot:
         return np.asarray(X[:3, :3] @ self.place + X[:3, 3])
 
 
-def scene(found: AssemblyModes) -> Scene:
+def scene(found: AssemblyModes) -> ModesScene:
     """What a picture of the modes shows; they must not be a continuum."""
     assert found.confined is not None
     plot = _PLOTS[found.confined.motion](found, found.confined)
@@ -97,7 +97,7 @@ def scene(found: AssemblyModes) -> Scene:
     mechanism = found.goal.twin.mechanism
     ground = np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
     rest = tuple(tip.leg for tip in found.confined.tips if plot.legs and tip.leg not in plot.legs)
-    return Scene(_normal(found), (*plot.traces, *drawn), placed, ground, rest)
+    return ModesScene(_normal(found), (*plot.traces, *drawn), placed, ground, rest)
 
 
 def _placed(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) -> Placed:

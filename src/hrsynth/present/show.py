@@ -1,30 +1,21 @@
-"""Results as they are shown outside the command line: text, HTML for notebooks, pictures."""
+"""Answers as they are shown: text, JSON, HTML for notebooks, pictures."""
 
 from __future__ import annotations
 
 import html as markup
+import json
 import re
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from .. import __version__
 from ..errors import BadRequest
 from ..results import Result
+from .outputs import OUTPUTS, function
 
 if TYPE_CHECKING:
     from ..mechanism.pose import Pose
-
-_TEXTS = {
-    "Accuracy": "accuracy.accuracy", "Advice": "advice.advice", "AssemblyModes": "modes.modes",
-    "Certificate": "verdicts.certificate", "Check": "check.check", "Derivation": "verdicts.derivation",
-    "Legs": "verdicts.legs", "Mechanism": "robot.robot", "PathAnswer": "aspects.path",
-    "Selection": "selection.selection", "Servo": "servo.servo", "Singularity": "singularity.singularity",
-    "Verdict": "verdicts.verdict",
-}
-"""What writes each kind of result, in ``present.text``."""
-_DRAWN = {"AssemblyModes": "modes.picture", "Servo": "runs.picture"}
-"""What draws each kind of result that needs no more, in ``present``."""
 
 
 @dataclass(frozen=True, repr=False)
@@ -54,11 +45,18 @@ class Picture:
         write_whole(file, self.content)
 
 
-def text(result: Result) -> str:
-    """The text that the command line prints of a result."""
-    module, name = _TEXTS[type(result).__name__].split(".")
-    written: str = getattr(import_module(f".text.{module}", __package__), name)(result)
+def text(result: Result, *files: str | None) -> str:
+    """The text that the command line prints of a result, with the names of the ``files`` that it was written to."""
+    written: str = function(OUTPUTS[result.shown_as].text)(result, *files)
     return written
+
+
+def record(command: str, robot: str | None, fields: dict[str, Any]) -> str:
+    """The JSON text of a command's answer: one object, always with ``command`` and ``version`` (no NaN, no
+    infinity)."""
+    head: dict[str, Any] = {} if robot is None else {"robot": robot}
+    return json.dumps({**head, "command": command, "version": __version__, **fields}, ensure_ascii=False, indent=2,
+                      allow_nan=False)
 
 
 def html(result: Result) -> str:
@@ -75,39 +73,13 @@ def draw(result: Result, *, plane: Pose | str | None = None, steps: int = 51) ->
 
     Raises ``BadRequest`` for a result that has no picture.
     """
-    kind = type(result).__name__
-    if kind != "Singularity" and plane is not None:
-        raise BadRequest("a plane is drawn", kind, "only of the result of singular")
-    if kind == "Derivation":
-        return Picture(_schemes(result).encode(), result.headline(), "svg")
-    if kind == "Singularity":
-        return Picture(_locus(result, plane, steps), result.headline())
-    if kind in _DRAWN:
-        module, name = _DRAWN[kind].split(".")
-        return Picture(getattr(import_module(f".{module}", __package__), name)(result), result.headline())
-    return Picture(_grid(result), result.headline())
-
-
-def _schemes(result: Any) -> str:
-    from .drawings.derived import derivation_svg
-
-    return derivation_svg(result)
-
-
-def _locus(result: Any, plane: Pose | str | None, steps: int) -> bytes:
-    from ..analysis.singularity.singular import locus_of
-    from .loci import locus_map
-
-    return locus_map(result, locus_of(result.setting, plane=plane, steps=steps))
-
-
-def _grid(result: Any) -> bytes:
-    from .accuracy import error_map
-    from .plots import distance_map
-
-    if getattr(result, "field", None) is not None:
-        return error_map(result)
-    if getattr(result, "grid", None) is not None:
-        return distance_map(result)
+    asked = {"plane": plane, "steps": steps, "seed": 0, "progress": None}
+    drawn = [(file, ending) for file in OUTPUTS[result.shown_as].files for ending in (".png", ".svg")
+             if ending in file.makers and (file.part is None or getattr(result, file.part) is not None)]
+    if plane is not None and not any("plane" in file.takes for file, _ in drawn):
+        raise BadRequest("a plane is drawn", type(result).__name__, "only of the result of singular")
+    for file, ending in drawn:
+        content, _ = file.content(result, ending, asked)
+        return Picture(b"".join([content] if isinstance(content, bytes) else content), result.headline(), ending[1:])
     raise BadRequest("there is no picture of", repr(result),
                      "derive, modes, servo, singular; check with a grid; accuracy with a plane or grid")

@@ -48,7 +48,7 @@ AUTO = "auto"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Selection(Result):
+class Selection(Result, shown_as="select"):
     """All sets of legs up to a size for one displacement: the kept ones, those not examined, the most accurate at the
     goal before the others in both, then the discarded ones."""
 

@@ -50,7 +50,7 @@ class Spread:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Servo(Result):
+class Servo(Result, shown_as="servo"):
     """A servo run: what was asked, the run, its ending, what it passed.
 
     With noise the ending is that of the same loop without noise, run on from where the noisy one stopped; ``spread`` is

@@ -16,7 +16,7 @@ from hrsynth.analysis.modes.solve import SystemModes, solve
 from hrsynth.analysis.modes.translating import Translating
 from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import Array, unit
-from hrsynth.present.text.modes import modes as text
+from hrsynth.present.text.poses import modes as text
 from strategies import random_rotation
 
 MORE: dict[str, Callable[[Rng], Draw]] = {

@@ -21,10 +21,10 @@ from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import rotation_about
 from hrsynth.present.coupler import chains, points, swept, traced
-from hrsynth.present.modes import MARKS, described, figure, picture, shown, writable
-from hrsynth.present.scenes import CLOSES, GOAL, NEAR, OPEN, Scene, scene
+from hrsynth.present.modes import MARKS, described, figure, picture, shown
+from hrsynth.present.scenes import CLOSES, GOAL, NEAR, OPEN, ModesScene, scene
 from hrsynth.present.sketch import Sketch
-from hrsynth.present.text.modes import modes as text
+from hrsynth.present.text.poses import modes as text
 from strategies import random_rotation, transformed
 
 ROOT = Path(__file__).resolve().parents[3]
@@ -43,7 +43,7 @@ def found(name: str, observe: str | None = None, real: bool = False) -> Assembly
 
 
 @cache
-def drawn(name: str, observe: str | None = None, real: bool = False) -> Scene:
+def drawn(name: str, observe: str | None = None, real: bool = False) -> ModesScene:
     return scene(found(name, observe, real))
 
 
@@ -238,7 +238,6 @@ def test_bad_files_are_refused_before_any_work(path: str, tmp_path: Path, monkey
     assert execute(["modes", "rrrrr_m1", "-o", path]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []
-    writable(None)
 
 
 @pytest.mark.parametrize(("name", "observe"), [("quattro", "1,2"), ("i4l", None)])

@@ -19,7 +19,7 @@ from hrsynth.geometry.vectors import unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.platform_motion import PlatformMotion
 from hrsynth.mechanism.pose import Pose
-from hrsynth.present.loci import locus_map
+from hrsynth.present.maps import locus_map
 
 STEPS = 15
 

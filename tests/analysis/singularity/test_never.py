@@ -13,7 +13,7 @@ from hrsynth.analysis.singularity.singular import Singularity, singular
 from hrsynth.geometry.vectors import Array, frozen, inverse
 from hrsynth.kinematics.sampling import random_walk
 from hrsynth.mechanism.model import Mechanism
-from hrsynth.present.text.singularity import singularity
+from hrsynth.present.text.poses import singularity
 from strategies import deltas
 
 

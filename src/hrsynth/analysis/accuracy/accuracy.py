@@ -30,7 +30,7 @@ WORST = 3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Accuracy(Result):
+class Accuracy(Result, shown_as="accuracy"):
     """The error maxima for cones about the observed directions: at single poses, over a grid, and where asked for what
     samples of true errors give (None otherwise)."""
 

@@ -35,7 +35,7 @@ class End:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PathAnswer(Result):
+class PathAnswer(Result, shown_as="path"):
     """``same aspect`` (with a certified path), ``separated`` or ``undecided``, and why.
 
     Between its poses the path moves the told ``point`` on straight lines and turns the platform about one axis;

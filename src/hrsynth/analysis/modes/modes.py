@@ -98,7 +98,7 @@ class AssemblyMode:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class AssemblyModes(Result):
+class AssemblyModes(Result, shown_as="modes"):
     """All assembly modes with the measurements of one pose, the goal.
 
     ``complex``, ``complete``, ``proof``, ``degenerate`` and ``continuum`` as for :class:`SystemModes`; ``kind`` is

@@ -49,7 +49,7 @@ class Example:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Singularity(Result):
+class Singularity(Result, shown_as="singular"):
     """Where a robot loses a freedom of its platform to what is measured: the watched directions, or its own motors."""
 
     setting: ObservedRobot

@@ -12,7 +12,7 @@ HEAD, GAP = 30.0, 24.0
 """Height of the words above the schemes, and the space between them (pixels)."""
 
 
-def derivation_svg(found: Derivation) -> str:
+def derivation_svg(found: Derivation) -> bytes:
     """Both robots, the architecture over each; the real one alone where every leg is blind."""
     watched = [o.link for o in found.setting.observed]
     schemes = [(f"real robot  {found.architecture}", robot_svg(found.setting.anatomy, observed=watched))]
@@ -24,7 +24,7 @@ def derivation_svg(found: Derivation) -> str:
         width, height = _size(scheme)
         parts += [svg.words(words, x + 16, 20, font_weight="bold"), _placed(scheme, x)]
         x, tall = x + width + GAP, max(tall, height)
-    return svg.picture(x - GAP, HEAD + tall, f"Derivation of {found.robot.name}", found.headline(), *parts)
+    return svg.picture(x - GAP, HEAD + tall, f"Derivation of {found.robot.name}", found.headline(), *parts).encode()
 
 
 def _size(scheme: str) -> tuple[float, float]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from ...mechanism import Mechanism
 from ...mechanism.legs import LegDecomposition
 from . import svg
-from .plan import Net, Plan, Row, Spot, plan
+from .plan import Layout, Net, PlacedBox, Row, plan
 
 PITCH, LANE, GAP = 50.0, 34.0, 14.0
 """Between columns, between lanes, and more between groups (pixels)."""
@@ -59,7 +59,7 @@ def graph_svg(mechanism: Mechanism | LegDecomposition, *, observed: Collection[s
                        _links(drawn, scale), *_boxes(drawn, scale), *ends(drawn, scale))
 
 
-def described(drawn: Plan) -> str:
+def described(drawn: Layout) -> str:
     """The drawing in words: each group's boxes in order, what is driven, what is observed."""
     sentences = []
     for number, row in enumerate(drawn.rows):
@@ -74,12 +74,12 @@ def described(drawn: Plan) -> str:
     return " ".join(sentences)
 
 
-def _said(spot: Spot) -> str:
+def _said(spot: PlacedBox) -> str:
     box = spot.box
     return box.letter + (" (virtual actuator)" if box.virtual else " (motor)" if box.driven else "")
 
 
-def bands(drawn: Plan, scale: Scale) -> list[str]:
+def bands(drawn: Layout, scale: Scale) -> list[str]:
     """A pale band behind each group, with the leg's label on its left."""
     found = []
     for row in drawn.rows:
@@ -95,7 +95,7 @@ def bands(drawn: Plan, scale: Scale) -> list[str]:
     return found
 
 
-def _links(drawn: Plan, scale: Scale) -> str:
+def _links(drawn: Layout, scale: Scale) -> str:
     plain: list[str] = []
     seen: list[str] = []
     dots: list[str] = []
@@ -124,7 +124,7 @@ def _dots(net: Net, scale: Scale) -> list[str]:
     return [f"M{svg.number(scale.x(x))} {svg.number(scale.y(lane))}h0" for lane in lanes]
 
 
-def _boxes(drawn: Plan, scale: Scale) -> list[str]:
+def _boxes(drawn: Layout, scale: Scale) -> list[str]:
     kinds: dict[str, list[str]] = {"joint": [], "motor": [], "virtual": []}
     for spot in drawn.spots:
         kind = "virtual" if spot.box.virtual else "motor" if spot.box.driven else "joint"
@@ -135,7 +135,7 @@ def _boxes(drawn: Plan, scale: Scale) -> list[str]:
             for kind, found in kinds.items() if found]
 
 
-def _box(spot: Spot, scale: Scale) -> str:
+def _box(spot: PlacedBox, scale: Scale) -> str:
     box = spot.box
     x, y = scale.x(spot.x), scale.y(spot.lane)
     letter = "#fff" if box.virtual else svg.INK
@@ -146,7 +146,7 @@ def _box(spot: Spot, scale: Scale) -> str:
                        data_joint="\n".join(box.joints))
 
 
-def ends(drawn: Plan, scale: Scale) -> list[str]:
+def ends(drawn: Layout, scale: Scale) -> list[str]:
     """Thick bars for the base and the platform links on which legs end, with their names."""
     found = []
     for net in drawn.nets:
@@ -160,7 +160,7 @@ def ends(drawn: Plan, scale: Scale) -> list[str]:
     return found
 
 
-def named(drawn: Plan, link: str) -> str:
+def named(drawn: Layout, link: str) -> str:
     """What a bar is called: base, platform, or by its own name where the platform has several links."""
     if link == drawn.mechanism.base:
         return "base"

@@ -24,7 +24,7 @@ BESIDE = 0.4
 
 
 @dataclass(frozen=True)
-class Spot:
+class PlacedBox:
     """A box, where it stands, and the group that it belongs to."""
 
     box: Box
@@ -56,11 +56,11 @@ class Row:
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Layout:
     """A drawing in columns and lanes; ``observed`` are links, ``platform`` all links of an articulated platform."""
 
     mechanism: Mechanism
-    spots: tuple[Spot, ...]
+    spots: tuple[PlacedBox, ...]
     nets: tuple[Net, ...]
     rows: tuple[Row, ...]
     observed: frozenset[str]
@@ -84,7 +84,7 @@ class _Group:
 
 
 def plan(mechanism: Mechanism | LegDecomposition, *, observed: Collection[str] | None = None,
-         virtual: Collection[str] = (), leg: str | None = None) -> Plan:
+         virtual: Collection[str] = (), leg: str | None = None) -> Layout:
     """The plan of a mechanism, or of one that is already taken apart; of one ``leg`` by its label.
 
     ``observed`` are names of links (default: those of the mechanism's observations), ``virtual`` names of joints.
@@ -103,7 +103,7 @@ def plan(mechanism: Mechanism | LegDecomposition, *, observed: Collection[str] |
     columns = _columns(groups, whole.base)
     ends = {group.ears[0].links[-1] for group in groups if group.ears}
     spots, ways, rows = _placed(groups, columns)
-    return Plan(whole, tuple(spots), tuple(_nets(whole, ends, ways, columns)), tuple(rows), links, platform)
+    return Layout(whole, tuple(spots), tuple(_nets(whole, ends, ways, columns)), tuple(rows), links, platform)
 
 
 def _anatomy(mechanism: Mechanism) -> LegDecomposition | None:
@@ -175,8 +175,8 @@ _Way = tuple[str, tuple[Point, ...], int]
 """A link, the points of its line within a lane, the group."""
 
 
-def _placed(groups: Sequence[_Group], columns: dict[str, int]) -> tuple[list[Spot], list[_Way], list[Row]]:
-    spots: list[Spot] = []
+def _placed(groups: Sequence[_Group], columns: dict[str, int]) -> tuple[list[PlacedBox], list[_Way], list[Row]]:
+    spots: list[PlacedBox] = []
     ways: list[_Way] = []
     rows: list[Row] = []
     shared = _shared(ear for group in groups for ear in group.ears)
@@ -187,7 +187,7 @@ def _placed(groups: Sequence[_Group], columns: dict[str, int]) -> tuple[list[Spo
             ends = sorted((columns[ear.links[0]], columns[ear.links[-1]]))
             lane = _free(lanes, ends[0], ends[1])
             xs = _between(ear, columns, shared)
-            spots += [Spot(box, x, top + lane, number) for box, x in zip(ear.boxes, xs, strict=True)]
+            spots += [PlacedBox(box, x, top + lane, number) for box, x in zip(ear.boxes, xs, strict=True)]
             ways += _ways(ear, xs, columns, shared, top + lane, number)
         touched = [columns[link] for ear in group.ears for link in ear.links] or [0]
         rows.append(Row(group.label, top, top + max(len(lanes), 1) - 1, min(touched), max(touched)))

@@ -15,7 +15,7 @@ from ...mechanism import Mechanism
 from ...mechanism.legs import LegDecomposition
 from . import svg
 from .graph import Scale, bands, described, named
-from .plan import Net, Plan, Spot, plan
+from .plan import Layout, Net, PlacedBox, plan
 from .symbols import WORDS, arrow, symbol
 
 PITCH, LANE, GAP, RISE = 72.0, 52.0, 18.0, 22.0
@@ -52,7 +52,7 @@ class _Bends:
     """Lanes with sliders beside a group's first chain: they are not bent."""
 
     @classmethod
-    def of(cls, drawn: Plan) -> _Bends:
+    def of(cls, drawn: Layout) -> _Bends:
         scale = Scale(drawn.rows, PITCH, LANE, GAP, top=46.0)
         first = {row.first for row in drawn.rows}
         level = frozenset(s.lane for s in drawn.spots if s.box.letter in STRAIGHT and s.lane not in first)
@@ -71,7 +71,7 @@ class _Bends:
         return 0.0
 
 
-def _knees(drawn: Plan, number: int) -> tuple[tuple[float, float], ...]:
+def _knees(drawn: Layout, number: int) -> tuple[tuple[float, float], ...]:
     row = drawn.rows[number]
     first = sorted((s.x, s.box.letter) for s in drawn.spots if s.row == number and s.lane == row.first)
     turns = [x for x, letter in first if letter not in STRAIGHT]
@@ -82,7 +82,7 @@ def _knees(drawn: Plan, number: int) -> tuple[tuple[float, float], ...]:
     return ((turns[0], 0.0), *zip(inner, rises, strict=True), (turns[-1], 0.0))
 
 
-def _drawing(drawn: Plan, name: str) -> str:
+def _drawing(drawn: Layout, name: str) -> str:
     bends = _Bends.of(drawn)
     scale = bends.scale
     bottom = scale.band(drawn.rows[-1])[1]
@@ -90,7 +90,7 @@ def _drawing(drawn: Plan, name: str) -> str:
                        *_ends(drawn, bends), _links(drawn, bends), _symbols(drawn, bends))
 
 
-def _links(drawn: Plan, bends: _Bends) -> str:
+def _links(drawn: Layout, bends: _Bends) -> str:
     plain = [_net(net, bends) for net in drawn.nets if net.link not in drawn.observed]
     seen = [_net(net, bends) for net in drawn.nets if net.link in drawn.observed]
     heads = "".join(_head(net, bends) for net in drawn.nets if net.link in drawn.observed)
@@ -116,11 +116,11 @@ def _head(net: Net, bends: _Bends) -> str:
     return arrow(bends.at(*start), bends.at(*end))
 
 
-def _symbols(drawn: Plan, bends: _Bends) -> str:
+def _symbols(drawn: Layout, bends: _Bends) -> str:
     return svg.element("g", *(_symbol(spot, bends) for spot in drawn.spots), stroke=svg.INK, stroke_width=1.6)
 
 
-def _symbol(spot: Spot, bends: _Bends) -> str:
+def _symbol(spot: PlacedBox, bends: _Bends) -> str:
     box = spot.box
     x, y = bends.at(spot.x, spot.lane)
     fill = svg.TINT if box.virtual else svg.MOTOR if box.driven else "#fff"
@@ -135,13 +135,13 @@ def _symbol(spot: Spot, bends: _Bends) -> str:
     return svg.element("g", drawing, letter, class_=kind, **stroke)
 
 
-def _slope(spot: Spot, bends: _Bends) -> float:
+def _slope(spot: PlacedBox, bends: _Bends) -> float:
     """The angle of the leg at a box, in degrees."""
     (x, y), (u, v) = (bends.at(spot.x + d, spot.lane) for d in (-0.05, 0.05))
     return math.degrees(math.atan2(v - y, u - x))
 
 
-def _ends(drawn: Plan, bends: _Bends) -> list[str]:
+def _ends(drawn: Layout, bends: _Bends) -> list[str]:
     """The base hatched, the platform links on which legs end as thick bars, with their names."""
     found = []
     for net in drawn.nets:

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import base64
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cache
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,51 +16,33 @@ from ...analysis.derive import Derivation
 from ...analysis.modes.modes import AssemblyModes
 from ...analysis.observed import silent
 from ...analysis.singularity.singular import Singularity
-from ...description.files import require_folder, write_whole
 from ...errors import BadRequest
 from ...tolerances import RANK_GAP, SAME_RELATION
-from ..accuracy import error_map
 from ..drawings.graph import graph_svg
+from ..maps import error_map
 from ..modes import nothing
 from ..modes import picture as modes_picture
-from ..text.accuracy import field_rows
-from ..text.modes import all_of, at_mode, proved
-from ..text.verdicts import exact_cell, exact_words
+from ..text.poses import all_of, at_mode, proved
+from ..text.robots import exact_cell, exact_words
+from ..text.runs import field_rows
 from .formulas import barred, collected, formula, indexed
 from .legs import actuators, pairs
 from .parts import Parts, Refused, parts, reason
 from .steps import SOURCES, scenes
 
-ENDINGS = (".html", ".htm")
 LARGEST_LIST = 63
 """Sets of legs in the table at most: all of six legs; of more, the smallest sets."""
 
 
-def report(found: Derivation, observe: Sequence[str] | None = None, camera: str | None = None, *, seed: int = 0,
-           progress: Callable[[str], None] | None = None) -> str:
-    """The report of a derivation as a page of HTML without references to anything outside.
-
-    ``observe``, ``camera`` and ``seed`` are those that the derivation was asked with. Leg sets, singularities, modes
-    and accuracy are computed here (seconds to a minute); what is refused is told with its reason.
-    """
-    tell = progress or silent
-    rest = parts(found, observe, camera, seed, tell)
-    tell("drawings")
-    return _template().render(version=__version__, **_robot(found), **_derivation(found), **_rest(rest))
+def report(found: Derivation, *, seed: int = 0, progress: Callable[[str], None] = silent) -> str:
+    """The report of a derivation as a page of HTML without references to anything outside; ``seed`` is the one that the
+    derivation was asked with. The other parts are computed here (seconds to a minute)."""
+    return page(found, parts(found, seed, progress)).decode()
 
 
-def writable(path: str | None) -> None:
-    """Raise ``BadRequest`` where the file's ending is not that of a page, or its folder is not there."""
-    if path is None:
-        return
-    if Path(path).suffix.lower() not in ENDINGS:
-        raise BadRequest("cannot write the report: unknown ending", path, ENDINGS)
-    require_folder(path)
-
-
-def write(page: str, path: str) -> None:
-    """Write a page, whole or not at all."""
-    write_whole(path, page.encode())
+def page(found: Derivation, told: Parts) -> bytes:
+    """The page that says a derivation and the other parts; what is refused is told with its reason."""
+    return str(_template().render(version=__version__, **_robot(found), **_derivation(found), **_rest(told))).encode()
 
 
 @cache
@@ -165,7 +146,7 @@ def _singularity(found: Singularity) -> dict[str, Any]:
 def _modes(found: AssemblyModes) -> dict[str, Any]:
     count, why = found.found, nothing(found)
     rows = [{"number": number, "pose": str(mode.pose) + (" (the pose itself)" if mode.goal else ""),
-             "proved": proved(mode), "there": "; ".join(text for _, text in at_mode(mode, found.kind))}
+             "proved": proved(mode), "there": "; ".join(at_mode(mode, found.kind))}
             for number, mode in enumerate(found.modes, 1)]
     words = None
     if count.continuum is None:

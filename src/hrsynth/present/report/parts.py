@@ -5,7 +5,7 @@ Each part is asked by itself, so that one that is refused leaves a sentence and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TypeVar
 
@@ -48,15 +48,17 @@ class Parts:
     accuracy: Accuracy | Refused
 
 
-def parts(found: Derivation, observe: Sequence[str] | None, camera: str | None, seed: int,
-          tell: Callable[[str], None]) -> Parts:
-    """Ask for each part of a derivation's report; ``observe``, ``camera`` and ``seed`` are those of the derivation."""
-    setting, robot = found.setting, found.robot
-    return Parts(
-        asked(robot.name, lambda: legs(robot, camera, seed=seed, progress=lambda: tell("sets of legs"))),
-        asked(robot.name, lambda: singular(robot, observe, camera, points=POINTS, seed=seed, progress=tell)),
-        asked(robot.name, lambda: modes_at(setting, setting.everything.start, progress=tell)),
-        asked(robot.name, lambda: mapped(setting, seed, tell)))
+def parts(found: Derivation, seed: int, progress: Callable[[str], None]) -> Parts:
+    """Ask for each part of a derivation's report; ``seed`` is that of the derivation."""
+    setting, robot = found.setting, found.setting.robot
+    observe = [o.link for o in setting.observed]
+    told = Parts(
+        asked(robot.name, lambda: legs(robot, seed=seed, progress=lambda: progress("sets of legs"))),
+        asked(robot.name, lambda: singular(robot, observe, points=POINTS, seed=seed, progress=progress)),
+        asked(robot.name, lambda: modes_at(setting, setting.everything.start, progress=progress)),
+        asked(robot.name, lambda: mapped(setting, seed, progress)))
+    progress("drawings")
+    return told
 
 
 def asked(robot: str, question: Callable[[], Answer]) -> Answer | Refused:

@@ -20,7 +20,7 @@ _NAMES = re.compile(r"<title>.*?</title>|<desc>.*?</desc>|<text[^>]*>leg [^<]*</
 
 
 @dataclass(frozen=True)
-class Scene:
+class StepFigure:
     """An accepted step with its drawings; ``steps`` are the numbers, from 1, of all steps that it stands for."""
 
     rule: str
@@ -34,9 +34,9 @@ class Scene:
     after: str
 
 
-def scenes(found: Derivation) -> list[Scene]:
+def scenes(found: Derivation) -> list[StepFigure]:
     """The accepted steps that changed the robot, in order."""
-    drawn: list[Scene] = []
+    drawn: list[StepFigure] = []
     setting = found.setting
     seen = {o.link for o in setting.observed}
     state: State | None = None
@@ -53,14 +53,14 @@ def scenes(found: Derivation) -> list[Scene]:
     return drawn
 
 
-def _scene(number: int, step: Step, before: LegDecomposition, earlier: State | None, seen: set[str]) -> Scene:
+def _scene(number: int, step: Step, before: LegDecomposition, earlier: State | None, seen: set[str]) -> StepFigure:
     assert step.state is not None
     after = step.state.anatomy()
     leg = step.leg if step.leg in before.labels and step.leg in after.labels else None
     pictures = [_picture(anatomy, leg, seen, virtual, f"{step.rule}: {word}" + (f" (leg {leg})" if leg else ""))
                 for anatomy, virtual, word in ((before, _actuators(earlier), "before"),
                                                (after, _actuators(step.state), "after"))]
-    return Scene(step.rule, SOURCES.get(step.rule, ""), (number,), (step.leg,) if step.leg else (), (step.reason,),
+    return StepFigure(step.rule, SOURCES.get(step.rule, ""), (number,), (step.leg,) if step.leg else (), (step.reason,),
                  step.largest_angle, *pictures)
 
 
@@ -74,7 +74,7 @@ def _picture(anatomy: LegDecomposition, leg: str | None, seen: set[str], virtual
     return leg_svg(anatomy, leg, observed=seen, virtual=virtual, title=title)
 
 
-def _alike(one: Scene, other: Scene) -> bool:
+def _alike(one: StepFigure, other: StepFigure) -> bool:
     """Whether two steps of different legs look the same but for names."""
     if one.rule != other.rule or not (one.legs and other.legs):
         return False
@@ -82,7 +82,7 @@ def _alike(one: Scene, other: Scene) -> bool:
     return all(_NAMES.sub("", a) == _NAMES.sub("", b) for a, b in drawings)
 
 
-def _together(first: Scene, other: Scene) -> Scene:
+def _together(first: StepFigure, other: StepFigure) -> StepFigure:
     angles = [angle for angle in (first.largest_angle, other.largest_angle) if angle is not None]
     return replace(first, steps=first.steps + other.steps, legs=first.legs + other.legs,
                    reasons=tuple(dict.fromkeys(first.reasons + other.reasons)), largest_angle=max(angles, default=None))

@@ -1,8 +1,17 @@
-"""Columns of text, and rows of names with their values."""
+"""Columns of text, rows of names with their values, and the rows that most answers begin with."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ...analysis.observed import ObservedRobot
+
+Rows = list[tuple[str, str | Sequence[str]]]
+"""Names with their values: several stand under each other, none is no row."""
+GAP: Rows = [("", "")]
+"""An empty line."""
 
 
 def width(text: str) -> int:
@@ -22,7 +31,31 @@ def table(rows: Sequence[Sequence[str]], heads: Sequence[str]) -> str:
     return "\n".join([line(heads), "  ".join("-" * size for size in columns), *map(line, rows)])
 
 
-def listing(rows: Sequence[tuple[str, str]]) -> str:
-    """A line a row, the values under each other; a name is left out where it is the same as before."""
-    head = max(len(name) for name, _ in rows)
-    return "\n".join(f"{name:<{head}}  {value}".rstrip() for name, value in rows)
+def listing(rows: Iterable[tuple[str, str | Sequence[str]]]) -> str:
+    """A line a value, the values under each other, the name before the first."""
+    lines = [(name if i == 0 else "", value) for name, values in rows
+             for i, value in enumerate([values] if isinstance(values, str) else values)]
+    head = max(len(name) for name, _ in lines)
+    return "\n".join(f"{name:<{head}}  {value}".rstrip() for name, value in lines)
+
+
+def known(name: str, value: str | None) -> Rows:
+    """A row where there is a value."""
+    return [] if value is None else [(name, value)]
+
+
+def head(found: ObservedRobot) -> Rows:
+    """The robot and what is observed of it."""
+    return [("robot", f"{found.robot.name}   {found.anatomy.architecture()}"),
+            ("observed", ", ".join(f"{o.leg} ({o.link})" for o in found.observed))]
+
+
+def camera(found: ObservedRobot) -> Rows:
+    """What carries the camera, where it is not the base."""
+    reference = found.mechanism.reference
+    return known("camera on", reference if reference != found.mechanism.base else None)
+
+
+def sets(found: Iterable[Iterable[str]]) -> list[str]:
+    """Sets of names in braces."""
+    return ["{" + ", ".join(each) + "}" for each in found]

@@ -12,7 +12,7 @@ from ...analysis.observed import ObservedRobot
 from ...geometry.vectors import Array
 from .shapes import BASE, LEG, PLATFORM, Shape
 
-HEAVY = 200_000
+MOST_TRIANGLES = 200_000
 """Triangles of all meshes together beyond which they are left out: the page holds them as text."""
 
 
@@ -36,8 +36,8 @@ def meshes(setting: ObservedRobot) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
         mechanism = setting.mechanism
         role = BASE if into == mechanism.base else PLATFORM if into in setting.anatomy.platform else LEG
         found.append(Shape("mesh", into, points, 0.0, role, faces=np.asarray(solid.faces)))
-    if sum(len(shape.faces) for shape in found if shape.faces is not None) > HEAVY:
-        return (), (f"the meshes have more than {HEAVY} triangles: rods are drawn instead",)
+    if sum(len(shape.faces) for shape in found if shape.faces is not None) > MOST_TRIANGLES:
+        return (), (f"the meshes have more than {MOST_TRIANGLES} triangles: rods are drawn instead",)
     note = (f"{len(missing)} visual shapes cannot be read ({missing[0]}): rods are drawn instead",) if missing else ()
     return tuple(found), note
 

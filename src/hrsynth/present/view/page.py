@@ -6,27 +6,15 @@ import importlib.util
 from pathlib import Path
 from typing import Any
 
-from ...description.files import require_folder, write_whole
-from ...errors import BadRequest, MissingExtra
+from ...errors import MissingExtra
 from .view import View
 
 FOLDER = Path(__file__).parent
 
 
-def writable(output: str | None) -> None:
-    """Raise ``BadRequest`` where a page cannot have this name or its folder is not there, ``MissingExtra`` where
-    MeshCat is missing."""
-    viewer()
-    if output is None:
-        return
-    if Path(output).suffix.lower() not in (".html", ".htm"):
-        raise BadRequest("cannot write the view: unknown ending", output, ".html")
-    require_folder(output)
-
-
-def write(found: View, file: str) -> None:
-    """Write the view as a page that needs no server, whole or not at all."""
-    write_whole(file, page(found).encode())
+def static(found: View) -> bytes:
+    """The view as a page that needs no server."""
+    return page(found).encode()
 
 
 def page(found: View, *, live: bool = False) -> str:

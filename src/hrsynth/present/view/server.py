@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRequest
+from ...tolerances import SLIDER_ARRIVED
 from .mode_outlines import ghosts
 from .page import page
 from .states import Posed
@@ -27,12 +28,10 @@ from .view import View
 HOST = "127.0.0.1"
 NAMES = (HOST, "localhost", "[::1]")
 """What a browser on this machine may call it."""
-LONGEST = 10_000
+QUESTION_BYTES = 10_000
 """Bytes of a question at most."""
 PATIENCE = 10.0
 """Seconds that a question may pause while it is sent."""
-ARRIVED = 1e-6
-"""Difference (metres, radians) within which the platform has come to where it was sent."""
 
 
 @dataclass(eq=False)
@@ -59,7 +58,7 @@ class Session:
             else:
                 self.here, reached = mover.sent(self.here, wanted)
             reply: dict[str, Any] = {"state": mover.state(self.here).scene(),
-                                     "stopped": bool(np.max(np.abs(reached - wanted), initial=0.0) > ARRIVED)}
+                                     "stopped": bool(np.max(np.abs(reached - wanted), initial=0.0) > SLIDER_ARRIVED)}
             if asked.get("modes") and self.found.ghosts:
                 others, _ = ghosts(self.found.setting, self.here.real)
                 reply["ghosts"] = [ghost.scene() for ghost in others]
@@ -115,7 +114,7 @@ class Handler(BaseHTTPRequestHandler):
         """A question of the page's sliders."""
         try:
             size = self._only("Content-Length") or ""
-            if self.path != "/pose" or not (size.isascii() and size.isdecimal()) or int(size) > LONGEST:
+            if self.path != "/pose" or not (size.isascii() and size.isdecimal()) or int(size) > QUESTION_BYTES:
                 raise ValueError(self.path)
             answer = self.server.session.answer(json.loads(self.rfile.read(int(size))))
         except (ValueError, KeyError, TypeError, AttributeError):

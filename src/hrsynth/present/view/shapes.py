@@ -25,7 +25,7 @@ RADIUS = 0.022
 """Of rods (characteristic lengths); the other shapes are multiples of it."""
 OUTER, INNER, PLAIN = 1.5, 0.7, 1.0
 """Of a rod in which another slides, of what slides in it, and of the others."""
-FINE = 7
+PAGE_DIGITS = 7
 """Digits of metres that the page is given."""
 
 
@@ -50,7 +50,7 @@ class Shape:
     def scene(self, places: dict[str, int]) -> dict[str, Any]:
         """What the page is given, links by their ``places``."""
         record: dict[str, Any] = {"kind": self.kind, "link": places[self.link], "role": self.role, "size": self.size,
-                                  "points": np.round(self.points, FINE).tolist()}
+                                  "points": np.round(self.points, PAGE_DIGITS).tolist()}
         if self.other is not None:
             record["other"] = places[self.other]
         if self.faces is not None:

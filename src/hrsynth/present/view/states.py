@@ -21,12 +21,12 @@ from ...kinematics.steps import track
 from ...kinematics.tasks import Target, solve
 from ...mechanism import Mechanism
 from ...tolerances import FOLLOWED, SOLVED
-from .shapes import FINE
+from .shapes import PAGE_DIGITS
 
 REAL, HIDDEN = "real", "hidden"
 TURN, WAY = 1.0, 1.0
 """How far a slider turns (rad) and moves (characteristic lengths) the platform each way at most."""
-FAR = 100.0
+BEYOND_SLIDERS = 100.0
 """Such distances beyond which no slider sends the platform."""
 STEPS = 10
 """Configurations on each side of a slider's home."""
@@ -35,7 +35,7 @@ EASY = 60
 
 
 @dataclass(frozen=True, eq=False)
-class State:
+class ViewState:
     """The places (links, 7) of each machine's links, and the smallest singular value of Mᵀ (characteristic lengths;
     None where Mᵀ does not exist)."""
 
@@ -56,7 +56,7 @@ class Slider:
     name: str
     unit: str
     values: tuple[float, ...]
-    states: tuple[State, ...]
+    states: tuple[ViewState, ...]
     home: int
 
     def to_dict(self) -> dict[str, Any]:
@@ -66,7 +66,7 @@ class Slider:
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
-        return {"name": self.name, "unit": self.unit, "values": [round(value, FINE) for value in self.values],
+        return {"name": self.name, "unit": self.unit, "values": [round(value, PAGE_DIGITS) for value in self.values],
                 "home": self.home, "states": [state.scene() for state in self.states]}
 
 
@@ -99,13 +99,13 @@ class Mover:
         """The zero configuration."""
         return Posed(self.setting.everything.start, None if self.hidden is None else self.hidden.q0)
 
-    def state(self, at: Posed) -> State:
+    def state(self, at: Posed) -> ViewState:
         """What the page shows of a configuration."""
         places = {REAL: displacements(self.setting.mechanism, at.real.pose)}
         if self.hidden is not None and at.hidden is not None:
             q = at.hidden
             places[HIDDEN] = displacements(self.hidden.mechanism, lambda link: self.hidden.pose(q, link))
-        return State(places, self.examiner.glance(at.real).distances.type2)
+        return ViewState(places, self.examiner.glance(at.real).distances.type2)
 
     def sent(self, here: Posed, values: Array) -> tuple[Posed, Array]:
         """Where the robot comes to from ``here`` when the platform is sent to coordinates (n,), and those there."""
@@ -118,7 +118,7 @@ class Mover:
     def far(self, values: Array) -> bool:
         """Whether coordinates (n,) are so far from home that no slider means them."""
         spans = np.where(np.array(self.coordinates.places) >= 3, TURN, WAY * self.home.real.twin.length)
-        return bool(np.any(np.abs(values - self.coordinates.values) > FAR * spans))
+        return bool(np.any(np.abs(values - self.coordinates.values) > BEYOND_SLIDERS * spans))
 
     def sliders(self) -> tuple[Slider, ...]:
         """Each coordinate alone changed from home, as far as the robot, and the hidden one with it, goes."""
@@ -171,4 +171,4 @@ def place(X: Array) -> Array:
 
 def listed(places: Array) -> list[list[float]]:
     """Places (links, 7) with the digits that the page is given."""
-    return (np.round(places, FINE) + 0.0).tolist()
+    return (np.round(places, PAGE_DIGITS) + 0.0).tolist()

@@ -13,10 +13,11 @@ from ...analysis.observed import ObservedRobot, prepare, silent
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
+from ...results import Result
 from .meshes import meshes
 from .mode_outlines import Ghost, ghosts
-from .shapes import FINE, RADIUS, Drawer, Shape
-from .states import HIDDEN, REAL, Mover, Slider, State, listed, place
+from .shapes import PAGE_DIGITS, RADIUS, Drawer, Shape
+from .states import HIDDEN, REAL, Mover, Slider, ViewState, listed, place
 
 ARROW = (0.35, 0.7)
 """Length of an arrow at least and at most (characteristic lengths); between these, a part ``SHARE`` of its link's."""
@@ -55,20 +56,24 @@ class Arrow:
     ends: Array
 
 
-@dataclass(frozen=True, eq=False)
-class View:
+@dataclass(frozen=True, eq=False, repr=False)
+class View(Result, shown_as="view"):
     """All that the page needs. ``normal`` (3,) is that of the plane in which everything moves, None in space."""
 
     setting: ObservedRobot
     derivation: Derivation | None
     mover: Mover
     machines: tuple[Machine, ...]
-    home: State
+    home: ViewState
     sliders: tuple[Slider, ...]
     arrows: tuple[Arrow, ...]
     ghosts: tuple[Ghost, ...]
     normal: Array | None
     notes: tuple[str, ...]
+
+    def headline(self) -> str:
+        """The robot, and how much there is to see of it."""
+        return f"{self.setting.robot.name}, {len(self.sliders)} sliders, {len(self.ghosts)} other assembly modes"
 
     @property
     def largest(self) -> float | None:
@@ -94,10 +99,10 @@ class View:
         places = {name: i for i, name in enumerate(mechanism.links)}
         return {
             "length": mechanism.length, "radius": _radius(mechanism), "largest": self.largest,
-            "normal": None if self.normal is None else np.round(self.normal, FINE).tolist(),
+            "normal": None if self.normal is None else np.round(self.normal, PAGE_DIGITS).tolist(),
             "machines": [machine.scene() for machine in self.machines],
             "home": self.home.scene(), "sliders": [slider.scene() for slider in self.sliders],
-            "arrows": [{"leg": a.leg, "link": places[a.link], "ends": np.round(a.ends, FINE).tolist()}
+            "arrows": [{"leg": a.leg, "link": places[a.link], "ends": np.round(a.ends, PAGE_DIGITS).tolist()}
                        for a in self.arrows],
             "ghosts": [ghost.scene() for ghost in self.ghosts], "notes": list(self.notes),
         }
@@ -132,7 +137,7 @@ def view(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: s
                 _normal(setting), (*notes, *missing))
 
 
-def _machine(key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, states: Sequence[State],
+def _machine(key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, states: Sequence[ViewState],
              meshes: Sequence[Shape]) -> Machine:
     real = setting.mechanism
     kept = tuple(shape for shape in meshes if shape.link in mechanism.links)
@@ -146,7 +151,7 @@ def _radius(mechanism: Mechanism) -> float:
     return RADIUS * mechanism.length
 
 
-def _travels(drawer: Drawer, key: str, states: Sequence[State]) -> dict[str, tuple[float, float]]:
+def _travels(drawer: Drawer, key: str, states: Sequence[ViewState]) -> dict[str, tuple[float, float]]:
     """How far each joint on the base slides, with a margin for its carriage (m)."""
     from scipy.spatial.transform import Rotation
 

@@ -1,0 +1,228 @@
+"""The commands that ask one question about a robot: their options, and the outputs of their answers."""
+
+from __future__ import annotations
+
+import inspect
+import sys
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import typer
+
+from ..present.outputs import OUTPUTS
+from .options import (
+    CAMERA,
+    JSON,
+    NEEDED,
+    SEED,
+    SOURCE,
+    WATCHED,
+    Option,
+    add_command,
+    flag,
+    listed,
+    output,
+    robot_of,
+    warn,
+)
+from .progress import Progress
+
+
+@dataclass(frozen=True)
+class Question:
+    """A command: the public function of its ``name``, what it says of itself, and its own options, named as the
+    function's parameters and those of the files. ``before`` gets the options before the work, ``after`` the answer and
+    the options at the end; ``shows`` does so instead of printing the text where nothing was written."""
+
+    name: str
+    help: str
+    options: tuple[Option, ...]
+    before: Callable[[], object] | None = None
+    shows: Callable[..., None] | None = None
+    after: Callable[..., None] | None = None
+
+    def add(self, app: typer.Typer) -> None:
+        """Make it a command."""
+        add_command(app, self.name, self.help, (*self.options, JSON, SEED, *SOURCE), self.answer)
+
+    def answer(self, *, json: bool, **values: Any) -> None:
+        """Ask, write the files that are asked for, print."""
+        import hrsynth
+
+        from ..description.files import require_other
+        from ..present.show import record, text
+
+        if self.before is not None:
+            self.before()
+        files = {each: values.pop(each.option) for each in OUTPUTS[self.name].files if each.option is not None}
+        for each, path in files.items():
+            each.require(path, values)
+        source, mechanism = values["robot"], robot_of(values)
+        more = {each.record: None for each in files if each.record is not None}
+        writers = []
+        with Progress() as progress:
+            values["progress"] = progress.tell
+            found = self._ask(getattr(hrsynth, self.name), mechanism, values)
+            for each, path in files.items():
+                if path is None:
+                    continue
+                why = each.unwritten(found, path)
+                if why is not None:
+                    warn(why)
+                    files[each] = None
+                    continue
+                require_other(path, source, mechanism.file)
+                writer, told = each.writer(found, path, values)
+                writers.append(writer)
+                more |= told
+        for write in writers:
+            write()
+        written = {each.field: path for each, path in files.items() if each.field is not None}
+        if json:
+            typer.echo(record(self.name, mechanism.name, {**found.to_dict(), **more, **written}))
+        elif self.shows is not None and not any(written.values()):
+            self.shows(found, **values)
+        else:
+            typer.echo(text(found, *written.values()))
+        if self.after is not None:
+            self.after(found, **values)
+
+    def _ask(self, function: Callable[..., Any], mechanism: Any, values: dict[str, Any]) -> Any:
+        """The answer of a function to those options that it takes and that are given."""
+        known = inspect.signature(function).parameters
+        given = {name: value for name, value in values.items() if name in known and value is not None}
+        if "observe" in given:
+            given["observe"] = listed(given["observe"])
+        return function(mechanism, **given)
+
+
+def _decided(found: Any, at: list[str] | None, **_: Any) -> None:
+    """Raise ``RankUndecided`` at poses that were asked for."""
+    from ..errors import RankUndecided
+    from ..tolerances import RANK_GAP
+
+    for posture in found.postures if at else ():
+        if not posture.decided:
+            raise RankUndecided(f"{found.setting.robot.name} at {posture.pose}", posture.gap, RANK_GAP)
+
+
+def _deprecated(_: Any, seconds: float | None, **__: Any) -> None:
+    if seconds is not None:
+        warn("--seconds is deprecated, what it leaves out depends on the machine: try --examine")
+
+
+def _viewer() -> None:
+    """Raise ``MissingExtra`` where a library for the view is missing."""
+    from ..present.view.page import viewer
+
+    viewer()
+
+
+def _served(found: Any, port: int, open_: bool, **_: Any) -> None:
+    """Serve a view until Ctrl-C, and open its page in the browser."""
+    from ..present.show import text
+    from ..present.view.server import serve
+
+    def ready(server: object, address: str) -> None:
+        typer.echo(f"{text(found, address)}   (Ctrl-C ends it)")
+        sys.stdout.flush()
+        if open_:
+            import threading
+            import webbrowser
+
+            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
+
+    serve(found, port, ready)
+
+
+def _file(command: str, option: str = "output") -> Option:
+    """The option of a file that a command's answer can be written to."""
+    (found,) = (each for each in OUTPUTS[command].files if each.option == option)
+    return output(found.help) if option == "output" else Option(option, found.help, "FILE")
+
+
+def _goal(help: str) -> Option:
+    return Option("goal", help, "POSE", default=NEEDED, flags=("--to",))
+
+
+POSES = "again for more (default: the zero configuration)."
+BEGIN = Option("at", "Start there instead of at the zero configuration, in another operation mode if need be.", "POSE")
+START = Option("start", "Where it starts, as x=0.02,y=0.1,z=-0.7.", "POSE", default=NEEDED, flags=("--from",))
+QUESTIONS = (
+    Question("derive", "The hidden robot of a robot, how it is derived, its certificate, and what the controller can "
+             "see.",
+             (*WATCHED, BEGIN,
+              Option("form", "simplified (as in the paper) or general (sliders, all legs kept).", default="simplified"),
+              _file("derive"), _file("derive", "report"))),
+    Question("legs", "Every set of observed legs: its verdict, the freedoms it loses, and the smallest sets that see "
+             "most.",
+             (CAMERA, BEGIN)),
+    Question("check", "Mobility, ranks, singularities and redundant constraints at poses, and over a grid of poses.",
+             (*WATCHED, Option("at", f"A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; {POSES}", "POSE", list[str]),
+              Option("grid", "A line, plane or box of poses, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 "
+                     "(from:to:count).", "GRID"),
+              _file("check")), after=_decided),
+    Question("singular", "Where a freedom of the platform is lost: the Type 2 condition in words, as an expression and "
+             "drawn.",
+             (*WATCHED, flag("real", "The real robot with its own motors instead of the hidden one."),
+              Option("plane", "Plane of poses to draw, as z=-0.7.", "PART=VALUE"), _file("singular"),
+              Option("points", "Random poses at which the condition is checked.", None, int, 10_000, low=1),
+              Option("steps", "Poses a side of the drawn plane.", None, int, 51, low=5, high=300))),
+    Question("advise", "What is missing: the smallest sets of further measurements that make a robot controllable.",
+             WATCHED),
+    Question("modes", "All assembly modes: every pose of the platform with the same directions, each proved.",
+             (Option("at", "Pose whose directions are held, as x=0.02,y=0.1,z=-0.7 (default: the zero "
+                     "configuration's).", "POSE"),
+              *WATCHED, flag("real", "The real robot with its own motors held instead."),
+              flag("as_written", "Take the file's numbers as they are: joint centres that coincide but for rounding "
+                   "stay apart."),
+              _file("modes"))),
+    Question("path", "Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, "
+             "undecided.",
+             (START, _goal("Where it ends."), *WATCHED)),
+    Question("servo", "A servo run on the directions of legs, simulated: where it ends, and what it passes on the way.",
+             (START, _goal("Pose whose directions are desired."), *WATCHED,
+              Option("gain", "λ of the control law (1/s).", None, float, 0.8),
+              Option("noise", "Error of measured directions, as 0.1deg; of edges, as 0.3px.", "AMOUNT"),
+              flag("bias", "The error of each direction or edge stays the same all along."),
+              Option("duration", "Lead the desired directions along the straight way in this time (default: at once).",
+                     "SECONDS", float),
+              Option("time", "Longest run.", "SECONDS", float),
+              flag("physics", "Drive a mock-up with rods, masses and velocity servos."),
+              Option("sense", "exact, edges (of the legs before a camera) or pictures (rendered).", "SENSE",
+                     default="exact"),
+              _file("servo"))),
+    Question("accuracy", "How far the platform can be off where the observed directions are off by up to given angles.",
+             (Option("cones", "Half-angle of the cone about each observed direction, as 0.1deg; or one a leg: "
+                     "1=0.1deg,2=0.2deg.", "ANGLE", default=NEEDED, flags=("--cone",)),
+              *WATCHED, Option("at", f"A pose, as x=0.02,y=0.1,z=-0.7; {POSES}", "POSE", list[str]),
+              Option("plane", "Plane of poses, as z=-0.7: all of it that is reached.", "PART=VALUE"),
+              Option("grid", "A line, plane or box of poses, such as x=-0.3:0.3:21,y=0,z=-0.7 (from:to:count).",
+                     "GRID"),
+              Option("steps", "Poses a side of the plane.", None, int, low=5, high=300),
+              Option("samples", "Try so many true errors (four at least) at each pose, of a plane or grid at its worst "
+                     "ones.", "COUNT", int, 0, ("--nonlinear",), low=0),
+              _file("accuracy"))),
+    Question("select", "Which legs to watch for a displacement: all sets, ranked by accuracy, and why the others are "
+             "discarded.",
+             (START, _goal("Where it is to end."),
+              Option("cones", "Half-angle of the cone about each direction, or one a leg: 1=0.1deg,2=0.2deg,…", "ANGLE",
+                     default="0.1deg", flags=("--cone",)),
+              CAMERA, Option("size", "Legs of the largest sets.", None, int, 4, low=1),
+              Option("runs", "Sets that a simulated run is to lead to the goal, best first.", None, int, 3, low=0),
+              Option("sight", "Pose of the camera on the link that carries it (x right, y down, z ahead), as "
+                     "x=0,y=0,z=0.5,rpy=180deg/0/0; or auto.", "POSE"),
+              Option("focal", "Focal length of the camera, of 640 by 480 pixels.", "PIXELS", float, 800.0),
+              Option("examine", "Sets, the most accurate first, whose modes, aspects and runs are asked for.", None,
+                     int, 20, low=1),
+              Option("seconds", "Deprecated, as the answer then depends on the machine: time after which no further "
+                     "set is examined.", None, float)), after=_deprecated),
+    Question("view", "A 3D view in the browser: sliders that keep the loops closed, what is observed, assembly modes.",
+             (*WATCHED, flag("hidden", "The hidden robot too, its virtual actuators highlighted."),
+              _file("view", "static"),
+              Option("port", "Port of the server (default: any that is free).", None, int, 0, low=0, high=65535),
+              Option("open_", "Open the page in the browser.", None, bool, True, ("--open/--no-open",))),
+             before=_viewer, shows=_served),
+)
+"""The commands in the order of the help."""

@@ -1,0 +1,164 @@
+"""The outputs of each kind of answer, stated once: its text, its pictures, the files that it is written to, and what
+they need. Prompts, notebooks and the command line take them from here.
+
+What makes an output is named as ``module:function`` of this folder, or with a dot before it of the package, and loaded
+when it is wanted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from ..errors import BadRequest
+
+Content = bytes | Iterable[bytes]
+Asked = Mapping[str, Any]
+"""Options by name."""
+
+
+def function(name: str) -> Callable[..., Any]:
+    """The function ``module:function`` of this folder, ``.module:function`` of the package."""
+    module, _, attribute = name.partition(":")
+    found: Callable[..., Any] = getattr(import_module(f".{module}", __package__), attribute)
+    return found
+
+
+@dataclass(frozen=True, eq=False)
+class File:
+    """What an answer is written to: ``makers`` give the content by the file's ending, ``refusal`` says that there is
+    none. The command line has an ``option`` for it with its ``help`` (None: it has not), its JSON a ``field``.
+
+    ``part`` names the part of the answer that is written, None where it was not asked for; then ``needs`` are the
+    options that ask for it, and ``words`` what it is called. ``computed`` is made of the answer first, with the options
+    that it ``takes``, a seed and the progress; the makers get it too, and the JSON as ``record``.
+    """
+
+    refusal: str
+    makers: Mapping[str, str]
+    help: str = ""
+    option: str | None = "output"
+    field: str | None = "file"
+    allowed: str | None = None
+    part: str | None = None
+    needs: tuple[str, ...] = ()
+    words: str = ""
+    computed: str | None = None
+    takes: tuple[str, ...] = ()
+    record: str | None = None
+    nothing: str | None = None
+    """Tells why there is nothing to draw in an answer, or None."""
+    installed: tuple[str, str] | None = None
+    """An ending, and what raises ``MissingExtra`` where a library for it is missing."""
+
+    def require(self, path: str | None, asked: Asked) -> None:
+        """Raise ``BadRequest`` where there is nothing to write, the ending is no format or the folder not there, and
+        ``MissingExtra``: before long work, not after it."""
+        from ..description.files import require_folder
+
+        if path is None:
+            if asked.get("plane") is not None and "plane" in self.takes:
+                raise BadRequest("a plane of poses is drawn", asked["plane"], "--plane together with --output FILE.png")
+            return
+        ending = Path(path).suffix.lower()
+        if self.needs and all(asked[name] is None for name in self.needs):
+            options = " or ".join(f"--{name}" for name in self.needs)
+            raise BadRequest(f"only {self.words} is written", path, f"--output together with {options}")
+        if ending not in self.makers:
+            raise BadRequest(f"{self.refusal}: unknown ending", path, self.allowed or tuple(self.makers))
+        if self.installed is not None and ending == self.installed[0]:
+            function(self.installed[1])()
+        require_folder(path)
+
+    def unwritten(self, found: Any, path: str) -> str | None:
+        """What is to be said where there is nothing to write."""
+        why = None if self.nothing is None else function(self.nothing)(found)
+        return None if why is None else f"{path} is not drawn: {why}"
+
+    def content(self, found: Any, ending: str, asked: Asked) -> tuple[Content, dict[str, Any]]:
+        """The file's content and what the JSON says more; raises ``BadRequest`` where there is nothing to draw."""
+        maker = function(self.makers[ending])
+        if self.computed is None:
+            return maker(found), {}
+        value = function(self.computed)(found, **{name: asked[name] for name in (*self.takes, "seed", "progress")})
+        return maker(found, value), {} if self.record is None else {self.record: value.to_dict()}
+
+    def writer(self, found: Any, path: str, asked: Asked) -> tuple[Callable[[], object], dict[str, Any]]:
+        """What writes the file, whole or not at all, once all else is done, and what the JSON says more."""
+        from ..description.files import write_whole
+
+        content, more = self.content(found, Path(path).suffix.lower(), asked)
+        return partial(write_whole, path, content), more
+
+
+class HiddenFile(File):
+    """The hidden robot in any dialect."""
+
+    def require(self, path: str | None, asked: Asked) -> None:
+        """Raise ``BadRequest`` for an ending that is no dialect's."""
+        from ..description import targets
+
+        if path is not None:
+            targets(path)
+
+    def unwritten(self, found: Any, path: str) -> str | None:
+        """What is to be said where there is no hidden robot."""
+        return "nothing was written: every leg is blind, there is no hidden robot" if found.hidden is None else None
+
+    def writer(self, found: Any, path: str, asked: Asked) -> tuple[Callable[[], object], dict[str, Any]]:
+        """What writes the robot, and nothing more."""
+        from ..description import save
+
+        return partial(save, found.hidden, path), {}
+
+
+@dataclass(frozen=True)
+class Outputs:
+    """What there is of one kind of answer: ``text`` is called with it and the names of the files written."""
+
+    text: str
+    files: tuple[File, ...] = ()
+
+
+PNG, CSV, HTML = ".png", ".csv", (".html", ".htm")
+OUTPUTS = {
+    "accuracy": Outputs("text.runs:accuracy", (
+        File("cannot write the errors", {PNG: "maps:error_map", CSV: "maps:error_table"},
+             "Write the plane or grid: map.png, map.csv.", part="field", needs=("plane", "grid"),
+             words="a plane or a grid"),)),
+    "advise": Outputs("text.robots:advice"),
+    "certificate": Outputs("text.robots:certificate"),
+    "check": Outputs("text.poses:check", (
+        File("cannot write the grid", {PNG: "maps:distance_map", CSV: "maps:check_table"},
+             "Write the grid: map.png, map.csv.", field=None, part="grid", needs=("grid",), words="a grid of poses"),)),
+    "derive": Outputs("text.robots:derivation", (
+        HiddenFile("cannot write the robot", {}, "Write the hidden robot.", field="hidden_file"),
+        File("cannot write the report", dict.fromkeys(HTML, "report.pages:page"),
+             "Write a page (.html) with drawings, proof, singularities, assembly modes and accuracy.", "report",
+             "report_file", computed="report.parts:parts"),
+        File("cannot draw the robots", {".svg": "drawings.derived:derivation_svg"}, option=None))),
+    "legs": Outputs("text.robots:legs"),
+    "modes": Outputs("text.poses:modes", (
+        File("cannot draw the modes", {PNG: "modes:picture"}, "Draw the modes (.png).", nothing="modes:nothing"),)),
+    "path": Outputs("text.poses:path"),
+    "robot": Outputs("text.robots:robot"),
+    "select": Outputs("text.runs:selection"),
+    "servo": Outputs("text.runs:servo", (
+        File("cannot draw the run", {PNG: "runs:picture", ".gif": "animations:animation"},
+             "Draw the run: curves (.png) or an animation (.gif).",
+             allowed=".png (curves) or .gif (what a camera sees)",
+             installed=(".gif", ".simulation.pictures:drawing")),)),
+    "singular": Outputs("text.poses:singularity", (
+        File("cannot draw the locus", {PNG: "maps:locus_map"}, "Draw the locus (.png).", computed="maps:locus",
+             takes=("plane", "steps"), record="locus"),)),
+    "verdict": Outputs("text.robots:verdict"),
+    "view": Outputs("text.robots:view", (
+        File("cannot write the view", dict.fromkeys(HTML, "view.page:static"),
+             "Write a page that needs no server (.html).", "static", allowed=".html"),)),
+}
+"""The outputs by the name under which a result is shown (:attr:`hrsynth.results.Result.shown_as`): that of its
+command, or of its kind where it is a part of an answer."""

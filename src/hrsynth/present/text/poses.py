@@ -1,0 +1,199 @@
+"""Poses in text: those that were checked, where a freedom is lost, all assembly modes, paths without a singularity."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...analysis.posture import CONSTRAINT, REGULAR, UNDECIDED
+from ...tolerances import NOISE, RANK_GAP
+from .robots import NO_MATRIX
+from .tables import GAP, Rows, camera, head, known, listing
+
+if TYPE_CHECKING:
+    from ...analysis.aspects.answer import PathAnswer
+    from ...analysis.check import Check
+    from ...analysis.modes.modes import AssemblyMode, AssemblyModes
+    from ...analysis.posture import Kinds, Posture
+    from ...analysis.singularity.singular import Singularity
+
+_STATES = {REGULAR: "regular", "type1": "Type 1 singularity", "type2": "Type 2 singularity",
+           "type3": "Type 3 singularity (Type 1 and 2 at once)", CONSTRAINT: "constraint singularity",
+           UNDECIDED: "not decided"}
+_SINCE = {"hidden": "the observed directions", "real": "the motors' coordinates"}
+
+
+def check(found: Check) -> str:
+    """What is observed, a block for each pose, then redundant constraints and the grid in numbers."""
+    rows = [*head(found.setting), *camera(found.setting),
+            ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians")]
+    for posture in found.postures:
+        rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture)]
+    redundant = [f"the loop cut at {each.loop}: {each.rows} of its constraints" for each in found.redundant]
+    rows += [*GAP, ("redundant", redundant or "no constraint")]
+    if found.grid is not None:
+        counts = Counter(found.grid.states)
+        axes = zip(found.grid.grid.shape, found.grid.grid.names, strict=True)
+        size = " × ".join(f"{count} {name}" for count, name in axes)
+        rows.append(("grid", f"{size}: " + ", ".join(f"{counts[state]} {state}" for state in sorted(counts))))
+    return listing(rows)
+
+
+def _posture(posture: Posture) -> Rows:
+    mobility, far, dof = posture.mobility, posture.distances, posture.dof
+    rows = [("mobility", f"{mobility.total}, of which {mobility.idle} idle; the platform has "
+             + ("one freedom" if dof == 1 else f"{dof} freedoms")),
+            *_kinds("hidden robot", f"the directions show {posture.hidden.rank} of {dof}", posture.hidden, "not seen")]
+    if far.condition is not None and far.type2 is not None and far.type1 is not None:
+        rows += [("", f"singular values of Mᵀ {far.type2:.3g} to {1 / far.type1:.3g}, condition {far.condition:.3g}"),
+                 ("", f"one degree of error in the directions, to first order: {_small(far.millimetres)} mm and "
+                      f"{_small(far.degrees)} degrees along the weakest freedom that they show")]
+        if far.condition > 1 / NOISE:
+            rows.append(("", f"nearly singular: dimensions known to {NOISE:g} cannot tell it from a singularity"))
+    elif far.type2 is None:
+        rows.append(("", NO_MATRIX))
+    if posture.real is None:
+        rows.append(("real robot", "has no motors"))
+    else:
+        rows += _kinds("real robot", f"the motors determine {posture.real.rank} of {dof}", posture.real, "not held")
+    if posture.constraint_singular:
+        rows.append(("loops", ["lose rank here, the platform has", *(freedom.name for freedom in posture.gained)]))
+    rows += [("redundant here", f"the loop cut at {each.loop}: {each.rows} more of its constraints")
+             for each in posture.redundant]
+    return [*rows, ("loops' margin", f"{far.constraints:.3g} (weakest singular value, as part of the largest)")]
+
+
+def _kinds(name: str, what: str, kinds: Kinds, lost: str) -> Rows:
+    title = f"{what}: {_STATES[kinds.state]} (smallest rank gap {kinds.gap:.1e}, needed {RANK_GAP:.0e})"
+    if kinds.classes is None:
+        return [(name, title)]
+    counts = "  ".join(f"{key} {value}" for key, value in kinds.classes.to_dict().items())
+    return [(name, [title, f"over the generic values: {counts}"]), *((lost, freedom.name) for freedom in kinds.lost)]
+
+
+def _small(value: float | None) -> str:
+    return "no limit" if value is None else f"{0.0 if value < 1e-9 else value:.3g}"
+
+
+def singularity(found: Singularity, file: str | None = None) -> str:
+    """The condition in words and as an expression, what was checked, and singular poses."""
+    condition, checked = found.condition, found.checked
+    name, seen = head(found.setting)
+    motors = dict.fromkeys(str(getattr(o, "joint", o.link)) for o in found.question.observations)
+    rows: Rows = [
+        name, ("motors", ", ".join(motors)) if found.real else seen,
+        ("verdict", f"{found.verdict.verdict} (rank {found.verdict.rank} of {found.verdict.dof})"),
+        ("Type 2", found.words)]
+    if condition is not None:
+        rows += [("expression", f"{condition.expression}{' (never zero)' if condition.never else ' = 0'}"),
+                 ("where", [f"{name}: {meaning}" for name, meaning in condition.where.items()]),
+                 ("split off", list(condition.factors))]
+    if checked is not None:
+        rows.append(("checked", [
+            f"{checked.points} random poses and {len(checked.on_locus)} on the locus, {checked.disagreements} "
+            "disagreements of words, expression and rank",
+            f"largest angle between a leg's named wrenches and the rank's {checked.largest_angle:.1e} rad"]))
+        if condition is not None and condition.signed:
+            rows.append(("", f"expression positive at {checked.sides[0]}, negative at {checked.sides[1]} of the random "
+                         "poses"))
+    if condition is not None and not condition.never and not found.examples:
+        searches = 0 if checked is None else checked.searches
+        rows.append(("singular at", f"not found by {searches} searches, which does not say that there is none"))
+    rows.append(("singular at", [line for each in found.examples for line in (
+        str(each.pose), f"  singular value {each.sigma:.1e}, a centimetre away up to {each.nearby:.1e}; lost: "
+        + "; ".join(freedom.name for freedom in each.lost))]))
+    return listing([*rows, *known("drawn in", file)])
+
+
+def modes(found: AssemblyModes, file: str | None = None) -> str:
+    """The pose whose measurements are held, the count with its proof, a block for each mode."""
+    count = found.found
+    name, seen = head(found.setting)
+    rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_SINCE[found.kind]} at {found.pose}")]
+    if count.continuum is None:
+        rows += [("modes", f"{len(found.modes)} real of {count.complex} complex, {all_of(found)}"),
+                 ("proof", count.proof)]
+    for each in count.meant:
+        legs = ", ".join(found.labels[k] for k in each.legs)
+        rows.append(("meant", f"legs {legs} share a joint centre of the {each.where} (to {each.defect:.1e} m; "
+                              "--as-written takes the numbers as they are)"))
+    rows += known("special", count.degenerate)
+    for number, mode in enumerate(found.modes, 1):
+        rows += [*GAP, (f"mode {number}", [f"{mode.pose}" + ("   (the pose itself)" if mode.goal else ""),
+                 proved(mode) if mode.fits is not None else f"{proved(mode)}, residual {mode.residual:.1e}",
+                 *at_mode(mode, found.kind)])]
+    for number, mode in enumerate(found.near, 1):
+        rows += [*GAP, (f"near {number}", [f"{mode.pose}   residual {mode.residual:.2e}: almost a mode"
+                 + (", and none" if count.complete else ""), *at_mode(mode, found.kind)])]
+    return listing([*rows, *(() if file is None else [*GAP, ("picture", file)])])
+
+
+def all_of(found: AssemblyModes) -> str:
+    """Whether the modes are all."""
+    if found.found.complete:
+        fitting = sum(mode.fits is not None and not mode.goal for mode in found.modes)
+        return f"proved to be all among {found.within}" + (
+            f"; {fitting} of them fit{'s' * (fitting == 1)}, not proved" if fitting else "")
+    return "found, not proved to be all"
+
+
+def proved(mode: AssemblyMode) -> str:
+    """What is proved of a mode's place."""
+    within = "" if not np.isfinite(mode.radius) else f"to {mode.shift:.1e} m" + (f", {mode.turn:.1e} rad" if mode.turn
+                                                                                 else "")
+    known = f"known {within}" if within else "known to no radius"
+    if mode.proved:
+        return f"{', '.join(mode.enclosed)}{' ' if mode.enclosed else ''}enclosed {within}"
+    if mode.fits is not None and mode.goal:
+        return f"a mode by construction, its place not proved, {known}"
+    if mode.fits is not None:
+        return f"fits all legs to {mode.fits:.1e}, which does not prove it; if it is a mode, {known}"
+    if mode.rounded:
+        return f"not proved: enclosed {within} for the rounded geometry, not for the file's".replace("  ", " ")
+    if mode.multiplicity > 1:
+        return f"not proved, a multiple one {within}".rstrip()
+    return f"{'a mode by construction, its place ' if mode.goal else ''}not proved, {known}"
+
+
+def at_mode(mode: AssemblyMode, kind: str) -> list[str]:
+    """What the real robot does at a mode."""
+    if mode.type2_distance is None:
+        return assembly(mode)
+    matrix = "Mᵀ" if kind == "hidden" else "the motors' Jacobian (motor rates by platform twist)"
+    return [*assembly(mode), f"smallest singular value of {matrix} {mode.type2_distance:.3g}"]
+
+
+def assembly(mode: AssemblyMode) -> list[str]:
+    """Whether the real robot can be assembled at a mode, and why not."""
+    def legs(labels: Sequence[str]) -> str:
+        return f"{'legs' if len(labels) > 1 else 'leg'} {', '.join(labels)}"
+
+    match mode.assembly:
+        case "yes":
+            return ["the real robot can be assembled there"]
+        case "beyond limits":
+            return [f"the real robot can be assembled there only beyond the limits of {', '.join(mode.beyond)}"]
+        case "no":
+            return [f"the real robot cannot be assembled there: {legs([leg for leg, _ in mode.misses])}",
+                    *(f"leg {leg}: {miss}" for leg, miss in mode.misses)]
+    where = f"beyond the limits of {', '.join(mode.beyond)}" if mode.beyond else f"without {legs(mode.open)}"
+    return [f"the real robot was not found assembled there but {where}: that says nothing"]
+
+
+def path(found: PathAnswer) -> str:
+    """The verdict with its reason, the values at the two poses, and the path."""
+    value = "expression" if found.signed else "smallest singular value"
+    rows = [*head(found.setting), ("from", f"{found.start.pose}   ({value} {found.start.value:.4g})"),
+            ("to", f"{found.goal.pose}   ({value} {found.goal.value:.4g})"),
+            ("verdict", [f"{found.verdict} ({'certified' if found.certified else 'not certified'})", found.reason])]
+    if found.margin is not None:
+        where = "all along the path" if found.certified and found.ways else "at both poses"
+        rows.append(("margin", f"|{value}| at least {found.margin:.3g} {where}, {found.boxes} intervals"))
+    if found.ways:
+        rows.append(("path" if found.certified else "best path", [str(pose) for pose in found.poses]))
+    rows.append(("crossings", [f"leg {leg} changes its working mode at {found.poses[place]}"
+                               for leg, place in found.crossings]))
+    return listing([*rows, *known("not proved", found.not_proved if found.certified else None)])

@@ -1,0 +1,203 @@
+"""A robot and what a camera sees of it: as it was read, its hidden robot, its sets of legs, what is missing, in 3D."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import comb, degrees, prod
+from typing import TYPE_CHECKING
+
+from ...analysis.exact import ExactVerdict, power_above
+from ...errors import HrsynthError
+from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
+from .tables import Rows, camera, head, known, listing, sets, table
+
+if TYPE_CHECKING:
+    from ...analysis.advice import Advice, FurtherMeasurement
+    from ...analysis.controllability import Legs, Verdict
+    from ...analysis.derive import Derivation
+    from ...analysis.observed import ObservedRobot
+    from ...kinematics.certificate import Certificate
+    from ...mechanism import Mechanism
+    from ..view.view import View
+
+NO_MATRIX = "there is no interaction matrix: observed links move while the platform rests"
+_KINDS = {"leg": "leg (direction of its default segment)", "direction": "direction of another link",
+          "line": "position of an observed line", "encoder": "encoder on a joint"}
+_SHOWN = 6
+"""Sets of measurements listed at most."""
+
+
+def robot(found: Mechanism) -> str:
+    """Name, size and motors; legs with their default segments, where the mechanism has legs; notes of its reading."""
+    from ...analysis.observed import defaults_of
+    from ...mechanism.legs import decompose
+    from ...mechanism.normal import normal_form
+
+    rows: Rows = [("links, joints", f"{len(found.links)}, {len(found.joints)}"), ("base", found.base),
+                  ("platform", found.platform),
+                  ("motors", ", ".join(joint.name for joint in found.joints.values() if joint.actuated) or "none"),
+                  *known("camera on", found.reference if found.reference != found.base else None)]
+    try:
+        anatomy = decompose(normal_form(found).mechanism)
+        rows.insert(0, ("robot", f"{found.name}   {anatomy.architecture()}"))
+        watched = {label: f"watched at {o.link}" for label, o in defaults_of(anatomy).items()}
+        rows += [(f"leg {leg.label}", watched.get(leg.label, "no segment with a direction of its own"))
+                 for leg in anatomy.legs]
+    except HrsynthError as error:
+        rows[:0] = [("robot", [found.name, str(error)])]
+    return listing([*rows, ("note", [str(note) for note in found.notes])])
+
+
+def derivation(found: Derivation, hidden_file: str | None = None, report: str | None = None) -> str:
+    """The hidden robot first, the proof next, the trace last."""
+    mobility, hidden, paper, observed = found.mobility, found.hidden_architecture, found.paper, found.setting
+    dof = [f"{found.dof} (mobility {mobility.total}, of which {mobility.idle} idle)"]
+    if observed.anatomy.point is not None:
+        dof.append("the platform is a point: its velocity is what is controlled, its turn is idle")
+    name, seen = head(observed)
+    rows: Rows = [
+        name, ("dof", dof), seen, *camera(observed),
+        ("hidden robot", str(hidden) if hidden else "none: every observed direction is constant"),
+        ("verdict", [found.verdict.verdict, *([near(found.verdict)] if found.verdict.near else [])]),
+        ("mode", _modes(observed)),
+        ("architecture", exact_words(found.exact, found.verdict.rank)),
+        ("lost at zero", [freedom.name for freedom in found.verdict.lost]),
+        ("", [] if found.verdict.graph else NO_MATRIX),
+        ("certificate", certificate(found.certificate)),
+    ]
+    if paper is not None:
+        rows.append(("paper's form", [f"{paper.hidden}: {'equivalent' if paper.equivalent else 'NOT equivalent'}"
+                                      f" ({paper.reason})", *(f"gains {freedom.name}" for freedom in paper.gains),
+                                      *(f"loses {freedom.name}" for freedom in paper.loses)]))
+    steps = [(step.rule, step.leg or "all", "yes" if step.accepted else "no",
+              "" if step.largest_angle is None else f"{step.largest_angle:.1e}", step.reason) for step in found.steps]
+    return "\n".join([listing([*rows, *known("written to", hidden_file), *known("report", report)]), "",
+                      table(steps, ("rule", "leg", "taken", "angle", "why"))])
+
+
+def _modes(observed: ObservedRobot) -> list[str]:
+    """For which operation mode a verdict holds, where others were met."""
+    found = observed.beside()
+    own = observed.everything.signature
+    return [f"for the operation mode of the zero configuration: {own.dof} dof ({own.motion}), mobility {own.mobility}",
+            *(f"another that was met: {text}" for text in found)] if found else []
+
+
+def near(found: Verdict) -> str:
+    """How far a verdict is from another one, where that is not far."""
+    counts = found.rank and found.counted < SURELY_SOMETHING
+    return (f"near another verdict: a motion that counts as {'seen' if counts else 'not seen'} has the singular value "
+            f"{found.counted if counts else found.dropped:.1e}, which counts above {RANK_CUTOFF:.0e} (rates of the "
+            "directions, characteristic lengths, radians)")
+
+
+def certificate(found: Certificate) -> str:
+    """How closely the hidden robot agrees with the real one, and how closely it must."""
+    return (f"{'passed' if found.passed else 'FAILED'} at {found.samples} configurations"
+            f" ({found.discarded} discarded): {found.reason + '; ' if found.reason else ''}"
+            f"largest angle {found.largest_angle:.1e} (allowed {SAME_RELATION:.0e}), smallest rank gap "
+            f"{found.smallest_gap:.1e} (needed {RANK_GAP:.0e}), follows to {found.residual:.1e}")
+
+
+def verdict(found: Verdict) -> str:
+    """What a set of legs sees, and what it does not."""
+    return listing([("legs", ", ".join(found.legs)), ("verdict", f"{found.verdict} (rank {found.rank} of {found.dof})"),
+                    ("lost", [freedom.name for freedom in found.lost])])
+
+
+def exact_words(exact: ExactVerdict, rank: int) -> str:
+    """The architecture's verdict beside the ``rank`` that the robot itself shows."""
+    if exact.rank is None:
+        return f"not decided: {exact.reason}"
+    text = f"{exact.verdict}, {exact.reason}"
+    if exact.rank == rank:
+        return text
+    return (f"{text}: generic geometry sees {exact.rank} of {exact.dof} freedoms, this robot {rank}, because of its "
+            "dimensions")
+
+
+def exact_cell(exact: ExactVerdict, rank: int) -> str:
+    """The same in a cell of a table."""
+    if exact.rank is None:
+        return "not decided"
+    text = "proved" if exact.proved else f"{exact.instances} instance" + "s" * (exact.instances > 1)
+    return text if exact.rank == rank else f"{text}, of generic geometry: {exact.rank} of {exact.dof}"
+
+
+def legs(found: Legs) -> str:
+    """One line a set of legs, the smallest sets of the best rank last."""
+    rows = [(", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", exact_cell(exact, each.rank),
+             "; ".join(freedom.name for freedom in each.lost))
+            for each, exact in zip(found.sets, found.exact, strict=True)]
+    lines = [f"{found.robot}   {found.architecture}   {found.dof} dof", "",
+             table(rows, ("legs", "verdict", "rank", "exact", "lost (at the zero configuration)")), "",
+             f"smallest sets of the best rank: {found.smallest}"]
+    lines += [f"not decided in exact arithmetic: {reason}"
+              for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)]
+    chance = max(each.chance for each in found.exact)
+    if chance:
+        lines.append(f"exact but for a chance below {power_above(chance)}: identities tested at random instances")
+    lines += [f"legs {', '.join(each.legs)}: {near(each)}" for each in found.sets if each.near]
+    lines += _modes(found.setting)
+    if not found.complete:
+        lines.append("not all sets were tried: there are too many legs")
+    return "\n".join(lines)
+
+
+def advice(found: Advice) -> str:
+    """What is seen now, then the smallest sets of measurements that cure it, by kind."""
+    now = found.now
+    rows = [*head(found.setting), *camera(found.setting), ("verdict", f"{now.verdict} (rank {now.rank} of {now.dof})"),
+            ("lost at zero", [freedom.name for freedom in now.lost])]
+    return "\n".join([listing(rows), "", *_missing(found)])
+
+
+def _missing(found: Advice) -> list[str]:
+    if found.nothing_missing:
+        return ["Nothing is missing"]
+    limits = [] if found.cured else ["No set of legs, links, lines and encoders sees more"]
+    if not found.complete:
+        limits = [f"Not every set was tried or decided: {found.tried} tried, {found.undecided} undecided"]
+    if not found.sets:
+        return limits
+    groups: dict[tuple[str, ...], list[tuple[FurtherMeasurement, ...]]] = {}
+    for each in found.sets:
+        groups.setdefault(tuple(m.kind for m in each.measurements), []).append(each.measurements)
+    best = found.sets[0].verdict
+    gap = min(each.verdict.gap for each in found.sets)
+    what = "one more measurement" if found.size == 1 else f"{found.size} more measurements"
+    ways = "one way" if len(found.sets) == 1 else f"{len(found.sets)} ways"
+    lines = [f"{best.verdict.capitalize()} (rank {best.rank} of {best.dof}) with {what}, {ways}, smallest rank gap "
+             f"{gap:.1e} (needed {RANK_GAP:.0e}):",
+             *(f"  {line}" for group in groups.items() for line in _ways(*group))]
+    starred = any(m.actuated for each in found.sets for m in each.measurements)
+    return [*lines, *(["* a joint with a motor"] if starred else []), *limits]
+
+
+def _ways(kinds: tuple[str, ...], found: Sequence[tuple[FurtherMeasurement, ...]]) -> list[str]:
+    """The sets of the same kinds in a few words: any so many of each kind where all choices do, else one by one."""
+    counts = {kind: kinds.count(kind) for kind in kinds}
+    names = {kind: list(dict.fromkeys(m.name for each in found for m in each if m.kind == kind)) for kind in counts}
+    if len(found) == prod(comb(len(names[kind]), count) for kind, count in counts.items()):
+        return [" and ".join(f"{_KINDS[kind]}: any {'' if count == 1 else f'{count} '}of {', '.join(names[kind])}"
+                             if len(names[kind]) > count else f"{_KINDS[kind]}: {', '.join(names[kind])}"
+                             for kind, count in counts.items())]
+    title = " and ".join(_KINDS[kind] if count == 1 else f"{count} × {_KINDS[kind]}" for kind, count in counts.items())
+    shown = "  ".join(sets([m.name for m in each] for each in found[:_SHOWN]))
+    more = "" if len(found) <= _SHOWN else f"  and {len(found) - _SHOWN} more (all with --json)"
+    return [f"{title}:", f"  {shown}{more}"]
+
+
+def view(found: View, file: str | None = None) -> str:
+    """What is drawn, how far the sliders go, and the page."""
+    sliders = []
+    for slider in found.sliders:
+        low, high = slider.values[0], slider.values[-1]
+        ends = f"{degrees(low):.3g}° to {degrees(high):.3g}°" if slider.unit == "rad" else f"{low:.4g} to {high:.4g} m"
+        sliders.append(f"{slider.name}: {ends}, {len(slider.values)} closed configurations")
+    return listing([
+        ("robot", f"{found.setting.robot.name}   {found.machines[0].words}"),
+        ("observed", ", ".join(f"{arrow.leg} ({arrow.link})" for arrow in found.arrows) or "nothing"),
+        *(("hidden robot", machine.words) for machine in found.machines[1:]), ("sliders", sliders),
+        ("other modes", ", ".join(outline.label for outline in found.ghosts) or []),
+        *(("note", note) for note in found.notes), *known("page", file)])

@@ -1,0 +1,192 @@
+"""The servo loop in text: a run, the errors that directions lead to, the legs to watch for a displacement."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from ...geometry.vectors import Array
+from ...tolerances import DAMPED
+from .tables import GAP, Rows, camera, head, known, listing, table
+
+if TYPE_CHECKING:
+    from ...analysis.accuracy.accuracy import Accuracy
+    from ...analysis.accuracy.field import Field
+    from ...analysis.accuracy.pose_errors import Extent, PoseErrors
+    from ...analysis.accuracy.sampled import Sampled
+    from ...selection.candidate import Candidate, Modes
+    from ...selection.select import Selection
+    from ...simulation.result import Servo
+
+PARTS_FROM_LINEAR = 0.1
+"""Relative difference from which samples are said to part from the linear law."""
+NEAR_SINGULARITY = 0.1
+"""Part of its value at the pose below which a smallest singular value is said to be near zero."""
+
+
+def servo(found: Servo, file: str | None = None) -> str:
+    """What was asked, where the run ended and why, what it passed, and how far noise kept it away."""
+    from ...simulation.track import CONSTRAINT, LIMIT, TYPE_1, TYPE_2
+
+    passed = {TYPE_2: "crosses a Type 2 singularity of the hidden robot",
+              TYPE_1: "a watched leg passes its limit (Type 1) into another working mode",
+              LIMIT: "a leg that is not watched passes its limit",
+              CONSTRAINT: "crosses a constraint singularity of the loops"}
+    run, track, off = found.run, found.track, found.from_goal
+    rows = [*head(found.setting), ("from", str(found.start)), ("to", str(found.goal)),
+            ("controller", f"gain {found.gain:g} per second, sensed: {found.sense}"
+                           + ("" if found.noise is None else f", noise {found.noise}")),
+            *GAP, ("ended", [f"{found.ended} after {run.times[-1]:.3g} s", found.ending.reason]),
+            ("at", str(found.pose))]
+    if found.ended != "goal":
+        rows.append(("", f"{1e3 * off[0]:.4g} mm and {_degrees(off[1])} degrees from the goal"))
+    if found.ending.modes is not None:
+        rows.append(("modes", [f"{i}: {mode.pose}" + ("   (the goal)" if mode.goal else "")
+                               for i, mode in enumerate(found.ending.modes.modes, 1)]))
+    if found.spread is not None:
+        s = found.spread
+        rows.append(("noise", f"keeps it within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} degrees of "
+                              f"there, root mean square {1e3 * s.rms_metres:.2g} mm and "
+                              f"{_degrees(s.rms_radians)} degrees"))
+        if s.aside:
+            rows.append(("", f"holds it aside: on average {1e3 * s.offset:.3g} mm from there, at "
+                             f"({' '.join(f'{value:.4g}' for value in s.mean)})"))
+    rows.append(("", list(found.notes)))
+    least = track.to_dict(run.times.tolist())
+    if least["smallest"] is not None:
+        rows.append(("on the way", f"smallest singular value of Mᵀ {least['smallest']:.3g}, at {least['at']:.3g} s"))
+    rows += [("", f"{passed[each.kind]} before {run.times[each.place]:.3g} s, at "
+                  f"{found.pose_of(run.configurations[each.place])}") for each in track.passages or ()]
+    if track.passages == ():
+        met = least["smallest"] is not None and least["smallest"] < DAMPED
+        rows.append(("", "a Type 2 singularity met and left again on the same side" if met
+                     else "no singularity crossed"))
+    return listing([*rows, *known("picture", file)])
+
+
+def _degrees(angle: float) -> str:
+    return f"{round(math.degrees(angle), 6):.2g}"
+
+
+def accuracy(found: Accuracy, file: str | None = None) -> str:
+    """The cones, the range of errors over a grid, a block for each single pose."""
+    name, _ = head(found.setting)
+    rows = [name, ("observed", ", ".join(f"{o.leg} ({o.link}) within {np.degrees(cone):.4g}°"
+                                         for o, cone in zip(found.setting.observed, found.cones, strict=True))),
+            *camera(found.setting),
+            ("errors", "largest over all errors of the directions inside their cones, to first order")]
+    if found.field is not None:
+        rows += [*GAP, *field_rows(found.field)]
+    for errors, true in zip(found.poses, found.sampled, strict=True):
+        rows += [*GAP, ("pose", str(errors.pose)), *_extent("position", errors.position, 1e3, "mm"),
+                 *_extent("orientation", errors.orientation, 180 / np.pi, "degrees"),
+                 *([] if true is None else _samples(errors, true))]
+    return listing([*rows, *(() if file is None else [*GAP, ("written", file)])])
+
+
+def field_rows(field: Field) -> list[tuple[str, str]]:
+    """What a grid holds: its size, what is reached of it, the range of the errors, how they were checked."""
+    grid = field.grid
+    size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
+    ranges = ", ".join(f"{name} {values[0]:.4g} to {values[-1]:.4g}" for name, values in grid.axes)
+    fixed = str(grid.fixed)
+    rows = [("poses", f"{size}: {ranges}" + (f"; {fixed}" if fixed else "")),
+            ("reached", f"{np.sum(field.reached)} of {field.reached.size}"),
+            ("position", _range(1e3 * field.position, "mm")),
+            ("orientation", _range(np.degrees(field.orientation), "degrees"))]
+    if field.spots is not None and field.spots.count:
+        rows.append(("checked", f"against Pinocchio at {field.spots.count} random poses, largest difference "
+                                f"{field.spots.difference:.1e}"))
+    if field.gap > 1e-9:
+        rows.append(("", f"three cones and more: upper bounds, nowhere more than {100 * field.gap:.2g} % too large"))
+    return rows
+
+
+def _range(errors: Array, unit: str) -> str:
+    finite = errors[np.isfinite(errors)]
+    if not np.nanmax(errors, initial=0.0) > 0:
+        return "no errors: the platform does not move so"
+    text = (f"{finite.min():.4g} to {finite.max():.4g} {unit}, median {np.median(finite):.4g}" if finite.size
+            else "infinite")
+    lost = int(np.sum(np.isinf(errors)))
+    return text + (f"; infinite at {lost} poses, where a freedom is lost" if lost and finite.size else "")
+
+
+def _samples(errors: PoseErrors, true: Sampled) -> Rows:
+    lines = [f"{true.count} true errors give up to {1e3 * true.position:.4g} mm, {np.degrees(true.orientation):.4g} "
+             "degrees",
+             f"smallest singular value of Mᵀ met {true.weakest:.3g}, at the pose {true.usual:.3g}"
+             + (": a singularity is near" if not true.weakest >= max(NEAR_SINGULARITY * true.usual, DAMPED) else "")]
+    if true.ended:
+        lines.append(f"for {len(true.ended)} of them the best fit becomes flat on the way, first at "
+                     f"{true.ended[0]:.2g} of the error: a controller slips away there, and further than is told")
+    if true.not_found:
+        lines.append(f"{true.not_found} of them were not followed to the end: the solver gave up, which says nothing "
+                     "of the robot")
+    if _apart(true.position, errors.position) or _apart(true.orientation, errors.orientation):
+        lines.append("they part from the maxima above, which are not to be relied on here")
+    return [("samples", lines)]
+
+
+def _extent(name: str, extent: Extent, unit: float, word: str) -> Rows:
+    if not np.isfinite(extent.largest):
+        return [(name, "infinite: a freedom is lost here")]
+    if extent.direction is None:
+        return [(name, "no error: the platform does not move so")]
+    lines = [f"{unit * extent.largest:.4g} {word}, along {_vector(extent.direction)}"]
+    if extent.anisotropy is not None and extent.least_direction is not None:
+        lines.append(f"least along {_vector(extent.least_direction)}: {unit * extent.least:.4g} {word}, anisotropy "
+                     f"{extent.anisotropy:.3g}")
+    return [(name, lines)]
+
+
+def _apart(true: float, linear: Extent) -> bool:
+    return np.isfinite(linear.largest) and abs(true - linear.largest) > PARTS_FROM_LINEAR * max(linear.largest, 1e-12)
+
+
+def _vector(vector: Array) -> str:
+    return " ".join(f"{value + 0.0:.3f}" for value in np.round(vector, 3))
+
+
+def selection(found: Selection) -> str:
+    """The displacement, the table, the reasons."""
+    observed, sight = found.setting.observed, found.sight is not None
+    cones = dict.fromkeys(f"{np.degrees(cone):.4g}°" for cone in found.cones)
+    angle = next(iter(cones)) if len(cones) == 1 else ", ".join(
+        f"{o.leg} {np.degrees(cone):.4g}°" for o, cone in zip(observed, found.cones, strict=True))
+    name, _ = head(found.setting)
+    rows = [name, ("from", str(found.start)), ("to", str(found.goal)), ("cones", f"{angle} about each direction"),
+            ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}, the most accurate first")]
+    if found.unexamined:
+        rows.append(("", f"not examined: {len(found.unexamined)} ({found.left})"))
+    if found.sight is not None:
+        rows.append(("camera", f"on {found.sight.reference}"))
+    blocks = [listing(rows)]
+    if found.kept:
+        heads = ["legs", "mm", "degrees", "modes", "aspect", *(["seen"] if sight else []), "run"]
+        blocks.append(table([_row(each, sight) for each in found.kept], heads))
+        blocks.append("mm, degrees: largest errors at the goal; modes: those of the start / of the goal, in brackets\n"
+                      "those that the robot was found to take; – not asked")
+    if found.unexamined:
+        blocks.append(table([_row(each, sight)[:3] for each in found.unexamined], ["not examined", "mm", "degrees"]))
+    discarded = [each for each in found.candidates if each.discarded is not None]
+    if discarded:
+        blocks.append(table([(", ".join(each.legs), str(each.discarded)) for each in discarded],
+                            ("discarded", "because")))
+    return "\n\n".join(blocks)
+
+
+def _row(each: Candidate, sight: bool) -> list[str]:
+    errors = each.errors
+    assert errors is not None
+    seen = [] if not sight else ["–" if each.seen is None else f"{100 * min(each.seen.values()):.0f} %"]
+    return [", ".join(each.legs), f"{1e3 * errors.position.largest:.4g}",
+            f"{np.degrees(errors.orientation.largest):.4g}", f"{_modes(each.start_modes)} / {_modes(each.goal_modes)}",
+            "–" if each.aspect is None else each.aspect.verdict, *seen,
+            "–" if each.run is None else each.run.verdict]
+
+
+def _modes(modes: Modes | None) -> str:
+    return "–" if modes is None or modes.count is None else f"{modes.count} ({modes.reachable})"
