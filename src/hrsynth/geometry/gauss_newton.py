@@ -23,26 +23,35 @@ class Damping:
     most: float
 
 
-def descend(x: X, evaluate: Callable[[X], tuple[Array, Array]],
-            advance: Callable[[X, Array, Array, float], X | None], damping: Damping, iterations: int,
-            content: Callable[[Array, Array, float], bool]) -> tuple[X, float]:
-    """Where steps lead that make the error smaller, and its norm there.
+@dataclass(frozen=True, eq=False)
+class Residual:
+    """An error (rows,), its Jacobian (rows, n) and its norm."""
 
-    ``evaluate`` gives the error (rows,) and its Jacobian at a place, ``advance`` where a step with a damping factor
-    leads (None: nowhere), ``content`` whether an error with its Jacobian and norm is small enough.
+    error: Array
+    J: Array
+    size: float
+
+    @classmethod
+    def of(cls, error: Array, J: Array) -> Residual:
+        """With its norm."""
+        return cls(error, J, math.sqrt(error @ error))
+
+
+def descend(x: X, evaluate: Callable[[X], tuple[Array, Array]], advance: Callable[[X, Residual, float], X | None],
+            damping: Damping, iterations: int, content: Callable[[Residual], bool]) -> tuple[X, Residual]:
+    """Where steps lead that make the error smaller, and what is left of it there.
+
+    ``evaluate`` gives the error and its Jacobian at a place, ``advance`` where a step with a damping factor leads (or
+    None), ``content`` tells whether that is enough.
     """
-    error, J = evaluate(x)
-    size, factor = math.sqrt(error @ error), damping.start
+    found, factor = Residual.of(*evaluate(x)), damping.start
     for _ in range(iterations):
-        if content(error, J, size) or factor > damping.most:
+        if content(found) or factor > damping.most:
             break
-        there = advance(x, error, J, factor)
-        if there is not None:
-            trial, trial_J = evaluate(there)
-            trial_size = math.sqrt(trial @ trial)
-            if trial_size < size:
-                x, error, J, size = there, trial, trial_J, trial_size
-                factor = max(damping.eased * factor, damping.least)
-                continue
-        factor *= 10.0
-    return x, size
+        there = advance(x, found, factor)
+        trial = None if there is None else Residual.of(*evaluate(there))
+        if there is not None and trial is not None and trial.size < found.size:
+            x, found, factor = there, trial, max(damping.eased * factor, damping.least)
+        else:
+            factor *= 10.0
+    return x, found

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import HrsynthError
-from ..geometry.gauss_newton import Damping, descend
+from ..geometry.gauss_newton import Damping, Residual, descend
 from ..geometry.ranks import kernel_basis
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
@@ -69,13 +69,14 @@ def _approached(at: ClosedConfiguration, goal: Goal, manner: Goal, iterations: i
         error, rows = goal.rows(twin, here[0].q)
         return error, rows @ here[1]
 
-    def advance(here: tuple[ClosedConfiguration, Array], error: Array, J: Array, factor: float
+    def advance(here: tuple[ClosedConfiguration, Array], left: Residual, factor: float
                 ) -> tuple[ClosedConfiguration, Array] | None:
-        step = here[1] @ np.linalg.solve(J.T @ J + factor * np.eye(J.shape[1]), -(J.T @ error))
+        J = left.J
+        step = here[1] @ np.linalg.solve(J.T @ J + factor * np.eye(J.shape[1]), -(J.T @ left.error))
         q, residual = solve(twin, twin.moved(here[0].q, step), manner, tolerance=SOLVED)
         return tangent(ClosedConfiguration.of(twin, q)) if residual <= CLOSED else None
 
-    def content(error: Array, J: Array, size: float) -> bool:
-        return size <= SOLVED or bool(np.linalg.norm(J.T @ error) <= RANK_CUTOFF * size)
+    def content(left: Residual) -> bool:
+        return left.size <= SOLVED or bool(np.linalg.norm(left.J.T @ left.error) <= RANK_CUTOFF * left.size)
 
     return descend(tangent(at), evaluate, advance, DAMPING, iterations, content)[0][0]

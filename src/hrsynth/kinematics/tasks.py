@@ -5,13 +5,12 @@ Lengths are in characteristic lengths, so that errors of positions and of turns 
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
 
-from ..geometry.gauss_newton import Damping, descend
+from ..geometry.gauss_newton import Damping, Residual, descend
 from ..geometry.so3 import logarithm
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
@@ -71,14 +70,15 @@ def solve(twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance
     The damping is the square of the residual: off closure a redundant or idle direction has singular values of the
     residual's own size, which must not be followed; near closure the convergence stays fast.
     """
-    def advance(q: Array, error: Array, J: Array, factor: float) -> Array:
-        normal = J.T @ J
-        normal.flat[:: twin.nv + 1] += max(factor * math.sqrt(error @ error) ** 2, 1e-14)
-        step: Array = np.asarray(np.linalg.solve(normal, -(J.T @ error)), dtype=float)
+    def advance(q: Array, at: Residual, factor: float) -> Array:
+        normal = at.J.T @ at.J
+        normal.flat[:: twin.nv + 1] += max(factor * at.size**2, 1e-14)
+        step: Array = np.asarray(np.linalg.solve(normal, -(at.J.T @ at.error)), dtype=float)
         return twin.moved(q, shortened(step, 0.5))
 
-    return descend(q, lambda q: system(twin, q, task), advance, DAMPING, iterations,
-                   lambda error, J, size: size <= tolerance)
+    q, left = descend(q, lambda q: system(twin, q, task), advance, DAMPING, iterations,
+                      lambda at: at.size <= tolerance)
+    return q, left.size
 
 
 def shortened(step: Array, longest: float) -> Array:

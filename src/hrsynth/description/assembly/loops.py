@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...geometry.gauss_newton import Damping, Residual, descend
 from ...geometry.ranks import Rank, rank_of
 from ...geometry.vectors import Array, inverse, pose
 from ...mechanism.model import JointType, Mechanism
@@ -18,6 +19,7 @@ from ...tolerances import FAINT, FIRM, NEARLY_SINGULAR, NEWTON_REACH, NOISE, RAN
 from ..jointgraph import FrameSpec, GearSpec, JointSpec, TreeJoint, spanning_tree, zero_poses
 from ..jointmotion import displacement, opening, screws, step_along, zero
 
+DAMPING = Damping(start=1.0, eased=0.1, least=1e-3, most=1e6)
 STRIDE = 0.4
 """Largest change of a coordinate in one step."""
 EFFORT = 100_000
@@ -126,23 +128,18 @@ class LoopAssembly:
 
     def close(self, values: Values, iterations: int = 60) -> tuple[Values, float]:
         """The closed values that are reached from ``values``, and what is left open."""
-        error, J = self.system(values)
-        size, factor = float(np.linalg.norm(error)), 1.0
-        for _ in range(iterations):
-            if size <= SOLVED or factor > 1e6 or not self.size or self._spent > EFFORT:
-                break
-            trial = self.step(values, self._damped(error, J, size, factor))
-            trial_error, trial_J = self.system(trial)
-            trial_size = float(np.linalg.norm(trial_error))
-            if trial_size < size:
-                gain = size - trial_size
-                values, error, J, size = trial, trial_error, trial_J, trial_size
-                factor = max(0.1 * factor, 1e-3)
-                if gain < 1e-6 * size and size < NOISE:
-                    break
-            else:
-                factor *= 10.0
-        return self._polished(values, error, J, size) if SOLVED < size < NOISE else (values, size)
+        before = np.inf
+
+        def content(at: Residual) -> bool:
+            nonlocal before
+            gain, before = before - at.size, at.size
+            stalled = 0 < gain < 1e-6 * at.size and at.size < NOISE
+            return at.size <= SOLVED or stalled or not self.size or self._spent > EFFORT
+
+        values, left = descend(values, self.system, lambda values, at, factor: self.step(
+            values, self._damped(at.error, at.J, at.size, factor)), DAMPING, iterations, content)
+        close = SOLVED < left.size < NOISE
+        return self._polished(values, left.error, left.J, left.size) if close else (values, left.size)
 
     def _polished(self, values: Values, error: Array, J: Array, size: float) -> tuple[Values, float]:
         """Plain Newton steps, faint directions too, as long as they are short for the residual that they remove."""
