@@ -226,6 +226,8 @@ FOUND = (
     ("offset_u", 3036, "enclosures"),  # a fitted curve, where two branches are nearly one
     ("translational", 3020, "paths"),  # a held leg whose tip may move anywhere
     ("rods", 20261164, "hidden modes"),  # the pose itself, whose solution is known to 1e-8 only
+    ("translational", 20261429, "errors"),  # a platform that turns by 1e-10 rad, taken for one that does not
+    ("pods words", 20261184, "real modes"),  # the pose itself, where msolve finds nothing
     ("tripods", 20261176, "real modes"),  # legs R-R-S with skew axes, told not to reach a mode
     ("slides", 20261175, "hidden robot"),  # zero as a dead point, where the certificate says nothing
     ("deltas words", 20261425, "hidden robot"),  # no way of straight steps to a pose that the hidden robot reaches

@@ -73,10 +73,10 @@ def torn(system: System, places: Mapping[int, tuple[Array, float]]) -> bool:
         return any(not (arm @ arm - own @ own).contains(0) for arm, own in arms)
 
 
-def words(goal: bool, fitting: Sequence[float], out: int, open_: int) -> str:
-    """What the legs say of all solutions: whether one is the goal, the residuals of those that fit, how many are
-    excluded and how many are not decided."""
-    parts = ["one is the goal, at which all legs fit by construction"] if goal else []
+def words(goal: bool, lost: bool, fitting: Sequence[float], out: int, open_: int) -> str:
+    """What the legs say of all solutions: whether one is the goal, or it is ``lost`` among them, the residuals of those
+    that fit, how many are excluded and how many are not decided."""
+    parts = [f"{'none' if lost else 'one'} is the goal, at which all legs fit by construction"] if goal else []
     if fitting:
         parts.append(f"{len(fitting)} fit{'s' * (len(fitting) == 1)} all legs to {max(fitting):.1e} of the robot's "
                      "size, which does not prove it")

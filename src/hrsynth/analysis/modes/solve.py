@@ -186,16 +186,18 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
                   for mode in left if mode is at_goal or mode.residual <= VANISHES)
     enclosed = roots.complete and len(modes) == len(left) and all(mode.proved or mode.fits for mode in modes)
     open_ = [mode for mode in left if mode is not at_goal and mode.residual > VANISHES]
+    lost = goal is not None and not any(_same(system, mode.q, goal) for mode in left)
     if goal is not None and not any(_same(system, mode.q, goal) for mode in modes):
         # a mode by construction, whose solution is known too roughly to fit
         at_goal = SystemMode((), np.inf, np.inf, np.pi, system.residual(system.reached(goal)),
                              frozen(system.pose(goal)), frozen(goal), square.legs)
         modes, open_ = (*modes, at_goal), [mode for mode in open_ if not _same(system, mode.q, goal)]
+        enclosed = False
     near = () if others is None else _near(system, found, modes, others)
     near = tuple(_nearly(system, mode.q) for mode in found if mode not in left and mode.residual <= VANISHES) + near
     fitting = [mode.residual for mode in modes if mode is not at_goal]
     proof = (f"from {len(square.legs)} of {len(system.curves)} legs: {proof}; of these "
-             + words(at_goal is not None, fitting, len(found) - len(left), len(open_)))
+             + words(at_goal is not None, lost, fitting, len(found) - len(left), len(open_)))
     return SystemModes(len(modes), modes, enclosed and bound != "none", proof, near, _special(roots), None, bound,
                        enclosed)
 
