@@ -94,9 +94,10 @@ def wanted_poses(setting: ObservedRobot, count: int, seed: int) -> Iterator[tupl
     rng, motion = np.random.default_rng(seed), setting.motion
     for number in range(count):
         axis = np.eye(3)[number] if number < 3 and not seed else random_direction(rng)
-        if motion.spins.shape[1] == 1:
-            axis = motion.spins[:, 0]
-        shift = 0.1 * setting.everything.twin.length * motion.shifts @ rng.uniform(-1, 1, motion.shifts.shape[1])
+        if motion.rotations.shape[1] == 1:
+            axis = motion.rotations[:, 0]
+        along = motion.translations
+        shift = 0.1 * setting.everything.twin.length * along @ rng.uniform(-1, 1, along.shape[1])
         X = motion.home.copy()
         X[:3, :3] = half_turn(axis) @ X[:3, :3]
         X[:3, 3] = motion.position(motion.home) + shift - X[:3, :3] @ motion.point
@@ -188,7 +189,7 @@ def mapped(case: Case, pose: Pose) -> Answer:
 
 def located(case: Case, pose: Pose) -> Answer:
     """Over a plane of poses turned alike: the nearest cell's distance from a singularity is that of its pose."""
-    plane = Pose(z=pose.z if case.setting.motion.shifts.shape[1] == 3 else None, rpy=pose.rpy)
+    plane = Pose(z=pose.z if case.setting.motion.translations.shape[1] == 3 else None, rpy=pose.rpy)
     locus = locus_of(case.setting, plane=plane, steps=5)
     cell = np.unravel_index(np.nanargmax(locus.hidden.type2), locus.grid.shape)
     (there,) = locus.grid.poses_at([tuple(map(int, cell))])

@@ -226,7 +226,7 @@ def spinning() -> ObservedRobot:
 
 def test_directions_that_move_while_the_platform_rests() -> None:
     setting = spinning()
-    assert setting.everything.members[0].relation.unexplained == 1
+    assert setting.everything.members[0].relation.RI == 1
     generic = architecture(setting)
     for places, observed in sets(setting):
         verdict = generic.verdict(observed)

@@ -31,7 +31,7 @@ class Counts:
     def of(cls, found: Relation) -> Counts:
         """The counts of a relation."""
         seen = range_basis(found.rates, 1.0)[1].value
-        return cls(found.mobility, found.dimension, found.dof.value, seen, found.lost_rank.value, found.unexplained)
+        return cls(found.mobility, found.dimension, found.dof.value, seen, found.RO.value, found.RI)
 
 
 def generic(counts: Sequence[Counts]) -> Counts:
@@ -42,7 +42,7 @@ def generic(counts: Sequence[Counts]) -> Counts:
 
 def gap_of(found: Relation) -> float:
     """The smallest gap of all ranks that the counts rest on."""
-    return min(found.gap, found.dof.gap, found.lost_rank.gap, range_basis(found.rates, 1.0)[1].gap)
+    return min(found.gap, found.dof.gap, found.RO.gap, range_basis(found.rates, 1.0)[1].gap)
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ class Classes:
 def interaction_matrix(found: Relation) -> Array | None:
     """Mᵀ (rates, dof) on the basis ``found.twists`` of the feasible twists (MMT eq. 7; lengths in characteristic
     lengths); None where it does not exist."""
-    if found.unexplained:
+    if found.RI:
         return None
     return found.rates @ np.asarray(np.linalg.lstsq(found.twist_part, found.twists, rcond=None)[0])
 

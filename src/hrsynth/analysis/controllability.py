@@ -113,13 +113,13 @@ def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) ->
     if any(each.rank != rank for each in found):
         between = min(each.seen.weakest for each in found) / max(each.seen.dropped for each in found)
         raise RankUndecided(f"{what} is not the same at all configurations", between, RANK_GAP)
-    gap = min(min(each.gap, each.lost_rank.gap) for each in found)
+    gap = min(min(each.gap, each.RO.gap) for each in found)
     Rank(rank, gap).decided(what)
     dof = setting.dof
     lost: tuple[Freedom, ...] = ()
     if rank < dof:
         lost = _lost(setting, samples, tuple(legs), dof - rank)
-    graph = not any(each.unexplained for each in found)
+    graph = not any(each.RI for each in found)
     return Verdict(tuple(legs), word(rank, dof), dof, rank, lost, gap, graph,
                    max(each.seen.weakest for each in found), min(each.seen.dropped for each in found))
 
@@ -128,10 +128,10 @@ def _lost(setting: ObservedRobot, samples: Samples, legs: tuple[str, ...], count
     """The lost freedoms at the zero configuration where it is generic, else at a sample."""
     start = relation(samples.start, samples.question)
     position = None
-    found = start.lost
+    found = start.unobserved_twists
     if found.shape[1] != count or start.gap < RANK_GAP:
-        member = next(member for member in samples.members if member.relation.lost.shape[1] == count)
-        found, position = member.relation.lost, member.configuration.pose(samples.question.platform)[:3, 3]
+        member = next(member for member in samples.members if member.relation.unobserved_twists.shape[1] == count)
+        found, position = member.relation.unobserved_twists, member.configuration.pose(samples.question.platform)[:3, 3]
     named = name_freedoms(found, setting.anatomy, legs, position)
     if position is None:
         return named

@@ -248,6 +248,7 @@ def _exchanged(anatomy: LegDecomposition, found: Certificate) -> tuple[tuple[Fre
 
     gains, loses = beyond(hidden.twists, real.twists), beyond(real.twists, hidden.twists)
     if not gains and not loses:
-        gains, loses = beyond(hidden.lost, real.lost), beyond(real.lost, hidden.lost)
+        ours, theirs = real.unobserved_twists, hidden.unobserved_twists
+        gains, loses = beyond(theirs, ours), beyond(ours, theirs)
     return gains, loses
 

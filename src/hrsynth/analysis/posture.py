@@ -171,9 +171,9 @@ class Examiner:
         posture = self.glance(at)
         hidden, real = posture.hidden, posture.real
         found = relation(at, self.setting.samples.question)
-        hidden = replace(hidden, lost=self._named(at, found.lost) if hidden.classes else ())
+        hidden = replace(hidden, lost=self._named(at, found.unobserved_twists) if hidden.classes else ())
         if real is not None and real.classes:
-            real = replace(real, lost=self._named(at, self._real(at).lost))
+            real = replace(real, lost=self._named(at, self._real(at).unobserved_twists))
         extra = surplus(redundant_rows(at), self.redundant)
         gained = self._named(at, self._gained(found)) if posture.constraint_singular else ()
         return replace(posture, hidden=hidden, real=real, gained=gained, redundant=listed(extra, generic=False))

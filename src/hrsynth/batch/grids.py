@@ -41,7 +41,8 @@ def pose_of(motion: PlatformMotion, goal: Goal) -> Array:
     elif goal.phi is not None:
         X[:3, :3] = exponential(goal.phi * goal.normal) @ motion.home[:3, :3]
     home = motion.position(motion.home)
-    way = motion.shifts @ np.linalg.lstsq(goal.directions @ motion.shifts, goal.values - goal.directions @ home,
+    along = goal.directions @ motion.translations
+    way = motion.translations @ np.linalg.lstsq(along, goal.values - goal.directions @ home,
                                           rcond=RANK_CUTOFF)[0]
     X[:3, 3] = home + way - X[:3, :3] @ motion.point
     return X
@@ -59,19 +60,19 @@ def poses_over(motion: PlatformMotion, grid: Grid, robot: str, places: Array) ->
     values = np.tile(first.values, (len(places), 1))
     for row, direction in enumerate(first.directions):
         values[:, row] = columns.get("xyz"[int(np.argmax(direction))], values[:, row])
-    home, rows = motion.position(motion.home), first.directions @ motion.shifts
+    home, rows = motion.position(motion.home), first.directions @ motion.translations
     missing = (values - first.directions @ home).T
     way = np.linalg.lstsq(rows, missing, rcond=RANK_CUTOFF)[0]
     met = np.linalg.norm(rows @ way - missing, axis=0) <= FOLLOWED
-    X[:, :3, 3] = home + (motion.shifts @ way).T - X[:, :3, :3] @ motion.point
+    X[:, :3, 3] = home + (motion.translations @ way).T - X[:, :3, :3] @ motion.point
     return X, met
 
 
 def _freedoms_left(motion: PlatformMotion, goal: Goal) -> int:
     """How many of the platform's turns a goal leaves free; more than there are where it leaves a translation free."""
-    spins = motion.spins.shape[1]
-    placed = np.linalg.matrix_rank(goal.directions @ motion.shifts, tol=RANK_CUTOFF) if len(goal.values) else 0
-    if placed < motion.shifts.shape[1]:
+    spins = motion.rotations.shape[1]
+    placed = np.linalg.matrix_rank(goal.directions @ motion.translations, tol=RANK_CUTOFF) if len(goal.values) else 0
+    if placed < motion.translations.shape[1]:
         return spins + 2
     if goal.rotation is not None:
         return 0
@@ -82,7 +83,7 @@ def _some_turn(placer: Placer, motion: PlatformMotion, X: Array) -> Flags:
     """Whether some turn about the platform's one axis makes each of the poses X (n, 4, 4) one that is reached, (n,)."""
     if len(X) == 0:
         return np.zeros(0, dtype=bool)
-    turns = exponential(np.linspace(-np.pi, np.pi, TURNS)[:, None] * motion.spins[:, 0])
+    turns = exponential(np.linspace(-np.pi, np.pi, TURNS)[:, None] * motion.rotations[:, 0])
     p = X[:, :3, 3] + X[:, :3, :3] @ motion.point
     poses = np.tile(np.eye(4), (len(X), TURNS, 1, 1))
     poses[..., :3, :3] = turns @ X[:, None, :3, :3]

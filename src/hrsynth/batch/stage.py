@@ -76,7 +76,7 @@ class Stage:
         p = X[:, :3, 3] + X[:, :3, :3] @ motion.point
         found = {name: body for name in names if motion.body
                  and (body := _body(p, X[:, :3, :3], frames[name], length)) is not None}
-        return cls(motion.link, motion.point, motion.shifts, motion.spins, found, motion.dof)
+        return cls(motion.link, motion.point, motion.translations, motion.rotations, found, motion.dof)
 
 
 def _along_axes(basis: Array) -> Array:

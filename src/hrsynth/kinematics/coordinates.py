@@ -43,7 +43,7 @@ class Coordinates:
         twists = relation(start, replace(question, observations=(), bodies=())).twists
         if twists.shape[1] != motion.dof:
             twists = motion.twists
-        if motion.spins.shape[1] == 1:
+        if motion.rotations.shape[1] == 1:
             twists = np.vstack([twists[:3], _axis(motion) @ twists[3:]])
         chosen: list[int] = []
         for place in range(len(twists) if motion.body else 3):
@@ -58,7 +58,7 @@ class Coordinates:
     def names(self) -> tuple[str, ...]:
         """What the coordinates are called."""
         names: tuple[str, ...] = NAMES
-        if self.motion.spins.shape[1] == 1:
+        if self.motion.rotations.shape[1] == 1:
             axis = _axis(self.motion)
             plain = abs(axis @ self.motion.normal) > 1 - SAME_DIRECTION
             names = *NAMES[:3], "phi" if plain else f"turn about {' '.join(f'{x:.3g}' for x in axis)}"
@@ -72,14 +72,14 @@ class Coordinates:
         """By how much a platform pose X (4, 4) is off the coordinates (n,), metres, radians; a turn about one axis is
         the same after a whole one."""
         found = self.read(X) - self.values
-        if self.motion.spins.shape[1] == 1:
+        if self.motion.rotations.shape[1] == 1:
             found = np.array([wrap_angle(x) if place == 3 else x for x, place in zip(found, self.places, strict=True)])
         return found
 
     def _turn(self, X: Array) -> tuple[Array, Array]:
         """The turn since the zero configuration, and the map from the angular velocity to its rate."""
         R = X[:3, :3] @ self.motion.home[:3, :3].T
-        if self.motion.spins.shape[1] == 1:
+        if self.motion.rotations.shape[1] == 1:
             angle, row = turn_about(_axis(self.motion), R)
             return np.array([angle]), row[None]
         turn = logarithm(R)
@@ -127,5 +127,5 @@ class Coordinates:
 
 def _axis(motion: PlatformMotion) -> Array:
     """The one axis about which a platform turns, (3,), with the sense of phi where that turns about it."""
-    axis = motion.spins[:, 0]
+    axis = motion.rotations[:, 0]
     return axis * np.sign(axis[np.argmax(np.abs(axis))])

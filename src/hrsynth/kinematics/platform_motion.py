@@ -97,8 +97,8 @@ class Goal:
 class PlatformMotion:
     """What a platform does at generic configurations, relative to its pose ``home`` (4, 4) at the zero configuration.
 
-    ``shifts`` (3, k) spans the velocities of ``point`` (in the platform's frame), ``spins`` (3, m) the angular
-    velocities that count (none of a point body), ``twists`` (6, n) both together.
+    ``translations`` (3, k) spans the velocities of ``point`` (in the platform's frame), ``rotations`` (3, m) the
+    angular velocities that count (none of a point body), ``twists`` (6, n) both together.
     """
 
     link: str
@@ -106,8 +106,8 @@ class PlatformMotion:
     body: bool
     """Whether the platform's turn counts: not that of a point body."""
     home: Array
-    shifts: Array
-    spins: Array
+    translations: Array
+    rotations: Array
     twists: Array
     dof: int
     """Freedoms at a generic configuration; ``twists`` spans more where they change from pose to pose."""
@@ -124,32 +124,32 @@ class PlatformMotion:
             columns.append(found)
             twin = at.twin
         together = np.hstack(columns)
-        shifts, spins, twists = (range_basis(part, 1.0)[0] for part in (together[:3], together[3:], together))
+        translations, rotations, twists = (range_basis(part, 1.0)[0] for part in (together[:3], together[3:], together))
         home, dof = twin.pose(twin.q0, question.platform), max(column.shape[1] for column in columns)
-        return cls(question.platform, point, question.point is None, home, shifts, spins, twists, dof)
+        return cls(question.platform, point, question.point is None, home, translations, rotations, twists, dof)
 
     @property
     def normal(self) -> Array:
         """The axis of phi: the normal of a planar robot's plane (its largest component positive), else z."""
-        if self.spins.shape[1] != 1:
+        if self.rotations.shape[1] != 1:
             return np.array([0.0, 0.0, 1.0])
-        normal = self.spins[:, 0]
-        if np.linalg.norm(normal @ self.shifts) > RANK_CUTOFF:
+        normal = self.rotations[:, 0]
+        if np.linalg.norm(normal @ self.translations) > RANK_CUTOFF:
             return np.array([0.0, 0.0, 1.0])
         return normal * np.sign(normal[np.argmax(np.abs(normal))])
 
     @property
     def planar(self) -> bool:
         """Whether it is free in a plane: two translations and the turn about their normal."""
-        return (self.shifts.shape[1], self.spins.shape[1], self.dof) == (2, 1, 3)
+        return (self.translations.shape[1], self.rotations.shape[1], self.dof) == (2, 1, 3)
 
     @property
     def parts(self) -> tuple[str, ...]:
         """The parts of a pose that the platform can change."""
-        found = [name for name, row in zip("xyz", self.shifts, strict=True) if np.linalg.norm(row) > RANK_CUTOFF]
-        if np.linalg.norm(self.normal @ self.spins) > RANK_CUTOFF:
+        found = [name for name, row in zip("xyz", self.translations, strict=True) if np.linalg.norm(row) > RANK_CUTOFF]
+        if np.linalg.norm(self.normal @ self.rotations) > RANK_CUTOFF:
             found.append("phi")
-        return (*found, "rpy") if self.spins.shape[1] else tuple(found)
+        return (*found, "rpy") if self.rotations.shape[1] else tuple(found)
 
     def position(self, X: Array) -> Array:
         """The position of the point at a platform pose X (4, 4), (3,)."""
@@ -167,12 +167,12 @@ class PlatformMotion:
                 raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts or "no part")
         pose = replace(pose, **dict.fromkeys(constant))
         normal, phi, rotation = self.normal, pose.phi, pose.rotation
-        if rotation is not None and self.spins.shape[1] == 1:
-            turn, normal = rotation @ self.home[:3, :3].T, self.spins[:, 0]
+        if rotation is not None and self.rotations.shape[1] == 1:
+            turn, normal = rotation @ self.home[:3, :3].T, self.rotations[:, 0]
             phi, rotation = turn_about(normal, turn)[0], None
             if np.linalg.norm(turn @ normal - normal) > AS_PRINTED:
                 raise BadRequest(f"{robot}: the platform turns about one axis only, rpy is no such turn", str(pose),
-                                 "phi, or a turn about " + " ".join(f"{x:.4g}" for x in self.spins[:, 0]))
+                                 "phi, or a turn about " + " ".join(f"{x:.4g}" for x in self.rotations[:, 0]))
         placed = [i for i, name in enumerate("xyz") if name in pose.given]
         values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)
         return Goal(self.link, self.point, self.home[:3, :3], np.eye(3)[placed], values, normal, phi, rotation)
@@ -193,9 +193,10 @@ class PlatformMotion:
     def manner(self) -> Goal:
         """What the platform never changes: where its point does not move, turns that it does not make (or makes about
         one axis only)."""
-        fixed = np.linalg.svd(self.shifts.T)[2][self.shifts.shape[1] :] if self.shifts.shape[1] else np.eye(3)
+        k = self.translations.shape[1]
+        fixed = np.linalg.svd(self.translations.T)[2][k:] if k else np.eye(3)
         R = self.home[:3, :3]
         goal = Goal(self.link, self.point, R, fixed, fixed @ self.position(self.home), self.normal)
-        if not self.body or self.spins.shape[1] > 1:
+        if not self.body or self.rotations.shape[1] > 1:
             return goal
-        return replace(goal, axis=self.spins[:, 0]) if self.spins.shape[1] else replace(goal, rotation=R)
+        return replace(goal, axis=self.rotations[:, 0]) if self.rotations.shape[1] else replace(goal, rotation=R)

@@ -109,17 +109,17 @@ class Relation:
         return self._unseen[2]
 
     @property
-    def lost(self) -> Array:
+    def unobserved_twists(self) -> Array:
         """A basis of {t : (t, 0) ∈ ρ}, the twists that no observation sees, shape (twist rows, RO)."""
         return self._unseen[0]
 
     @property
-    def lost_rank(self) -> Rank:
+    def RO(self) -> Rank:
         """RO = dim {t : (t, 0) ∈ ρ}, with its gap."""
         return self._unseen[1]
 
     @cached_property
-    def unexplained(self) -> int:
+    def RI(self) -> int:
         """RI = dim {u̇ : (0, u̇) ∈ ρ}: where it is not zero, Mᵀ does not exist."""
         kernel, _ = kernel_basis(self.twist_part, 1.0)
         return range_basis(self.rates @ kernel, 1.0)[1].value
@@ -127,7 +127,7 @@ class Relation:
     @cached_property
     def rank(self) -> int:
         """Freedoms of the platform that the observations see: dof − RO."""
-        return self.dof.value - self.lost.shape[1]
+        return self.dof.value - self.unobserved_twists.shape[1]
 
 
 def platform_motions(at: ClosedConfiguration, question: Measurement) -> Array:

@@ -39,7 +39,8 @@ def row(replay: Replay) -> str:
     here = found.ended
     if found.spread is not None:
         s = found.spread
-        here += f" ± {1e3 * s.rms_metres:.2g} mm, {s.rms_radians:.1g} rad" if found.setting.motion.spins.shape[1] else (
+        turns = found.setting.motion.rotations.shape[1]
+        here += f" ± {1e3 * s.rms_metres:.2g} mm, {s.rms_radians:.1g} rad" if turns else (
             f" ± {1e3 * s.rms_metres:.2g} mm")
         if s.aside:
             here += f", about {_place(Pose(*s.mean))}"

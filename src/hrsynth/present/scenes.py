@@ -121,7 +121,7 @@ def _normal(found: AssemblyModes) -> Array | None:
     assert found.confined is not None
     if found.confined.plane is not None:
         return found.confined.plane
-    shifts = found.setting.motion.shifts
+    shifts = found.setting.motion.translations
     return np.cross(*shifts.T) if shifts.shape[1] == 2 and found.confined.motion == "translations" else None
 
 

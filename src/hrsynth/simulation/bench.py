@@ -52,7 +52,7 @@ class Bench:
         """The bench; raises ``MissingExtra``, and ``BadRequest`` where the robot's motors do not move all of it."""
         simulator("the physics bench")
         question = motors(setting)
-        if relation(start, question).lost.shape[1]:
+        if relation(start, question).unobserved_twists.shape[1]:
             raise BadRequest(f"{setting.robot.name}: its motors do not determine the platform's motion",
                              str(setting.motion.pose(start.pose(setting.motion.link))), "a robot whose motors do")
         return cls(setting, start)

@@ -79,7 +79,7 @@ def _towards(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last
              ) -> tuple[ClosedConfiguration, bool]:
     """The configuration at a goal of the whole pose nearby, and whether it was reached: where parts of the pose depend
     on each other the nearest one, which is to be the goal's only at the ``last``."""
-    if motion.dof >= motion.shifts.shape[1] + motion.spins.shape[1]:
+    if motion.dof >= motion.translations.shape[1] + motion.rotations.shape[1]:
         there, came = track(here, motion, goal)
         return there, came == 1
     there = nearest(here, replace(goal, directions=np.zeros((0, 3)), values=np.zeros(0), rotation=None), goal)

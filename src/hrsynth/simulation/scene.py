@@ -172,7 +172,7 @@ def _sees(setting: ObservedRobot) -> None:
         lost = "; ".join(freedom.name for freedom in verdict.lost)
         raise BadRequest(f"{robot}: the legs do not see {lost}", name,
                          "legs that make it controllable (hrsynth legs lists them)")
-    if any(member.relation.unexplained for member in setting.samples.members):
+    if any(member.relation.RI for member in setting.samples.members):
         raise BadRequest(f"{robot}: observed links move while the platform rests, there is no interaction matrix", name,
                          "other legs")
 

@@ -118,7 +118,7 @@ def goal_near_home(setting: ObservedRobot, rng: np.random.Generator) -> str:
     given = [f"{name}={home['xyz'.index(name)] + length * rng.uniform(-0.1, 0.1):.3f}"
              for name in motion.parts if name in "xyz"]
     if motion.dof > 3:
-        given.append("rpy=" + "/".join(f"{v:.2f}" for v in rng.uniform(-0.3, 0.3, 3)) if motion.spins.shape[1] == 3
+        given.append("rpy=" + "/".join(f"{v:.2f}" for v in rng.uniform(-0.3, 0.3, 3)) if motion.rotations.shape[1] == 3
                      else f"phi={rng.uniform(-0.3, 0.3):.2f}")
     elif motion.planar:
         given.append(f"phi={rng.uniform(-0.3, 0.3):.2f}")

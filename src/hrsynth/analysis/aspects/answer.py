@@ -117,5 +117,6 @@ def _marks(way: Way) -> list[tuple[Array, Array]]:
 def _led(here: ClosedConfiguration, carriage: Carriage, p: Array) -> ClosedConfiguration:
     """The configuration with the carriage's point at ``p``."""
     motion = carriage.motion
-    goal = replace(motion.at_home(), directions=motion.shifts.T, values=carriage.length * motion.shifts.T @ p)
+    directions = motion.translations.T
+    goal = replace(motion.at_home(), directions=directions, values=carriage.length * directions @ p)
     return track(here, motion, goal)[0]

@@ -26,8 +26,8 @@ Place = tuple[Array, Array]
 
 @dataclass(frozen=True, eq=False)
 class Carriage:
-    """The coordinates of a platform: the position of a point, along ``motion.shifts``, and its turn, by
-    ``motion.spins``, where ``turning``; together as many as the robot has freedoms."""
+    """The coordinates of a platform: the position of a point, along ``motion.translations``, and its turn, by
+    ``motion.rotations``, where ``turning``; together as many as the robot has freedoms."""
 
     motion: PlatformMotion
     turning: bool
@@ -59,7 +59,7 @@ def carriages(anatomy: LegDecomposition, question: Measurement, dof: int, config
         if any(relation(at, asked).dof.value != dof for at in configurations):
             continue
         motion = PlatformMotion.of(configurations, asked)
-        shifts, spins = motion.shifts.shape[1], motion.spins.shape[1]
+        shifts, spins = motion.translations.shape[1], motion.rotations.shape[1]
         if motion.twists.shape[1] == shifts + spins == dof and spins in (0, 1, 3):
             yield Carriage(motion, motion.body, configurations[0].twin.length)
 

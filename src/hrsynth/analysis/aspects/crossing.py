@@ -89,7 +89,7 @@ def crossing(carriage: Carriage, limb: Limb, number: int, place: Place) -> Cross
     rods = [tip[0] - end for end in ends]
     axis = limb.axis if isinstance(limb, OnCrank) else np.cross(*rods)
     axis = axis / max(float(np.linalg.norm(axis)), FOLLOWED)
-    shifts = carriage.motion.shifts
+    shifts = carriage.motion.translations
     if shifts.shape[1] < 2 or (shifts.shape[1] == 2 and np.linalg.norm(axis @ shifts) > FOLLOWED):
         return None
     rod = Turning.between(rods[0], rods[1], axis)

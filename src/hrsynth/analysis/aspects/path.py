@@ -70,7 +70,7 @@ class Aspects:
             return "the condition has no named vectors"
         used = {str(symbol) for symbol in self.condition.expression.free_symbols}
         features = [f for f in self.structure.features if not sign_of(self.condition) or f.symbol in used]
-        many = self.motion.shifts.shape[1] + self.motion.spins.shape[1]
+        many = self.motion.translations.shape[1] + self.motion.rotations.shape[1]
         reason = (f"the {many} parts of the platform's pose that change depend on each other, {self.setting.dof} are "
                   "free: ways that move a point straight and turn about one axis do not keep to the others")
         for each in carriages(self.setting.anatomy, self.setting.samples.question, self.setting.dof, self.members):

@@ -25,9 +25,9 @@ class Region:
     def around(cls, carriage: Carriage, p: Array, R: Array) -> Region:
         """The region that is wider than known poses (n, 3), (n, 3, 3), around the first."""
         motion = carriage.motion
-        shifts = (p - p[0]) @ motion.shifts
-        turns = logarithm(R @ R[0].T) @ motion.spins
-        middle = p[0] + motion.shifts @ ((shifts.max(axis=0) + shifts.min(axis=0)) / 2)
+        shifts = (p - p[0]) @ motion.translations
+        turns = logarithm(R @ R[0].T) @ motion.rotations
+        middle = p[0] + motion.translations @ ((shifts.max(axis=0) + shifts.min(axis=0)) / 2)
         exact = cls(carriage, (middle, R[0]), np.ptp(shifts, axis=0) / 2,
                     np.max(np.abs(turns), axis=0, initial=0.0))
         return exact.wider(REGION_WIDER)
@@ -40,6 +40,6 @@ class Region:
     def draw(self, rng: np.random.Generator, count: int) -> tuple[Array, Array]:
         """Random poses (count, 3), (count, 3, 3)."""
         motion = self.carriage.motion
-        p = self.centre[0] + (rng.uniform(-1, 1, (count, len(self.shift))) * self.shift) @ motion.shifts.T
-        turns = (rng.uniform(-1, 1, (count, len(self.turn))) * self.turn) @ motion.spins.T
+        p = self.centre[0] + (rng.uniform(-1, 1, (count, len(self.shift))) * self.shift) @ motion.translations.T
+        turns = (rng.uniform(-1, 1, (count, len(self.turn))) * self.turn) @ motion.rotations.T
         return p, exponential(turns) @ self.centre[1]

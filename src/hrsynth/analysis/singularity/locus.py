@@ -145,19 +145,19 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
     if not fixed and motion.planar:
         plane, turned = replace(plane, phi=0.0), True
     places = [part for part in parts if part in "xyz" and part not in fixed]
-    count = motion.shifts.shape[1] - len(fixed & set("xyz"))
+    count = motion.translations.shape[1] - len(fixed & set("xyz"))
     if count == 3:
         plane, places, count = replace(plane, z=round(_coordinates(motion, start, ("z",))[0], 9)), places[:2], 2
     if count == 2:
         return plane, max(combinations(places, 2), key=lambda pair: _spread(motion, pair))
-    if count == 1 and "phi" in parts and not turned and motion.dof > motion.shifts.shape[1]:
+    if count == 1 and "phi" in parts and not turned and motion.dof > motion.translations.shape[1]:
         return plane, (places[0], "phi")
     raise BadRequest(f"{name}: a plane of poses leaves two parts free", str(plane) or "none", parts)
 
 
 def _spread(motion: PlatformMotion, pair: tuple[str, str]) -> float:
     """How freely two coordinates of the position vary: the volume of their rows."""
-    rows = motion.shifts[["xyz".index(name) for name in pair]]
+    rows = motion.translations[["xyz".index(name) for name in pair]]
     return round(float(np.linalg.svd(rows, compute_uv=False).prod()), 9)
 
 

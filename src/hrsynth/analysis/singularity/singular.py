@@ -147,7 +147,7 @@ def locus_of(setting: ObservedRobot, *, plane: Pose | str | None = None, steps: 
 
 def _example(setting: ObservedRobot, question: Measurement, at: ClosedConfiguration) -> Example:
     X = at.pose(question.platform)
-    lost = name_freedoms(relation(at, question).lost, setting.anatomy, position=X[:3, 3])
+    lost = name_freedoms(relation(at, question).unobserved_twists, setting.anatomy, position=X[:3, 3])
     nearby = max((weakest(other, question) for other in neighbours(at, question, NEIGHBOUR_STEP)), default=0.0)
     return Example(at, setting.motion.pose(X), lost, weakest(at, question), nearby)
 

@@ -183,9 +183,9 @@ def _arrows(setting: ObservedRobot) -> Iterator[Arrow]:
 def _normal(setting: ObservedRobot) -> Array | None:
     """The normal of the plane in which the platform moves, None where it leaves every plane."""
     motion = setting.motion
-    if motion.shifts.shape[1] != 2:
+    if motion.translations.shape[1] != 2:
         return None
-    normal = np.cross(*motion.shifts.T)
-    if motion.spins.shape[1] > 1 or (motion.spins.shape[1] and abs(normal @ motion.spins[:, 0]) < 1 - 1e-6):
+    normal = np.cross(*motion.translations.T)
+    if motion.rotations.shape[1] > 1 or (motion.rotations.shape[1] and abs(normal @ motion.rotations[:, 0]) < 1 - 1e-6):
         return None
     return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))]))
