@@ -31,11 +31,14 @@ from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMU
 from hrsynth.simulation.law import Law, directions
 from hrsynth.simulation.result import Servo
 from hrsynth.simulation.scene import EXACT, Scene
+from kinematics.robots import state_of
+from oracle import Oracle
 from simulation.scenes import CONTROLLABLE, far_pairs, setting
 
 START = "<!-- generated: endings -->"
-VANISHED, THERE = 1e-9, 1e-6
-"""‖e‖ that counts as zero; how far (m, rotation matrices) the pose may be from the mode it is said to be."""
+VANISHED, THERE, CLOSED = 1e-9, 1e-6, 1e-9
+"""‖e‖ that counts as zero; how far (m, rotation matrices) the pose may be from the mode it is said to be; residual of
+closed loops, by the oracle."""
 
 
 def run_between(name: str, start: ClosedConfiguration, goal: ClosedConfiguration, gain: float = 0.8) -> Servo:
@@ -65,6 +68,8 @@ def untrue(found: Servo) -> Iterator[str]:
         yield "antipodal with all directions alike"
     if found.ended != ANTIPODAL and (max(found.from_goal) < THERE) != (found.ended == GOAL):
         yield f"{found.ended} at {found.from_goal} from the goal"
+    if found.ended in (GOAL, MODE) and (open_ := Oracle(at.twin.mechanism).error(state_of(at.twin, at.q))) > CLOSED:
+        yield f"{found.ended} with loops open by {open_}"
     if found.ended == MODE:
         yield from _no_mode(found)
     if found.ended == MINIMUM:
@@ -79,7 +84,8 @@ def untrue(found: Servo) -> Iterator[str]:
 
 
 def _no_mode(found: Servo) -> Iterator[str]:
-    """What is wrong where a run is said to end at another mode: all robots here have their modes listed."""
+    """What is wrong where a run is said to end at another mode: all robots here have their modes listed. That one which
+    merely fits is a mode is shown by the run, whose last state is closed and has the directions."""
     listed = found.ending.modes
     if listed is None or found.ending.matched is None:
         yield f"mode: {found.ending.reason}"
