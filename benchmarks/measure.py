@@ -12,7 +12,7 @@ from unittest import mock
 
 import numpy as np
 
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch import compiled as quick
 from hrsynth.batch.chain import exponentials
 from hrsynth.batch.engine import Batch
@@ -59,7 +59,7 @@ def alone(command: Sequence[str]) -> tuple[float, float]:
 
 
 def compiled(robot: str) -> tuple[ObservedRobot, Batch]:
-    setting = prepare(load(robot))
+    setting = ObservedRobot.of(load(robot))
     assert setting.batch is not None
     return setting, setting.batch
 

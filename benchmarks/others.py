@@ -18,7 +18,7 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.exact import architecture
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
@@ -78,7 +78,7 @@ def jacobians() -> Iterator[Row]:
     except ImportError:
         return
     for robot in ("quattro", "gough_stewart", "delta"):
-        here = rezero(prepare(load(robot), samples=3).configurations[0])
+        here = rezero(ObservedRobot.of(load(robot), samples=3).configurations[0])
         twin = PinocchioModel(here)
         model = mujoco.MjModel.from_xml_string(write(here).texts[0])
         model.opt.disableflags |= mujoco.mjtDisableBit.mjDSBL_CONTACT | mujoco.mjtDisableBit.mjDSBL_LIMIT
@@ -164,7 +164,7 @@ def _prepared(words: list[str]) -> Iterator[ObservedRobot]:
     found = 0
     for word in words:
         try:
-            setting = prepare(mechanism(parse(word).driven), samples=10)
+            setting = ObservedRobot.of(mechanism(parse(word).driven), samples=10)
         except HrsynthError:
             continue
         if setting.dof and found < EXACT:

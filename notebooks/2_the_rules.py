@@ -13,7 +13,6 @@
 from dataclasses import replace
 
 import hrsynth
-from hrsynth.analysis.observed import prepare
 from hrsynth.kinematics.certificate import certify
 from hrsynth.mechanism.builder import Builder
 from hrsynth.rewrite.evidence import Evidence
@@ -50,7 +49,7 @@ leg
 # largest angle between the two spaces. It is zero up to rounding, or it is not. In between there is a wide gap.
 
 # %%
-setting = prepare(leg)
+setting = hrsynth.observe(leg)
 evidence = Evidence(setting.anatomy, setting.samples)  # what the rules may know: how the leg moves
 start = State(setting.anatomy, replace(setting.mechanism, observations=()))
 
@@ -187,7 +186,7 @@ print("               ", found.paper.reason)
 # anywhere. It is another robot, and the comparison of ρ notices at once, because the dimension of ρ changes:
 
 # %%
-setting = prepare(rrs)
+setting = hrsynth.observe(rrs)
 evidence = Evidence(setting.anatomy, setting.samples)
 state = State(setting.anatomy, replace(setting.mechanism, observations=()))
 for module in (motors_off, lift, anchor_locus):
@@ -224,7 +223,7 @@ b.joint("shoulder", "U", "base", "tube", at=(0, 0, 0), axis=(0, 1, 0), axis2=(1,
 b.joint("slide", "P", "tube", "rod", at=(0.2, 0.05, 0.3), axis=(0.4, 0.1, 0.6), motor=True)
 b.joint("wrist", "S", "rod", "platform", at=(0.4, 0.1, 0.6))
 ups = b.build(platform="platform")
-setting = prepare(ups)
+setting = hrsynth.observe(ups)
 evidence = Evidence(setting.anatomy, setting.samples)
 state = State(setting.anatomy, replace(setting.mechanism, observations=()))
 for module in (motors_off, lift, direction_locus, anchor_locus, prismatic_merge):

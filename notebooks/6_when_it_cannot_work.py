@@ -10,7 +10,6 @@ import matplotlib.pyplot as plt
 import numpy as np
 
 import hrsynth
-from hrsynth.analysis.observed import prepare
 
 # %% [markdown]
 # ## Two rails
@@ -40,7 +39,7 @@ print("smallest sets that see as much as can be seen:", hrsynth.legs(robot).smal
 # size:
 
 # %%
-setting = prepare(robot)
+setting = hrsynth.observe(robot)
 places = np.array([at.pose(setting.motion.link) for at in setting.configurations])
 values = setting.batch.evaluate(places).singular_values
 print("largest singular values from", values[:, 0].min().round(2), "to", values[:, 0].max().round(2))

@@ -16,10 +16,10 @@ import pytest
 from hrsynth.analysis import check as checks
 from hrsynth.analysis.accuracy import accuracy as accuracies
 from hrsynth.analysis.aspects.path import Aspects
-from hrsynth.analysis.modes.modes import modes_with
-from hrsynth.analysis.observed import ObservedRobot, motors, prepare
+from hrsynth.analysis.modes.modes import modes
+from hrsynth.analysis.observed import ObservedRobot, motors
 from hrsynth.analysis.singularity.agreement import weakest
-from hrsynth.analysis.singularity.singular import locus_of
+from hrsynth.analysis.singularity.locus import locus
 from hrsynth.batch.chain import Chain
 from hrsynth.batch.reach import reach
 from hrsynth.description import load
@@ -31,7 +31,6 @@ from hrsynth.kinematics.tasks import Target
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.pose import Grid, Pose
 from hrsynth.selection import select as selections
-from hrsynth.simulation import scene as scenes
 from hrsynth.simulation.desired import whole
 from hrsynth.simulation.servo import servo
 from kinematics.robots import state_of
@@ -58,7 +57,7 @@ ROBOTS: dict[str, tuple[Callable[[], Mechanism], str | None, int]] = {
     "3rrr_m1": (partial(load, "3rrr_m1"), None, 50),
 }
 """Robots, what is watched, and how many of the thousand poses each has."""
-sampled = cache(partial(prepare, samples=3))
+sampled = cache(partial(ObservedRobot.of, samples=3))
 """Robots are sampled once, not again at each question."""
 
 
@@ -75,7 +74,7 @@ class Case:
 
     @cached_property
     def aspects(self) -> Aspects:
-        return Aspects.about(self.setting)
+        return Aspects.of(self.setting)
 
 
 @cache
@@ -158,7 +157,7 @@ def swept(case: Case, pose: Pose) -> Answer:
 
 
 def moded(case: Case, pose: Pose) -> Answer:
-    found = modes_with(case.setting, pose)
+    found = modes(case.setting, at=pose)
     assert found.found.continuum or sum(mode.goal for mode in found.modes) == 1
     return [found.goal, *(mode.configuration for mode in found.modes if mode.goal and mode.configuration is not None)]
 
@@ -190,12 +189,12 @@ def mapped(case: Case, pose: Pose) -> Answer:
 def located(case: Case, pose: Pose) -> Answer:
     """Over a plane of poses turned alike: the nearest cell's distance from a singularity is that of its pose."""
     plane = Pose(z=pose.z if case.setting.motion.translations.shape[1] == 3 else None, rpy=pose.rpy)
-    locus = locus_of(case.setting, plane=plane, steps=5)
-    cell = np.unravel_index(np.nanargmax(locus.hidden.type2), locus.grid.shape)
-    (there,) = locus.grid.poses_at([tuple(map(int, cell))])
+    found = locus(case.setting, plane=plane, steps=5)
+    cell = np.unravel_index(np.nanargmax(found.hidden.type2), found.grid.shape)
+    (there,) = found.grid.poses_at([tuple(map(int, cell))])
     assert there.rpy == plane.rpy
     (at,) = reached(case, there)
-    assert locus.hidden.type2[cell] == pytest.approx(weakest(at, case.setting.samples.question), rel=1e-6)
+    assert found.hidden.type2[cell] == pytest.approx(weakest(at, case.setting.samples.question), rel=1e-6)
     return reached(case, pose)
 
 
@@ -270,11 +269,11 @@ def test_a_link_that_has_turned_over_does_not_close_its_leg() -> None:
 
 @pytest.fixture(autouse=True)
 def prepared_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    def prepared(robot: Mechanism, observe: str | None = None, *_: object, **__: object) -> ObservedRobot:
-        return sampled(robot, observe)
+    def prepared(robot: Mechanism | ObservedRobot, observe: str | None = None, *_: object, **__: object
+                 ) -> ObservedRobot:
+        return robot if isinstance(robot, ObservedRobot) else sampled(robot, observe)
 
-    for module in (checks, accuracies, scenes, selections):
-        monkeypatch.setattr(module, "prepare", prepared)
+    monkeypatch.setattr(ObservedRobot, "of", prepared)
 
 
 QUICK = ("reached", "led_whole", "checked", "swept", "moded")

@@ -20,7 +20,7 @@ PACKAGE = ROOT / "src" / "hrsynth"
 
 # A module imports only from its own folder and from those above it here.
 FOLDERS = [
-    {"errors", "tolerances", "budgets", "results", "claims"},
+    {"errors", "tolerances", "budgets", "results", "claims", "progress"},
     {"geometry"},
     {"mechanism"},
     {"description"},

@@ -13,16 +13,18 @@ if TYPE_CHECKING:
     from .analysis.controllability import legs
     from .analysis.derive import derive
     from .analysis.modes.modes import modes
+    from .analysis.observed import observe
     from .analysis.singularity.singular import singular
     from .description import load, save, shipped
     from .present.show import draw, html, text
     from .present.view.view import view
+    from .progress import following
     from .selection.select import select
     from .simulation.servo import servo
 
 __version__ = "0.2.0"
-__all__ = ["__version__", "accuracy", "advise", "catalog", "check", "derive", "draw", "html", "legs", "load", "modes",
-           "path", "save", "select", "servo", "shipped", "singular", "text", "view"]
+__all__ = ["__version__", "accuracy", "advise", "catalog", "check", "derive", "draw", "following", "html", "legs",
+           "load", "modes", "observe", "path", "save", "select", "servo", "shipped", "singular", "text", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
@@ -30,10 +32,12 @@ _HOME = {
     "check": ".analysis.check",
     "derive": ".analysis.derive",
     "draw": ".present.show",
+    "following": ".progress",
     "html": ".present.show",
     "legs": ".analysis.controllability",
     "load": ".description",
     "modes": ".analysis.modes.modes",
+    "observe": ".analysis.observed",
     "path": ".analysis.aspects.path",
     "save": ".description",
     "select": ".selection.select",

@@ -17,7 +17,7 @@ import hrsynth
 from hrsynth.analysis import advice as module
 from hrsynth.analysis.advice import Advice, advise, candidates
 from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL
-from hrsynth.analysis.observed import prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.geometry.vectors import Array, unit
@@ -65,7 +65,7 @@ class Independent:
     """What stays lost with any further measurements, by maximal coordinates at a state of a random walk."""
 
     def __init__(self, robot: Mechanism, observe: str | None, camera: str | None = None, seed: int = 1) -> None:
-        setting = prepare(robot, observe, camera, samples=1)
+        setting = ObservedRobot.of(robot, observe, camera, samples=1)
         self.everything = candidates(setting)
         oracle = Oracle(setting.mechanism)
         self.state = list(oracle.random_walk(np.random.default_rng(seed), 2))[-1]
@@ -314,7 +314,8 @@ def test_motors_come_first(robot: str) -> None:
 def test_progress_and_the_public_name() -> None:
     told: list[str] = []
     assert hrsynth.advise is advise
-    advise(load("3prp"), progress=told.append)
+    with hrsynth.following(told.append):
+        advise(load("3prp"))
     assert {"sampling", "sets of 1", "sets of 2", "verification"} == set(told)
 
 

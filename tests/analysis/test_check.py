@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hrsynth.analysis import posture as posture_module
 from hrsynth.analysis.check import MEASURES, Check, check
 from hrsynth.analysis.classes import Counts, interaction_matrix, redundant_rows, surplus
-from hrsynth.analysis.observed import prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.posture import Examiner, Posture
 from hrsynth.description import load
 from hrsynth.geometry.ranks import CLEAN
@@ -234,7 +234,7 @@ def test_gained_freedoms_are_those_beyond_the_usual_ones() -> None:
 @given(parallel_robots())
 @quick
 def test_random_robots_obey_the_identities(mechanism: Mechanism) -> None:
-    setting = prepare(mechanism, samples=3)
+    setting = ObservedRobot.of(mechanism, samples=3)
     examiner = Examiner(setting)
     for at in (setting.everything.start, *(m.configuration for m in setting.everything.members)):
         found = examiner.examine(at)

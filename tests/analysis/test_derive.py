@@ -11,6 +11,7 @@ import pinocchio as pin
 import pytest
 import yourdfpy
 
+import hrsynth
 from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.analysis.observed import SAMPLES
@@ -387,7 +388,8 @@ def test_the_same_seed_gives_the_same_answer() -> None:
 
 def test_progress_is_told() -> None:
     told: list[str] = []
-    derive(load("rrrrr_m1"), progress=told.append)
+    with hrsynth.following(told.append):
+        derive(load("rrrrr_m1"))
     assert {"sampling", "certificate", "the paper's form"} <= set(told)
 
 

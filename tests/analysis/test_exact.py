@@ -18,7 +18,7 @@ from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL, legs
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.exact import INSTANCES, TESTS, ExactArchitecture, ExactVerdict, architecture, architecture_of
 from hrsynth.analysis.instances import Geometry, Instance, NotRecognised, draw, kernel, rank, seen
-from hrsynth.analysis.observed import ObservedRobot, prepare, selected
+from hrsynth.analysis.observed import ObservedRobot, selected
 from hrsynth.errors import HrsynthError
 from hrsynth.geometry.vectors import Array, frozen, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -191,7 +191,7 @@ def test_kernels_are_exact(rows: list[list[int]]) -> None:
 def check_agreement(mechanism: Mechanism) -> None:
     """Exact ranks are those of a random robot, or there is a reason."""
     try:
-        setting = prepare(mechanism, samples=3)
+        setting = ObservedRobot.of(mechanism, samples=3)
     except HrsynthError:
         assume(False)
     generic = architecture(setting)
@@ -221,7 +221,7 @@ def spinning() -> ObservedRobot:
     first, *rest = setting_of("delta").everything.question.observations
     assert isinstance(first, Direction)
     tilted = replace(first, direction=unit(first.direction + [0.3, -0.5, 0.4]))
-    return prepare(robot.changed(observations=(tilted, *rest)), samples=3)
+    return ObservedRobot.of(robot.changed(observations=(tilted, *rest)), samples=3)
 
 
 def test_directions_that_move_while_the_platform_rests() -> None:
@@ -279,7 +279,7 @@ def check_refused(generic: ExactArchitecture, words: str) -> None:
 def test_axes_that_are_not_quite_parallel() -> None:
     """A joint with its axis off by 1e-4 is locked: no planar robot any more, neither in fact nor in its instances."""
     robot = planar(["RRR"] * 3, np.random.default_rng(1), [{0}] * 3)
-    question = prepare(robot, samples=2).everything.question
+    question = ObservedRobot.of(robot, samples=2).everything.question
     mobile = relation(ClosedConfiguration.of(PinocchioModel(robot), PinocchioModel(robot).q0), question)
     joint = robot.joints["joint_2_2"]
     bent = robot.changed(joints=[replace(joint, axes=(unit(joint.axis + 1e-4 * np.array([0.3, -0.5, 0.7])),))])

@@ -16,7 +16,7 @@ from hrsynth.analysis.controllability import CONTROLLABLE, PARTIAL
 from hrsynth.analysis.exact import TESTS, ExactArchitecture, architecture, architecture_of
 from hrsynth.analysis.instances import Instance, draw, instance, ranks_at
 from hrsynth.analysis.kept import degree, kept
-from hrsynth.analysis.observed import ObservedRobot, prepare, selected
+from hrsynth.analysis.observed import ObservedRobot, selected
 from hrsynth.catalog.geometry import mechanism as built
 from hrsynth.catalog.words import parse
 from hrsynth.description import load
@@ -69,7 +69,7 @@ def test_relations_of_random_robots_are_derived(mechanism: Mechanism, seed: int)
     rng = np.random.default_rng(seed)
     robot = transformed(mechanism, random_rotation(rng), rng.normal(size=3))
     try:
-        generic = architecture(prepare(robot, samples=3))
+        generic = architecture(ObservedRobot.of(robot, samples=3))
         states = walked(generic.mechanism, 3, seed)
     except (HrsynthError, NotAssembled, Undecided):
         assume(False)
@@ -182,7 +182,7 @@ def test_robots_without_axes_or_without_centres() -> None:
 
 @pytest.mark.parametrize("robot", ["3upu", "delta", "quattro", "3rps", "hexaglide"])
 def test_the_seed_of_the_samples_does_not_matter(robot: str) -> None:
-    settings = [prepare(load(robot), samples=4, seed=seed) for seed in (0, 1, 2)]
+    settings = [ObservedRobot.of(load(robot), samples=4, seed=seed) for seed in (0, 1, 2)]
     architectures = [architecture(setting) for setting in settings]
     assert len({frozenset(ties(each.relations)) for each in architectures}) == 1
     verdicts = [each.verdict(each.observations) for each in architectures]
@@ -204,7 +204,7 @@ def test_identities_are_tested_at_several_instances() -> None:
 @pytest.fixture(scope="module", params=[0, 7, 42])
 def pod(request: pytest.FixtureRequest) -> ObservedRobot:
     """The pod with the catalog's own dimensions and with others, some samples of which may be of another mode."""
-    return prepare(built(parse(POD), request.param))
+    return ObservedRobot.of(built(parse(POD), request.param))
 
 
 def test_a_mixture_of_operation_modes_proves_nothing(pod: ObservedRobot) -> None:
@@ -245,7 +245,7 @@ def nearly(misses: dict[str, float], seed: int) -> Mechanism:
 @pytest.mark.parametrize("angle", [1e-12, 1e-9, 1e-8, 1e-6, 1e-4])
 def test_rails_that_are_nearly_parallel(angle: float) -> None:
     """The verdict is that of the numbers, and says how near the other one is."""
-    setting = prepare(nearly({"guide_2": angle}, seed=int(-np.log10(angle))), samples=4)
+    setting = ObservedRobot.of(nearly({"guide_2": angle}, seed=int(-np.log10(angle))), samples=4)
     verdict = architecture(setting).verdict(setting.observed)
     assert {member.relation.rank for member in setting.everything.members} == {verdict.rank}
     assert verdict.verdict == (PARTIAL if angle < 1e-7 else CONTROLLABLE)
@@ -262,7 +262,7 @@ def test_no_verdict_where_held_and_missed_are_close() -> None:
     angles = (3e-8, 3e-6, 0, 0, 0, 0)
     bent = robot.changed(joints=[replace(rail, axes=(rotation_about((1, 2, 3), angle) @ rail.axis,))
                                  for rail, angle in zip(rails, angles, strict=True)])
-    setting = prepare(bent, samples=4)
+    setting = ObservedRobot.of(bent, samples=4)
     verdict = architecture(setting).verdict(setting.observed)
     assert not verdict.exact
     assert "nearly special" in verdict.reason

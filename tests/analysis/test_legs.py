@@ -9,6 +9,7 @@ from math import comb
 import numpy as np
 import pytest
 
+import hrsynth
 from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL, Legs, Verdict, legs
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
@@ -157,9 +158,10 @@ def test_the_whole_hexaglide_misses_its_rails() -> None:
 
 
 def test_progress_and_record() -> None:
-    told = []
-    answer = legs(load("3rrr_m1"), progress=lambda: told.append(1))
-    assert len(told) == len(answer.sets) == 7
+    told: list[str] = []
+    with hrsynth.following(told.append):
+        answer = legs(load("3rrr_m1"))
+    assert told.count("sets of legs") == len(answer.sets) == 7
     record = answer.to_dict()
     assert record["robot"] == "3rrr_m1"
     assert record["architecture_ascii"] == "3-R*RR"

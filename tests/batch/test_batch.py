@@ -12,7 +12,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 
 from hrsynth.analysis.classes import interaction_matrix
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.engine import Batch, Evaluation
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError
@@ -32,7 +32,7 @@ SOLVED = {"3rps", "prrrp_m1", "prrrp_m2", "prrrp_parallel", "rprpr_m1", "rprpr_m
 
 @cache
 def shipped_batch(robot: str) -> tuple[ObservedRobot, Batch]:
-    setting = prepare(load(robot), samples=4)
+    setting = ObservedRobot.of(load(robot), samples=4)
     assert setting.batch is not None
     return setting, setting.batch
 
@@ -97,7 +97,7 @@ def test_a_batch_is_the_relation_at_every_pose(robot: str) -> None:
 @given(parallel_robots())
 def test_a_batch_of_a_random_robot_is_its_relation(mechanism) -> None:
     try:
-        setting = prepare(mechanism, samples=3)
+        setting = ObservedRobot.of(mechanism, samples=3)
     except HrsynthError:
         return
     batch = setting.batch

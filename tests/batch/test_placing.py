@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from batch.test_batch import SOLVED, poses_near, shipped_batch
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.singularity.agreement import spectrum
 from hrsynth.analysis.singularity.batch_spectrum import Quick
 from hrsynth.batch.placing import Placer, coordinates
@@ -92,7 +92,7 @@ def test_singular_values_are_pinocchios_also_where_another_working_mode_is_met()
     everything, question = setting.everything, setting.samples.question
     walk = [reach(everything.start, everything.question, setting.motion.pose(at.pose(setting.mechanism.platform)),
                   setting.motion) for at in placer.wander(6, seed=1)]
-    other = prepare(load("3rrr_m1"), samples=3, seed=7).everything.members[0].configuration
+    other = ObservedRobot.of(load("3rrr_m1"), samples=3, seed=7).everything.members[0].configuration
     quick = Quick.of(placer, question)
     assert quick is not None
     for ours, theirs in zip(quick.spectrum([*walk, other], spectrum), spectrum([*walk, other], question), strict=True):

@@ -9,7 +9,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.reach import generic_motion, reach, sweep
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
@@ -86,7 +86,7 @@ def test_a_pose_can_be_typed_as_it_is_printed(robot: str) -> None:
 @pytest.mark.parametrize("robot", ["3rrr_m1", "rrrrr_m1", "delta", "3rps", "quattro"])
 def test_a_pose_of_a_robot_that_stands_aslant_can_be_typed_as_it_is_printed(robot: str) -> None:
     rng = np.random.default_rng(7)
-    check_printed(prepare(transformed(load(robot), random_rotation(rng), rng.normal(size=3)), samples=4))
+    check_printed(ObservedRobot.of(transformed(load(robot), random_rotation(rng), rng.normal(size=3)), samples=4))
 
 
 @pytest.mark.parametrize(("robot", "parts"), [
@@ -158,7 +158,7 @@ def test_the_empty_pose_is_the_zero_configuration() -> None:
 def test_phi_of_a_planar_robot_is_about_its_normal(seed: int, angle: float) -> None:
     mechanism = planar(["RRR", "RPR", "RRR"], np.random.default_rng(seed), [{0}, {0}, {0}])
     normal = next(joint.axis for joint in mechanism.joints.values() if joint.type.value == "R")
-    setting = prepare(mechanism, samples=3)
+    setting = ObservedRobot.of(mechanism, samples=3)
     motion = motion_of(setting)
     assert abs(abs(normal @ motion.normal) - 1) < 1e-9
     assert motion.normal[np.argmax(np.abs(motion.normal))] > 0
@@ -170,7 +170,7 @@ def test_phi_of_a_planar_robot_is_about_its_normal(seed: int, angle: float) -> N
 def test_the_manner_of_a_platform_is_what_it_never_changes() -> None:
     """A planar robot keeps to its plane and its normal; a shift or a tilt out of it is an error."""
     mechanism = planar(["RRR", "RPR", "RRR"], np.random.default_rng(5), [{0}, {0}, {0}])
-    setting = prepare(mechanism, samples=3)
+    setting = ObservedRobot.of(mechanism, samples=3)
     motion, twin = motion_of(setting), setting.everything.twin
     manner = motion.manner()
     normal = next(joint.axis for joint in mechanism.joints.values() if joint.type.value == "R")
@@ -188,7 +188,7 @@ def test_the_manner_of_a_platform_is_what_it_never_changes() -> None:
 @given(parallel_robots())
 @quick
 def test_random_robots_reach_the_poses_of_their_samples(mechanism) -> None:
-    setting = prepare(mechanism, samples=3)
+    setting = ObservedRobot.of(mechanism, samples=3)
     motion = motion_of(setting)
     for member in setting.everything.members:
         check_reached(setting, motion, member.way[0].pose)

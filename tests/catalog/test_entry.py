@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.observed import prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.catalog.entry import entry, model
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS, words
@@ -130,7 +130,7 @@ def test_screws_without_pinocchio_see_the_same(name):
         found = entry(text)
         if "refused" in found:
             continue
-        setting = prepare(mechanism(parse(text)), samples=1)
+        setting = ObservedRobot.of(mechanism(parse(text)), samples=1)
         oracle = Oracle(setting.mechanism)
         assert oracle.mobility(oracle.zero()) == found["mobility"]
         sets = [setting.segments, *([o for o in setting.segments if o.leg in each] for each in found["minimal"])]

@@ -22,7 +22,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any
 
-from hrsynth.analysis.observed import SAMPLES, ObservedRobot, prepare
+from hrsynth.analysis.observed import SAMPLES, ObservedRobot
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
 from hrsynth.catalog.words import Word, parse
@@ -60,7 +60,7 @@ def ranks(setting: ObservedRobot) -> list[int]:
 def answer(text: str, dimensions: int, seed: int, samples: int) -> str:
     """The ranks of all leg sets for one seed, or how the robot is refused."""
     try:
-        setting = prepare(mechanism(parse(text), dimensions), samples=samples, seed=seed)
+        setting = ObservedRobot.of(mechanism(parse(text), dimensions), samples=samples, seed=seed)
     except HrsynthError as error:
         return f"{type(error).__name__}: {getattr(error, 'what', '')[:60]}"
     counts = f"{setting.dof} {setting.mobility.total} {setting.everything.signature.motion}"

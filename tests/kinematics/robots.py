@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from hrsynth.analysis.derive import Derivation, derive
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -26,7 +26,7 @@ ROBOTS = tuple(shipped())
 def setting_of(robot: str, observe: tuple[str, ...] | None = None, camera: str | None = None,
                samples: int = 2) -> ObservedRobot:
     """The setting of a shipped robot with a few samples."""
-    return prepare(load(robot), observe, camera, samples=samples)
+    return ObservedRobot.of(load(robot), observe, camera, samples=samples)
 
 
 @cache

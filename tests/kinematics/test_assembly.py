@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import pose
 from hrsynth.kinematics.assembly import Assembler
@@ -18,7 +18,7 @@ ROBOTS = sorted(shipped())
 
 
 def prepared(name: str) -> ObservedRobot:
-    return prepare(load(shipped()[name]), samples=3)
+    return ObservedRobot.of(load(shipped()[name]), samples=3)
 
 
 def assembler(setting: ObservedRobot) -> Assembler:
@@ -71,7 +71,7 @@ def test_limits_of_joints_are_kept():
     sliders = [joint for joint in robot.joints.values() if joint.type is JointType.PRISMATIC]
     for upper, reachable in ((0.01, True), (-0.01, False)):
         limited = replace(sliders[0], limits=Limits(lower=-0.2, upper=upper))
-        setting = prepare(robot.changed(joints=[limited]), samples=1)
+        setting = ObservedRobot.of(robot.changed(joints=[limited]), samples=1)
         found = assembler(setting).at(bodies(setting, setting.everything.start), ())
         assert found.configuration is not None
         assert found.reachable is reachable

@@ -8,10 +8,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hrsynth.analysis.advice import advised
+from hrsynth.analysis.advice import advise
 from hrsynth.analysis.controllability import legs, verdict_of
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.observed import prepare, restricted
+from hrsynth.analysis.observed import ObservedRobot, restricted
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
 from hrsynth.description import load
@@ -78,7 +78,7 @@ def test_a_flat_parallelogram_belongs_to_two_modes(angle: float) -> None:
 def test_samples_of_a_pod_stay_in_its_operation_mode(dimensions: int, seed: int) -> None:
     """The rails of legs 2 and 3 are along z, so neither sees the platform, which only translates, move along z. In its
     other operation mode, which lies near, the platform turns and both together see all."""
-    setting = prepare(mechanism(parse(POD), dimensions), seed=seed)
+    setting = ObservedRobot.of(mechanism(parse(POD), dimensions), seed=seed)
     segments = setting.segments
     assert [setting.mechanism.joints[f"joint_{leg}_1"].axis.tolist() for leg in (2, 3)] == [[0, 0, 1]] * 2
     for at in setting.configurations:
@@ -103,8 +103,8 @@ def test_another_operation_mode_is_named_and_can_be_asked_for() -> None:
 
 def test_a_cure_cures_on_the_whole_branch() -> None:
     """Legs of this robot have closures beside each other, 0.01 rad apart; samples of two make 18 wrong cures of 36."""
-    setting = prepare(mechanism(parse("3(Ph*-Ra-Rb-Rb-Pj)"), 4))
-    advice = advised(setting)
+    setting = ObservedRobot.of(mechanism(parse("3(Ph*-Ra-Rb-Rb-Pj)"), 4))
+    advice = advise(setting)
     assert advice.cured
     assert (len(advice.sets), advice.undecided) == (18, 0)
     places = list(random_walk(setting.everything.start, 24, seed=5, steps=6))[3::4]

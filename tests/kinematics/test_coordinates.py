@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrsynth.analysis.observed import prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.geometry.vectors import rotation_from_rpy
@@ -26,7 +26,7 @@ EXPECTED = {
 
 
 def made(name: str) -> tuple[Coordinates, object]:
-    setting = prepare(load(name))
+    setting = ObservedRobot.of(load(name))
     start = setting.everything.start
     return Coordinates.of(start, setting.everything.question, setting.motion), setting
 
@@ -41,7 +41,7 @@ def test_a_platform_has_as_many_coordinates_as_freedoms(name: str):
 @pytest.mark.parametrize("seed", range(4))
 def test_the_turn_of_a_planar_robot_is_its_angle_about_the_normal(seed: int):
     """Wherever its plane lies: no component of the turn, which is less."""
-    setting = prepare(planar(["RRR", "RPR", "RPR"], np.random.default_rng(seed), [{0}, {1}, {1}]), samples=3)
+    setting = ObservedRobot.of(planar(["RRR", "RPR", "RPR"], np.random.default_rng(seed), [{0}, {1}, {1}]), samples=3)
     start, motion = setting.everything.start, setting.motion
     coordinates = Coordinates.of(start, setting.everything.question, motion)
     assert coordinates.names[2] == "phi"
@@ -54,7 +54,7 @@ def test_the_turn_of_a_planar_robot_is_its_angle_about_the_normal(seed: int):
 def test_the_turn_about_a_tilted_axis_is_its_angle():
     """A robot that turns about one axis in space, which is not the base's z."""
     R = rotation_from_rpy(0.5, 0.3, 0.2)
-    setting = prepare(transformed(load("quattro"), R, np.zeros(3)), samples=3)
+    setting = ObservedRobot.of(transformed(load("quattro"), R, np.zeros(3)), samples=3)
     start, motion = setting.everything.start, setting.motion
     coordinates = Coordinates.of(start, setting.everything.question, motion)
     assert coordinates.names[3] == "turn about " + " ".join(f"{x:.3g}" for x in R[:, 2])

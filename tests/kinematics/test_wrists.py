@@ -6,7 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.reach import reach
 from hrsynth.errors import PoseNotReached
 from hrsynth.geometry.so3 import logarithm
@@ -117,7 +117,7 @@ def robots(seed: int) -> tuple[ObservedRobot, ObservedRobot, list[np.ndarray]]:
     free = transformed(pods(["RPS", *["UPS"] * 4], rng, square=True), random_rotation(rng), rng.normal(size=3))
     held = oblique(free, rng, "tip_1", rng.uniform(0.2, 0.4, 2))
     axes = [held.joints[f"tip_1__{k}"].axis for k in (1, 2, 3)]
-    return prepare(free, samples=3), prepare(held, samples=3), axes
+    return ObservedRobot.of(free, samples=3), ObservedRobot.of(held, samples=3), axes
 
 
 def turned_platforms(free: ObservedRobot, rng: Rng, count: int) -> list[np.ndarray]:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.kinematics.certificate import Certificate, certify
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.rewrite.evidence import Evidence
@@ -162,4 +162,4 @@ def test_the_law_on_random_robots(kind: str, seed: int) -> None:
         robot = deltas(["R", "R", "P"], [str(w) for w in rng.choice(["2-SS", "US"], 3)], rng, kind == "aligned")
     labels = tuple(o.leg for o in robot.observations)
     for legs in (None, labels[: int(rng.integers(1, len(labels)))]):
-        assert obeys(prepare(robot, legs, samples=3)).steps
+        assert obeys(ObservedRobot.of(robot, legs, samples=3)).steps

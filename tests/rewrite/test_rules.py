@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.kinematics.certificate import certify
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import JointType, Mechanism
@@ -117,7 +117,7 @@ def skew(legs: int, rng: np.random.Generator, pods: int = 0) -> Mechanism:
 @pytest.mark.parametrize(("legs", "pods", "seed"), [(3, 0, 1), (3, 0, 2), (1, 5, 3), (2, 3, 4)])
 def test_takeover_of_a_skew_elbow_is_caught(legs: int, pods: int, seed: int) -> None:
     """An R that is skew to the base R cannot give way to U: done without its side condition it changes the relation."""
-    setting = prepare(skew(legs, np.random.default_rng(seed), pods), samples=3)
+    setting = ObservedRobot.of(skew(legs, np.random.default_rng(seed), pods), samples=3)
     state, evidence = lifted(setting), evidence_of(setting)
     offered, refused = proposals(takeover.RULE.proposals(state, evidence, "1"))
     assert offered == []
@@ -130,7 +130,7 @@ def test_takeover_of_a_skew_elbow_is_caught(legs: int, pods: int, seed: int) -> 
 @pytest.mark.parametrize(("legs", "pods", "seed", "word"), [
     (3, 0, 1, "3-{RR|Pi-U*R}-S"), (1, 5, 3, "{RR|Pi-U*R}-S"), (2, 3, 4, "2-{RR|Pi-U*R}-S")])
 def test_legs_with_skew_axes_keep_their_joint(legs: int, pods: int, seed: int, word: str) -> None:
-    setting = prepare(skew(legs, np.random.default_rng(seed), pods), samples=3)
+    setting = ObservedRobot.of(skew(legs, np.random.default_rng(seed), pods), samples=3)
     result = simplified(setting)
     is_right(setting, result.state.mechanism)
     assert word in result.state.architecture().ascii.split("+")
@@ -194,7 +194,7 @@ def test_a_parallelogram_with_a_wrong_offset_is_caught(robot: str) -> None:
 @pytest.mark.parametrize("seed", range(4))
 def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
     """Where the base R is not parallel to the short side, the companion rod does not stay beside the observed one."""
-    setting = prepare(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), False), samples=3)
+    setting = ObservedRobot.of(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), False), samples=3)
     evidence = evidence_of(setting)
     trusted = trusting(evidence, change_ends=False)
     assert len(trusted) == 1
@@ -210,7 +210,7 @@ def test_trust_in_arms_that_turn_the_parallelogram_is_caught(seed: int) -> None:
 
 @pytest.mark.parametrize("seed", range(3))
 def test_trust_in_aligned_arms_is_justified(seed: int) -> None:
-    setting = prepare(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), True), samples=3)
+    setting = ObservedRobot.of(deltas(["R"] * 3, ["2-SS"] * 3, np.random.default_rng(seed), True), samples=3)
     trusted = trusting(evidence_of(setting), change_ends=False)
     is_right(setting, trusted[0].state.mechanism)
     result = simplified(setting)

@@ -16,7 +16,7 @@ from hrsynth.analysis.accuracy.cones import half_angles
 from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.modes.modes import modes
-from hrsynth.analysis.observed import prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.reach import reach
 from hrsynth.cli import execute
 from hrsynth.description import load
@@ -39,7 +39,7 @@ def found() -> Selection:
 
 @cache
 def work() -> _Work:
-    setting = prepare(load("quattro"))
+    setting = ObservedRobot.of(load("quattro"))
     everything = setting.everything
     ends = [reach(everything.start, everything.question, Pose.parse(text), setting.motion) for text in (START, GOAL)]
     cones = half_angles("0.1deg", setting.observed)
@@ -168,7 +168,7 @@ def test_hidden_is_what_a_fine_search_finds() -> None:
 
 
 def test_sight_sees_what_is_ahead_in_the_picture_and_not_hidden() -> None:
-    setting = prepare(load("quattro"), samples=2)
+    setting = ObservedRobot.of(load("quattro"), samples=2)
     at = setting.everything.start
     rods = dict(zip(setting.labels, cylinders(setting.mechanism, setting.observed), strict=True))
     below = rotation_from_rpy(0.0, 0.0, 0.0)

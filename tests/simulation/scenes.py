@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from _pytest.mark import ParameterSet
 
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.posture import REGULAR, Examiner
 from hrsynth.batch.reach import reach
 from hrsynth.description import load, shipped
@@ -36,7 +36,7 @@ def few_first(names: list[str]) -> list[ParameterSet]:
 
 @cache
 def setting(name: str) -> ObservedRobot:
-    return prepare(load(name))
+    return ObservedRobot.of(load(name))
 
 
 @cache

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, islice
 from math import comb
@@ -17,10 +17,11 @@ from ..kinematics.sampling import Samples
 from ..mechanism import Direction, JointType, Mechanism, Observation
 from ..mechanism.legs import LegDecomposition, observation_of
 from ..mechanism.sensors import encoders, line_position
+from ..progress import followed, tell
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
 from .controllability import CONTROLLABLE, Verdict, verdict_of
-from .observed import ObservedRobot, prepare, restricted, silent
+from .observed import ObservedRobot, restricted
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
 """The names of the coordinates of joints that have two."""
@@ -169,29 +170,25 @@ class Advice(Result, shown_as="advise"):
                 "complete": self.complete, "undecided": self.undecided}
 
 
-def advise(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *, seed: int = 0,
-           progress: Callable[[str], None] | None = None) -> Advice:
+@followed
+def advise(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+           most: int | None = None, seed: int = 0) -> Advice:
     """The smallest sets of further measurements with which u̇ = 0 forces t = 0 (theory 3; MMT 5.3).
 
     ``observe`` holds leg labels or link names (default: all legs), ``camera`` the link that carries the camera. Added
     can be the default segment of a further leg, the direction of any other link of a leg, the position of a line whose
-    direction is observed, and an encoder on any joint. Every set that is returned is verified at all samples. Raises
+    direction is observed, and an encoder on any joint. Every set that is returned is verified at all samples; of the
+    smallest ones at most ``most`` are. Raises
     ``BadRequest`` for unknown names, ``RankUndecided`` where what is seen now has no clear rank.
     """
-    tell = progress or silent
-    tell("sampling")
-    return advised(prepare(robot, observe, camera, seed=seed), tell)
-
-
-def advised(setting: ObservedRobot, tell: Callable[[str], None] = silent, *, most: int | None = None) -> Advice:
-    """What is missing in a setting, as :func:`advise`; of the smallest sets at most so many are verified and given."""
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     now = verdict_of(setting, setting.labels, setting.samples)
     if now.verdict == CONTROLLABLE:
         return Advice(setting, now, (), 0, True)
     everything = candidates(setting)
     samples = setting.measuring((*setting.observed, *(each.observation for each in everything)))
     search = Search(samples, len(setting.observed), everything)
-    chosen, complete = search.smallest(tell)
+    chosen, complete = search.smallest()
     tell("verification")
     sets = _verified(setting, samples, [tuple(search.useful[i] for i in places) for places in chosen[:most]])
     undecided = len(chosen[:most]) - len(sets)
@@ -248,7 +245,7 @@ class Search:
             found.append(_ranks(both) - _ranks(seen))
         return np.min(found, axis=0)
 
-    def smallest(self, tell: Callable[[str], None]) -> tuple[list[tuple[int, ...]], bool]:
+    def smallest(self) -> tuple[list[tuple[int, ...]], bool]:
         """All smallest sets that lose as little as all candidates together, and whether all sets up to their size were
         tried; within the budget the best there are."""
         count = len(self.useful)
@@ -296,3 +293,8 @@ def _padded(block: Array) -> Array:
 def _ranks(matrices: Array) -> Array:
     """The rank of each matrix (k, rows, columns), zero relative to one or to its largest singular value; shape (k,)."""
     return np.asarray(np.sum(singular_values(matrices) > RANK_CUTOFF, axis=1))
+
+
+def advised(setting: ObservedRobot, *, most: int | None = None) -> Advice:
+    """As :func:`advise`."""
+    return advise(setting, most=most)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,9 +11,10 @@ import numpy as np
 from ..batch.reach import reach, sweep
 from ..mechanism import Mechanism
 from ..mechanism.pose import SCALARS, Grid, Pose
+from ..progress import followed, tell
 from ..results import Result
 from .classes import Redundancy, listed
-from .observed import ObservedRobot, prepare, silent
+from .observed import ObservedRobot
 from .posture import Examiner, Posture
 
 UNREACHABLE = "unreachable"
@@ -75,9 +76,9 @@ class Check(Result, shown_as="check"):
                 "grid": self.grid and self.grid.to_dict()}
 
 
-def check(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-          at: Sequence[Pose | str] = (), grid: Grid | str | None = None, seed: int = 0,
-          progress: Callable[[str], None] | None = None) -> Check:
+@followed
+def check(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+          at: Sequence[Pose | str] = (), grid: Grid | str | None = None, seed: int = 0) -> Check:
     """Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six, constraint singularities and redundant constraints
     (theory 4) at the poses ``at`` (default: the zero configuration) and over ``grid``.
 
@@ -90,10 +91,7 @@ def check(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
     """
     poses = [Pose.parse(each) if isinstance(each, str) else each for each in at]
     cells = Grid.parse(grid) if isinstance(grid, str) else grid
-
-    tell = progress or silent
-    tell("sampling")
-    setting = prepare(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     examiner = Examiner(setting)
     start, question, motion = setting.everything.start, setting.everything.question, setting.motion
     configurations = [reach(start, question, pose, motion) for pose in poses] or [start]
@@ -101,6 +99,6 @@ def check(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
     postures = tuple(map(examiner.examine, configurations))
     swept = None
     if cells is not None:
-        found = sweep(start, question, cells, motion, lambda: tell("grid"), setting.placer)
+        found = sweep(start, question, cells, motion, setting.placer)
         swept = GridCheck(cells, tuple(None if each is None else examiner.glance(each) for each in found))
     return Check(setting, postures, listed(examiner.redundant, generic=True), swept)

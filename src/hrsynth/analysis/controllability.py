@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
@@ -13,11 +13,12 @@ from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.observation import labels_of
+from ..progress import followed, tell
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
 from .exact import ExactVerdict, architecture
 from .freedoms import Freedom, name_freedoms, point_text
-from .observed import ObservedRobot, prepare, restricted, started
+from .observed import ObservedRobot, restricted
 from .verdict import BLIND as BLIND
 from .verdict import CONTROLLABLE as CONTROLLABLE
 from .verdict import PARTIAL as PARTIAL
@@ -138,11 +139,12 @@ def _lost(setting: ObservedRobot, samples: Samples, legs: tuple[str, ...], count
     return tuple(replace(each, name=f"{each.name} (with the platform at {point_text(position)})") for each in named)
 
 
-def legs(robot: Mechanism, camera: str | None = None, *, at: Pose | str | None = None,
-         progress: Callable[[], None] | None = None, seed: int = 0) -> Legs:
+@followed
+def legs(robot: Mechanism | ObservedRobot, camera: str | None = None, *, at: Pose | str | None = None, seed: int = 0
+         ) -> Legs:
     """The verdict of every set of legs at their default segments (theory 3, verdicts), on the branch of the zero
     configuration, or of the pose ``at``."""
-    setting = prepare(robot if at is None else started(robot, at, seed), None, camera, seed=seed)
+    setting = ObservedRobot.of(robot, None, camera, at=at, seed=seed)
     anatomy = setting.anatomy
     segments = setting.segments
     labels = labels_of(segments)
@@ -156,10 +158,9 @@ def legs(robot: Mechanism, camera: str | None = None, *, at: Pose | str | None =
             samples = restricted(setting.everything, [segments[i] for i in places])
             sets.append(verdict_of(setting, [labels[i] for i in places], samples))
             exact.append(generic.verdict(samples.question.observations))
-            if progress is not None:
-                progress()
+            tell("sets of legs")
     best = max(each.rank for each in sets)
     smallest = min(len(each.legs) for each in sets if each.rank == best)
     minimal = tuple(each.legs for each in sets if each.rank == best and len(each.legs) == smallest)
-    return Legs(setting, robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), tuple(exact), complete,
-                minimal)
+    return Legs(setting, setting.robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), tuple(exact),
+                complete, minimal)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.notation import Architecture
+from ..progress import followed, tell
 from ..results import Result
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
@@ -26,7 +27,7 @@ from .controllability import Verdict, verdict_of
 from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
-from .observed import Mobility, ObservedRobot, prepare, silent, started
+from .observed import Mobility, ObservedRobot
 
 if TYPE_CHECKING:
     from ..mechanism.pose import Pose
@@ -87,13 +88,12 @@ class Derivation(Result, shown_as="derive"):
         return (f"{self.robot.name} {self.architecture}, watching {legs}: "
                 f"hidden robot {self.hidden_architecture or 'none'}, {self.verdict.verdict}")
 
-    def modes(self, at: Pose | str | None = None, *, real: bool = False,
-              progress: Callable[[str], None] = silent) -> AssemblyModes:
+    def modes(self, at: Pose | str | None = None, *, real: bool = False) -> AssemblyModes:
         """All poses with the directions (``real``: the motors' coordinates) of the pose ``at``, as ``hrsynth.modes``
         lists them."""
-        from .modes.modes import modes_with
+        from .modes.modes import modes
 
-        return modes_with(self.setting, at, real=real, progress=progress)
+        return modes(self.setting, at=at, real=real)
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
@@ -121,35 +121,27 @@ class Derivation(Result, shown_as="derive"):
         }
 
 
-def derive(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-           at: Pose | str | None = None, form: str = "simplified", seed: int = 0,
-           progress: Callable[[str], None] | None = None) -> Derivation:
-    """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; theory 2 and 3).
+@followed
+def derive(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+           at: Pose | str | None = None, form: str = "simplified", paper: bool = True, seed: int = 0) -> Derivation:
+    """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3
+    to 5).
 
     ``observe`` holds leg labels or link names (default: all legs); ``camera`` names the link that carries the camera
     (default: the base); ``at`` is a pose that takes the place of the zero configuration, in another operation mode if
-    need be; ``form`` is ``simplified`` or ``general``. Raises ``BadRequest`` for unknown names,
-    ``NotCertified`` if even the exact lift fails.
+    need be; an observed robot says all of that itself. ``form`` is ``simplified`` or ``general``; ``paper``: with the
+    paper's own form beside it. Raises ``BadRequest`` for unknown names, ``NotCertified`` if even the exact lift fails.
     """
     if form not in FORMS:
         raise BadRequest("unknown form", form, tuple(FORMS))
-    tell = progress or silent
-    tell("sampling")
-    setting = prepare(robot if at is None else started(robot, at, seed), observe, camera, seed=seed)
-    return derived(setting, form=form, progress=tell)
-
-
-def derived(setting: ObservedRobot, *, form: str = "simplified", beside: bool = True,
-            progress: Callable[[str], None] = silent) -> Derivation:
-    """The certified hidden robot of a setting, as :func:`derive`; ``beside``: with the paper's own form."""
-    tell, robot = progress, setting.robot
+    setting = ObservedRobot.of(robot, observe, camera, at=at, seed=seed)
     anatomy, samples = setting.anatomy, setting.samples
     verdict = verdict_of(setting, setting.labels, samples)
     exact = exact_architecture(setting).verdict(setting.observed)
     evidence = Evidence(anatomy, samples)
 
-    result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES), tell))
-    paper = None
+    result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES)))
+    by_paper = None
     if result.state.chains:
         tell("certificate")
         hidden: Mechanism | None = finished(setting, result.state)
@@ -158,16 +150,16 @@ def derived(setting: ObservedRobot, *, form: str = "simplified", beside: bool = 
         if not (certificate.passed and result.virtual_only):
             result, hidden, certificate = _fallback(setting, evidence, samples, certificate, FORMS[form])
         architecture: Architecture | None = result.state.architecture()
-        if beside and form == "simplified" and architecture is not None:
+        if paper and form == "simplified" and architecture is not None:
             tell("the paper's form")
-            paper = _paper_form(setting, evidence, samples, architecture, certificate)
+            by_paper = _paper_form(setting, evidence, samples, architecture, certificate)
     else:
         hidden = architecture = None
         certificate = _blind(samples)
         if not certificate.passed:
-            raise NotCertified(robot.name, certificate.largest_angle, SAME_RELATION)
-    return Derivation(robot, setting, form, anatomy.architecture(), hidden, architecture, verdict, exact, result.steps,
-                      certificate, paper)
+            raise NotCertified(setting.robot.name, certificate.largest_angle, SAME_RELATION)
+    return Derivation(setting.robot, setting, form, anatomy.architecture(), hidden, architecture, verdict, exact,
+                      result.steps, certificate, by_paper)
 
 
 def finished(setting: ObservedRobot, state: State) -> Mechanism:
@@ -252,3 +244,8 @@ def _exchanged(anatomy: LegDecomposition, found: Certificate) -> tuple[tuple[Fre
         gains, loses = beyond(theirs, ours), beyond(ours, theirs)
     return gains, loses
 
+
+
+def derived(setting: ObservedRobot, *, form: str = "simplified", beside: bool = True) -> Derivation:
+    """As :func:`derive`."""
+    return derive(setting, form=form, paper=beside)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import TYPE_CHECKING, Any
@@ -23,6 +23,7 @@ from ..mechanism.normal import NormalForm, normal_form
 from ..mechanism.observation import Direction, labels_of
 from ..mechanism.pose import Pose
 from ..mechanism.sensors import encoders
+from ..progress import tell
 
 if TYPE_CHECKING:
     from ..batch.engine import Batch
@@ -52,6 +53,23 @@ class ObservedRobot:
     """Samples for the question of all default segments, and of the observed ones besides."""
     defaults: int
     """How many of the observations of ``everything`` are default segments; they come first."""
+
+    @classmethod
+    def of(cls, robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None,
+           *, at: Pose | str | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
+        """What a question is asked of: an observed robot itself, or a robot with what is watched of it, as
+        :func:`observe`."""
+        if isinstance(robot, ObservedRobot):
+            if (observe, camera, at) != (None, None, None):
+                raise BadRequest(f"{robot.headline()}: what is watched is asked twice", observe or camera or str(at),
+                                 "nothing besides an observed robot")
+            return robot
+        tell("sampling")
+        try:
+            return _observed_robot(robot if at is None else _started(robot, at, seed), observe, camera, samples, seed)
+        except (BadMechanism, NotSampled) as error:
+            error.file = robot.file
+            raise
 
     def headline(self) -> str:
         """The robot and the observed legs."""
@@ -158,15 +176,25 @@ class ObservedRobot:
                      "pose": Pose.of(mode.at.pose(drawn.question.platform)).to_dict()} for mode in drawn.met]}
 
 
-def started(robot: Mechanism, at: Pose | str, seed: int = 0) -> Mechanism:
-    """The robot in normal form whose zero configuration is the one at a pose: on the branch of the file's zero
-    configuration where that reaches it, else in another operation mode that was met.
+def observe(robot: Mechanism, legs: Sequence[str] | str | None = None, camera: str | None = None, *,
+            at: Pose | str | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
+    """A robot with what is watched of it, its normal form and samples of its motion: what every question takes.
 
-    Raises ``BadRequest`` and ``PoseNotReached`` for poses of neither.
+    ``legs`` holds leg labels or link names (a string sets them apart by commas); None or ``["all"]`` means all legs at
+    their default segments. ``camera`` names the link that carries the camera. ``at`` is a pose that takes the place of
+    the zero configuration: on the branch of that where it reaches the pose, else in another operation mode that was
+    met.
+
+    Raises ``BadRequest`` for labels, links and parts of a pose that there are not, ``PoseNotReached``.
     """
+    return ObservedRobot.of(robot, legs, camera, at=at, samples=samples, seed=seed)
+
+
+def _started(robot: Mechanism, at: Pose | str, seed: int) -> Mechanism:
+    """The robot in normal form whose zero configuration is the one at a pose; see :func:`observe`."""
     from ..batch.reach import reach
 
-    setting = prepare(robot, seed=seed)
+    setting = ObservedRobot.of(robot, seed=seed)
     drawn, wanted = setting.everything, Pose.parse(at) if isinstance(at, str) else at
     refused: HrsynthError | None = None
     for start in (drawn.start, *(mode.at for mode in drawn.met)):
@@ -178,28 +206,8 @@ def started(robot: Mechanism, at: Pose | str, seed: int = 0) -> Mechanism:
     raise refused
 
 
-def silent(text: str) -> None:
-    """The progress of a question that nobody follows."""
-
-
-def prepare(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-            samples: int = SAMPLES, seed: int = 0, progress: Callable[[], None] | None = None) -> ObservedRobot:
-    """Normal form, legs, observations and samples of a robot.
-
-    ``observe`` holds leg labels or link names (a string sets them apart by commas); None or ``["all"]`` means all legs
-    at their default segments. ``camera`` names the link that carries the camera.
-
-    Raises ``BadRequest`` for labels and links that there are not.
-    """
-    try:
-        return _prepared(robot, observe, camera, samples, seed, progress)
-    except (BadMechanism, NotSampled) as error:
-        error.file = robot.file
-        raise
-
-
-def _prepared(robot: Mechanism, observe: Sequence[str] | str | None, camera: str | None, samples: int, seed: int,
-              progress: Callable[[], None] | None) -> ObservedRobot:
+def _observed_robot(robot: Mechanism, observe: Sequence[str] | str | None, camera: str | None, samples: int, seed: int
+                    ) -> ObservedRobot:
     if isinstance(observe, str):
         observe = [name.strip() for name in observe.split(",")]
     if camera is not None:
@@ -213,8 +221,8 @@ def _prepared(robot: Mechanism, observe: Sequence[str] | str | None, camera: str
     known = {o.key for o in defaults.values()}
     extra = tuple(o for o in observed if o.key not in known)
     question = Measurement(normal.mechanism.platform, anatomy.point, normal.mechanism.reference,
-                        (*defaults.values(), *extra))
-    drawn = sample(PinocchioModel(normal.mechanism), question, samples, seed, led_by=observed, progress=progress)
+                           (*defaults.values(), *extra))
+    drawn = sample(PinocchioModel(normal.mechanism), question, samples, seed, led_by=observed)
     return ObservedRobot(robot, normal, anatomy, observed, drawn, len(defaults))
 
 
@@ -292,3 +300,10 @@ def selected(relation: Relation, places: Sequence[int]) -> Relation:
     basis, rank = range_basis(np.vstack(blocks), 1.0)
     sizes = tuple(relation.sizes[i] for i in places)
     return Relation(basis, relation.twist_rows, sizes, relation.mobility, min(relation.gap, rank.gap))
+
+
+prepare = observe
+
+
+def silent(text: str) -> None:
+    """The progress of a question that nobody follows."""

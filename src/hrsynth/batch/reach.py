@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -17,6 +17,7 @@ from ..kinematics.relation import Measurement
 from ..kinematics.sampling import random_walk
 from ..kinematics.steps import HALVINGS, nearest, track
 from ..mechanism.pose import Grid, Pose
+from ..progress import tell
 from ..tolerances import AS_PRINTED
 from .grids import ready
 from .placing import Placer
@@ -54,8 +55,7 @@ def _arrived(at: ClosedConfiguration, goal: Goal) -> bool:
 
 
 def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion: PlatformMotion | None = None,
-          progress: Callable[[], None] | None = None, placer: Placer | None = None
-          ) -> tuple[ClosedConfiguration | None, ...]:
+          placer: Placer | None = None) -> tuple[ClosedConfiguration | None, ...]:
     """Configurations at the poses of a grid, in its order, each reached from a neighbour; None where that fails from
     every neighbour. The first is the reachable one nearest to ``start``.
 
@@ -77,8 +77,7 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
         if came == 1 and _arrived(there, goals[cell]):
             found[cell] = there
             queue.extend((other, cell) for other in _neighbours(cell, grid.shape) if other not in found)
-            if progress is not None:
-                progress()
+            tell("poses")
 
     distance = [float(np.linalg.norm(goal.rows(start.twin, start.q)[0])) for goal in goals]
     for cell in sorted(range(len(goals)), key=lambda i: (round(distance[i], 9), i))[:FIRST_CELLS]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -57,7 +56,7 @@ class Certificate(Result, shown_as="certificate"):
 
 
 def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bodies: tuple[str, ...] = (),
-            complete: bool = True, progress: Callable[[], None] | None = None) -> Certificate:
+            complete: bool = True) -> Certificate:
     """Compare ρ of the real robot's samples with ρ of ``hidden`` at the same poses and directions.
 
     ``bodies`` are further links whose twists must agree too. Only the first ``count`` samples are used. Each actuator
@@ -105,8 +104,6 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         if active and not _parametrise(at, asked, active, blind, complete):
             angle = np.pi / 2
             return verdict("the virtual actuators do not parametrise the observed directions")
-        if progress is not None:
-            progress()
     return verdict("")
 
 

@@ -7,7 +7,7 @@ What fails is discarded and counted. All samples must agree in what tells operat
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -81,7 +81,7 @@ class Samples:
 
 
 def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 0, *,
-         led_by: Sequence[Observation] | None = None, progress: Callable[[], None] | None = None) -> Samples:
+           led_by: Sequence[Observation] | None = None) -> Samples:
     """``count`` random samples of one operation mode; raises ``NotSampled`` where too few can be reached,
     ``BranchPoint`` where the zero configuration belongs to several.
 
@@ -97,7 +97,7 @@ def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 
     roots = [start] if _regular(start, rng) else _ways_out(start, question, rng)
     for freely in (False, True):
         walks = _Walks(question, leading, np.random.default_rng(seed), freely)
-        members, discarded, led = walks.sample(roots, count, progress)
+        members, discarded, led = walks.sample(roots, count)
         if freely or not (far := _far(roots[0])):
             break
         probe = _mode(_firmest(far), question)
@@ -192,8 +192,7 @@ class _Walks:
         self.question, self.leading, self.rng, self.freely = question, leading, rng, freely
         self.beyond: list[ClosedConfiguration] = []
 
-    def sample(self, roots: Sequence[ClosedConfiguration], count: int, progress: Callable[[], None] | None
-             ) -> tuple[list[Sample], int, bool]:
+    def sample(self, roots: Sequence[ClosedConfiguration], count: int) -> tuple[list[Sample], int, bool]:
         """So many samples, how many were discarded, and whether the robot finds all of them again; raises
         ``NotSampled``."""
         members, lonely = list[Sample](), list[Sample]()
@@ -204,8 +203,6 @@ class _Walks:
                 discarded += 1
                 continue
             (members if self._found_again(sample) else lonely).append(sample)
-            if progress is not None:
-                progress()
             if len(members) == count:
                 return members, discarded + len(lonely), True
         if len(members) + len(lonely) < count:

@@ -13,6 +13,7 @@ from typing import Any, Protocol
 
 from ..mechanism import Mechanism
 from ..mechanism.observation import labels_of
+from ..progress import tell
 from .evidence import Evidence
 from .rule import Proposal, Refusal, Rule, Stage
 from .rules import rules
@@ -58,16 +59,15 @@ class Rewriting:
     state: State
     evidence: Evidence
     check: Check | None = None
-    tell: Callable[[str], None] | None = None
     steps: tuple[Step, ...] = ()
     tried: int = 0
     """How many proposals were checked."""
 
     @classmethod
-    def of(cls, evidence: Evidence, check: Check | None = None, tell: Callable[[str], None] | None = None) -> Rewriting:
+    def of(cls, evidence: Evidence, check: Check | None = None) -> Rewriting:
         """The real robot, before any rule."""
         real = evidence.anatomy
-        return cls(State(real, replace(real.mechanism, observations=())), evidence, check, tell)
+        return cls(State(real, replace(real.mechanism, observations=())), evidence, check)
 
     @property
     def virtual_only(self) -> bool:
@@ -90,8 +90,7 @@ class Rewriting:
         """After the check of one proposal: its state where that passes."""
         if isinstance(proposal, Refusal):
             return self._after(rule, leg, False, proposal.reason)
-        if self.tell is not None:
-            self.tell(f"{rule.name} {leg or ''}")
+        tell(f"{rule.name} {leg or ''}")
         if self.check is None:
             return self._after(rule, leg, True, proposal.reason, None, proposal.state)
         if self.tried >= BUDGET:

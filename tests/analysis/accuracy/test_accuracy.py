@@ -15,7 +15,7 @@ from hrsynth.analysis.accuracy.field import Mapper
 from hrsynth.analysis.accuracy.pose_errors import _descended, _width, reading
 from hrsynth.analysis.accuracy.sampled import sampled
 from hrsynth.analysis.accuracy.singular_search import singular_poses
-from hrsynth.analysis.observed import ObservedRobot, prepare, silent
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError, PlaneNotMet, PoseNotReached
 from hrsynth.geometry.vectors import Array
@@ -124,7 +124,7 @@ def check_extents(setting: ObservedRobot, cones: Array) -> None:
 
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_extremes_are_attained_and_not_exceeded(robot: str) -> None:
-    setting = prepare(load(robot), samples=3)
+    setting = ObservedRobot.of(load(robot), samples=3)
     cones = CONE * (1 + np.arange(len(setting.observed)) / 3)
     check_extents(setting, cones)
 
@@ -133,7 +133,7 @@ def test_extremes_are_attained_and_not_exceeded(robot: str) -> None:
 @given(parallel_robots())
 def test_extremes_of_random_robots(robot) -> None:
     try:
-        setting = prepare(robot, samples=3)
+        setting = ObservedRobot.of(robot, samples=3)
     except HrsynthError:
         assume(False)
     check_extents(setting, np.full(len(setting.observed), CONE))
@@ -141,7 +141,7 @@ def test_extremes_of_random_robots(robot) -> None:
 
 @pytest.mark.parametrize("robot", ["quattro", "3rrr_m1", "gough_stewart", "orthoglide", "delta"])
 def test_samples_approach_the_linear_maxima_as_cones_shrink(robot: str) -> None:
-    setting = prepare(load(robot), samples=3)
+    setting = ObservedRobot.of(load(robot), samples=3)
     question, start = setting.samples.question, setting.everything.start
     away = []
     for cone in (2e-3, 1e-3):
@@ -170,8 +170,8 @@ def test_cones_of_their_own_scale_their_legs() -> None:
 
 
 def test_a_grid_by_the_batch_is_that_by_pinocchio() -> None:
-    setting = prepare(load("quattro"), "1,3,4")
-    mapper = Mapper(setting, np.full(3, CONE), silent)
+    setting = ObservedRobot.of(load("quattro"), "1,3,4")
+    mapper = Mapper(setting, np.full(3, CONE))
     grid = Grid.parse("x=-0.2:0.2:4,phi=-10deg:20deg:3,y=0.05,z=-0.7")
     quick, slow = mapper.over(grid, 0), mapper._one_by_one(grid)
     assert quick.position.ravel() == pytest.approx(slow.position, rel=1e-8)
@@ -243,7 +243,7 @@ def test_poses_and_planes_out_of_reach() -> None:
 
 
 def test_cones_by_link_and_by_leg() -> None:
-    setting = prepare(load("quattro"), "1,4", samples=2)
+    setting = ObservedRobot.of(load("quattro"), "1,4", samples=2)
     sees_all(setting)
     link = setting.observed[0].link
     assert half_angles({link: 0.1, "4": 0.2}, setting.observed).tolist() == [0.1, 0.2]

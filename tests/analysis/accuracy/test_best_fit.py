@@ -13,7 +13,7 @@ from scipy.optimize import minimize
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy
 from hrsynth.analysis.accuracy.best_fit import ENDS, FIT, Fit, best_fits, seen, weakest
 from hrsynth.analysis.accuracy.sampled import _tangents, tilted
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.errors import HrsynthError
@@ -88,7 +88,7 @@ def ways(setting: ObservedRobot, at: ClosedConfiguration, cone: float, count: in
     ("1,2", "x=0.1,y=0.1,z=-0.7", [0, 1, 20]), ("3,4", "x=0.15,y=0.2,z=-0.75", [2, 13, 24, 29])])
 def test_best_fits_are_those_of_the_closed_form(legs: str, at: str, chosen: list[int]) -> None:
     """Among the ways of the samples above; where no curve of best fits goes on (13, 29), the minimiser jumps."""
-    setting = prepare(load("quattro_rigid"), legs)
+    setting = ObservedRobot.of(load("quattro_rigid"), legs)
     here = reach(setting.everything.start, setting.everything.question, Pose.parse(at), setting.motion)
     numbers = [int(leg) - 1 for leg in legs.split(",")]
     P = setting.motion.position(here.pose(setting.motion.link))
@@ -131,7 +131,7 @@ def check_fit(setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fi
 
 @pytest.mark.parametrize("robot", ["3rps", "gough_stewart", "rrrrr_m1", "orthoglide", "quattro", "delta"])
 def test_best_fits_are_where_the_loop_rests(robot: str) -> None:
-    setting = prepare(load(robot), samples=3)
+    setting = ObservedRobot.of(load(robot), samples=3)
     at = setting.everything.start
     assert [check_fit(setting, at, way).outcome for way in ways(setting, at, 5e-3, 2, 1)] == [FIT] * 2
 
@@ -140,7 +140,7 @@ def test_best_fits_are_where_the_loop_rests(robot: str) -> None:
 @given(parallel_robots())
 def test_best_fits_of_random_robots(robot) -> None:
     try:
-        setting = prepare(robot, samples=3)
+        setting = ObservedRobot.of(robot, samples=3)
     except HrsynthError:
         assume(False)
     at = setting.configurations[0]

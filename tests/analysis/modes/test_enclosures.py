@@ -10,8 +10,8 @@ import pytest
 from flint import arb, arb_mat, ctx
 
 from analysis.modes.digits import BITS, File, column, turned
-from hrsynth.analysis.modes.modes import AssemblyModes, drift, modes_with
-from hrsynth.analysis.observed import ObservedRobot, prepare
+from hrsynth.analysis.modes.modes import AssemblyModes, drift, modes
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load, shipped
 from hrsynth.errors import PoseNotReached
 from hrsynth.geometry.vectors import pose
@@ -86,8 +86,8 @@ def missed(name: str, setting: ObservedRobot, at: Decimals, found: AssemblyModes
 
 @pytest.mark.parametrize(("name", "observe", "at"), QUICK)
 def test_the_exact_pose_is_within_the_radius(name: str, observe: tuple[str, ...] | None, at: str):
-    setting = prepare(load(shipped()[name]), observe)
-    found = modes_with(setting, at)
+    setting = ObservedRobot.of(load(shipped()[name]), observe)
+    found = modes(setting, at=at)
     parts = missed(name, setting, decimals(at), found)
     assert len(parts) >= sum(mode.configuration is not None for mode in found.modes) > 0
     assert max(max(each) for each in parts) < 1
@@ -97,12 +97,12 @@ def test_the_exact_pose_is_within_the_radius(name: str, observe: tuple[str, ...]
 @pytest.mark.long
 @pytest.mark.parametrize(("name", "observe", "count"), MANY)
 def test_the_exact_pose_is_within_the_radius_at_many_goals(name: str, observe: tuple[str, ...] | None, count: int):
-    setting = prepare(load(shipped()[name]), observe)
+    setting = ObservedRobot.of(load(shipped()[name]), observe)
     rng, seen = np.random.default_rng(1), 0
     for _ in range(count):
         at = goal_near_home(setting, rng)
         try:
-            found = modes_with(setting, Pose.parse(at))
+            found = modes(setting, at=Pose.parse(at))
         except PoseNotReached:
             continue
         parts = missed(name, setting, decimals(at), found)
@@ -127,7 +127,7 @@ def goal_near_home(setting: ObservedRobot, rng: np.random.Generator) -> str:
 
 def test_a_goal_that_is_not_closed_drifts_by_what_it_misses():
     """The residual that is allowed counts, and near a fold nothing is known."""
-    setting = prepare(load(shipped()["gough_stewart"]), ("1", "4", "6"))
+    setting = ObservedRobot.of(load(shipped()["gough_stewart"]), ("1", "4", "6"))
     goal = setting.everything.start
     off = ClosedConfiguration.of(goal.twin, goal.twin.moved(goal.q, np.full(goal.twin.nv, 1e-12)))
     assert drift(off) > drift(goal) + 0.3 * off.residual * goal.twin.length

@@ -10,7 +10,7 @@ from hrsynth.analysis.modes.branches import model
 from hrsynth.analysis.modes.curves import Circle, Line, Plane, Point, Sphere
 from hrsynth.analysis.modes.solve import solve
 from hrsynth.analysis.modes.tips import tip_loci
-from hrsynth.analysis.observed import motors, prepare
+from hrsynth.analysis.observed import ObservedRobot, motors
 from hrsynth.constraints.pattern import recognise
 from hrsynth.description import load, shipped
 from hrsynth.errors import NotConfined
@@ -27,7 +27,7 @@ RODS = ("delta", "linear_delta", "orthoglide", "uranesx", "3upu", "3puu", "3ruu"
 
 
 def confined(name: str, *, real: bool = False, member: int = 1):
-    setting = prepare(load(shipped()[name]))
+    setting = ObservedRobot.of(load(shipped()[name]))
     question = motors(setting) if real else setting.samples.question
     configurations = [each.configuration for each in setting.samples.members]
     pattern = recognise(setting.anatomy, question, configurations)

@@ -11,7 +11,7 @@ import pytest
 from analysis.singularity.found import found
 from analysis.singularity.test_figures import centre
 from hrsynth.analysis.singularity.locus import Locus
-from hrsynth.analysis.singularity.singular import drawn
+from hrsynth.analysis.singularity.locus import locus as drawn
 from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet

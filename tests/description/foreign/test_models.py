@@ -10,7 +10,7 @@ import pytest
 
 from hrsynth.analysis.check import check
 from hrsynth.analysis.derive import derive
-from hrsynth.analysis.observed import Mobility, prepare
+from hrsynth.analysis.observed import Mobility, ObservedRobot
 from hrsynth.description import load, save
 from hrsynth.mechanism import Mechanism
 
@@ -40,7 +40,7 @@ def model(name: str) -> Mechanism:
 @pytest.mark.parametrize("name", FIGURES)
 def test_every_model_is_read_closed_and_as_mobile_as_it_is(name: str):
     total, idle, written = FIGURES[name]
-    setting = prepare(model(name), samples=5)
+    setting = ObservedRobot.of(model(name), samples=5)
     assert setting.mobility == Mobility(total, idle)
     assert setting.mobility_as_written.total == written
     assert setting.everything.start.residual < 1e-10
@@ -53,7 +53,7 @@ def test_every_model_is_written_and_read_back(name: str, ending: str, tmp_path: 
     robot = model(name)
     save(robot, tmp_path / f"robot{ending}")
     back = load(tmp_path / f"robot{ending}")
-    assert prepare(back, samples=3).mobility == prepare(robot, samples=3).mobility
+    assert ObservedRobot.of(back, samples=3).mobility == ObservedRobot.of(robot, samples=3).mobility
     assert back.platform == robot.platform
 
 

@@ -109,15 +109,15 @@ def test_rods_and_axes_of_six_digits_are_equal_and_parallel(tmp_path: Path):
     from dataclasses import replace
 
     from description.samples import with_rods
-    from hrsynth.analysis.observed import prepare
+    from hrsynth.analysis.observed import ObservedRobot
     from hrsynth.description.formats.sdf.write import write
 
     rng, robot = np.random.default_rng(3), replace(with_rods(), observations=())
     joints = {name: replace(joint, point=joint.point + 2e-6 * rng.uniform(-1, 1, 3),
                             axes=tuple(axis + 2e-6 * rng.uniform(-1, 1, 3) for axis in joint.axes))
               for name, joint in robot.joints.items()}
-    setting = prepare(read(tmp_path, write(replace(robot, joints=joints)).texts[0], "sdf"), samples=3)
-    meant = prepare(robot, samples=3)
+    setting = ObservedRobot.of(read(tmp_path, write(replace(robot, joints=joints)).texts[0], "sdf"), samples=3)
+    meant = ObservedRobot.of(robot, samples=3)
     assert setting.anatomy.architecture() == meant.anatomy.architecture()
     assert (setting.dof, setting.mobility) == (meant.dof, meant.mobility)
     (note,) = [note.text for note in setting.robot.notes if "made exact" in note.text]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -15,9 +15,10 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
 from ...mechanism.pose import Grid, Pose
+from ...progress import followed, tell
 from ...results import Result
 from ..controllability import verdict_of
-from ..observed import ObservedRobot, prepare, silent
+from ..observed import ObservedRobot
 from .cones import Cones, half_angles
 from .field import Field, Mapper
 from .pose_errors import PoseErrors, measured
@@ -58,10 +59,10 @@ class Accuracy(Result, shown_as="accuracy"):
                 "poses": poses}
 
 
-def accuracy(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+@followed
+def accuracy(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
              cones: Cones, at: Sequence[Pose | str] = (), plane: Pose | str | None = None,
-             grid: Grid | str | None = None, steps: int | None = None, samples: int = 0, seed: int = 0,
-             progress: Callable[[str], None] | None = None) -> Accuracy:
+             grid: Grid | str | None = None, steps: int | None = None, samples: int = 0, seed: int = 0) -> Accuracy:
     """The largest position and orientation error of the platform over all errors of the directions inside ``cones``
     (theory 6; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
 
@@ -73,7 +74,6 @@ def accuracy(robot: Mechanism, observe: Sequence[str] | str | None = None, camer
     Raises ``BadRequest`` for names that there are not, cones that are none, legs that do not see every freedom (their
     error is infinite everywhere), ``PoseNotReached``, ``PlaneNotMet``.
     """
-    tell = progress or silent
     wanted = [Pose.parse(each) if isinstance(each, str) else each for each in at]
     if plane is not None and grid is not None:
         raise BadRequest("both a plane and a grid are given", f"{plane} and {grid}", "one of them")
@@ -83,13 +83,12 @@ def accuracy(robot: Mechanism, observe: Sequence[str] | str | None = None, camer
         raise BadRequest("number of samples", samples, "none or more")
     held = Pose.parse(plane) if isinstance(plane, str) else plane
     cells = Grid.parse(grid, LARGEST_FIELD) if isinstance(grid, str) else grid
-    tell("sampling")
-    setting = prepare(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     if not all(isinstance(o, Direction) for o in setting.observed):
         raise BadRequest("cones are about directions", ", ".join(setting.labels), "directions of legs")
     half = half_angles(cones, setting.observed)
     sees_all(setting)
-    mapper = Mapper(setting, half, tell)
+    mapper = Mapper(setting, half)
     field = None
     if held is not None:
         cells = mapper.plane(held, steps)
@@ -103,7 +102,7 @@ def accuracy(robot: Mechanism, observe: Sequence[str] | str | None = None, camer
         configurations = [start]
     tell("errors")
     poses = tuple(errors_at(setting, half, each) for each in configurations)
-    true = tuple(sampled(each, mapper.question, motion, half, errors, samples, seed, lambda: tell("samples"))
+    true = tuple(sampled(each, mapper.question, motion, half, errors, samples, seed)
                  if samples else None for each, errors in zip(configurations, poses, strict=True))
     return Accuracy(setting, half, poses, true, field)
 

@@ -20,6 +20,7 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement
 from ...mechanism.pose import SCALARS, Grid, Pose
+from ...progress import tell
 from ...tolerances import SAME_RELATION, USUAL_ERROR
 from ..observed import ObservedRobot
 from ..singularity.locus import framed
@@ -117,7 +118,7 @@ class Mapper:
 
     setting: ObservedRobot
     cones: Array
-    progress: Callable[[str], None]
+    heard: Any = None
 
     @property
     def question(self) -> Measurement:
@@ -142,8 +143,7 @@ class Mapper:
             if self.batch is not None:
                 X, possible = poses_over(motion, coarse, self.setting.robot.name, coarse.places())
                 return possible & self.batch.evaluate(X).reached
-            return np.array([at is not None for at in sweep(first, everything.question, coarse, motion,
-                                                            lambda: self.progress("how far the plane is reached"))])
+            return np.array([at is not None for at in sweep(first, everything.question, coarse, motion)])
 
         count = steps or (FINE if self.batch is not None else COARSE)
         return framed(everything.start, everything.question, motion, plane, count, met)
@@ -201,19 +201,18 @@ class Mapper:
         assert self.batch is not None
         size = -(-len(places) // max(1, len(places) // PART))
         for start in range(0, len(places), size):
-            self.progress("poses")
+            tell("poses")
             X, possible = poses_over(self.setting.motion, grid, self.setting.robot.name, places[start : start + size])
             yield possible, self.batch.evaluate(X, self.setting.labels, cones,
                                                 compiled=None if len(places) >= POSES_FOR_NUMBA else False)
 
     def _one_by_one(self, grid: Grid) -> Seen:
         everything = self.setting.everything
-        found = sweep(everything.start, everything.question, grid, self.setting.motion,
-                      lambda: self.progress("poses"), self.setting.placer)
+        found = sweep(everything.start, everything.question, grid, self.setting.motion, self.setting.placer)
         table = np.full((3, len(found)), np.nan)
         for i, at in enumerate(found):
             if at is not None:
-                self.progress("errors")
+                tell("errors")
                 rates, twists = reading(at, self.question)
                 table[:2, i] = maxima(at, self.question, self.cones)
                 table[2, i] = _weakest(rates, twists, at.twin.length)

@@ -5,7 +5,7 @@ To first order such a pose is M^{T+} δu away. Near a singularity, and where err
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from ...geometry.vectors import Array, rotation_about
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
+from ...progress import tell
 from .best_fit import ENDS, NOT_FOUND, best_fits, seen, weakest
 from .pose_errors import PoseErrors, finite
 
@@ -50,7 +51,7 @@ class Sampled:
 
 
 def sampled(at: ClosedConfiguration, question: Measurement, motion: PlatformMotion, cones: Array, linear: PoseErrors,
-            count: int, seed: int = 0, progress: Callable[[], None] | None = None) -> Sampled:
+            count: int, seed: int = 0) -> Sampled:
     """The true errors at a configuration for ``count`` samples, seeded."""
     u = seen(at, question)[0]
     ways = _extremes(linear)
@@ -60,8 +61,7 @@ def sampled(at: ClosedConfiguration, question: Measurement, motion: PlatformMoti
     position, orientation, usual = 0.0, 0.0, weakest(at, question)
     least, ended, not_found = usual, [], 0
     for way in ways:
-        if progress is not None:
-            progress()
+        tell("samples")
         fit = best_fits(at, question, lambda part, way=way: tilted(u, part * way))  # type: ignore[misc]
         least = min(least, fit.weakest)
         if fit.outcome == ENDS:

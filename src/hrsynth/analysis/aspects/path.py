@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -15,9 +16,10 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
+from ...progress import followed, tell
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
 from ..measured import MeasuredRobot
-from ..observed import ObservedRobot, prepare
+from ..observed import ObservedRobot
 from ..singularity.agreement import smallest_of
 from .answer import SAME, SEPARATED, UNDECIDED, End, PathAnswer, between
 from .carriage import Place, carriages
@@ -46,17 +48,15 @@ class Aspects:
     """Freedoms that are never seen: then every pose is singular."""
 
     @classmethod
-    def of(cls, robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-           seed: int = 0) -> Aspects:
+    def of(cls, robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None,
+           *, seed: int = 0) -> Aspects:
         """The condition of a robot from random samples of its motion."""
-        return cls.about(prepare(robot, observe, camera, seed=seed))
-
-    @classmethod
-    def about(cls, setting: ObservedRobot) -> Aspects:
-        """The condition of a robot from the samples of a setting."""
+        setting = ObservedRobot.of(robot, observe, camera, seed=seed)
         seen = MeasuredRobot.watched(setting)
         return cls(setting, setting.motion, seen.pattern, seen.condition,
                    tuple(freedom.name for freedom in seen.verdict.lost))
+
+    about = of
 
     @property
     def members(self) -> list[ClosedConfiguration]:
@@ -87,7 +87,7 @@ class Aspects:
         return Reading(self.condition, self.pattern.chart(at))
 
     def join(self, start: ClosedConfiguration, goal: ClosedConfiguration, *, seed: int = 0, budget: int = BUDGET,
-             progress: Callable[[], None] | None = None) -> PathAnswer:
+             progress: Any = None) -> PathAnswer:
         """Whether a path without Type 2 singularity joins two configurations."""
         found, scene = self.condition, self.structure.values_at([start, goal])
         values = found.expressed(scene) if found.signed else smallest_of(found.rows(scene))
@@ -103,10 +103,9 @@ class Aspects:
             readings = [self.reading(end.configuration) for end in ends]
         except NoChart as why:
             return _pointwise(answer, str(why))
-        return self._decided(answer, readings, seed, budget, progress)
+        return self._decided(answer, readings, seed, budget)
 
-    def _decided(self, answer: PathAnswer, readings: Sequence[Reading], seed: int, budget: int,
-                 progress: Callable[[], None] | None) -> PathAnswer:
+    def _decided(self, answer: PathAnswer, readings: Sequence[Reading], seed: int, budget: int) -> PathAnswer:
         """The verdict where poses decide what the legs do."""
         assert isinstance(self.pattern, Pattern)
         carriage = self.pattern.carriage
@@ -128,7 +127,7 @@ class Aspects:
             if beyond:
                 return replace(answer, reason=f"at the {end} beyond its limits: joint {', '.join(beyond)}")
         found = plan((readings[0], readings[1]), Region.around(carriage, p, R), (p[0], R[0]), (p[1], R[1]), seed=seed,
-                     budget=budget, progress=progress)
+                     budget=budget)
         answer = self._shown(answer, found, self.pattern)
         if not found.proved:
             return replace(answer, reason=_unproved(found, readings, budget))
@@ -149,9 +148,9 @@ class Aspects:
         return replace(answer, carriage=known.carriage, ways=found.ways, poses=poses)
 
 
-def path(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-         start: Pose | str, goal: Pose | str, seed: int = 0, budget: int = BUDGET,
-         progress: Callable[[str], None] | None = None) -> PathAnswer:
+@followed
+def path(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+         start: Pose | str, goal: Pose | str, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
     """Whether a path without Type 2 singularity of the hidden robot joins two poses (theory 5, aspects).
 
     Both are reached from the zero configuration in its working mode; on the way legs may pass their limits into other
@@ -163,17 +162,11 @@ def path(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: s
     Raises ``BadRequest`` for names and parts of a pose that there are not, ``PoseNotReached``.
     """
     wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
-
-    def tell(text: str) -> None:
-        if progress is not None:
-            progress(text)
-
-    tell("sampling")
     aspects = Aspects.of(robot, observe, camera, seed=seed)
     samples = aspects.setting.samples
     tell("poses")
     ends = [reach(samples.start, samples.question, pose, aspects.motion) for pose in wanted]
-    return aspects.join(*ends, seed=seed, budget=budget, progress=lambda: tell("road map"))
+    return aspects.join(*ends, seed=seed, budget=budget)
 
 
 def leads(ways: Sequence[Way], start: Place, goal: Place, readings: Sequence[Reading]) -> bool:

@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from ...progress import tell
 from .carriage import Place
 from .crossing import crossing
 from .proof import Proof, Reading, Way
@@ -39,8 +39,8 @@ class Plan:
         return min(proof.margin for proof in self.proofs)
 
 
-def plan(readings: tuple[Reading, Reading], region: Region, start: Place, goal: Place, *, seed: int, budget: int,
-         progress: Callable[[], None] | None = None) -> Plan:
+def plan(readings: tuple[Reading, Reading], region: Region, start: Place, goal: Place, *, seed: int, budget: int
+         ) -> Plan:
     """A way between two places in the working modes of two readings, with at most ``budget`` intervals.
 
     In the first round only those limbs pass their limits that differ; then any that can.
@@ -60,8 +60,7 @@ def plan(readings: tuple[Reading, Reading], region: Region, start: Place, goal: 
     for size, factor in ROUNDS:
         if roads.spent >= budget:
             break
-        if progress is not None:
-            progress()
+        tell("road map")
         roads.open(crossed)
         roads.add(region.wider(factor), rng, int(np.ceil(size / np.sqrt(len(roads.readings)))))
         found = roads.way()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -20,10 +20,11 @@ from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Task, system
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
+from ...progress import followed, tell
 from ...results import Result
 from ...tolerances import CHAIN_ROUNDING, SAME_RELATION
 from ..measured import MeasuredRobot
-from ..observed import ObservedRobot, prepare, silent
+from ..observed import ObservedRobot
 from ..singularity.agreement import weakest
 from .branches import Model, solve_all
 from .solve import SystemMode, SystemModes, continuum
@@ -143,16 +144,17 @@ class AssemblyModes(Result, shown_as="modes"):
                 "meant": [each.to_dict(self.labels) for each in found.meant]}
 
 
-def modes(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-          at: Pose | str | None = None, real: bool = False, as_written: bool = False, seed: int = 0,
-          progress: Callable[[str], None] = silent) -> AssemblyModes:
+@followed
+def modes(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+          at: Pose | str | ClosedConfiguration | None = None, real: bool = False, as_written: bool = False,
+          seed: int = 0) -> AssemblyModes:
     """All poses with the directions that are observed at ``at`` (default: the zero configuration), or with ``real`` the
     motors' coordinates: complex solutions counted, real ones enclosed (theory 5; MMT 3.3, 4.1.2, 4.2).
 
     A Π counts as a parallelogram throughout, never crossed; where legs or measurements keep the platform from turning,
     poses that are turned all the same (another operation mode) are not looked for. ``observe`` and ``camera`` as for
-    ``derive``. Joint centres that nearly coincide, and solutions nearly at infinity, are taken to be so where that is
-    clearly meant, unless ``as_written`` is true.
+    ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide, and
+    solutions nearly at infinity, are taken to be so where that is clearly meant, unless ``as_written`` is true.
 
     Raises ``BadRequest`` for names that there are not, ``PoseNotReached`` for a pose out of reach, ``NotConfined``
     where the tips' paths are none of those known, ``MeaningUndecided`` where special geometry may be meant or not,
@@ -160,28 +162,14 @@ def modes(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: 
     """
     if real and observe not in (None, "all", ["all"]):
         raise BadRequest("the motors are held instead of directions", f"real with observe {observe}", "one of the two")
-    progress("sampling")
-    return modes_with(prepare(robot, observe, camera, seed=seed), at, real=real, as_written=as_written,
-                      progress=progress)
-
-
-def modes_with(setting: ObservedRobot, at: Pose | str | None = None, *, real: bool = False, as_written: bool = False,
-               progress: Callable[[str], None] = silent) -> AssemblyModes:
-    """All assembly modes with the measurements at a pose of a setting, as :func:`modes`."""
-    goal, wanted = setting.everything.start, None
-    if at is not None:
-        pose = Pose.parse(at) if isinstance(at, str) else at
-        wanted = setting.motion.goal(pose, setting.robot.name)
-        goal = reach(goal, setting.everything.question, pose, setting.motion)
-    return modes_at(setting, goal, wanted, real=real, as_written=as_written, progress=progress)
-
-
-def modes_at(setting: ObservedRobot, goal: ClosedConfiguration, wanted: Task | None = None, *, real: bool = False,
-             as_written: bool = False, progress: Callable[[str], None] = silent) -> AssemblyModes:
-    """All assembly modes with the measurements of a configuration of a setting, as :func:`modes`; ``wanted`` is the
-    pose that the configuration was asked for."""
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    motion, wanted = setting.motion, None
+    goal = at if isinstance(at, ClosedConfiguration) else setting.everything.start
+    if isinstance(at, Pose | str):
+        asked = Pose.parse(at) if isinstance(at, str) else at
+        wanted = motion.goal(asked, setting.robot.name)
+        goal = reach(goal, setting.everything.question, asked, motion)
     measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)
-    motion = setting.motion
     pose = motion.pose(goal.pose(motion.link))
     kind = "real" if real else "hidden"
     free = setting.dof - measured.rank
@@ -189,7 +177,7 @@ def modes_at(setting: ObservedRobot, goal: ClosedConfiguration, wanted: Task | N
         text = f"the {'motors' if real else 'directions'} leave {free} of the platform's freedoms undetermined"
         return AssemblyModes(setting, kind, goal, pose, continuum(f"{text}: a continuum of dimension {free}", free),
                              (), ())
-    progress("modes")
+    tell("modes")
     confined = tip_loci(setting.anatomy, measured.question, measured.pattern, goal)
     # a curve that was fitted to a leg's moves is not known to hold its exact tip
     fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
@@ -305,3 +293,15 @@ def _lever(goal: ClosedConfiguration, link: str) -> float:
     origin = mechanism.links[link].pose[:3, 3]
     return max([LEVER, *(float(np.linalg.norm(joint.point - origin)) / goal.twin.length
                          for joint in mechanism.joints.values() if link in joint.links)])
+
+
+def modes_with(setting: ObservedRobot, at: Pose | str | None = None, *, real: bool = False, as_written: bool = False
+               ) -> AssemblyModes:
+    """As :func:`modes`."""
+    return modes(setting, at=at, real=real, as_written=as_written)
+
+
+@followed
+def modes_at(setting: ObservedRobot, goal: ClosedConfiguration) -> AssemblyModes:
+    """As :func:`modes`."""
+    return modes(setting, at=goal)

@@ -23,6 +23,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.sampling import WEAKEST, random_walk
 from ...kinematics.tasks import solve
+from ...progress import tell
 from ...tolerances import CLOSED, FOLLOWED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT, SHARP
 from .batch_spectrum import SPOTS, Quick
 
@@ -60,8 +61,7 @@ class Agreement:
 
 
 def agreement(start: ClosedConfiguration, question: Measurement, pattern: ConstraintPattern, condition: Condition,
-              count: int, *, seed: int = 0, progress: Callable[[], None] | None = None,
-              placer: Placer | None = None) -> Agreement:
+              count: int, *, seed: int = 0, placer: Placer | None = None) -> Agreement:
     """Compare at ``count`` random reachable poses and at poses on the locus.
 
     Raises ``Disagreement`` where the rank, the rows behind the words and the expression do not agree. Poses near
@@ -97,8 +97,7 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
             sizes += zip(np.abs(values), _volumes(matrices), strict=True)
         low = sorted([*low, *zip(ranks.tolist(), chunk, strict=True)], key=_size)[:TRIES]
         parts.append(min(zip(ranks.tolist(), chunk, strict=True), key=_size))
-        if progress is not None:
-            progress()
+        tell("random poses")
     on_locus: list[ClosedConfiguration] = []
     if all(leg.tip.link == leg.body for leg in pattern.legs):
         wrong += _out_of_proportion(np.array(sizes))

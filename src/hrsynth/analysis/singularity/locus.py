@@ -18,14 +18,20 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
+from ...mechanism import Mechanism
 from ...mechanism.pose import Grid, Pose
+from ...progress import followed
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from ..measured import MeasuredRobot
+from ..observed import ObservedRobot
 from .agreement import descend, spectrum, weakest
 from .batch_spectrum import Quick
 
 STARTS = 8
 """Valleys of the smallest singular value from which an isolated singular pose is sought."""
+
+STEPS = 51
+"""Poses a side of a drawn plane."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,8 +74,27 @@ def _table(values: Array) -> list[list[float | None]]:
     return [[float(value) if np.isfinite(value) else None for value in row] for row in values]
 
 
-def locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None, steps: int,
-          progress: Callable[[], None] | None = None) -> Locus:
+@followed
+def locus(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+          plane: Pose | str | None = None, steps: int = STEPS, seed: int = 0) -> Locus:
+    """Where the hidden and the real robot (with its own motors) lose a freedom over a plane of poses.
+
+    ``plane`` fixes parts of the pose so that two are left; a robot that is only partially controllable has no locus
+    (``BadRequest``). Raises ``PlaneNotMet`` where no pose of the plane is reached.
+    """
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    hidden = MeasuredRobot.watched(setting)
+    if hidden.verdict.rank < setting.dof:
+        raise BadRequest(f"{setting.robot.name} has no locus: a freedom is lost at every pose", None,
+                         "legs that make it controllable")
+    real = None
+    if any(joint.actuated for joint in setting.mechanism.joints.values()):
+        driven = MeasuredRobot.driven(setting)
+        real = driven if driven.rank == setting.dof else None
+    return _locus(hidden, real, Pose.parse(plane) if isinstance(plane, str) else plane, steps)
+
+
+def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None, steps: int) -> Locus:
     """Both robots over the plane that ``plane`` fixes (default: of three parts the third as at the zero configuration).
 
     Raises ``PlaneNotMet`` where no pose of it is reached, ``BadRequest`` where it does not leave two parts free.
@@ -78,10 +103,10 @@ def locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None,
     placer = hidden.setting.placer
 
     def met(first: ClosedConfiguration, coarse: Grid) -> NDArray[np.bool_]:
-        return np.array([at is not None for at in sweep(first, question, coarse, motion, progress, placer)])
+        return np.array([at is not None for at in sweep(first, question, coarse, motion, placer)])
 
     grid = framed(start, question, motion, plane, steps, met)
-    configurations = sweep(start, question, grid, motion, progress, placer)
+    configurations = sweep(start, question, grid, motion, placer)
     if not any(configurations):
         raise PlaneNotMet(start.twin.mechanism.name, f"the plane {grid.fixed}", "none of its poses is reached")
 

@@ -2,33 +2,30 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from ...budgets import NEIGHBOUR_STEP
 from ...constraints.condition import Condition, always
 from ...constraints.pattern import ConstraintPattern
-from ...errors import BadRequest
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import solve
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
+from ...progress import followed, tell
 from ...results import Result
 from ...tolerances import SOLVED
 from ..controllability import Verdict
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
-from ..observed import ObservedRobot, prepare, silent
+from ..observed import ObservedRobot
 from .agreement import Agreement, agreement, weakest
-from .locus import Locus, locus
 
 POINTS = 10_000
 """Random poses at which words, expression and rank are compared."""
 EXAMPLES = 3
-STEPS = 51
-"""Poses a side of a drawn plane."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,17 +89,15 @@ class Singularity(Result, shown_as="singular"):
         }
 
 
-def singular(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-             real: bool = False, points: int = POINTS, seed: int = 0,
-             progress: Callable[[str], None] | None = None) -> Singularity:
+@followed
+def singular(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+             real: bool = False, points: int = POINTS, seed: int = 0) -> Singularity:
     """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory 4; MMT 3.3.
 
     Words, expression and rank are compared at ``points`` random reachable poses and at singular poses constructed from
     the expression; raises ``Disagreement`` where they do not agree, ``BadRequest`` where a robot has no motor.
     """
-    tell = progress or silent
-    tell("sampling")
-    setting = prepare(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)
     question, verdict = measured.question, measured.verdict
     tell("pattern of the legs' wrenches")
@@ -112,37 +107,10 @@ def singular(robot: Mechanism, observe: Sequence[str] | str | None = None, camer
         return Singularity(setting, question, real, verdict, pattern, None, words, None, ())
     found = measured.condition
     checked = agreement(setting.everything.start, question, pattern, found, points, seed=seed,
-                        progress=lambda: tell("random poses"), placer=setting.placer)
+                        placer=setting.placer)
     tell("singular poses")
     examples = tuple(_example(setting, question, at) for at in checked.on_locus[:EXAMPLES])
     return Singularity(setting, question, real, verdict, pattern, found, found.words, checked, examples)
-
-
-def drawn(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-          plane: Pose | str | None = None, steps: int = STEPS, seed: int = 0,
-          progress: Callable[[str], None] | None = None) -> Locus:
-    """Where the hidden and the real robot (with its own motors) lose a freedom over a plane of poses.
-
-    ``plane`` fixes parts of the pose so that two are left; a robot that is only partially controllable has no locus
-    (``BadRequest``). Raises ``PlaneNotMet`` where no pose of the plane is reached.
-    """
-    return locus_of(prepare(robot, observe, camera, seed=seed), plane=plane, steps=steps, progress=progress)
-
-
-def locus_of(setting: ObservedRobot, *, plane: Pose | str | None = None, steps: int = STEPS,
-             progress: Callable[[str], None] | None = None) -> Locus:
-    """Where the hidden and the real robot of a setting lose a freedom over a plane of poses, as :func:`drawn`."""
-    tell = progress or silent
-    hidden = MeasuredRobot.watched(setting)
-    if hidden.verdict.rank < setting.dof:
-        raise BadRequest(f"{setting.robot.name} has no locus: a freedom is lost at every pose", None,
-                         "legs that make it controllable")
-    real = None
-    if any(joint.actuated for joint in setting.mechanism.joints.values()):
-        driven = MeasuredRobot.driven(setting)
-        real = driven if driven.rank == setting.dof else None
-    wanted = Pose.parse(plane) if isinstance(plane, str) else plane
-    return locus(hidden, real, wanted, steps, lambda: tell("poses of the plane"))
 
 
 def _example(setting: ObservedRobot, question: Measurement, at: ClosedConfiguration) -> Example:
@@ -162,3 +130,11 @@ def neighbours(at: ClosedConfiguration, question: Measurement, distance: float) 
         if residual <= 10 * SOLVED:
             found.append(ClosedConfiguration.of(at.twin, q))
     return found
+
+
+@followed
+def locus_of(setting: ObservedRobot, *, plane: Pose | str | None = None, steps: int = 51) -> Any:
+    """As :func:`hrsynth.analysis.singularity.locus.locus`."""
+    from .locus import locus
+
+    return locus(setting, plane=plane, steps=steps)

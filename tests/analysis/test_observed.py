@@ -1,0 +1,55 @@
+"""What was asked is a value: a question asked of an observed robot answers as one that is asked with its parts."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+import hrsynth
+from hrsynth.analysis.advice import advise
+from hrsynth.analysis.check import check
+from hrsynth.analysis.controllability import legs
+from hrsynth.analysis.derive import derive
+from hrsynth.analysis.modes.modes import modes
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.analysis.singularity.singular import singular
+from hrsynth.description import load
+from hrsynth.errors import BadRequest
+
+QUESTIONS: dict[str, Callable[..., Any]] = {
+    "derive": derive, "check": check, "advise": advise, "modes": modes,
+    "singular": lambda *asked, **more: singular(*asked, points=20, **more)}
+
+
+@pytest.mark.parametrize("name", QUESTIONS)
+def test_an_observed_robot_is_asked_as_its_parts_are(name: str) -> None:
+    question, robot = QUESTIONS[name], load("3rrr_m1")
+    observed = hrsynth.observe(robot, "1,2", "platform", seed=3)
+    assert question(observed).to_dict() == question(robot, "1,2", "platform", seed=3).to_dict()
+
+
+def test_a_pose_takes_the_place_of_the_zero_configuration() -> None:
+    robot, pose = load("3rrr_m1"), "x=0.02,y=0.03"
+    observed = hrsynth.observe(robot, at=pose)
+    assert legs(observed).to_dict() == legs(robot, at=pose).to_dict()
+    assert derive(observed).to_dict() == derive(robot, at=pose).to_dict()
+
+
+def test_one_observed_robot_is_sampled_once() -> None:
+    told: list[str] = []
+    observed = hrsynth.observe(load("delta"))
+    with hrsynth.following(told.append):
+        derive(observed)
+        modes(observed, at=observed.everything.start)
+    assert "sampling" not in told
+    assert {"certificate", "modes"} <= set(told)
+
+
+@pytest.mark.parametrize("more", [{"observe": "1"}, {"camera": "platform"}])
+def test_what_is_watched_is_asked_once(more: dict[str, str]) -> None:
+    observed = hrsynth.observe(load("delta"), "1,2")
+    assert ObservedRobot.of(observed) is observed
+    with pytest.raises(BadRequest, match="asked twice"):
+        derive(observed, **more)
