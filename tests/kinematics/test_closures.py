@@ -11,7 +11,7 @@ import pytest
 import hrsynth
 from hrsynth.geometry.vectors import inverse, rotation_about, unit
 from hrsynth.kinematics.assembly import ASSEMBLED, BEYOND, IMPOSSIBLE, NOT_FOUND, Assembler, Assembly
-from hrsynth.kinematics.closures import End, closures
+from hrsynth.kinematics.closures import LegEnd, closures
 from hrsynth.kinematics.ways import Part
 from hrsynth.mechanism import Joint, Mechanism
 from hrsynth.mechanism.builder import Builder
@@ -140,7 +140,7 @@ def test_values_that_close_a_skew_leg_are_among_those_told(first: str, second: s
         values = {each.joint: value for each, value in zip(way, q, strict=True)}
         free = replace(way[0], axis=random_direction(rng)) if first == "S" else way[0]
         D = shifted(free, q[0]) @ shifted(way[1], q[1]) @ (np.eye(4) if last == "S" else shifted(way[2], q[2]))
-        found = closures(way, End(D, 1.0, 1e-12, last != "S"))
+        found = closures(way, LegEnd(D, 1.0, 1e-12, last != "S"))
         assert found.miss is None, found.miss
         told += bool(found.values)
         for joint, several in found.values:
