@@ -5,9 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar
-from functools import wraps
-from inspect import signature
-from typing import Any
 
 _listener: ContextVar[Callable[[str], None] | None] = ContextVar("listener", default=None)
 
@@ -27,15 +24,3 @@ def following(listener: Callable[[str], None]) -> Iterator[None]:
         yield
     finally:
         _listener.reset(token)
-
-
-def followed(question: Callable[..., Any]) -> Callable[..., Any]:
-    """A question that also takes the listener itself, as ``progress``."""
-    @wraps(question)
-    def asked(*args: Any, progress: Callable[..., None] | None = None, **kwargs: Any) -> Any:
-        if progress is None:
-            return question(*args, **kwargs)
-        listener = progress if signature(progress).parameters else lambda stage: progress()
-        with following(listener):
-            return question(*args, **kwargs)
-    return asked

@@ -253,4 +253,4 @@ def test_a_page_that_cannot_be_written_is_refused_at_once(tmp_path: Path, capsys
 def test_accuracy_is_about_directions_that_see_everything():
     found = made(*FAST)[0]
     with pytest.raises(BadRequest, match="infinite"):
-        parts.mapped(found.setting, 0, lambda text: None)
+        parts.mapped(found.setting, 0)

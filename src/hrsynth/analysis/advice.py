@@ -17,7 +17,7 @@ from ..kinematics.sampling import Samples
 from ..mechanism import Direction, JointType, Mechanism, Observation
 from ..mechanism.legs import LegDecomposition, observation_of
 from ..mechanism.sensors import encoders, line_position
-from ..progress import followed, tell
+from ..progress import tell
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
 from .controllability import CONTROLLABLE, Verdict, verdict_of
@@ -170,7 +170,6 @@ class Advice(Result, shown_as="advise"):
                 "complete": self.complete, "undecided": self.undecided}
 
 
-@followed
 def advise(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
            most: int | None = None, seed: int = 0) -> Advice:
     """The smallest sets of further measurements with which u̇ = 0 forces t = 0 (theory 3; MMT 5.3).

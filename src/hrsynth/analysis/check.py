@@ -11,7 +11,7 @@ import numpy as np
 from ..batch.reach import reach, sweep
 from ..mechanism import Mechanism
 from ..mechanism.pose import SCALARS, Grid, Pose
-from ..progress import followed, tell
+from ..progress import tell
 from ..results import Result
 from .classes import Redundancy, listed
 from .observed import ObservedRobot
@@ -76,7 +76,6 @@ class Check(Result, shown_as="check"):
                 "grid": self.grid and self.grid.to_dict()}
 
 
-@followed
 def check(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
           at: Sequence[Pose | str] = (), grid: Grid | str | None = None, seed: int = 0) -> Check:
     """Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six, constraint singularities and redundant constraints

@@ -13,7 +13,7 @@ from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.observation import labels_of
-from ..progress import followed, tell
+from ..progress import tell
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
 from .exact import ExactVerdict, architecture
@@ -139,7 +139,6 @@ def _lost(setting: ObservedRobot, samples: Samples, legs: tuple[str, ...], count
     return tuple(replace(each, name=f"{each.name} (with the platform at {point_text(position)})") for each in named)
 
 
-@followed
 def legs(robot: Mechanism | ObservedRobot, camera: str | None = None, *, at: Pose | str | None = None, seed: int = 0
          ) -> Legs:
     """The verdict of every set of legs at their default segments (theory 3, verdicts), on the branch of the zero

@@ -17,7 +17,7 @@ from ..kinematics.sampling import Samples
 from ..mechanism import Mechanism
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.notation import Architecture
-from ..progress import followed, tell
+from ..progress import tell
 from ..results import Result
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
@@ -121,7 +121,6 @@ class Derivation(Result, shown_as="derive"):
         }
 
 
-@followed
 def derive(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
            at: Pose | str | None = None, form: str = "simplified", paper: bool = True, seed: int = 0) -> Derivation:
     """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3

@@ -52,6 +52,7 @@ class Question:
 
         from ..description.files import require_other
         from ..present.show import record, text
+        from ..progress import following
 
         if self.before is not None:
             self.before()
@@ -61,8 +62,7 @@ class Question:
         source, mechanism = values["robot"], robot_of(values)
         more = {each.record: None for each in files if each.record is not None}
         writers = []
-        with Progress() as progress:
-            values["progress"] = progress.tell
+        with Progress() as progress, following(progress.tell):
             found = self._ask(getattr(hrsynth, self.name), mechanism, values)
             for each, path in files.items():
                 if path is None:

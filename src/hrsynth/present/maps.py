@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from itertools import product
 from typing import TYPE_CHECKING, Any
 
@@ -142,12 +142,11 @@ def check_table(found: Check) -> bytes:
     return stream.getvalue().encode()
 
 
-def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int,
-          progress: Callable[[str], None] | None) -> Locus:
+def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -> Locus:
     """Where a freedom is lost over a plane of poses."""
-    from ..analysis.singularity.singular import locus_of
+    from ..analysis.singularity.locus import locus as over
 
-    return locus_of(found.setting, plane=plane, steps=steps, progress=progress)
+    return over(found.setting, plane=plane, steps=steps, seed=seed)
 
 
 def locus_map(found: Singularity, drawn: Locus) -> bytes:

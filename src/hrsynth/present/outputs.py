@@ -35,7 +35,7 @@ class File:
 
     ``part`` names the part of the answer that is written, None where it was not asked for; then ``needs`` are the
     options that ask for it, and ``words`` what it is called. ``computed`` is made of the answer first, with the options
-    that it ``takes``, a seed and the progress; the makers get it too, and the JSON as ``record``.
+    that it ``takes`` and a seed; the makers get it too, and the JSON as ``record``.
     """
 
     refusal: str
@@ -84,7 +84,7 @@ class File:
         maker = function(self.makers[ending])
         if self.computed is None:
             return maker(found), {}
-        value = function(self.computed)(found, **{name: asked[name] for name in (*self.takes, "seed", "progress")})
+        value = function(self.computed)(found, **{name: asked[name] for name in (*self.takes, "seed")})
         return maker(found, value), {} if self.record is None else {self.record: value.to_dict()}
 
     def writer(self, found: Any, path: str, asked: Asked) -> tuple[Callable[[], object], dict[str, Any]]:

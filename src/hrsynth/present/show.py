@@ -73,7 +73,7 @@ def draw(result: Result, *, plane: Pose | str | None = None, steps: int = 51) ->
 
     Raises ``BadRequest`` for a result that has no picture.
     """
-    asked = {"plane": plane, "steps": steps, "seed": 0, "progress": None}
+    asked = {"plane": plane, "steps": steps, "seed": 0}
     drawn = [(file, ending) for file in OUTPUTS[result.shown_as].files for ending in (".png", ".svg")
              if ending in file.makers and (file.part is None or getattr(result, file.part) is not None)]
     if plane is not None and not any("plane" in file.takes for file, _ in drawn):

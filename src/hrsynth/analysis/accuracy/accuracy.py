@@ -15,7 +15,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
 from ...mechanism.pose import Grid, Pose
-from ...progress import followed, tell
+from ...progress import tell
 from ...results import Result
 from ..controllability import verdict_of
 from ..observed import ObservedRobot
@@ -59,7 +59,6 @@ class Accuracy(Result, shown_as="accuracy"):
                 "poses": poses}
 
 
-@followed
 def accuracy(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
              cones: Cones, at: Sequence[Pose | str] = (), plane: Pose | str | None = None,
              grid: Grid | str | None = None, steps: int | None = None, samples: int = 0, seed: int = 0) -> Accuracy:

@@ -118,7 +118,6 @@ class Mapper:
 
     setting: ObservedRobot
     cones: Array
-    heard: Any = None
 
     @property
     def question(self) -> Measurement:

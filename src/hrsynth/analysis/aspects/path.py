@@ -16,7 +16,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
-from ...progress import followed, tell
+from ...progress import tell
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
@@ -148,7 +148,6 @@ class Aspects:
         return replace(answer, carriage=known.carriage, ways=found.ways, poses=poses)
 
 
-@followed
 def path(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
          start: Pose | str, goal: Pose | str, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
     """Whether a path without Type 2 singularity of the hidden robot joins two poses (theory 5, aspects).

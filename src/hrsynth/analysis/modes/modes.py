@@ -20,7 +20,7 @@ from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Task, system
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
-from ...progress import followed, tell
+from ...progress import tell
 from ...results import Result
 from ...tolerances import CHAIN_ROUNDING, SAME_RELATION
 from ..measured import MeasuredRobot
@@ -144,7 +144,6 @@ class AssemblyModes(Result, shown_as="modes"):
                 "meant": [each.to_dict(self.labels) for each in found.meant]}
 
 
-@followed
 def modes(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
           at: Pose | str | ClosedConfiguration | None = None, real: bool = False, as_written: bool = False,
           seed: int = 0) -> AssemblyModes:
@@ -295,13 +294,6 @@ def _lever(goal: ClosedConfiguration, link: str) -> float:
                          for joint in mechanism.joints.values() if link in joint.links)])
 
 
-def modes_with(setting: ObservedRobot, at: Pose | str | None = None, *, real: bool = False, as_written: bool = False
-               ) -> AssemblyModes:
-    """As :func:`modes`."""
-    return modes(setting, at=at, real=real, as_written=as_written)
-
-
-@followed
 def modes_at(setting: ObservedRobot, goal: ClosedConfiguration) -> AssemblyModes:
     """As :func:`modes`."""
     return modes(setting, at=goal)

@@ -20,7 +20,6 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...mechanism import Mechanism
 from ...mechanism.pose import Grid, Pose
-from ...progress import followed
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
@@ -74,7 +73,6 @@ def _table(values: Array) -> list[list[float | None]]:
     return [[float(value) if np.isfinite(value) else None for value in row] for row in values]
 
 
-@followed
 def locus(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
           plane: Pose | str | None = None, steps: int = STEPS, seed: int = 0) -> Locus:
     """Where the hidden and the real robot (with its own motors) lose a freedom over a plane of poses.

@@ -14,7 +14,7 @@ from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import solve
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
-from ...progress import followed, tell
+from ...progress import tell
 from ...results import Result
 from ...tolerances import SOLVED
 from ..controllability import Verdict
@@ -89,7 +89,6 @@ class Singularity(Result, shown_as="singular"):
         }
 
 
-@followed
 def singular(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
              real: bool = False, points: int = POINTS, seed: int = 0) -> Singularity:
     """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory 4; MMT 3.3.
@@ -130,11 +129,3 @@ def neighbours(at: ClosedConfiguration, question: Measurement, distance: float) 
         if residual <= 10 * SOLVED:
             found.append(ClosedConfiguration.of(at.twin, q))
     return found
-
-
-@followed
-def locus_of(setting: ObservedRobot, *, plane: Pose | str | None = None, steps: int = 51) -> Any:
-    """As :func:`hrsynth.analysis.singularity.locus.locus`."""
-    from .locus import locus
-
-    return locus(setting, plane=plane, steps=steps)

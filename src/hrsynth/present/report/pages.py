@@ -14,7 +14,6 @@ from ...analysis.accuracy.accuracy import Accuracy
 from ...analysis.controllability import Legs
 from ...analysis.derive import Derivation
 from ...analysis.modes.modes import AssemblyModes
-from ...analysis.observed import silent
 from ...analysis.singularity.singular import Singularity
 from ...errors import BadRequest
 from ...tolerances import RANK_GAP, SAME_RELATION
@@ -34,10 +33,10 @@ LARGEST_LIST = 63
 """Sets of legs in the table at most: all of six legs; of more, the smallest sets."""
 
 
-def report(found: Derivation, *, seed: int = 0, progress: Callable[[str], None] = silent) -> str:
+def report(found: Derivation, *, seed: int = 0) -> str:
     """The report of a derivation as a page of HTML without references to anything outside; ``seed`` is the one that the
     derivation was asked with. The other parts are computed here (seconds to a minute)."""
-    return page(found, parts(found, seed, progress)).decode()
+    return page(found, parts(found, seed)).decode()
 
 
 def page(found: Derivation, told: Parts) -> bytes:

@@ -14,12 +14,13 @@ from ...analysis.accuracy.cones import half_angles
 from ...analysis.accuracy.field import Mapper
 from ...analysis.controllability import Legs, legs
 from ...analysis.derive import Derivation
-from ...analysis.modes.modes import AssemblyModes, modes_at
+from ...analysis.modes.modes import AssemblyModes, modes
 from ...analysis.observed import ObservedRobot
 from ...analysis.singularity.singular import Singularity, singular
 from ...errors import BadRequest, HrsynthError
 from ...mechanism.observation import Direction
 from ...mechanism.pose import Pose
+from ...progress import tell
 
 POINTS = 500
 """Random poses at which the singularity condition is checked."""
@@ -48,16 +49,14 @@ class Parts:
     accuracy: Accuracy | Refused
 
 
-def parts(found: Derivation, seed: int, progress: Callable[[str], None]) -> Parts:
-    """Ask for each part of a derivation's report; ``seed`` is that of the derivation."""
-    setting, robot = found.setting, found.setting.robot
-    observe = [o.link for o in setting.observed]
+def parts(found: Derivation, seed: int) -> Parts:
+    """Ask for each part of a derivation's report of its own observed robot; ``seed`` is that of the derivation."""
+    setting = found.setting
+    name = setting.robot.name
     told = Parts(
-        asked(robot.name, lambda: legs(robot, seed=seed, progress=lambda: progress("sets of legs"))),
-        asked(robot.name, lambda: singular(robot, observe, points=POINTS, seed=seed, progress=progress)),
-        asked(robot.name, lambda: modes_at(setting, setting.everything.start, progress=progress)),
-        asked(robot.name, lambda: mapped(setting, seed, progress)))
-    progress("drawings")
+        asked(name, lambda: legs(setting)), asked(name, lambda: singular(setting, points=POINTS, seed=seed)),
+        asked(name, lambda: modes(setting)), asked(name, lambda: mapped(setting, seed)))
+    tell("drawings")
     return told
 
 
@@ -74,12 +73,12 @@ def reason(error: HrsynthError, robot: str) -> str:
     return (error.what if isinstance(error, BadRequest) else str(error)).removeprefix(f"{robot}: ")
 
 
-def mapped(setting: ObservedRobot, seed: int, tell: Callable[[str], None]) -> Accuracy:
+def mapped(setting: ObservedRobot, seed: int) -> Accuracy:
     """The error maxima over a plane of poses through the zero configuration."""
     if not all(isinstance(o, Direction) for o in setting.observed):
         raise BadRequest("cones are about directions, and something else is observed")
     cones = half_angles(CONE, setting.observed)
     sees_all(setting)
-    mapper = Mapper(setting, cones, tell)
+    mapper = Mapper(setting, cones)
     grid = mapper.plane(Pose(), FEW if mapper.batch is None else MANY)
     return Accuracy(setting, cones, (), (), mapper.over(grid, seed))

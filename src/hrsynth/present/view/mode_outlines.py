@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...analysis.modes.modes import AssemblyMode, modes_at
+from ...analysis.modes.modes import AssemblyMode, modes
 from ...analysis.observed import ObservedRobot
 from ...errors import HrsynthError
 from ...geometry.vectors import Array, inverse
@@ -47,7 +47,7 @@ def ghosts(setting: ObservedRobot,
            goal: ClosedConfiguration | None = None) -> tuple[tuple[Ghost, ...], tuple[str, ...]]:
     """All modes but the pose itself (default: the zero configuration's), and why there are none or not all."""
     try:
-        found = modes_at(setting, goal or setting.everything.start)
+        found = modes(setting, at=goal)
     except HrsynthError as error:
         return (), (f"assembly modes are not shown: {error}",)
     if found.found.continuum is not None:

@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...analysis.derive import Derivation, derive
-from ...analysis.observed import ObservedRobot, prepare, silent
+from ...analysis.observed import ObservedRobot
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
+from ...progress import tell
 from ...results import Result
 from .meshes import meshes
 from .mode_outlines import Ghost, ghosts
@@ -108,22 +109,21 @@ class View(Result, shown_as="view"):
         }
 
 
-def view(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-         hidden: bool = False, seed: int = 0, progress: Callable[[str], None] = silent) -> View:
+def view(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+         hidden: bool = False, seed: int = 0) -> View:
     """What there is to see of a robot, and with ``hidden`` of its hidden robot too: every position of a slider is a
     closed configuration, in which one of the platform's coordinates alone differs from the zero configuration's.
 
     ``observe`` and ``camera`` as for ``derive``, which also says what is raised. Assembly modes that cannot be listed
     and meshes that are missing are told in ``notes``.
     """
-    progress("sampling")
-    derivation = derive(robot, observe, camera, seed=seed, progress=progress) if hidden else None
-    setting = prepare(robot, observe, camera, seed=seed) if derivation is None else derivation.setting
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    derivation = derive(setting) if hidden else None
     other = None if derivation is None else derivation.hidden
     mover = Mover.of(setting, other)
-    progress("sliders")
+    tell("sliders")
     sliders = mover.sliders()
-    progress("modes")
+    tell("modes")
     found, notes = ghosts(setting)
     shapes, missing = meshes(setting)
     home = mover.state(mover.home)
