@@ -8,7 +8,8 @@ compute the arms or sliders from it, so that the rods have exactly the length th
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -16,47 +17,81 @@ from numpy.typing import ArrayLike
 from ..geometry.vectors import Array, rotation_about
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
-from .geometry import Z, on_circle, on_line, polar, radial, tangent
+from .geometry import THREE_ANGLES, Z, on_circle, on_line, polar, radial, six_angles, six_tips, tangent, wrist
 
 QUATTRO_ANGLES = (-3 * math.pi / 4, -math.pi / 4, math.pi / 4, 3 * math.pi / 4)
 """θ_i of both Quattros (rad): MMT Appendix B.1, IROS IV-A."""
-THREE_ANGLES = (0.0, 2 * math.pi / 3, 4 * math.pi / 3)
 
 
-def _arm(b: Builder, leg: int, angle: float, A: Array, C: Array, proximal: float, distal: float) -> Array:
-    """Adds ``arm_i`` on its actuated R and gives B_i, knee outwards, with ‖C_i − B_i‖ = ``distal``; shape (3,)."""
+@dataclass(frozen=True)
+class _DrivenLeg:
+    """A leg up to its rods, which join B_i on the driven link (``type`` R: an arm, P: a slider) to C_i; shapes (3,).
+    ``side``: along which two rods are set apart, or the first axis of a rod's U."""
+
+    type: str
+    at: Array
+    axis: Array
+    B: Array
+    C: Array
+    side: Array
+
+    def add(self, b: Builder, leg: int) -> str:
+        """Adds ``arm_i`` or ``slider_i`` on its actuated joint and gives its name."""
+        link, joint = {"R": ("arm", "shoulder"), "P": ("slider", "guide")}[self.type]
+        b.link(f"{link}_{leg}", at=self.at)
+        b.joint(f"{joint}_{leg}", self.type, "base", f"{link}_{leg}", at=self.at, axis=self.axis, motor=f"motor_{leg}")
+        return f"{link}_{leg}"
+
+
+def _on_arm(angle: float, radius: float, C: Array, proximal: float, distal: float) -> _DrivenLeg:
+    """A leg whose arm turns about A_i, at ``angle`` on a circle: knee outwards, ‖C_i − B_i‖ = ``distal``."""
+    A = polar(radius, angle)
     B = on_circle(A, radial(angle), Z, proximal, C, distal, outward=True)
-    b.link(f"arm_{leg}", at=A)
-    b.joint(f"shoulder_{leg}", "R", "base", f"arm_{leg}", at=A, axis=-tangent(angle), motor=f"motor_{leg}")
-    return B
+    return _DrivenLeg("R", A, -tangent(angle), B, C, tangent(angle))
 
 
-def _slider(b: Builder, leg: int, rail: Array, direction: Array, C: Array, distal: float, forward: bool) -> Array:
-    """Adds ``slider_i`` on its actuated P and gives B_i with ‖C_i − B_i‖ = ``distal``; shape (3,)."""
-    B = on_line(rail, direction, C, distal, forward)
-    b.link(f"slider_{leg}", at=B)
-    b.joint(f"guide_{leg}", "P", "base", f"slider_{leg}", at=B, axis=direction, motor=f"motor_{leg}")
-    return B
+def _on_rail(start: Array, direction: Array, C: Array, distal: float, side: Array, forward: bool = True) -> _DrivenLeg:
+    """A leg whose slider moves on a rail, with ‖C_i − B_i‖ = ``distal``."""
+    B = on_line(start, direction, C, distal, forward)
+    return _DrivenLeg("P", B, direction, B, C, side)
 
 
-def _two_rods(b: Builder, leg: int, proximal: str, plate: str, B: Array, C: Array, side: Array, half: float,
-              carries: bool) -> None:
-    """Adds a {2-SS}: equal parallel rods at ± ``half`` along ``side``; ``carries``: the plate hangs on the first."""
-    for letter, offset in (("a", half * side), ("b", -half * side)):
-        rod = f"rod_{leg}{letter}"
-        b.link(rod, at=B + offset)
-        b.joint(f"elbow_{leg}{letter}", "S", proximal, rod, at=B + offset)
-        b.joint(f"wrist_{leg}{letter}", "S", rod, plate, at=C + offset, loop=not (carries and letter == "a"))
+def _on_inclined_rail(angle: float, radius: float, slope: float, C: Array, distal: float) -> _DrivenLeg:
+    """A leg whose rail starts at ``angle`` on a circle, descending outwards by ``slope`` (rad) below the horizontal."""
+    direction = math.cos(slope) * radial(angle) - math.sin(slope) * Z
+    return _on_rail(polar(radius, angle), direction, C, distal, tangent(angle))
 
 
-def _rotary(name: str, angles: Sequence[float], base: Sequence[Array], tips: Sequence[Array], proximal: float,
-            distal: float, half: float, home: ArrayLike) -> Mechanism:
-    """n-R̲-{2-SS} with a rigid platform: A_i in ``base``, C_i in ``tips``, the platform frame at ``home``."""
+def _add_pairs(b: Builder, legs: Iterable[_DrivenLeg], half: float, plates: Sequence[str]) -> None:
+    """Adds legs that end in a {2-SS}: equal parallel rods at ± ``half`` along their sides, on their plates; the first
+    plate hangs on the first rod."""
+    for leg, (each, plate) in enumerate(zip(legs, plates, strict=True), start=1):
+        proximal = each.add(b, leg)
+        for letter, offset in (("a", half * each.side), ("b", -half * each.side)):
+            rod = f"rod_{leg}{letter}"
+            b.link(rod, at=each.B + offset)
+            b.joint(f"elbow_{leg}{letter}", "S", proximal, rod, at=each.B + offset)
+            b.joint(f"wrist_{leg}{letter}", "S", rod, plate, at=each.C + offset, loop=(leg, letter) != (1, "a"))
+
+
+def _of_pairs(name: str, home: Array, legs: Sequence[_DrivenLeg], half: float) -> Mechanism:
+    """n-R̲-{2-SS} or n-P̲-{2-SS} with a rigid platform, its frame at ``home``."""
     b = Builder(name)
     b.link("base")
-    for leg, (angle, A, C) in enumerate(zip(angles, base, tips, strict=True), start=1):
-        B = _arm(b, leg, angle, A, C, proximal, distal)
-        _two_rods(b, leg, f"arm_{leg}", "platform", B, C, tangent(angle), half, carries=leg == 1)
+    _add_pairs(b, legs, half, ["platform"] * len(legs))
+    b.link("platform", at=home)
+    return b.build(platform="platform")
+
+
+def _of_rods(name: str, home: Array, legs: Sequence[_DrivenLeg], end: str) -> Mechanism:
+    """Legs that end in one rod: U at B_i (its second axis normal to the first and the rod), then S or U at C_i."""
+    b = Builder(name)
+    b.link("base")
+    for leg, each in enumerate(legs, start=1):
+        proximal, second = each.add(b, leg), np.cross(each.side, each.C - each.B)
+        b.link(f"rod_{leg}", at=each.B)
+        b.joint(f"elbow_{leg}", "U", proximal, f"rod_{leg}", at=each.B, axis=each.side, axis2=second)
+        wrist(b, leg, end, each.C, second, each.side)
     b.link("platform", at=home)
     return b.build(platform="platform")
 
@@ -77,8 +112,8 @@ def delta(*, base_radius: float = 0.2, platform_radius: float = 0.06, proximal: 
         P at the zero configuration, shape (3,).
     """
     P = np.asarray(home, dtype=float)
-    return _rotary("delta", THREE_ANGLES, [polar(base_radius, a) for a in THREE_ANGLES],
-                   [P + polar(platform_radius, a) for a in THREE_ANGLES], proximal, distal, half_width, P)
+    legs = [_on_arm(a, base_radius, P + polar(platform_radius, a), proximal, distal) for a in THREE_ANGLES]
+    return _of_pairs("delta", P, legs, half_width)
 
 
 def quattro_rigid(*, base_radius: float = 0.296, platform_radius: float = 0.102, proximal: float = 0.380,
@@ -90,8 +125,8 @@ def quattro_rigid(*, base_radius: float = 0.296, platform_radius: float = 0.102,
     distance and the home pose are free choices. Parameters as in :func:`delta`.
     """
     P = np.asarray(home, dtype=float)
-    return _rotary("quattro_rigid", QUATTRO_ANGLES, [polar(base_radius, a) for a in QUATTRO_ANGLES],
-                   [P + polar(platform_radius, a) for a in QUATTRO_ANGLES], proximal, distal, half_width, P)
+    legs = [_on_arm(a, base_radius, P + polar(platform_radius, a), proximal, distal) for a in QUATTRO_ANGLES]
+    return _of_pairs("quattro_rigid", P, legs, half_width)
 
 
 def quattro(*, base_radius: float = 0.275, proximal: float = 0.380, distal: float = 0.825,
@@ -122,14 +157,10 @@ def quattro(*, base_radius: float = 0.275, proximal: float = 0.380, distal: floa
     E1, E4 = D1 - [side_bar_offset, 0, 0], D2 - [side_bar_offset, 0, 0]
     b = Builder("quattro")
     b.link("base")
-    for leg, (angle, C) in enumerate(zip(QUATTRO_ANGLES, tips, strict=True), start=1):
-        B = _arm(b, leg, angle, polar(base_radius, angle), C, proximal, distal)
-        _two_rods(b, leg, f"arm_{leg}", "plate_12" if leg < 3 else "plate_34", B, C, tangent(angle), half_width,
-                  carries=leg == 1)
-    b.link("plate_12", at=D1)
-    b.link("platform", at=P)
-    b.link("plate_34", at=D2)
-    b.link("side_bar", at=E1)
+    legs = [_on_arm(angle, base_radius, C, proximal, distal) for angle, C in zip(QUATTRO_ANGLES, tips, strict=True)]
+    _add_pairs(b, legs, half_width, ["plate_12", "plate_12", "plate_34", "plate_34"])
+    for name, origin in (("plate_12", D1), ("platform", P), ("plate_34", D2), ("side_bar", E1)):
+        b.link(name, at=origin)
     b.joint("hinge_1", "R", "plate_12", "platform", at=D1, axis=Z)
     b.joint("hinge_2", "R", "platform", "plate_34", at=D2, axis=Z)
     b.joint("side_hinge_1", "R", "plate_12", "side_bar", at=E1, axis=Z)
@@ -153,27 +184,9 @@ def orthoglide(*, distal: float = 0.31, platform_radius: float = 0.04, half_widt
         Distance of C_i from P, along axis i.
     """
     P, axes = np.asarray(home, dtype=float), np.eye(3)
-    b = Builder("orthoglide")
-    b.link("base")
-    for leg in (1, 2, 3):
-        axis, side = axes[leg - 1], axes[leg % 3]
-        C = P + platform_radius * axis
-        B = _slider(b, leg, np.zeros(3), axis, C, distal, forward=True)
-        _two_rods(b, leg, f"slider_{leg}", "platform", B, C, side, half_width, carries=leg == 1)
-    b.link("platform", at=P)
-    return b.build(platform="platform")
-
-
-def _linear(name: str, angles: Sequence[float], rails: Sequence[Array], directions: Sequence[Array],
-            tips: Sequence[Array], distal: float, half: float, P: Array) -> Mechanism:
-    """n-P̲-{2-SS} with a rigid platform; the rods of leg i are set apart along the tangent at θ_i."""
-    b = Builder(name)
-    b.link("base")
-    for leg, (angle, rail, direction, C) in enumerate(zip(angles, rails, directions, tips, strict=True), start=1):
-        B = _slider(b, leg, rail, direction, C, distal, forward=True)
-        _two_rods(b, leg, f"slider_{leg}", "platform", B, C, tangent(angle), half, carries=leg == 1)
-    b.link("platform", at=P)
-    return b.build(platform="platform")
+    legs = [_on_rail(np.zeros(3), axis, P + platform_radius * axis, distal, side)
+            for axis, side in zip(axes, np.roll(axes, -1, axis=0), strict=True)]
+    return _of_pairs("orthoglide", P, legs, half_width)
 
 
 def linear_delta(*, base_radius: float = 0.15, slope: float = math.radians(20), platform_radius: float = 0.06,
@@ -185,9 +198,8 @@ def linear_delta(*, base_radius: float = 0.15, slope: float = math.radians(20), 
     Other parameters as in :func:`delta`.
     """
     P = np.asarray(home, dtype=float)
-    directions = [math.cos(slope) * radial(a) - math.sin(slope) * Z for a in THREE_ANGLES]
-    return _linear("linear_delta", THREE_ANGLES, [polar(base_radius, a) for a in THREE_ANGLES], directions,
-                   [P + polar(platform_radius, a) for a in THREE_ANGLES], distal, half_width, P)
+    legs = [_on_inclined_rail(a, base_radius, slope, P + polar(platform_radius, a), distal) for a in THREE_ANGLES]
+    return _of_pairs("linear_delta", P, legs, half_width)
 
 
 def uranesx(*, base_radius: float = 0.4, platform_radius: float = 0.08, distal: float = 0.55, half_width: float = 0.04,
@@ -198,8 +210,9 @@ def uranesx(*, base_radius: float = 0.4, platform_radius: float = 0.08, distal: 
     stand on a circle of ``base_radius``.
     """
     P = np.asarray(home, dtype=float)
-    return _linear("uranesx", THREE_ANGLES, [polar(base_radius, a) for a in THREE_ANGLES], [Z] * 3,
-                   [P + polar(platform_radius, a) for a in THREE_ANGLES], distal, half_width, P)
+    legs = [_on_rail(polar(base_radius, a), Z, P + polar(platform_radius, a), distal, tangent(a))
+            for a in THREE_ANGLES]
+    return _of_pairs("uranesx", P, legs, half_width)
 
 
 def i4l(*, rail_distance: float = 0.35, plate_x: float = 0.06, plate_y: float = 0.05, distal: float = 0.6,
@@ -222,31 +235,16 @@ def i4l(*, rail_distance: float = 0.35, plate_x: float = 0.06, plate_y: float = 
     distal, half_width, home
         As in :func:`delta`.
     """
-    P = np.asarray(home, dtype=float)
-    quadrants = ((-1, -1), (-1, 1), (1, 1), (1, -1))
+    P, x = np.asarray(home, dtype=float), np.array([1.0, 0, 0])
+    legs = [_on_rail(np.array([0, sy * rail_distance, 0]), x, P + [sx * plate_x, sy * plate_y, 0], distal,
+                     tangent(math.atan2(sy, sx)), forward=sx > 0) for sx, sy in ((-1, -1), (-1, 1), (1, 1), (1, -1))]
     b = Builder("i4l")
     b.link("base")
-    for leg, (sx, sy) in enumerate(quadrants, start=1):
-        C = P + [sx * plate_x, sy * plate_y, 0]
-        B = _slider(b, leg, np.array([0, sy * rail_distance, 0]), np.array([1.0, 0, 0]), C, distal, forward=sx > 0)
-        side = tangent(math.atan2(sy, sx))
-        _two_rods(b, leg, f"slider_{leg}", "platform" if leg > 2 else "plate_12", B, C, side, half_width,
-                  carries=leg == 1)
+    _add_pairs(b, legs, half_width, ["plate_12", "plate_12", "platform", "platform"])
     b.link("plate_12", at=P)
     b.link("platform", at=P)
     b.joint("slide", "P", "plate_12", "platform", at=P, axis=(0, 1, 0))
     return b.build(platform="platform")
-
-
-def _rod(b: Builder, leg: int, proximal: str, B: Array, C: Array, first: Array, end: str) -> None:
-    """Adds a rod: U at B (``first`` on the proximal link, the second axis normal to it and the rod), then S or U."""
-    second = np.cross(first, C - B)
-    b.link(f"rod_{leg}", at=B)
-    b.joint(f"elbow_{leg}", "U", proximal, f"rod_{leg}", at=B, axis=first, axis2=second)
-    if end == "U":
-        b.joint(f"wrist_{leg}", "U", f"rod_{leg}", "platform", at=C, axis=second, axis2=first, loop=leg != 1)
-    else:
-        b.joint(f"wrist_{leg}", "S", f"rod_{leg}", "platform", at=C, loop=leg != 1)
 
 
 def three_ruu(*, base_radius: float = 0.2, platform_radius: float = 0.06, proximal: float = 0.25, distal: float = 0.6,
@@ -257,14 +255,8 @@ def three_ruu(*, base_radius: float = 0.2, platform_radius: float = 0.06, proxim
     two inner axes are parallel to each other. Parameters as in :func:`delta`.
     """
     P = np.asarray(home, dtype=float)
-    b = Builder("3ruu")
-    b.link("base")
-    for leg, angle in enumerate(THREE_ANGLES, start=1):
-        C = P + polar(platform_radius, angle)
-        B = _arm(b, leg, angle, polar(base_radius, angle), C, proximal, distal)
-        _rod(b, leg, f"arm_{leg}", B, C, tangent(angle), "U")
-    b.link("platform", at=P)
-    return b.build(platform="platform")
+    legs = [_on_arm(a, base_radius, P + polar(platform_radius, a), proximal, distal) for a in THREE_ANGLES]
+    return _of_rods("3ruu", P, legs, "U")
 
 
 def three_puu(*, base_radius: float = 0.15, slope: float = math.radians(20), platform_radius: float = 0.06,
@@ -275,26 +267,8 @@ def three_puu(*, base_radius: float = 0.15, slope: float = math.radians(20), pla
     are the two inner axes. Parameters as in :func:`linear_delta`.
     """
     P = np.asarray(home, dtype=float)
-    b = Builder("3puu")
-    b.link("base")
-    for leg, angle in enumerate(THREE_ANGLES, start=1):
-        C = P + polar(platform_radius, angle)
-        direction = math.cos(slope) * radial(angle) - math.sin(slope) * Z
-        B = _slider(b, leg, polar(base_radius, angle), direction, C, distal, forward=True)
-        _rod(b, leg, f"slider_{leg}", B, C, tangent(angle), "U")
-    b.link("platform", at=P)
-    return b.build(platform="platform")
-
-
-def _six_angles(half: float, turn: float = 0.0) -> list[float]:
-    """Six angles in three pairs, leg 2k+1 and 2k+2 at 120° k ∓ ``half``, all turned by ``turn`` (rad)."""
-    return [turn + 2 * math.pi / 3 * pair + sign * half for pair in range(3) for sign in (-1, 1)]
-
-
-def _six_tips(P: Array, radius: float, half: float, twist: float) -> list[Array]:
-    """C_i of a hexapod: legs 2k+1 and 2k+2 end at 120° k ∓ (60° − ``half``), the platform turned by ``twist`` (rad)."""
-    turn = rotation_about(Z, twist)
-    return [P + turn @ polar(radius, angle) for angle in _six_angles(math.pi / 3 - half)]
+    legs = [_on_inclined_rail(a, base_radius, slope, P + polar(platform_radius, a), distal) for a in THREE_ANGLES]
+    return _of_rods("3puu", P, legs, "U")
 
 
 def hexa(*, base_radius: float = 0.25, base_half: float = math.radians(26), platform_radius: float = 0.18,
@@ -314,14 +288,9 @@ def hexa(*, base_radius: float = 0.25, base_half: float = math.radians(26), plat
         As in :func:`delta`.
     """
     P = np.asarray(home, dtype=float)
-    b = Builder("hexa")
-    b.link("base")
-    tips = _six_tips(P, platform_radius, platform_half, twist)
-    for leg, (angle, C) in enumerate(zip(_six_angles(base_half), tips, strict=True), start=1):
-        B = _arm(b, leg, angle, polar(base_radius, angle), C, proximal, distal)
-        _rod(b, leg, f"arm_{leg}", B, C, tangent(angle), "S")
-    b.link("platform", at=P)
-    return b.build(platform="platform")
+    tips = six_tips(P, rotation_about(Z, twist), platform_radius, platform_half)
+    legs = [_on_arm(a, base_radius, C, proximal, distal) for a, C in zip(six_angles(base_half), tips, strict=True)]
+    return _of_rods("hexa", P, legs, "S")
 
 
 def hexaglide(*, rails: Sequence[float] = (-0.12, 0.24, 0.36, 0.12, -0.24, -0.36),
@@ -341,15 +310,10 @@ def hexaglide(*, rails: Sequence[float] = (-0.12, 0.24, 0.36, 0.12, -0.24, -0.36
     platform_radius, platform_half, distal, home, twist
         As in :func:`hexa`.
     """
-    P = np.asarray(home, dtype=float)
-    b = Builder("hexaglide")
-    b.link("base")
-    tips = _six_tips(P, platform_radius, platform_half, twist)
-    for leg, (y, forward, C) in enumerate(zip(rails, ahead, tips, strict=True), start=1):
-        B = _slider(b, leg, np.array([0.0, y, 0.0]), np.array([1.0, 0.0, 0.0]), C, distal, forward)
-        _rod(b, leg, f"slider_{leg}", B, C, np.array([0.0, 1.0, 0.0]), "S")
-    b.link("platform", at=P)
-    return b.build(platform="platform")
+    P, (x, y, _) = np.asarray(home, dtype=float), np.eye(3)
+    tips = six_tips(P, rotation_about(Z, twist), platform_radius, platform_half)
+    legs = [_on_rail(rail * y, x, C, distal, y, forward) for rail, forward, C in zip(rails, ahead, tips, strict=True)]
+    return _of_rods("hexaglide", P, legs, "S")
 
 
 def six_pus(*, base_radius: float = 0.15, base_half: float = math.radians(20), slope: float = math.radians(20),
@@ -361,12 +325,7 @@ def six_pus(*, base_radius: float = 0.15, base_half: float = math.radians(20), s
     U is tangential. Other parameters as in :func:`hexa`.
     """
     P = np.asarray(home, dtype=float)
-    b = Builder("6pus")
-    b.link("base")
-    tips = _six_tips(P, platform_radius, platform_half, twist)
-    for leg, (angle, C) in enumerate(zip(_six_angles(base_half), tips, strict=True), start=1):
-        direction = math.cos(slope) * radial(angle) - math.sin(slope) * Z
-        B = _slider(b, leg, polar(base_radius, angle), direction, C, distal, forward=True)
-        _rod(b, leg, f"slider_{leg}", B, C, tangent(angle), "S")
-    b.link("platform", at=P)
-    return b.build(platform="platform")
+    tips = six_tips(P, rotation_about(Z, twist), platform_radius, platform_half)
+    legs = [_on_inclined_rail(a, base_radius, slope, C, distal)
+            for a, C in zip(six_angles(base_half), tips, strict=True)]
+    return _of_rods("6pus", P, legs, "S")

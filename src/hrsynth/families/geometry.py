@@ -1,4 +1,4 @@
-"""Where joints lie once the platform's pose is chosen: points on circles, lines and spheres, in closed form."""
+"""Where joints lie once the platform's pose is chosen: points on circles and lines, in closed form."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from numpy.typing import ArrayLike
 
 from ..errors import BadRequest
 from ..geometry.vectors import Array, unit
+from ..mechanism.builder import Builder
 
 Z = np.array([0.0, 0.0, 1.0])
+THREE_ANGLES = (0.0, 2 * math.pi / 3, 4 * math.pi / 3)
 
 
 def polar(radius: float, angle: float, height: float = 0.0) -> Array:
@@ -26,6 +28,16 @@ def radial(angle: float) -> Array:
 def tangent(angle: float) -> Array:
     """The unit vector [-sin θ, cos θ, 0] = z × radial, shape (3,)."""
     return polar(1.0, angle + math.pi / 2)
+
+
+def six_angles(half: float) -> list[float]:
+    """Six angles in three pairs: legs 2k+1 and 2k+2 at 120° k ∓ ``half`` (rad)."""
+    return [2 * math.pi / 3 * pair + sign * half for pair in range(3) for sign in (-1, 1)]
+
+
+def six_tips(P: Array, R: Array, radius: float, half: float) -> list[Array]:
+    """Tips of six legs on a platform at P, turned by R: legs 2k+1 and 2k+2 at 120° k ∓ (60° − ``half``)."""
+    return [P + R @ polar(radius, angle) for angle in six_angles(math.pi / 3 - half)]
 
 
 def on_circle(centre: Array, x: Array, z: Array, radius: float, target: Array, length: float, outward: bool) -> Array:
@@ -60,3 +72,9 @@ def on_line(point: Array, direction: ArrayLike, target: Array, length: float, fo
         raise BadRequest("the rail does not come near enough to the tip", round(math.sqrt(length**2 - square), 6),
                          f"a distance below {length} m")
     return point + (foot + (1 if forward else -1) * math.sqrt(square)) * d
+
+
+def wrist(b: Builder, leg: int, type: str, C: Array, second: Array, first: Array) -> None:
+    """Adds the joint S or U (with its two axes) from ``rod_i`` to the platform, which hangs on the first rod."""
+    axes = {"axis": second, "axis2": first} if type == "U" else {}
+    b.joint(f"wrist_{leg}", type, f"rod_{leg}", "platform", at=C, loop=leg != 1, **axes)

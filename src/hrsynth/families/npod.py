@@ -8,6 +8,7 @@ desktop machine. Lengths in m.
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -15,26 +16,28 @@ from numpy.typing import ArrayLike
 from ..geometry.vectors import Array, rotation_about, unit
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
-from .geometry import Z, polar, tangent
-
-THREE_ANGLES = (0.0, 2 * math.pi / 3, 4 * math.pi / 3)
+from .geometry import THREE_ANGLES, Z, polar, six_angles, six_tips, tangent, wrist
 
 
-def _leg(b: Builder, leg: int, base: str, end: str, A: Array, B: Array, first: Array) -> None:
-    """Adds a leg from A_i to B_i: ``base`` joint U or R, actuated P, ``end`` joint S or U; ``first``: base axis."""
-    cylinder, rod = f"cylinder_{leg}", f"rod_{leg}"
-    second = np.cross(first, B - A)
-    b.link(cylinder, at=A)
-    b.link(rod, at=(A + B) / 2)
-    if base == "U":
-        b.joint(f"shoulder_{leg}", "U", "base", cylinder, at=A, axis=first, axis2=second)
-    else:
-        b.joint(f"shoulder_{leg}", "R", "base", cylinder, at=A, axis=first)
-    b.joint(f"slide_{leg}", "P", cylinder, rod, at=(A + B) / 2, axis=unit(B - A), motor=f"motor_{leg}")
-    if end == "U":
-        b.joint(f"wrist_{leg}", "U", rod, "platform", at=B, axis=second, axis2=first, loop=leg != 1)
-    else:
-        b.joint(f"wrist_{leg}", "S", rod, "platform", at=B, loop=leg != 1)
+def _n_pod(name: str, home: ArrayLike, base: str, end: str, legs: Iterable[tuple[Array, Array, Array]]) -> Mechanism:
+    """Legs from A_i to B_i: ``base`` joint U or R, actuated P, ``end`` joint S or U; ``legs`` are A_i, B_i and the
+    (first) axis of the base joint."""
+    b = Builder(name)
+    b.link("base")
+    for leg, (A, B, first) in enumerate(legs, start=1):
+        cylinder, rod, second = f"cylinder_{leg}", f"rod_{leg}", np.cross(first, B - A)
+        b.link(cylinder, at=A)
+        b.link(rod, at=(A + B) / 2)
+        b.joint(f"shoulder_{leg}", base, "base", cylinder, at=A, axis=first, axis2=second if base == "U" else None)
+        b.joint(f"slide_{leg}", "P", cylinder, rod, at=(A + B) / 2, axis=unit(B - A), motor=f"motor_{leg}")
+        wrist(b, leg, end, B, second, first)
+    b.link("platform", at=home)
+    return b.build(platform="platform")
+
+
+def _three(base_radius: float, platform_radius: float, P: Array) -> list[tuple[Array, Array, Array]]:
+    """Three such legs a third of a turn apart, their first axes tangential."""
+    return [(polar(base_radius, a), P + polar(platform_radius, a), tangent(a)) for a in THREE_ANGLES]
 
 
 def gough_stewart(*, base_radius: float = 0.3, base_half: float = math.radians(20), platform_radius: float = 0.2,
@@ -57,17 +60,9 @@ def gough_stewart(*, base_radius: float = 0.3, base_half: float = math.radians(2
         The platform's rotation about z, then about x, at the zero configuration (rad).
     """
     P = np.asarray(home, dtype=float)
-    R = rotation_about((1, 0, 0), tilt) @ rotation_about(Z, twist)
-    b = Builder("gough_stewart")
-    b.link("base")
-    for pair in range(3):
-        for sign in (-1, 1):
-            leg = 2 * pair + (1 if sign < 0 else 2)
-            angle = 2 * math.pi / 3 * pair + sign * base_half
-            tip = 2 * math.pi / 3 * pair + sign * (math.pi / 3 - platform_half)
-            _leg(b, leg, "U", "S", polar(base_radius, angle), P + R @ polar(platform_radius, tip), tangent(angle))
-    b.link("platform", at=P)
-    return b.build(platform="platform")
+    tips = six_tips(P, rotation_about((1, 0, 0), tilt) @ rotation_about(Z, twist), platform_radius, platform_half)
+    legs = [(polar(base_radius, a), B, tangent(a)) for a, B in zip(six_angles(base_half), tips, strict=True)]
+    return _n_pod("gough_stewart", P, "U", "S", legs)
 
 
 def three_upu(*, base_radius: float = 0.3, platform_radius: float = 0.12,
@@ -78,12 +73,7 @@ def three_upu(*, base_radius: float = 0.3, platform_radius: float = 0.12,
     are the two inner ones, normal to the leg. Parameters as in :func:`gough_stewart`.
     """
     P = np.asarray(home, dtype=float)
-    b = Builder("3upu")
-    b.link("base")
-    for leg, angle in enumerate(THREE_ANGLES, start=1):
-        _leg(b, leg, "U", "U", polar(base_radius, angle), P + polar(platform_radius, angle), tangent(angle))
-    b.link("platform", at=P)
-    return b.build(platform="platform")
+    return _n_pod("3upu", P, "U", "U", _three(base_radius, platform_radius, P))
 
 
 def three_rps(*, base_radius: float = 0.4, platform_radius: float = 0.15, height: float = 0.3) -> Mechanism:
@@ -94,9 +84,4 @@ def three_rps(*, base_radius: float = 0.4, platform_radius: float = 0.15, height
     ``height``: of P, above the base's origin, at the zero configuration. Other parameters as in :func:`gough_stewart`.
     """
     P = np.array([0.0, 0.0, height])
-    b = Builder("3rps")
-    b.link("base")
-    for leg, angle in enumerate(THREE_ANGLES, start=1):
-        _leg(b, leg, "R", "S", polar(base_radius, angle), P + polar(platform_radius, angle), tangent(angle))
-    b.link("platform", at=P)
-    return b.build(platform="platform")
+    return _n_pod("3rps", P, "R", "S", _three(base_radius, platform_radius, P))

@@ -10,10 +10,11 @@ configuration. Lengths in m.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..errors import BadRequest
 from ..geometry.vectors import Array, unit
@@ -22,6 +23,7 @@ from ..mechanism.model import Mechanism
 from .geometry import Z, on_circle, on_line, polar, radial
 
 Pairs = Sequence[tuple[float, float]]
+Pose = tuple[float, float, float]
 
 BASE: Pairs = ((0.300, math.radians(88)), (0.310, math.radians(211)), (0.290, math.radians(332)))
 """Polar coordinates of A_i in the base: a slightly irregular triangle."""
@@ -32,14 +34,14 @@ HOME = (0.010, -0.015, math.radians(22))
 
 
 @dataclass(frozen=True)
-class _Leg:
+class _PlanarLeg:
     """The points of a leg's three joints and, where a joint is a P, its axis; shapes (3,)."""
 
     points: tuple[Array, Array, Array]
     axes: tuple[Array, Array, Array] = (Z, Z, Z)
 
 
-def _add(b: Builder, leg: int, types: str, geometry: _Leg, motor: int, frame: Array | None = None) -> None:
+def _add(b: Builder, leg: int, types: str, geometry: _PlanarLeg, motor: int, frame: Array | None = None) -> None:
     """Adds ``prox_i`` and ``dist_i`` with the first two joints; ``frame``: the origin of ``dist_i``."""
     if motor not in (1, 2):
         raise BadRequest("motor: the actuated joint of each leg", motor, "1 or 2")
@@ -61,7 +63,7 @@ def _elbow(A: Array, C: Array, proximal: float, distal: float, left: bool) -> Ar
 # ------------------------------------------------------------------------------------------ two degrees of freedom
 
 
-def _pair(name: str, types: str, legs: Sequence[_Leg], motor: int, point_body: bool = False) -> Mechanism:
+def _pair(name: str, types: str, legs: Sequence[_PlanarLeg], motor: int, point_body: bool = False) -> Mechanism:
     """Two planar legs that share their end joint; the platform is ``dist_1`` with its frame there, or a point body."""
     b = Builder(name)
     b.link("base")
@@ -71,10 +73,21 @@ def _pair(name: str, types: str, legs: Sequence[_Leg], motor: int, point_body: b
     if not point_body:
         b.joint("end", "R", "dist_1", "dist_2", at=end, axis=Z, loop=True)
         return b.build(platform="dist_1")
-    b.link("platform", at=end)
-    for number in (1, 2):
-        b.joint(f"wrist_{number}", "R", f"dist_{number}", "platform", at=end, axis=Z, loop=number == 2)
+    return _with_platform(b, "R", legs, end)
+
+
+def _with_platform(b: Builder, kind: str, legs: Sequence[_PlanarLeg], home: ArrayLike) -> Mechanism:
+    """The legs' last joints on a platform of its own, which hangs on the first leg."""
+    b.link("platform", at=home)
+    for number, leg in enumerate(legs, start=1):
+        b.joint(f"{'wrist' if kind == 'R' else 'slide'}_{number}", kind, f"dist_{number}", "platform",
+                at=leg.points[2], axis=leg.axes[2], loop=number != 1)
     return b.build(platform="platform")
+
+
+def _bases(distance: float) -> list[Array]:
+    """The two base points, on the x axis."""
+    return [np.array([sign * distance / 2, 0.0, 0.0]) for sign in (-1, 1)]
 
 
 def rrrrr(*, motor: int = 1, base_distance: float = 0.2, proximal: float = 0.16, distal: float = 0.2,
@@ -93,10 +106,8 @@ def rrrrr(*, motor: int = 1, base_distance: float = 0.2, proximal: float = 0.16,
         The end joint at the zero configuration, x and y.
     """
     P = np.array([*home, 0.0])
-    legs = []
-    for sign in (-1, 1):
-        A = np.array([sign * base_distance / 2, 0.0, 0.0])
-        legs.append(_Leg((A, _elbow(A, P, proximal, distal, left=sign < 0), P)))
+    legs = [_PlanarLeg((A, _elbow(A, P, proximal, distal, left=left), P))
+            for A, left in zip(_bases(base_distance), (True, False), strict=True)]
     return _pair(f"rrrrr_m{motor}", "RRR", legs, motor)
 
 
@@ -106,10 +117,7 @@ def rprpr(*, motor: int = 1, base_distance: float = 0.3, home: tuple[float, floa
     ``motor`` 1: R̲PRPR̲; 2: RP̲RP̲R. Other parameters as in :func:`rrrrr`.
     """
     P = np.array([*home, 0.0])
-    legs = []
-    for sign in (-1, 1):
-        A = np.array([sign * base_distance / 2, 0.0, 0.0])
-        legs.append(_Leg((A, (A + P) / 2, P), (Z, P - A, Z)))
+    legs = [_PlanarLeg((A, (A + P) / 2, P), (Z, P - A, Z)) for A in _bases(base_distance)]
     return _pair(f"rprpr_m{motor}", "RPR", legs, motor)
 
 
@@ -117,9 +125,9 @@ def _prrrp(name: str, motor: int, base_distance: float, rails: tuple[float, floa
            home: tuple[float, float], point_body: bool = False) -> Mechanism:
     P = np.array([*home, 0.0])
     legs = []
-    for sign, angle in zip((-1, 1), rails, strict=True):
-        B = on_line(np.array([sign * base_distance / 2, 0.0, 0.0]), radial(angle), P, distal)
-        legs.append(_Leg((B, B, P), (radial(angle), Z, Z)))
+    for A, angle in zip(_bases(base_distance), rails, strict=True):
+        B = on_line(A, radial(angle), P, distal)
+        legs.append(_PlanarLeg((B, B, P), (radial(angle), Z, Z)))
     return _pair(name, "PRR", legs, motor, point_body)
 
 
@@ -157,29 +165,24 @@ def prrrp_parallel(*, base_distance: float = 0.4, distal: float = 0.3, home: tup
 # ---------------------------------------------------------------------------------------- three degrees of freedom
 
 
-def _corners(base: Pairs, platform: Pairs, home: tuple[float, float, float]) -> list[tuple[Array, Array]]:
+def _corners(base: Pairs, platform: Pairs, home: Pose) -> list[tuple[Array, Array]]:
     """A_i and C_i of the three legs in the base frame at the zero configuration."""
     x, y, phi = home
     return [(polar(*a), np.array([x, y, 0.0]) + polar(radius, angle + phi))
             for a, (radius, angle) in zip(base, platform, strict=True)]
 
 
-def _triple(name: str, types: str, legs: Sequence[_Leg], motor: int, home: tuple[float, float, float]) -> Mechanism:
+def _triple(name: str, types: str, legs: Sequence[_PlanarLeg], motor: int, home: Pose) -> Mechanism:
     """Three planar legs and a rigid platform; the platform frame has the axes of the base at the zero configuration."""
     b = Builder(name)
     b.link("base")
     for number, geometry in enumerate(legs, start=1):
         _add(b, number, types, geometry, motor)
-    b.link("platform", at=(home[0], home[1], 0.0))
-    for number, geometry in enumerate(legs, start=1):
-        kind = types[2]
-        b.joint(f"{'wrist' if kind == 'R' else 'slide'}_{number}", kind, f"dist_{number}", "platform",
-                at=geometry.points[2], axis=geometry.axes[2], loop=number != 1)
-    return b.build(platform="platform")
+    return _with_platform(b, types[2], legs, (home[0], home[1], 0.0))
 
 
 def three_rrr(*, motor: int = 1, proximal: float = 0.17, distal: float = 0.16, base: Pairs = BASE,
-              platform: Pairs = PLATFORM, home: tuple[float, float, float] = HOME) -> Mechanism:
+              platform: Pairs = PLATFORM, home: Pose = HOME) -> Mechanism:
     """3-RRR: three planar freedoms (MMT 4.1.1, Table 1; Fig. 6).
 
     Parameters
@@ -193,22 +196,22 @@ def three_rrr(*, motor: int = 1, proximal: float = 0.17, distal: float = 0.16, b
     home
         Platform pose x, y, φ at the zero configuration.
     """
-    legs = [_Leg((A, _elbow(A, C, proximal, distal, left=True), C)) for A, C in _corners(base, platform, home)]
+    legs = [_PlanarLeg((A, _elbow(A, C, proximal, distal, left=True), C)) for A, C in _corners(base, platform, home)]
     return _triple(f"3rrr_m{motor}", "RRR", legs, motor, home)
 
 
 def three_rpr(*, motor: int = 1, base: Pairs = BASE, platform: Pairs = PLATFORM,
-              home: tuple[float, float, float] = HOME) -> Mechanism:
+              home: Pose = HOME) -> Mechanism:
     """3-RPR: three planar freedoms (MMT 4.1.1, Table 1).
 
     ``motor`` 1: 3-R̲PR; 2: 3-RP̲R. Other parameters as in :func:`three_rrr`.
     """
-    legs = [_Leg((A, (A + C) / 2, C), (Z, C - A, Z)) for A, C in _corners(base, platform, home)]
+    legs = [_PlanarLeg((A, (A + C) / 2, C), (Z, C - A, Z)) for A, C in _corners(base, platform, home)]
     return _triple(f"3rpr_m{motor}", "RPR", legs, motor, home)
 
 
 def three_prr(*, motor: int = 1, distal: float = 0.2, rail: float = math.radians(50), base: Pairs = BASE,
-              platform: Pairs = PLATFORM, home: tuple[float, float, float] = HOME) -> Mechanism:
+              platform: Pairs = PLATFORM, home: Pose = HOME) -> Mechanism:
     """3-PRR: three planar freedoms (MMT 4.1.1, Table 1).
 
     Parameters
@@ -226,12 +229,20 @@ def three_prr(*, motor: int = 1, distal: float = 0.2, rail: float = math.radians
     for (_, angle), (A, C) in zip(base, _corners(base, platform, home), strict=True):
         direction = radial(angle + rail)
         B = on_line(A, direction, C, distal, forward=True)
-        legs.append(_Leg((B, B, C), (direction, Z, Z)))
+        legs.append(_PlanarLeg((B, B, C), (direction, Z, Z)))
     return _triple(f"3prr_m{motor}", "PRR", legs, motor, home)
 
 
+def _slots(platform: Pairs, home: Pose, reach: float, slot: float
+           ) -> Iterator[tuple[float, Array, Array, Array]]:
+    """For a P on the platform: the angle of C_i's radius, the joint B_i before it, C_i, the P's direction from C_i."""
+    for (_, angle), (_, C) in zip(platform, _corners(BASE, platform, home), strict=True):
+        along = radial(angle + home[2] + slot)
+        yield angle + home[2], C + reach * along, C, along
+
+
 def three_prp(*, reach: float = 0.15, rail: float = math.radians(75), slot: float = math.radians(15),
-              platform: Pairs = PLATFORM, home: tuple[float, float, float] = HOME) -> Mechanism:
+              platform: Pairs = PLATFORM, home: Pose = HOME) -> Mechanism:
     """3-P̲RP: three planar freedoms, of which the legs show the rotation only (MMT 4.1.1, Table 1).
 
     Parameters
@@ -243,17 +254,14 @@ def three_prp(*, reach: float = 0.15, rail: float = math.radians(75), slot: floa
     platform, home
         As in :func:`three_rrr`.
     """
-    legs = []
-    for (_, angle), (_, C) in zip(platform, _corners(BASE, platform, home), strict=True):
-        along = radial(angle + home[2] + slot)
-        B = C + reach * along
-        legs.append(_Leg((B, B, C), (radial(angle + home[2] + rail), Z, -along)))
+    legs = [_PlanarLeg((B, B, C), (radial(angle + rail), Z, -along))
+            for angle, B, C, along in _slots(platform, home, reach, slot)]
     return _triple("3prp", "PRP", legs, 1, home)
 
 
 def three_rrp(*, reach: float = 0.15, proximal: float = 0.18, bend: float = math.radians(80),
               slot: float = math.radians(15), platform: Pairs = PLATFORM,
-              home: tuple[float, float, float] = HOME) -> Mechanism:
+              home: Pose = HOME) -> Mechanism:
     """3-R̲RP: three planar freedoms, of which the legs show the rotation only (MMT 4.1.1, Table 1).
 
     Parameters
@@ -265,17 +273,14 @@ def three_rrp(*, reach: float = 0.15, proximal: float = 0.18, bend: float = math
     reach, slot, platform, home
         As in :func:`three_prp`.
     """
-    legs = []
-    for (_, angle), (_, C) in zip(platform, _corners(BASE, platform, home), strict=True):
-        along = radial(angle + home[2] + slot)
-        B = C + reach * along
-        legs.append(_Leg((B + proximal * radial(angle + home[2] + bend), B, C), (Z, Z, -along)))
+    legs = [_PlanarLeg((B + proximal * radial(angle + bend), B, C), (Z, Z, -along))
+            for angle, B, C, along in _slots(platform, home, reach, slot)]
     return _triple("3rrp", "RRP", legs, 1, home)
 
 
 def three_ppr(*, motor: int = 1, first: float = math.radians(50), second: float = math.radians(-40),
               base: Pairs = BASE, platform: Pairs = PLATFORM,
-              home: tuple[float, float, float] = HOME) -> Mechanism:
+              home: Pose = HOME) -> Mechanism:
     """3-PPR: three planar freedoms, legs whose last segments never turn: nothing can be seen (MMT 4.1.1, Table 1).
 
     Parameters
@@ -292,5 +297,5 @@ def three_ppr(*, motor: int = 1, first: float = math.radians(50), second: float 
         d, e = radial(angle + first), radial(angle + second)
         travel = np.linalg.solve(np.column_stack([d[:2], e[:2]]), (C - A)[:2])
         B = A + travel[0] * d
-        legs.append(_Leg((B, B, C), (d, e, Z)))
+        legs.append(_PlanarLeg((B, B, C), (d, e, Z)))
     return _triple(f"3ppr_m{motor}", "PPR", legs, motor, home)
