@@ -46,6 +46,11 @@ def exact(value: float) -> str:
     return text.removesuffix(".0") if text != "-0.0" else "0"
 
 
+def exact_vector(values: ArrayLike) -> str:
+    """The numbers of a vector in that form."""
+    return " ".join(exact(value) for value in np.asarray(values, dtype=float))
+
+
 def length_decimals(scale: float) -> int:
     """Decimals of a length in a robot whose largest coordinate is ``scale`` metres: 14 significant digits of it."""
     return 13 - math.floor(math.log10(scale * (1 + 1e-7))) if scale > 0 else ANGLE_DECIMALS

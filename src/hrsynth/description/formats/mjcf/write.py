@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
-
 import numpy as np
 from lxml import etree
 
@@ -34,25 +32,14 @@ def write(mechanism: Mechanism) -> Written:
                  if joint.type is JointType.FREE)
     robot, lost = reduce(mechanism, (*_TREE, JointType.FREE) if floats else _TREE, _LOOPS, content=False)
     require_free_world(robot, WORLD, "MJCF")
-    root = etree.Element("mujoco", model=robot.name)
-    etree.SubElement(root, "compiler", angle="radian", boundmass="0.001", boundinertia="0.000001")
-    custom = etree.SubElement(root, "custom")
-    for number, (key, text) in enumerate(annotations_of(robot), 1):
-        etree.SubElement(custom, "text", name=f"{PREFIX}_{key}_{number}", data=text)
-    _bodies(root, robot)
-    equality = etree.Element("equality")
-    for joint in robot.joints.values():
-        if not joint.in_tree:
-            _closure(equality, robot, joint)
-    _gears(equality, robot)
-    if len(equality):
-        root.append(equality)
-    actuator = etree.Element("actuator")
-    for joint in robot.joints.values():
-        if joint.motor is not None and joint.type is not JointType.FIXED:
-            etree.SubElement(actuator, "motor", name=joint.motor.name, joint=joint.name)
-    if len(actuator):
-        root.append(actuator)
+    custom = [xml.new("text", name=f"{PREFIX}_{key}_{number}", data=text)
+              for number, (key, text) in enumerate(annotations_of(robot), 1)]
+    loops = [element for joint in robot.joints.values() if not joint.in_tree for element in _closure(robot, joint)]
+    motors = [xml.new("motor", name=joint.motor.name, joint=joint.name) for joint in robot.joints.values()
+              if joint.motor is not None and joint.type is not JointType.FIXED]
+    sections = {"custom": custom, "worldbody": _bodies(robot), "equality": [*loops, *_gears(robot)], "actuator": motors}
+    root = xml.new("mujoco", xml.new("compiler", angle="radian", boundmass="0.001", boundinertia="0.000001"),
+                   *(xml.new(tag, *elements) for tag, elements in sections.items() if elements), model=robot.name)
     return Written((xml.text_of(root),), (*lost, *_lost(robot)))
 
 
@@ -71,72 +58,61 @@ def _lost(robot: Mechanism) -> list[Note]:
     return found
 
 
-def _bodies(root: xml.Element, robot: Mechanism) -> None:
-    world = etree.SubElement(root, "worldbody")
+def _bodies(robot: Mechanism) -> list[xml.Element]:
+    """The bodies that hang on the world, each holding those that hang on it."""
+    world = xml.new("worldbody")
     elements = {robot.base: world}
     if robot.base != WORLD:
         elements[robot.base] = etree.SubElement(world, "body", name=robot.base)
     for joint in outward(robot):
         X = inverse(robot.links[joint.predecessor].pose) @ robot.links[joint.successor].pose
-        parent = world if joint.type is JointType.FREE else elements[joint.predecessor]
-        body = etree.SubElement(parent, "body", {"name": joint.successor, **_pose(X)})
-        elements[joint.successor] = body
+        body = xml.new("body", name=joint.successor)
+        if np.any(X[:3, 3]):
+            body.set("pos", numerals.exact_vector(X[:3, 3]))
+        if not np.array_equal(X[:3, :3], np.eye(3)):
+            body.set("quat", numerals.exact_vector(quaternions(X[:3, :3])))
         if joint.type is not JointType.FIXED:
             body.append(_joint(robot, joint))
-
-
-def _pose(X: Array) -> dict[str, str]:
-    found = {}
-    if np.any(X[:3, 3]):
-        found["pos"] = _text(X[:3, 3])
-    if not np.array_equal(X[:3, :3], np.eye(3)):
-        found["quat"] = _text(quaternions(X[:3, :3]))
-    return found
-
-
-def _text(values: Array | tuple[float, ...]) -> str:
-    return " ".join(numerals.exact(float(value)) for value in values)
+        (world if joint.type is JointType.FREE else elements[joint.predecessor]).append(body)
+        elements[joint.successor] = body
+    return list(world)
 
 
 def _joint(robot: Mechanism, joint: Joint) -> xml.Element:
     if joint.type is JointType.FREE:
-        return etree.Element("freejoint", name=joint.name)
-    X = inverse(robot.links[joint.successor].pose)
-    element = etree.Element("joint", name=joint.name, type=_NAMES[joint.type],
-                            pos=_text(X[:3, :3] @ joint.point + X[:3, 3]))
+        return xml.new("freejoint", name=joint.name)
+    element = xml.new("joint", name=joint.name, type=_NAMES[joint.type],
+                      pos=_at(robot, joint.successor, joint.point))
     if joint.axes:
-        element.set("axis", _text(X[:3, :3] @ joint.axis))
+        element.set("axis", numerals.exact_vector(robot.links[joint.successor].pose[:3, :3].T @ joint.axis))
     limits = joint.limits
     if limits is not None and limits.lower is not None and limits.upper is not None and limits.lower < limits.upper:
-        element.set("range", _text((limits.lower, limits.upper)))
+        element.set("range", numerals.exact_vector((limits.lower, limits.upper)))
     return element
 
 
-def _closure(equality: xml.Element, robot: Mechanism, joint: Joint) -> None:
+def _at(robot: Mechanism, link: str, point: Array) -> str:
+    """A point in the frame of a link."""
+    X = inverse(robot.links[link].pose)
+    return numerals.exact_vector(X[:3, :3] @ point + X[:3, 3])
+
+
+def _closure(robot: Mechanism, joint: Joint) -> list[xml.Element]:
+    """A rigid closure as a weld, a point as a point, a revolute joint as two."""
     one, two = joint.links
-    X = inverse(robot.links[one].pose)
-    names = {"body1": one, "body2": two}
     if joint.type is JointType.FIXED:
-        relative = X @ robot.links[two].pose
-        relpose = _text((*(X[:3, :3] @ joint.point + X[:3, 3]), *quaternions(relative[:3, :3])))
-        Y = inverse(robot.links[two].pose)
-        etree.SubElement(equality, "weld", {"name": joint.name, **names, "relpose": relpose,
-                                            "anchor": _text(Y[:3, :3] @ joint.point + Y[:3, 3])})
-        return
-    points = [joint.point]
+        relative = inverse(robot.links[one].pose) @ robot.links[two].pose
+        relpose = f"{_at(robot, one, joint.point)} {numerals.exact_vector(quaternions(relative[:3, :3]))}"
+        return [xml.new("weld", name=joint.name, body1=one, body2=two, relpose=relpose,
+                        anchor=_at(robot, two, joint.point))]
+    points = {joint.name: joint.point}
     if joint.type is JointType.REVOLUTE:
-        points.append(joint.point + robot.length * joint.axis)
-    for point, suffix in zip(points, ("", SECOND), strict=False):
-        anchor = _text(X[:3, :3] @ point + X[:3, 3])
-        etree.SubElement(equality, "connect", {"name": joint.name + suffix, **names, "anchor": anchor})
+        points[joint.name + SECOND] = joint.point + robot.length * joint.axis
+    return [xml.new("connect", name=name, body1=one, body2=two, anchor=_at(robot, one, point))
+            for name, point in points.items()]
 
 
-def _gears(equality: xml.Element, robot: Mechanism) -> None:
-    carrier: dict[str, list[str]] = defaultdict(list)
-    for joint in robot.joints.values():
-        if joint.in_tree:
-            carrier[joint.successor].append(joint.name)
-    for coupling in robot.couplings:
-        etree.SubElement(equality, "joint", name=coupling.name, joint1=carrier[coupling.successor][0],
-                         joint2=carrier[coupling.predecessor][0],
-                         polycoef=_text((0.0, coupling.ratio, 0.0, 0.0, 0.0)))
+def _gears(robot: Mechanism) -> list[xml.Element]:
+    carrier = {joint.successor: joint.name for joint in robot.joints.values() if joint.in_tree}
+    return [xml.new("joint", name=each.name, joint1=carrier[each.successor], joint2=carrier[each.predecessor],
+                    polycoef=numerals.exact_vector((0, each.ratio, 0, 0, 0))) for each in robot.couplings]

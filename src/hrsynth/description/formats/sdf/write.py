@@ -45,12 +45,12 @@ def write(mechanism: Mechanism) -> Written:
 
 def _pose(parent: xml.Element, X: Array) -> None:
     """Append a ``<pose>`` unless it says nothing."""
-    position = [numerals.exact(float(value)) for value in X[:3, 3]]
+    position = numerals.exact_vector(X[:3, 3])
     if not np.array_equal(X[:3, :3], np.eye(3)):
-        w, x, y, z = (numerals.exact(float(value)) for value in quaternions(X[:3, :3]))
-        etree.SubElement(parent, "pose", rotation_format="quat_xyzw").text = " ".join([*position, x, y, z, w])
+        turn = numerals.exact_vector(quaternions(X[:3, :3])[[1, 2, 3, 0]])
+        etree.SubElement(parent, "pose", rotation_format="quat_xyzw").text = f"{position} {turn}"
     elif np.any(X[:3, 3]):
-        etree.SubElement(parent, "pose").text = " ".join([*position, "0", "0", "0"])
+        etree.SubElement(parent, "pose").text = f"{position} 0 0 0"
 
 
 def _joint(model: xml.Element, robot: Mechanism, joint: Joint) -> None:
