@@ -10,7 +10,7 @@ from importlib import resources
 from pathlib import Path
 from typing import Any, Protocol
 
-from ..description.files import drafted
+from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
 from . import tables
 from .journal import ENDING, Journal
@@ -58,7 +58,7 @@ class Folder:
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         file = self.file(group)
-        with writable(file), drafted(file, sync=True) as draft:
+        with writable(file), replacement(file, sync=True) as draft:
             draft.write_bytes(encoded(group, lines))
 
     def journal(self, group: str, *, anew: bool = False) -> Journal:
@@ -86,7 +86,7 @@ class Database:
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         kept = {} if not self.path.exists() else {name: self.lines(name, {}) for name in self.groups() if name != group}
-        with writable(self.path), drafted(self.path, sync=True) as draft:
+        with writable(self.path), replacement(self.path, sync=True) as draft:
             draft.unlink(missing_ok=True)
             try:
                 tables.write(draft, {**kept, group: lines})

@@ -40,7 +40,7 @@ def write_whole(path: str | Path, content: bytes | Iterable[bytes]) -> None:
     """Write a file, at once or piece by piece, under a temporary name, then rename it; raises ``BadRequest`` where it
     cannot be written."""
     try:
-        with drafted(path) as draft, draft.open("wb") as file:
+        with replacement(path) as draft, draft.open("wb") as file:
             file.writelines([content] if isinstance(content, bytes) else content)
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or str(error)
@@ -48,7 +48,7 @@ def write_whole(path: str | Path, content: bytes | Iterable[bytes]) -> None:
 
 
 @contextlib.contextmanager
-def drafted(path: str | Path, *, sync: bool = False) -> Iterator[Path]:
+def replacement(path: str | Path, *, sync: bool = False) -> Iterator[Path]:
     """A temporary name beside a file; what is written there takes the file's place when the block ends without an
     error, with ``sync`` not before it is on the disk. Raises ``BadRequest`` for a directory or a device, ``OSError``
     where the disk refuses."""

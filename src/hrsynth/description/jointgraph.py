@@ -109,7 +109,7 @@ class JointGraph:
     def note_assumed(self) -> None:
         """Record the guesses about many joints, one note a kind."""
         for what, names in self.assumed.items():
-            self.note("guess", f"{what}: {listed(names)}")
+            self.note("guess", f"{what}: {comma_list(names)}")
         self.assumed.clear()
 
     def fresh(self, name: str) -> str:
@@ -131,7 +131,7 @@ class JointGraph:
         return graphs.component(graphs.adjacency(self.links, (e.links for e in self.joints.values())), base)
 
 
-def listed(names: Iterable[str], most: int = 8) -> str:
+def comma_list(names: Iterable[str], most: int = 8) -> str:
     """Names set apart by commas, the first of many."""
     every = list(names)
     return ", ".join(every[:most]) + (" …" if every[most:] else "")

@@ -9,7 +9,7 @@ from ..errors import BadRequest
 from ..mechanism.legs import decompose, observation_of
 from ..mechanism.model import JointType, Mechanism, Motor
 from ..mechanism.normal import normal_form
-from .jointgraph import LOOP_TYPES, FrameSpec, JointGraph, listed
+from .jointgraph import LOOP_TYPES, FrameSpec, JointGraph, comma_list
 
 CLOSURES = {"3d": JointType.SPHERICAL, "6d": JointType.FIXED, **LOOP_TYPES}
 
@@ -37,7 +37,7 @@ class Overrides:
             _close(graph, closure)
         for name in self.freeze:
             if name not in graph.joints:
-                raise BadRequest("--freeze: no such joint", name, listed(graph.joints))
+                raise BadRequest("--freeze: no such joint", name, comma_list(graph.joints))
             graph.joints[name] = replace(graph.joints[name], type=JointType.FIXED, axes=(), motor=None, limits=None)
         if self.motors is not None:
             _drive(graph, self.motors)
@@ -61,7 +61,7 @@ def _close(graph: JointGraph, wish: str) -> None:
                          + ", ".join(name for name in CLOSURES if name != "universal"))
     for link in parts[:2]:
         if link not in graph.links:
-            raise BadRequest("--close: no such link", link, listed(graph.links))
+            raise BadRequest("--close: no such link", link, comma_list(graph.links))
     if parts[0] == parts[1]:
         raise BadRequest("--close: a link cannot meet itself", wish, "two links")
     graph.close(graph.fresh(f"close_{parts[0]}_{parts[1]}"), kind, (FrameSpec(parts[0]), FrameSpec(parts[1])))
@@ -73,21 +73,21 @@ def _drive(graph: JointGraph, wanted: Iterable[str]) -> None:
     for name in wanted:
         own = [each for each in graph.joints if each == name or each.rpartition("__")[0] == name]
         if not own or all(graph.joints[each].type is JointType.FIXED for each in own):
-            raise BadRequest("--motors: no such joint that moves", name, listed(graph.joints))
+            raise BadRequest("--motors: no such joint that moves", name, comma_list(graph.joints))
         chosen.update(own)
     for name, joint in graph.joints.items():
         motor = (joint.motor or Motor(f"motor_{name}")) if name in chosen else None
         graph.joints[name] = replace(joint, motor=motor)
 
 
-def observing(mechanism: Mechanism, links: Iterable[str]) -> Mechanism:
+def observe_links(mechanism: Mechanism, links: Iterable[str]) -> Mechanism:
     """The mechanism with the default segments of the named links as its observed directions."""
     normal = normal_form(mechanism)
     legs = decompose(normal.mechanism)
     found = []
     for link in links:
         if normal.into.get(link) not in normal.mechanism.links:
-            raise BadRequest(f"{mechanism.name}: no link of a leg to observe", link, listed(normal.mechanism.links))
+            raise BadRequest(f"{mechanism.name}: no link of a leg to observe", link, comma_list(normal.mechanism.links))
         default = observation_of(legs, normal.into[link])
         turn = mechanism.links[link].pose[:3, :3].T @ normal.mechanism.links[default.link].pose[:3, :3]
         found.append(replace(default, link=link, direction=turn @ default.direction))

@@ -5,14 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
-from ..errors import BadRobotFile, Defect
 from ..mechanism.model import Mechanism
 from ..mechanism.part import between
 from . import formats, xml
 from .dialect import RobotFile
 from .formats.urdf import xacro
 from .jointgraph import MOST_LINKS, JointGraph
-from .overrides import Overrides, observing
+from .overrides import Overrides, observe_links
 from .tree import spanning
 
 
@@ -25,14 +24,14 @@ def read(path: Path, overrides: Overrides) -> Mechanism:
     robot = formats.read(robot_file(path, strict=not overrides.any))
     if isinstance(robot, JointGraph):
         if len(robot.links) > MOST_LINKS or len(robot.joints) > 2 * MOST_LINKS:
-            raise _refused(path, f"{len(robot.links)} links and {len(robot.joints)} joints",
-                           f"up to {MOST_LINKS} links")
+            raise xml.refusal(path, f"{len(robot.links)} links and {len(robot.joints)} joints",
+                              f"up to {MOST_LINKS} links")
         from .assembly.build import build
 
         robot = build(robot, overrides)
     if overrides.base is not None:
         robot = spanning(between(robot, overrides.base, overrides.platform or robot.platform))
-    return robot if overrides.observe is None else observing(robot, overrides.observe)
+    return robot if overrides.observe is None else observe_links(robot, overrides.observe)
 
 
 def robot_file(path: Path, *, strict: bool = True) -> RobotFile:
@@ -45,14 +44,15 @@ def robot_file(path: Path, *, strict: bool = True) -> RobotFile:
     root = xml.document(data, str(path))
     if not (strict and root.find("hrsynth") is not None):
         _require_few(path, root)
-    return RobotFile(path, xacro.expanded(path) if xacro.is_needed(root) else root, strict)
+    return RobotFile(path, xacro.expand(path) if xacro.is_needed(root) else root, strict)
 
 
 def _require_few(path: Path, root: xml.Element) -> None:
     """Refuse what has too many links before any of them is read."""
     for count, _ in enumerate(root.iter("link", "body", "model", "default", "frame"), 1):
         if count > 2 * MOST_LINKS:
-            raise _refused(path, f"more than {2 * MOST_LINKS} links, bodies and frames", f"up to {MOST_LINKS} links")
+            raise xml.refusal(path, f"more than {2 * MOST_LINKS} links, bodies and frames",
+                              f"up to {MOST_LINKS} links")
 
 
 def _in_folder(path: Path) -> Path:
@@ -61,10 +61,6 @@ def _in_folder(path: Path) -> Path:
     files = sorted(each for pattern in ("*.urdf", "*.sdf", "*.xml", "*.mjcf", "*.xacro") for each in path.glob(pattern)
                    if each.name not in ("package.xml", "model.config"))
     if len(files) != 1:
-        raise _refused(path, "a folder of " + (f"{len(files)} robot files" if files else "no robot file"),
-                       "robot.urdf with robot.yaml, or one robot file")
+        raise xml.refusal(path, "a folder of " + (f"{len(files)} robot files" if files else "no robot file"),
+                          "robot.urdf with robot.yaml, or one robot file")
     return files[0]
-
-
-def _refused(path: Path, what: str, allowed: str) -> BadRobotFile:
-    return BadRobotFile([Defect(str(path), None, what, None, allowed)])

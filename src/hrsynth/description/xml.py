@@ -30,58 +30,57 @@ def _parser() -> etree.XMLParser:
                            remove_comments=False, remove_pis=True)
 
 
+def refusal(file: str | Path, what: str, allowed: str | None = None, *, value: str | None = None,
+            line: int | None = None) -> BadRobotFile:
+    """The error of a file with one defect, or of a file as a whole."""
+    return BadRobotFile([Defect(str(file), line, what, value, allowed)])
+
+
 def content(path: str | Path) -> bytes:
     """The bytes of a robot file; raises :class:`BadRobotFile` for what is no readable file of a sensible size."""
-    file = str(path)
-
-    def refuse(what: str, value: str | None = None, allowed: str | None = None) -> BadRobotFile:
-        return BadRobotFile([Defect(file, None, what, value, allowed)])
-
+    most = f"up to {LARGEST_FILE}"
     try:
         status = Path(path).stat()
         if stat.S_ISDIR(status.st_mode):
-            raise refuse("a directory, not a robot file")
+            raise refusal(path, "a directory, not a robot file")
         if not stat.S_ISREG(status.st_mode):
-            raise refuse("not a regular file")
+            raise refusal(path, "not a regular file")
         if status.st_size > LARGEST_FILE:
-            raise refuse("file too large", f"{status.st_size} bytes", f"up to {LARGEST_FILE}")
+            raise refusal(path, "file too large", most, value=f"{status.st_size} bytes")
         with open(path, "rb") as stream:
             data = stream.read(LARGEST_FILE + 1)
     except FileNotFoundError:
-        raise refuse("no such file") from None
+        raise refusal(path, "no such file") from None
     except (OSError, ValueError) as error:
-        raise refuse("cannot be read", getattr(error, "strerror", None) or str(error)) from None
+        raise refusal(path, "cannot be read", value=getattr(error, "strerror", None) or str(error)) from None
     if len(data) > LARGEST_FILE:
-        raise refuse("file too large", f"more than {LARGEST_FILE} bytes", f"up to {LARGEST_FILE}")
+        raise refusal(path, "file too large", most, value=f"more than {LARGEST_FILE} bytes")
     return data
 
 
 def document(text: bytes | str, file: str) -> Element:
     """The root element of an XML document; raises :class:`BadRobotFile` with the line where it stops being one."""
     data = text.encode() if isinstance(text, str) else text
-
-    def refuse(line: int | None, what: str, value: str | None = None, allowed: str | None = None) -> BadRobotFile:
-        return BadRobotFile([Defect(file, line, what, value, allowed)])
-
     if not data.strip():
-        raise refuse(1, "an empty file")
+        raise refusal(file, "an empty file", line=1)
     try:
         data.decode("utf-8")
     except UnicodeDecodeError as error:
-        raise refuse(data.count(b"\n", 0, error.start) + 1, "not UTF-8 text", hex(data[error.start]),
-                     "a file in UTF-8") from None
+        raise refusal(file, "not UTF-8 text", "a file in UTF-8", value=hex(data[error.start]),
+                      line=data.count(b"\n", 0, error.start) + 1) from None
     if (count := data.count(b"<") - data.count(b"</")) > MOST_ELEMENTS:
-        raise refuse(None, "too many elements", str(count), f"up to {MOST_ELEMENTS}")
+        raise refusal(file, "too many elements", f"up to {MOST_ELEMENTS}", value=str(count))
     bare = _COMMENT.sub(lambda match: b"\n" * match[0].count(b"\n"), data)
     if declaration := _DECLARATION.search(bare):
-        raise refuse(bare.count(b"\n", 0, declaration.start()) + 1, "a document type declaration, which is not allowed")
+        raise refusal(file, "a document type declaration, which is not allowed",
+                      line=bare.count(b"\n", 0, declaration.start()) + 1)
     try:
         return etree.fromstring(data, _parser())
     except etree.XMLSyntaxError as error:
         what = (error.msg or "syntax error").split(", line ")[0]
-        raise refuse(error.lineno or 1, "malformed XML", what) from None
+        raise refusal(file, "malformed XML", value=what, line=error.lineno or 1) from None
     except (ValueError, LookupError) as error:
-        raise refuse(1, "malformed XML", str(error)) from None
+        raise refusal(file, "malformed XML", value=str(error), line=1) from None
 
 
 class Line(int):

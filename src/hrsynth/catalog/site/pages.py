@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...description import native
-from ...description.files import drafted
+from ...description.files import replacement
 from ...errors import HrsynthError
 from ...mechanism.model import Mechanism
 from ...present.drawings.schematic import robot_svg
@@ -50,7 +50,7 @@ def _write(folder: Path, structure: Structure, studied: Study) -> None:
             continue
         (folder / ROBOTS / f"{named(record['word'])}.urdf").write_bytes(content)
         robots[record["word"]] = robot
-    with drafted(folder / PAGES / f"{structure.name}.html") as draft:
+    with replacement(folder / PAGES / f"{structure.name}.html") as draft:
         draft.write_text(page(structure, studied, robots), encoding="utf-8")
 
 

@@ -9,7 +9,7 @@ from ...errors import BadMechanism, BadRequest, LoopsNotClosed, RankUndecided
 from ...geometry.vectors import Array, inverse, unit
 from ...mechanism.model import Coupling, Joint, JointType, Mechanism, Note
 from ...tolerances import FAINT, NOISE, RANK_GAP, SAME_GEOMETRY
-from ..jointgraph import JointGraph, JointSpec, listed
+from ..jointgraph import JointGraph, JointSpec, comma_list
 from ..overrides import Overrides
 from ..tree import spanning
 from . import closures, guess
@@ -38,7 +38,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     _prune(graph, base)
     for role, link in (("base", overrides.base), ("platform", overrides.platform)):
         if link is not None and link not in graph.links:
-            raise BadRequest(f"{graph.file}: no such {role} link", link, listed(graph.links))
+            raise BadRequest(f"{graph.file}: no such {role} link", link, comma_list(graph.links))
     platform = overrides.platform or graph.platform or guess.platform(graph, overrides.base or base)
     if platform == base and overrides.base is None:
         raise BadRequest(f"{graph.file}: the platform is the base", platform, "another link")
@@ -62,7 +62,7 @@ def _prune(graph: JointGraph, base: str) -> None:
     lost = [link for link in graph.links if link not in kept]
     if lost:
         graph.note("ignored", f"{len(lost)} links that no joint connects to the base {base!r}: "
-                              + listed(lost, 5))
+                              + comma_list(lost, 5))
         graph.links = {name: link for name, link in graph.links.items() if name in kept}
         graph.joints = {name: joint for name, joint in graph.joints.items() if set(joint.links) <= kept}
         graph.gears = [gear for gear in graph.gears if {gear.driver, gear.driven} <= set(graph.joints)]
@@ -86,7 +86,7 @@ def _moves(assembly: LoopAssembly, values: Values) -> str:
             if abs(q) > NOISE:
                 suffix = f"[{number}]" if value.size > 1 else ""
                 found.append(f"{joint.name}{suffix} = {q * assembly.unit(joint):.6g}")
-    return listed(found)
+    return comma_list(found)
 
 
 def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssembly, values: Values) -> Mechanism:
@@ -175,10 +175,10 @@ def _away_from_singular(mechanism: Mechanism) -> Mechanism:
     why = (f"singular (its loops have {freedoms[0]} freedoms there, {freedoms[1]} nearby)" if freedoms[1] < freedoms[0]
            else f"nearly singular (weakest singular value {here.weakest:.1e}, {after.weakest:.1e} nearby)")
     note = Note("solved", f"the zero pose is {why}: moved to {_moves(assembly, there)}")
-    return replace(_moved(mechanism, assembly, there), notes=(*mechanism.notes, note))
+    return replace(_with_zero_at(mechanism, assembly, there), notes=(*mechanism.notes, note))
 
 
-def _moved(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> Mechanism:
+def _with_zero_at(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> Mechanism:
     """The same mechanism with another closed configuration for its zero."""
     poses = assembly.poses(values)
     motion = {name: poses[name] @ inverse(link.pose) for name, link in mechanism.links.items()}

@@ -24,7 +24,7 @@ def merge_points(graph: JointGraph) -> None:
         if joint.type is JointType.SPHERICAL and not joint.in_tree:
             table[frozenset(joint.links)].append(joint)
     for joints in table.values():
-        merged = _merged(joints) if len(joints) > 1 else None
+        merged = _joint_through(joints) if len(joints) > 1 else None
         if merged is None:
             continue
         for joint in joints:
@@ -37,7 +37,7 @@ def merge_points(graph: JointGraph) -> None:
                              f"together and are read as one {what}")
 
 
-def _merged(joints: list[JointSpec]) -> JointSpec | None:
+def _joint_through(joints: list[JointSpec]) -> JointSpec | None:
     first = joints[0]
     points = np.array([[joint.ends[joint.links.index(link)].X[:3, 3] for joint in joints] for link in first.links])
     arms = points[:, 1:] - points[:, :1]

@@ -39,11 +39,11 @@ class LoopAssembly:
         self.base = base
         tree = spanning_tree(base, joints)
         self.length = _spread(base, tree)
-        self.tree = [(_scaled(joint, self.length), parent, child) for joint, parent, child in tree]
+        self.tree = [(_scale(joint, self.length), parent, child) for joint, parent, child in tree]
         used = {joint.name for joint, _, _ in tree}
         self._parent = {child: (joint, parent) for joint, parent, child in self.tree}
         reached = {base, *self._parent}
-        self.loops = [_scaled(joint, self.length) for joint in joints
+        self.loops = [_scale(joint, self.length) for joint in joints
                       if joint.name not in used and reached.issuperset(joint.links)]
         units = {joint.name: self.unit(joint) for joint in joints}
         self.gears = [replace(g, ratio=g.ratio * units[g.driver] / units[g.driven], offset=g.offset / units[g.driven])
@@ -88,7 +88,7 @@ class LoopAssembly:
 
     def poses(self, values: Values) -> dict[str, Array]:
         """The pose (4, 4) of every link in the base frame, in metres."""
-        return {link: _stretched(X, self.length) for link, X in self._poses(values).items()}
+        return {link: _stretch(X, self.length) for link, X in self._poses(values).items()}
 
     def system(self, values: Values) -> tuple[Array, Array]:
         """What is open in all loops and gears (rows,), and its derivative by the active coordinates (rows, size)."""
@@ -136,33 +136,33 @@ class LoopAssembly:
             stalled = 0 < gain < 1e-6 * at.size and at.size < NOISE
             return at.size <= SOLVED or stalled or not self.size or self._spent > EFFORT
 
-        values, left = descend(values, self.system, lambda values, at, factor: self.step(
-            values, self._damped(at.error, at.J, at.size, factor)), DAMPING, iterations, content)
-        close = SOLVED < left.size < NOISE
-        return self._polished(values, left.error, left.J, left.size) if close else (values, left.size)
+        def propose(values: Values, at: Residual, factor: float) -> Values:
+            return self.step(values, self._damped(at, factor))
 
-    def _polished(self, values: Values, error: Array, J: Array, size: float) -> tuple[Values, float]:
+        values, left = descend(values, self.system, propose, DAMPING, iterations, content)
+        return self._polish(values, left) if SOLVED < left.size < NOISE else (values, left.size)
+
+    def _polish(self, values: Values, at: Residual) -> tuple[Values, float]:
         """Plain Newton steps, faint directions too, as long as they are short for the residual that they remove."""
-        start = (values, size)
+        start = (values, at.size)
         for _ in range(10):
-            step: Array = np.asarray(-np.linalg.lstsq(J, error, rcond=RANK_CUTOFF)[0], dtype=float)
-            if np.max(np.abs(step), initial=0.0) > NEWTON_REACH * size:
+            step: Array = np.asarray(-np.linalg.lstsq(at.J, at.error, rcond=RANK_CUTOFF)[0], dtype=float)
+            if np.max(np.abs(step), initial=0.0) > NEWTON_REACH * at.size:
                 return start
             values = self.step(values, step)
-            error, J = self.system(values)
-            size = float(np.linalg.norm(error))
-            if size <= SOLVED:
-                return values, size
+            at = Residual.of(*self.system(values))
+            if at.size <= SOLVED:
+                return values, at.size
         return start
 
-    def _damped(self, error: Array, J: Array, size: float, factor: float) -> Array:
+    def _damped(self, at: Residual, factor: float) -> Array:
         """The damped step, no longer than ``STRIDE``; near the solution the plain one without faint directions."""
-        U, s, Vt = np.linalg.svd(J, full_matrices=False)
-        if size < NOISE and factor <= 1.0:
+        U, s, Vt = np.linalg.svd(at.J, full_matrices=False)
+        if at.size < NOISE and factor <= 1.0:
             kept = s > FAINT * s[0]
-            step = -(Vt[kept].T @ ((U.T @ error)[kept] / s[kept]))
+            step = -(Vt[kept].T @ ((U.T @ at.error)[kept] / s[kept]))
         else:
-            step = -(Vt.T @ (s / (s**2 + factor * max(size**2, 1e-12)) * (U.T @ error)))
+            step = -(Vt.T @ (s / (s**2 + factor * max(at.size**2, 1e-12)) * (U.T @ at.error)))
         largest = float(np.max(np.abs(step), initial=0.0))
         return np.asarray(step * min(1.0, STRIDE / largest) if largest > 0 else step)
 
@@ -256,12 +256,12 @@ def _slip(gear: GearSpec, values: Values) -> Array:
     return values[gear.driven][:1] - gear.ratio * values[gear.driver][:1] - gear.offset
 
 
-def _scaled(joint: JointSpec, length: float) -> JointSpec:
-    one, two = (FrameSpec(end.link, _stretched(end.X, 1 / length), end.line) for end in joint.ends)
+def _scale(joint: JointSpec, length: float) -> JointSpec:
+    one, two = (FrameSpec(end.link, _stretch(end.X, 1 / length), end.line) for end in joint.ends)
     return replace(joint, ends=(one, two))
 
 
-def _stretched(X: Array, factor: float) -> Array:
+def _stretch(X: Array, factor: float) -> Array:
     scaled = X.copy()
     scaled[:3, 3] *= factor
     return scaled

@@ -15,7 +15,7 @@ from ...chains import CUT, END, WELD
 from ...dialect import RobotFile
 from ...jointgraph import FrameSpec, JointGraph
 from ..urdf.read import read as read_urdf
-from .settings import KEYS, refused, settings_beside, settings_in
+from .settings import KEYS, settings_beside, settings_in
 
 TYPES = {"SPHERICAL": JointType.SPHERICAL, "FIXED": JointType.FIXED, "UJOINT": JointType.UNIVERSAL,
          "UNIVERSAL": JointType.UNIVERSAL, "REVOLUTE": JointType.REVOLUTE, "PRISMATIC": JointType.PRISMATIC,
@@ -28,18 +28,18 @@ def read(file: RobotFile) -> JointGraph:
     path, (beside, settings) = (file.path, found) if found else (_urdf_beside(file.path), (file.path, None))
     settings = settings or settings_in(beside)
     if settings is None:
-        raise refused(beside, "none of the keys of this dialect", ", ".join(KEYS))
+        raise xml.refusal(beside, "none of the keys of this dialect", ", ".join(KEYS))
     root = xml.document(xml.content(path), str(path))
     graph = read_urdf(RobotFile(path, root), frames=not settings.get("closed_loop"))
     graph.dialect = "Gepetto"
-    return _Settings(graph, beside, settings).applied()
+    return _Settings(graph, beside, settings).apply()
 
 
 def _urdf_beside(settings: Path) -> Path:
     for name in (settings.with_suffix(".urdf").name, "robot.urdf"):
         if settings.with_name(name).is_file():
             return settings.with_name(name)
-    raise refused(settings, "no URDF file beside the YAML file", settings.with_suffix(".urdf").name)
+    raise xml.refusal(settings, "no URDF file beside the YAML file", settings.with_suffix(".urdf").name)
 
 
 class _Settings:
@@ -48,7 +48,7 @@ class _Settings:
     def __init__(self, graph: JointGraph, path: Path, said: dict[str, Any]) -> None:
         self.graph, self.path, self.said = graph, path, said
 
-    def applied(self) -> JointGraph:
+    def apply(self) -> JointGraph:
         """The graph with other joint types, closures and motors."""
         self._types()
         self._closures()
@@ -60,24 +60,24 @@ class _Settings:
         if value is None:
             return []
         if not isinstance(value, list):
-            raise refused(self.path, f"{key}: not a list", "a list")
+            raise xml.refusal(self.path, f"{key}: not a list", "a list")
         return value
 
     def _name(self, key: str, value: object) -> str:
         if not isinstance(value, str):
-            raise refused(self.path, f"{key}: {str(value)[:60]!r} is no name", "names")
+            raise xml.refusal(self.path, f"{key}: {str(value)[:60]!r} is no name", "names")
         return value
 
     def _types(self) -> None:
         names, kinds = self._list("joint_name"), self._list("joint_type")
         if len(names) != len(kinds):
-            raise refused(self.path, "joint_name and joint_type are not equally long", None)
+            raise xml.refusal(self.path, "joint_name and joint_type are not equally long", None)
         for raw, kind in zip(names, kinds, strict=True):
             name = self._name("joint_name", raw)
             joint = self.graph.joints.get(name)
             found = _type(self._name("joint_type", kind))
             if joint is None or found is None:
-                raise refused(self.path, f"joint_name {name!r} with joint_type {str(kind)[:40]!r}",
+                raise xml.refusal(self.path, f"joint_name {name!r} with joint_type {str(kind)[:40]!r}",
                                "a joint of the URDF; SPHERICAL, FIXED, UJOINT_XY, REVOLUTE_X, PRISMATIC_X …")
             self.graph.joints[name] = replace(joint, type=found[0], axes=found[1], limits=None)
 
@@ -85,15 +85,15 @@ class _Settings:
         pairs, kinds = self._list("closed_loop"), self._list("type")
         if pairs and all(isinstance(each, str) for each in pairs):
             if len(pairs) % 2:
-                raise refused(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
+                raise xml.refusal(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
             pairs = [pairs[i : i + 2] for i in range(0, len(pairs), 2)]
         words = self._kinds(kinds, len(pairs))
         for number, pair in enumerate(pairs):
             if not isinstance(pair, list) or len(pair) != 2:
-                raise refused(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
+                raise xml.refusal(self.path, "closed_loop: not pairs of frames", "[[frame, frame], …]")
             links = [self._link(self._name("closed_loop", name)) for name in pair]
             if links[0] == links[1]:
-                raise refused(self.path, f"closed_loop: {pair[0]!r} and {pair[1]!r} are one link", "two links")
+                raise xml.refusal(self.path, f"closed_loop: {pair[0]!r} and {pair[1]!r} are one link", "two links")
             point = words[number] == "3d"
             stems = [str(frame).removesuffix(suffix) for frame, suffix in zip(pair, (CUT, END), strict=True)]
             name = self.graph.fresh(f"loop_{number + 1}" if stems[0] != stems[1] else stems[0] if point or
@@ -107,7 +107,7 @@ class _Settings:
     def _kinds(self, kinds: list[Any], count: int) -> list[str | None]:
         """The closures' types in small letters, None where there is none: this dialect takes all but ``3d`` for 6d."""
         if len(kinds) > count:
-            raise refused(self.path, f"type: {len(kinds)} types of {count} closures", "one each")
+            raise xml.refusal(self.path, f"type: {len(kinds)} types of {count} closures", "one each")
         words = [self._name("type", kind).lower() for kind in kinds]
         return [*words, *[None] * (count - len(words))]
 
@@ -117,7 +117,7 @@ class _Settings:
             return frame
         if frame in self.graph.joints:
             return self.graph.joints[frame].links[1]
-        raise refused(self.path, f"closed_loop: no frame {frame!r}", "links and joints of the URDF")
+        raise xml.refusal(self.path, f"closed_loop: no frame {frame!r}", "links and joints of the URDF")
 
     def _motors(self) -> None:
         joints = self.graph.joints
@@ -129,7 +129,7 @@ class _Settings:
                                          "dialect has it (--motors to change them)")
         for name in wanted:
             if name not in joints or joints[name].type is JointType.FIXED:
-                raise refused(self.path, f"name_mot: no joint {name!r} that moves", "joints of the URDF")
+                raise xml.refusal(self.path, f"name_mot: no joint {name!r} that moves", "joints of the URDF")
             joints[name] = replace(joints[name], motor=joints[name].motor or Motor(name))
 
 

@@ -7,7 +7,6 @@ from pathlib import Path
 from typing import Any
 
 from ....budgets import LARGEST_YAML
-from ....errors import BadRobotFile, Defect
 from ... import xml
 from ...dialect import RobotFile
 
@@ -21,15 +20,15 @@ def settings_in(path: Path) -> dict[str, Any] | None:
     data = xml.content(path)
     try:
         if len(data) > LARGEST_YAML:
-            raise refused(path, "YAML file too large", f"up to {LARGEST_YAML} bytes")
+            raise xml.refusal(path, "YAML file too large", f"up to {LARGEST_YAML} bytes")
         depth = 0
         for count, event in enumerate(yaml.parse(data.decode("utf-8"), Loader=yaml.SafeLoader)):
             depth += isinstance(event, yaml.CollectionStartEvent) - isinstance(event, yaml.CollectionEndEvent)
             if isinstance(event, yaml.AliasEvent) or depth > 6 or count > 20_000:
-                raise refused(path, "YAML with aliases, too deep or too long", "lists of names")
+                raise xml.refusal(path, "YAML with aliases, too deep or too long", "lists of names")
         found = yaml.safe_load(data.decode("utf-8"))
     except (yaml.YAMLError, UnicodeDecodeError, RecursionError, ValueError) as error:
-        raise refused(path, f"not YAML: {' '.join(str(error).split())[:120]}", None) from None
+        raise xml.refusal(path, f"not YAML: {' '.join(str(error).split())[:120]}", None) from None
     if not isinstance(found, dict) or not set(KEYS) & set(found):
         return None
     return found
@@ -47,8 +46,3 @@ def settings_beside(file: RobotFile) -> tuple[Path, dict[str, Any]] | None:
             if found is not None:
                 return beside, found
     return None
-
-
-def refused(path: Path, what: str, allowed: str | None) -> BadRobotFile:
-    """What is wrong with a file as a whole."""
-    return BadRobotFile([Defect(str(path), None, what, None, allowed)])

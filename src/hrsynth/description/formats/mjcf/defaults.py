@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from ....errors import BadRobotFile, Defect
+from ....errors import BadRobotFile
 from ....geometry.vectors import Array, pose, rotation_about
 from ... import xml
 from ...elements import XmlReader
@@ -134,7 +134,7 @@ def with_includes(root: xml.Element, file: str) -> xml.Element:
         name = element.get("file") or ""
 
         def refuse(what: str, allowed: str, at: xml.Element = element, value: str = name) -> BadRobotFile:
-            return BadRobotFile([Defect(at.base or file, xml.line(at), what, value, allowed)])
+            return xml.refusal(at.base or file, what, allowed, value=value, line=xml.line(at))
 
         try:
             path = (folder / name).resolve()

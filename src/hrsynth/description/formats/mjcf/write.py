@@ -12,7 +12,7 @@ from ... import numerals, xml
 from ...annotations import PREFIX, annotations_of
 from ...chains import SECOND
 from ...dialect import Written
-from ...jointgraph import listed
+from ...jointgraph import comma_list
 from ...reduction import reduce, require_free_world
 from ...tree import outward
 
@@ -51,10 +51,10 @@ def _lost(robot: Mechanism) -> list[Note]:
                 or joint.limits.velocity is not None or joint.limits.effort is not None)]
     if cut:
         found.append(Note("warning", "limits that are one-sided, of loops, of velocity or effort are not written: "
-                                     + listed(cut)))
+                                     + comma_list(cut)))
     fixed = [joint.name for joint in robot.joints.values() if joint.in_tree and joint.type is JointType.FIXED]
     if fixed:
-        found.append(Note("warning", "the names of fixed joints are not written: " + listed(fixed)))
+        found.append(Note("warning", "the names of fixed joints are not written: " + comma_list(fixed)))
     return found
 
 

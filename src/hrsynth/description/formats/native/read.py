@@ -64,7 +64,7 @@ class _NativeReader(UrdfReader):
         base = self.structure()
         if self.defects or base is None or self.platform is None:
             raise BadRobotFile(self.defects)
-        return self.assembled(name, base, self.platform)
+        return self.assemble(name, base, self.platform)
 
     def limits(self, element: xml.Element, kind: str | None) -> Limits | None:
         limit = self.only(element, "limit")
@@ -200,7 +200,7 @@ class _NativeReader(UrdfReader):
         elif self.platform not in graphs.component(graphs.adjacency(self.links, whole), base):
             self.defect(line, f"platform not reachable from the base {base!r}", self.platform)
 
-    def assembled(self, name: str, base: str, platform: str) -> Mechanism:
+    def assemble(self, name: str, base: str, platform: str) -> Mechanism:
         """The mechanism, all geometry in the base frame at the zero configuration; its loops must be closed there."""
         tree: list[TreeJoint] = graphs.outward(base, self.tree.values())
         poses = zero_poses(base, tree)

@@ -12,7 +12,7 @@ from ....mechanism.observation import Direction
 from ... import xml
 from ...dialect import RobotFile
 from ...elements import sound_limits
-from ...jointgraph import GearSpec, JointGraph, JointSpec, listed
+from ...jointgraph import GearSpec, JointGraph, JointSpec, comma_list
 from .conventions import CONVENTIONS
 from .elements import TREE_TYPES, UrdfReader
 
@@ -94,8 +94,8 @@ class _TolerantReader(UrdfReader):
         if not self.links:
             self.defect(xml.line(self.root), "no links")
         for ring in self.rings():
-            self.defect(ring[0].line, "joints that carry each other in a ring", listed(str(each.name) for each in ring),
-                        "a tree that hangs on one link")
+            names = comma_list(joint.name for joint in ring)
+            self.defect(ring[0].line, "joints that carry each other in a ring", names, "a tree that hangs on one link")
         self.require_sound()
 
     def add_gears(self, graph: JointGraph) -> None:

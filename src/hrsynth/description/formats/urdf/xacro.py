@@ -6,7 +6,6 @@ import importlib.util
 import sys
 from pathlib import Path
 
-from ....errors import BadRobotFile, Defect
 from ... import xml
 
 TIME_LIMIT = 4
@@ -19,23 +18,20 @@ def is_needed(root: xml.Element) -> bool:
     return any(isinstance(tag, str) and "xacro}" in tag for tag in tags)
 
 
-def expanded(path: Path) -> xml.Element:
+def expand(path: Path) -> xml.Element:
     """The document that a xacro file stands for; raises ``BadRobotFile``."""
     import subprocess
 
     if importlib.util.find_spec("xacro") is None:
-        raise _refused(path, "a xacro file, and the package xacro is not installed",
-                       "the extra hrsynth[xacro], or the URDF that it expands to")
+        raise xml.refusal(path, "a xacro file, and the package xacro is not installed",
+                          "the extra hrsynth[xacro], or the URDF that it expands to")
     command = [sys.executable, "-P", str(Path(__file__).with_name("xacro_process.py")), str(path.resolve())]
     try:
         run = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
     except subprocess.TimeoutExpired:
-        raise _refused(path, "xacro does not come to an end", f"{TIME_LIMIT} seconds") from None
+        raise xml.refusal(path, "xacro does not come to an end", f"{TIME_LIMIT} seconds") from None
     if run.returncode:
         lines = [line for line in run.stderr.splitlines() if line.strip()]
-        raise _refused(path, "xacro refuses it: " + " ".join(lines[-1:])[:200], "a file that xacro expands")
+        raise xml.refusal(path, "xacro refuses it: " + " ".join(lines[-1:])[:200],
+                          "a file that xacro expands")
     return xml.document(run.stdout, str(path))
-
-
-def _refused(path: Path, what: str, allowed: str) -> BadRobotFile:
-    return BadRobotFile([Defect(str(path), None, what, None, allowed)])
