@@ -76,5 +76,5 @@ def on_line(point: Array, direction: ArrayLike, target: Array, length: float, fo
 
 def wrist(b: Builder, leg: int, type: str, C: Array, second: Array, first: Array) -> None:
     """Adds the joint S or U (with its two axes) from ``rod_i`` to the platform, which hangs on the first rod."""
-    axes = {"axis": second, "axis2": first} if type == "U" else {}
-    b.joint(f"wrist_{leg}", type, f"rod_{leg}", "platform", at=C, loop=leg != 1, **axes)
+    axes = (second, first) if type == "U" else (None, None)
+    b.joint(f"wrist_{leg}", type, f"rod_{leg}", "platform", at=C, axis=axes[0], axis2=axes[1], loop=leg != 1)
