@@ -3,140 +3,117 @@
 What decides whether two things are the same is in :mod:`tolerances`.
 """
 
-BEST_FIT_FIRST_STEP = 0.25
-"""Part of the error of the directions that the first step along a best-fit curve makes."""
+# Mechanisms, poses, files
 
-BEST_FIT_SHORTEST_STEP = 2.0**-22
-"""Part of the error below which a step along a best-fit curve is not shortened any more."""
+LARGEST_MODEL = 256
+"""Coordinates above which a mechanism is refused: Pinocchio's data hold several cubes of their number."""
+SURELY_MEANT = 2
+"""Configurations beside the first at which a relation must hold before that is no accident."""
+LARGEST_GRID = 100_000
+"""Cells of a grid of poses beyond which it is taken for a slip."""
+FARTHEST_POSE = 1e9
+"""Metres or radians in a pose beyond which it is taken for a slip: numbers no longer tell nearby poses apart
+there."""
+LARGEST_NUMBER = 1e9
+"""Largest magnitude of a number that a robot file may hold (metres, radians)."""
+LARGEST_YAML = 1_000_000
+"""Bytes of a YAML file above which it is not read."""
+LARGEST_GUESSED = 150
+"""Bodies of a foreign file above which ways to the base are not counted to guess the platform."""
+LARGEST_RELATED = 120
+"""Joints of a foreign file above which relations that are meant are not looked for."""
 
-BEST_FIT_STEPS = 200
-"""Steps that are tried on one best-fit curve."""
+# Ways to a pose
 
+LONGEST_STEP = 0.3
+"""Largest change of a coordinate in one step on the way to a pose (characteristic lengths, radians)."""
+LEG_ITERATIONS = 400
+"""Iterations in which a leg is closed at a pose, at most: each moves a joint by half a characteristic length or
+less."""
+EASY_ITERATIONS = 10
+"""Iterations within which the robot itself must find each configuration of a sample's way again; more are a fold
+nearby."""
+FIRST_CELLS = 40
+"""Cells of a grid, nearest first, that are tried from the zero configuration before the grid counts as
+unreachable."""
+SWEEP_HALVINGS = 4
+"""How often a step is halved in a sweep, where a pose can be reached from several neighbours."""
+WIDEST_CHART = 0.5
+"""Length of the coordinates of a tangent chart (characteristic lengths, radians) beyond which another should take
+over."""
+SLIDER_PART = 0.98
+"""Part of the way to where a slider of the view stops that is used: the edge of the workspace is left out."""
+
+# Many poses at once
+
+CHAIN_STEP = 0.5
+"""Longest step of a link of a chain that is closed in a batch (characteristic lengths, radians)."""
+CHAIN_STEPS = 4
+"""Steps of such a chain at each place on the way."""
+LARGEST_BATCH = 1 << 29
+"""Bytes that the result of one evaluation may take; more poses are asked for in parts (``Batch.sweep``)."""
+FAST_DIRECTIONS = 20.0
+"""How much larger than at home the rates of the directions may become on a walk of poses in a batch."""
 POSES_FOR_NUMBA = 500_000
 """Poses of a sweep that make up for numba's start."""
 
+# Singularities, paths, modes
+
+WEAKEST_STARTS = 8
+"""Further starts, the weakest poses of parts of the walk, where the walk crosses no singularity."""
+COARSE_GRID = 25
+"""Poses a side of the grid that finds how far a plane is reached."""
+LOCUS_SIDES = (2.5, 5.0)
+"""Half the side of that grid (characteristic lengths), and where the robot reaches its border, of a second one."""
+NEIGHBOUR_STEP = 0.01
+"""How far from a singular pose its neighbours are looked at (m)."""
 VALLEY_NARROWING = 0.5
 """Part of its reach that the search in a valley keeps each time."""
-
 VALLEYS_ON_LINES = 600
 """Valleys along lines that are looked into at most."""
-
 VALLEYS_ON_PLANE = 12
 """Valleys over the plane that are looked into at most."""
-
 FIRST_INTERVALS = 4
 """Intervals that a way is first cut into where it is to be proved free of singularities."""
-
 FINEST_INTERVAL = 2.0**-16
 """Length of an interval (of its way) below which such a proof is given up."""
-
 REGION_WIDER = 1.5
 """How much wider than the known poses the region is from which poses of a road map are drawn."""
-
+BRANCH_CHOICES = 256
+"""Choices of branches of held legs that are solved; where there are more the list of modes is not complete."""
+FINEST_BOX = 2.0 ** -100
+"""Radius of the smallest box that is tried around a solution, relative to 1 plus the unknown."""
 LARGEST_RANDOM = 10**9
 """Range of the random whole numbers of exact instances, of either sign: the larger, the smaller the chance of an
 accident."""
 
-BRANCH_CHOICES = 256
-"""Choices of branches of held legs that are solved; where there are more the list of modes is not complete."""
+# Accuracy
 
-FINEST_BOX = 2.0 ** -100
-"""Radius of the smallest box that is tried around a solution, relative to 1 plus the unknown."""
+BEST_FIT_FIRST_STEP = 0.25
+"""Part of the error of the directions that the first step along a best-fit curve makes."""
+BEST_FIT_SHORTEST_STEP = 2.0**-22
+"""Part of the error below which a step along a best-fit curve is not shortened any more."""
+BEST_FIT_STEPS = 200
+"""Steps that are tried on one best-fit curve."""
 
-WEAKEST_STARTS = 8
-"""Further starts, the weakest poses of parts of the walk, where the walk crosses no singularity."""
-
-COARSE_GRID = 25
-"""Poses a side of the grid that finds how far a plane is reached."""
-
-LOCUS_SIDES = (2.5, 5.0)
-"""Half the side of that grid (characteristic lengths), and where the robot reaches its border, of a second one."""
-
-NEIGHBOUR_STEP = 0.01
-"""How far from a singular pose its neighbours are looked at (m)."""
-
-PARTS_AHEAD = 3
-"""Parts of a build that wait for each thread of a cluster."""
-
-LARGEST_WORD = 12
-"""Legs of a word of the catalog."""
-
-LARGEST_YAML = 1_000_000
-"""Bytes of a YAML file above which it is not read."""
-
-LARGEST_GUESSED = 150
-"""Bodies of a foreign file above which ways to the base are not counted to guess the platform."""
-
-LARGEST_RELATED = 120
-"""Joints of a foreign file above which relations that are meant are not looked for."""
-
-LARGEST_NUMBER = 1e9
-"""Largest magnitude of a number that a robot file may hold (metres, radians)."""
-
-LEG_ITERATIONS = 400
-"""Iterations in which a leg is closed at a pose, at most: each moves a joint by half a characteristic length or
-less."""
-
-CHAIN_STEP = 0.5
-"""Longest step of a link of a chain that is closed in a batch (characteristic lengths, radians)."""
-
-CHAIN_STEPS = 4
-"""Steps of such a chain at each place on the way."""
-
-LARGEST_BATCH = 1 << 29
-"""Bytes that the result of one evaluation may take; more poses are asked for in parts (``Batch.sweep``)."""
-
-FAST_DIRECTIONS = 20.0
-"""How much larger than at home the rates of the directions may become on a walk of poses in a batch."""
-
-WIDEST_CHART = 0.5
-"""Length of the coordinates of a tangent chart (characteristic lengths, radians) beyond which another should take
-over."""
-
-SLIDER_PART = 0.98
-"""Part of the way to where a slider of the view stops that is used: the edge of the workspace is left out."""
-
-FIRST_CELLS = 40
-"""Cells of a grid, nearest first, that are tried from the zero configuration before the grid counts as
-unreachable."""
-
-SWEEP_HALVINGS = 4
-"""How often a step is halved in a sweep, where a pose can be reached from several neighbours."""
-
-EASY_ITERATIONS = 10
-"""Iterations within which the robot itself must find each configuration of a sample's way again; more are a fold
-nearby."""
-
-LONGEST_STEP = 0.3
-"""Largest change of a coordinate in one step on the way to a pose (characteristic lengths, radians)."""
-
-LARGEST_MODEL = 256
-"""Coordinates above which a mechanism is refused: Pinocchio's data hold several cubes of their number."""
-
-SURELY_MEANT = 2
-"""Configurations beside the first at which a relation must hold before that is no accident."""
-
-LARGEST_GRID = 100_000
-"""Cells of a grid of poses beyond which it is taken for a slip."""
-
-FARTHEST_POSE = 1e9
-"""Metres or radians in a pose beyond which it is taken for a slip: numbers no longer tell nearby poses apart
-there."""
-
-AXIS_SEEN = 0.5
-"""Part of a leg's axis that is to be seen by a camera: its direction is rebuilt from what is seen of its edges."""
-
-WIDEST_NOISE = 50.0
-"""Pixels by which an edge may be wrong at most."""
-
-PICTURE_OVERSAMPLING = 3
-"""Drawn pixels a pixel each way where edges are sought: not every driver smooths edges by itself."""
+# The loop and its camera
 
 RUN_AWAY = 20.0
 """Characteristic lengths from its start at which a platform has run away."""
-
 RUN_EVALUATIONS = 20_000
 """Configurations that the integrator may ask for in a servo run."""
-
 LONGEST_RUN = 10_000.0
 """Seconds that a run with noise, on the physics bench or along a way may take: these go on to their end."""
+AXIS_SEEN = 0.5
+"""Part of a leg's axis that is to be seen by a camera: its direction is rebuilt from what is seen of its edges."""
+WIDEST_NOISE = 50.0
+"""Pixels by which an edge may be wrong at most."""
+PICTURE_OVERSAMPLING = 3
+"""Drawn pixels a pixel each way where edges are sought: not every driver smooths edges by itself."""
+
+# The catalog
+
+PARTS_AHEAD = 3
+"""Parts of a build that wait for each thread of a cluster."""
+LARGEST_WORD = 12
+"""Legs of a word of the catalog."""

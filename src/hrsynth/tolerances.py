@@ -4,263 +4,211 @@ Lengths are made comparable with angles by a robot's *characteristic length* (th
 from their centroid): a length divided by it is a pure number, as an angle is.
 """
 
+# Closed configurations, and the way to a pose
+
 ASSEMBLED = 1e-12
 """Residual (characteristic lengths, radians) below which a shipped or written file counts as assembled at zero."""
-
 SOLVED = 1e-12
 """Residual (characteristic lengths, radians) at which the solver of closed configurations is content."""
-
 SHARP = 1e-15
 """Residual that is asked for where a singular pose is wanted as exactly as numbers allow."""
-
+CLOSED = 1e-10
+"""Residual (characteristic lengths, radians) below which a configuration counts as closed."""
+PASSED_BY = 1e-3
+"""Residual at which a configuration on the way to another is near enough to go on from."""
 AS_PRINTED = 1e-5
 """Difference (metres, radians; characteristic lengths) at which a part of a pose that never changes, or a pose of more
 parts than there are freedoms, is taken as its printed value."""
-
-PASSED_BY = 1e-3
-"""Residual at which a configuration on the way to another is near enough to go on from."""
-
-CLOSED = 1e-10
-"""Residual (characteristic lengths, radians) below which a configuration counts as closed."""
-
+NEAREST = 1e-10
+"""Projected gradient (characteristic lengths, radians) at which a pose counts as the nearest one."""
+FOLLOWED = 1e-9
+"""Residual below which a hidden robot has reached the pose and the directions of the real one."""
+STEADY_TANGENT = 1e-10
+"""Turn (radians) of the tangent space that the residual of a sample may cause."""
+EASY_RANK = 1e-3
+"""Singular values below this part of the largest are no directions to go in where the straight way to a goal cannot
+be gone."""
+NEAR_FOLD = 1e-5
+"""Singular values of loops and goal below which a fold is looked for."""
+NO_SLIDER = 1e-3
+"""Part of its span below which the way of a slider of the view counts as none."""
 OUT_OF_REACH = 1e-7
 """Radius (part of the extents) of the balls around a pose within which no leg's closure is refused: a leg that is
 nearer to its reach than that stays undecided."""
 
-NEAREST = 1e-10
-"""Projected gradient (characteristic lengths, radians) at which a pose counts as the nearest one."""
-
-FOLLOWED = 1e-9
-"""Residual below which a hidden robot has reached the pose and the directions of the real one."""
-
-SAME_RELATION = 1e-6
-"""Largest principal angle (radians) at which two relations count as the same."""
+# Ranks and relations
 
 RANK_GAP = 1e3
 """Smallest ratio of the last kept to the first dropped singular value at which a rank is a verdict."""
-
 RANK_CUTOFF = 1e-7
 """Singular values below this fraction of the largest are candidates for zero; the gap around it is what decides."""
-
+SAME_RELATION = 1e-6
+"""Largest principal angle (radians) at which two relations count as the same."""
 SURELY_SOMETHING = 1e-5
 """Singular values of a relation above this count, whatever rounding did."""
-
 SURELY_ZERO = 1e-9
 """Singular values of a relation below this are zero, whatever rounding did; between the two lies the cutoff."""
-
-SAME_POINT = 1e-7
-"""Distance (characteristic lengths) below which two points are one: joint centres that meet, axes that intersect."""
-
-SAME_DIRECTION = 1e-7
-"""Sine of the angle below which two directions are parallel, cosine below which they are perpendicular."""
-
-NOISE = 1e-4
-"""Deviation (characteristic lengths, radians) up to which a relation in a foreign file (axes parallel or perpendicular,
-points that coincide, equal rods) counts as meant and is made exact: printed digits and CAD stay below."""
-
-EXACT = 1e-11
-"""Deviation (characteristic lengths, radians) below which such a relation holds as well as numbers allow."""
-
-WITHOUT_DIRECTION = 1e-9
-"""Length up to which a vector in a file has no direction."""
-
-COMPLEX_STEP = 1e-20
-"""Imaginary step over which the slope of a polynomial is taken: nothing cancels, so that it is exact."""
-
-FAINT = 1e-3
-"""Singular value of a file's loops, as part of the largest, below which a direction is held by rounding alone."""
-
-NEARLY_SINGULAR = 5e-3
-"""Weakest singular value, as part of the largest, below which a foreign file's zero pose is left for a firmer one."""
-
-FIRM = 3e-2
-"""Weakest singular value, as part of the largest, at which a pose is firm enough."""
-
-SAME_PLANE = 1e-4
-"""Sine of the angle between two planes below which they count as one when directions are put in order for drawing."""
-
-SAME_SPOT = 1e-6
-"""Distance (metres; of poses, of their matrices) below which two singular poses are told once."""
-
-ON_PLANE = 10**-4.5
-"""Error (characteristic lengths, radians) up to which a singular pose that was sought near a plane of poses counts as
-lying in it."""
-
-NUDGE = 1e-6
-"""Step (characteristic lengths, radians) over which a slope is taken."""
-
-NAMED = 1e-6
-"""Difference (metres, pure numbers) up to which a freedom is the one that a direction or a line of the robot names."""
-
 INVERTED = 1e-9
 """Singular values below this fraction of the largest are left out where a map is inverted on its range."""
-
-SAME_GEOMETRY = 1e-9
-"""Largest difference (metres, pure numbers) at which two mechanisms count as the same."""
-
-LOCUS = 1e-7
-"""Singular value, relative to the spread of a locus, below which the locus has no extent in that direction."""
-
-PARALLEL = 1e-13
-"""Sine of the angle below which two directions of given curves are taken for exactly parallel, as an angle rounded from
-one that is: it decides how many solutions lie at infinity."""
-
-VANISHES = 1e-9
-"""Distance of a tip from its curve (sizes of the mechanism) at which a pose matches one observation too many."""
-
-NEAR_MODE = 1e-2
-"""Distance of tips from their curves (sizes of the mechanism) up to which a pose that matches almost is reported."""
-
-MEANT = 1e-5
-"""Distance (sizes of the mechanism) up to which joint centres count as meant to coincide, where the next larger one is
-``RANK_GAP`` times as large at least."""
-
-FARTHEST = 1e7
-"""Distance (sizes of the mechanism) beyond which a solution is at infinity but for rounding, where the next nearer one
-is ``RANK_GAP`` times as near at least."""
-
-NEARLY_DOUBLE = 1e-6
-"""Distance between two solutions, in their parameters, below which the pose counts as singular."""
-
-DAMPED = 1e-3
-"""Singular values of the rows that a controller inverts (characteristic lengths, radians) below which it damps them."""
-
-SERVED = 1e-10
-"""Norm of the error of the directions at which a servo loop has ended."""
-
-AT_REST = 1e-8
-"""Speed (characteristic lengths, radians) for each unit of error and gain below which a servo loop is at a local
-minimum."""
-
-RESTED = 1e-10
-"""Newton step (characteristic lengths, radians) at which the rest of a servo loop is found."""
-
-ARRIVED = 1e-6
-"""Distance (characteristic lengths, radians) from a stable rest at which a servo loop has ended there."""
-
-HESSIAN_STEP = 1e-4
-"""Step of the differences of the Hessian of a best fit, whose own error is its square."""
-
-HESSIAN_CHANGE = 0.5
-"""How far the Hessian of a best fit may change over a step, relative to itself: evenly changed, it is definite all
-along below 1."""
-
-FLAT_CURVATURE = 0.05
-"""Curvature, as part of that at the start, below which a best fit that cannot be followed further is called flat."""
-
-NARROWEST_CONE = 1e-15
-"""Half-angle (rad) of a cone below which directions, as numbers, are no longer told apart."""
-
-USUAL_ERROR = 100.0
-"""Multiple of the median error of a field up to which a pose serves for a check by longer numbers: nearer to
-singularities rounding grows."""
-
-VALLEY_DEPTH = 0.5
-"""Part of the median below which a valley of the smallest singular value is looked into."""
-
-VALLEY_ZERO = 1e-5
-"""Part of the median at which the smallest singular value in a valley counts as zero."""
-
-TURNING_ARM = 1e-3
-"""Part of a vector normal to an axis (characteristic lengths) from which a turn about the axis is read."""
-
-CHAIN_ROUNDING = 16 * 2.0 ** -52
-"""What thirty-two roundings, those of a chain of joints from the file's decimals on, make of lengths and angles."""
-
-SAME_NEAR_MODE = 1e-6
-"""Difference of poses and of misses (sizes of the mechanism) below which two stationary poses are one."""
-
-NO_NEAR_MODE = 0.3
-"""Misses (sizes of the mechanism) beyond which a start leads to no near mode."""
-
-SHARP_ROOT = 2.0 ** -60
-"""Radius of a ball, relative to 1 plus its middle, above which a solution is sought with more digits."""
-
-TIP_ROUNDING = 2.0 ** -46
-"""What sixty-four roundings make of a length, relative to the size: poses and tips computed in floats."""
-
-BOXES_APART = 1e-12
-"""What is added to boxes around solutions, relative to their places and radii, before they count as apart."""
-
-BALL_ZERO = 2.0 ** -256
-"""Radius of a ball that holds zero at which the number in it counts as zero."""
-
-PROVED_CHANCE = 1e-9
-"""Largest chance of an error of a record of the catalog that is called proved."""
-
-SQUARE_AXES = 1e-9
-"""Cosine of the angle between two axes of a U below which they are at right angles, where a catalog's robot is
-built."""
-
-NEWTON_REACH = 1e4
-"""Length of a Newton step in a foreign file's loops, as a multiple of the residual that it removes, beyond which it
-follows rounded numbers."""
-
-AT_ORIGIN = 1e-12
-"""Distance (m) below which a joint's centre is the origin of the link that it carries, where a file is written."""
-
-CONES_MET = 1e-14
-"""Gap between the bounds, relative, at which a maximum of two cones is found."""
-
-FLAT_CONE = 1e-20
-"""Part of a cone's largest squared error below which its term has no derivative worth the name."""
-
-CONES_TIGHT = 1e-10
-"""Gap between the bounds of three cones and more, relative, at which the maximum counts as found."""
-
-NO_SLIDER = 1e-3
-"""Part of its span below which the way of a slider of the view counts as none."""
-
-STEADY_TANGENT = 1e-10
-"""Turn (radians) of the tangent space that the residual of a sample may cause."""
-
-EASY_RANK = 1e-3
-"""Singular values below this part of the largest are no directions to go in where the straight way to a goal cannot
-be gone."""
-
-NEAR_FOLD = 1e-5
-"""Singular values of loops and goal below which a fold is looked for."""
-
-BENCH_SETTLED = 1e-6
-"""‖e‖ at which the physics bench has settled."""
-
-BENCH_STEADY = 1e-3
-"""Part by which an error may still change in a time constant when the physics bench has settled."""
-
-REST_SLOPE = 1e-4
-"""Step of the differences of ẏ about a rest: less than the width over which the law is damped."""
-
-NEAR_REST = 0.1
-"""Longest Newton step (characteristic lengths, radians) to a rest: beyond it no rest is near."""
-
-NEUTRAL_GROWTH = 1e-6
-"""Growth (per time constant) up to which a motion about a rest counts as none; speed up to which a drift does."""
-
-INTEGRATED = 1e-6
-"""Relative tolerance of the integrator of a servo run, for coordinates of a chart as for errors at the start of a
-stretch."""
-
-STRETCH_END = 1e-2
-"""Part of its first error at which a stretch of a servo run ends, so that the tolerance follows the error."""
-
+NUDGE = 1e-6
+"""Step (characteristic lengths, radians) over which a slope is taken."""
+NAMED = 1e-6
+"""Difference (metres, pure numbers) up to which a freedom is the one that a direction or a line of the robot names."""
 LOOPS_LOST = 1e-3
 """Part of its value at the start to which the loops' weakest singular value has fallen where a servo run cannot go
 on."""
 
+# Points, directions, mechanisms
+
+SAME_POINT = 1e-7
+"""Distance (characteristic lengths) below which two points are one: joint centres that meet, axes that intersect."""
+SAME_DIRECTION = 1e-7
+"""Sine of the angle below which two directions are parallel, cosine below which they are perpendicular."""
+SAME_PLANE = 1e-4
+"""Sine of the angle between two planes below which they count as one when directions are put in order for drawing."""
+SAME_GEOMETRY = 1e-9
+"""Largest difference (metres, pure numbers) at which two mechanisms count as the same."""
+TURNING_ARM = 1e-3
+"""Part of a vector normal to an axis (characteristic lengths) from which a turn about the axis is read."""
+
+# Files
+
+NOISE = 1e-4
+"""Deviation (characteristic lengths, radians) up to which a relation in a foreign file (axes parallel or perpendicular,
+points that coincide, equal rods) counts as meant and is made exact: printed digits and CAD stay below."""
+EXACT = 1e-11
+"""Deviation (characteristic lengths, radians) below which such a relation holds as well as numbers allow."""
+FAINT = 1e-3
+"""Singular value of a file's loops, as part of the largest, below which a direction is held by rounding alone."""
+NEARLY_SINGULAR = 5e-3
+"""Weakest singular value, as part of the largest, below which a foreign file's zero pose is left for a firmer one."""
+FIRM = 3e-2
+"""Weakest singular value, as part of the largest, at which a pose is firm enough."""
+NEWTON_REACH = 1e4
+"""Length of a Newton step in a foreign file's loops, as a multiple of the residual that it removes, beyond which it
+follows rounded numbers."""
+AT_ORIGIN = 1e-12
+"""Distance (m) below which a joint's centre is the origin of the link that it carries, where a file is written."""
+WITHOUT_DIRECTION = 1e-9
+"""Length up to which a vector in a file has no direction."""
+
+# Singularities
+
+SAME_SPOT = 1e-6
+"""Distance (metres; of poses, of their matrices) below which two singular poses are told once."""
+ON_PLANE = 10**-4.5
+"""Error (characteristic lengths, radians) up to which a singular pose that was sought near a plane of poses counts as
+lying in it."""
+LOCUS = 1e-7
+"""Singular value, relative to the spread of a locus, below which the locus has no extent in that direction."""
+VALLEY_DEPTH = 0.5
+"""Part of the median below which a valley of the smallest singular value is looked into."""
+VALLEY_ZERO = 1e-5
+"""Part of the median at which the smallest singular value in a valley counts as zero."""
+COMPLEX_STEP = 1e-20
+"""Imaginary step over which the slope of a polynomial is taken: nothing cancels, so that it is exact."""
+
+# Assembly modes
+
+PARALLEL = 1e-13
+"""Sine of the angle below which two directions of given curves are taken for exactly parallel, as an angle rounded from
+one that is: it decides how many solutions lie at infinity."""
+VANISHES = 1e-9
+"""Distance of a tip from its curve (sizes of the mechanism) at which a pose matches one observation too many."""
+NEAR_MODE = 1e-2
+"""Distance of tips from their curves (sizes of the mechanism) up to which a pose that matches almost is reported."""
+NO_NEAR_MODE = 0.3
+"""Misses (sizes of the mechanism) beyond which a start leads to no near mode."""
+SAME_NEAR_MODE = 1e-6
+"""Difference of poses and of misses (sizes of the mechanism) below which two stationary poses are one."""
+MEANT = 1e-5
+"""Distance (sizes of the mechanism) up to which joint centres count as meant to coincide, where the next larger one is
+``RANK_GAP`` times as large at least."""
+FARTHEST = 1e7
+"""Distance (sizes of the mechanism) beyond which a solution is at infinity but for rounding, where the next nearer one
+is ``RANK_GAP`` times as near at least."""
+NEARLY_DOUBLE = 1e-6
+"""Distance between two solutions, in their parameters, below which the pose counts as singular."""
+CHAIN_ROUNDING = 16 * 2.0 ** -52
+"""What thirty-two roundings, those of a chain of joints from the file's decimals on, make of lengths and angles."""
+TIP_ROUNDING = 2.0 ** -46
+"""What sixty-four roundings make of a length, relative to the size: poses and tips computed in floats."""
+SHARP_ROOT = 2.0 ** -60
+"""Radius of a ball, relative to 1 plus its middle, above which a solution is sought with more digits."""
+BOXES_APART = 1e-12
+"""What is added to boxes around solutions, relative to their places and radii, before they count as apart."""
+BALL_ZERO = 2.0 ** -256
+"""Radius of a ball that holds zero at which the number in it counts as zero."""
+
+# Accuracy
+
+NARROWEST_CONE = 1e-15
+"""Half-angle (rad) of a cone below which directions, as numbers, are no longer told apart."""
+USUAL_ERROR = 100.0
+"""Multiple of the median error of a field up to which a pose serves for a check by longer numbers: nearer to
+singularities rounding grows."""
+CONES_MET = 1e-14
+"""Gap between the bounds, relative, at which a maximum of two cones is found."""
+CONES_TIGHT = 1e-10
+"""Gap between the bounds of three cones and more, relative, at which the maximum counts as found."""
+FLAT_CONE = 1e-20
+"""Part of a cone's largest squared error below which its term has no derivative worth the name."""
+HESSIAN_STEP = 1e-4
+"""Step of the differences of the Hessian of a best fit, whose own error is its square."""
+HESSIAN_CHANGE = 0.5
+"""How far the Hessian of a best fit may change over a step, relative to itself: evenly changed, it is definite all
+along below 1."""
+FLAT_CURVATURE = 0.05
+"""Curvature, as part of that at the start, below which a best fit that cannot be followed further is called flat."""
+
+# The loop
+
+DAMPED = 1e-3
+"""Singular values of the rows that a controller inverts (characteristic lengths, radians) below which it damps them."""
+SERVED = 1e-10
+"""Norm of the error of the directions at which a servo loop has ended."""
+AT_REST = 1e-8
+"""Speed (characteristic lengths, radians) for each unit of error and gain below which a servo loop is at a local
+minimum."""
+RESTED = 1e-10
+"""Newton step (characteristic lengths, radians) at which the rest of a servo loop is found."""
+ARRIVED = 1e-6
+"""Distance (characteristic lengths, radians) from a stable rest at which a servo loop has ended there."""
+REST_SLOPE = 1e-4
+"""Step of the differences of ẏ about a rest: less than the width over which the law is damped."""
+NEAR_REST = 0.1
+"""Longest Newton step (characteristic lengths, radians) to a rest: beyond it no rest is near."""
+NEUTRAL_GROWTH = 1e-6
+"""Growth (per time constant) up to which a motion about a rest counts as none; speed up to which a drift does."""
+INTEGRATED = 1e-6
+"""Relative tolerance of the integrator of a servo run, for coordinates of a chart as for errors at the start of a
+stretch."""
+STRETCH_END = 1e-2
+"""Part of its first error at which a stretch of a servo run ends, so that the tolerance follows the error."""
 RUN_SHORTEST_STEP = 1e-9
 """Longest step (time constants) with which a servo run that cannot go on has been tried."""
+BENCH_SETTLED = 1e-6
+"""‖e‖ at which the physics bench has settled."""
+BENCH_STEADY = 1e-3
+"""Part by which an error may still change in a time constant when the physics bench has settled."""
+
+# The catalog
+
+PROVED_CHANCE = 1e-9
+"""Largest chance of an error of a record of the catalog that is called proved."""
+SQUARE_AXES = 1e-9
+"""Cosine of the angle between two axes of a U below which they are at right angles, where a catalog's robot is
+built."""
+
+# Pictures and views
 
 DISTANCE_FLOOR = 1e-3
 """Part of the largest distance to a singularity on a map below which all share one colour."""
-
 DARKEST_DISTANCE = 1e-6
 """Singular value below which all share the darkest grey behind a locus."""
-
 UNMOVED = 1e-9
 """Metres, radians below which a platform has not moved along an axis, or not turned, in the picture of a run."""
-
 REST_OF_RUN = 1e-3
 """Part of the largest error below which the rest of a run is not drawn."""
-
 SLIDER_ARRIVED = 1e-6
 """Difference (metres, radians) within which the platform has come to where a slider sent it."""

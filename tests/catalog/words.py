@@ -27,7 +27,7 @@ from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
 from hrsynth.catalog.words import Word, parse
 from hrsynth.errors import HrsynthError
-from hrsynth.kinematics.operation import Signature
+from hrsynth.kinematics.branch import Signature
 
 OWN = 1000
 """Numbers of dimensions from here on are used by nothing else."""

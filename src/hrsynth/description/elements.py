@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..errors import BadRobotFile, Defect
+from ..geometry.so3 import rotation_of
 from ..geometry.vectors import Array, unit
 from ..mechanism.model import JointType, Limits
 from ..tolerances import WITHOUT_DIRECTION
@@ -95,10 +96,7 @@ class XmlReader:
         if not size > WITHOUT_DIRECTION:
             self.defect(xml.line(element), "a quaternion of length zero")
             return np.eye(3)
-        w, x, y, z = quaternion / size
-        return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                         [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                         [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+        return rotation_of(quaternion / size)
 
     def axes(self, element: xml.Element, type_: JointType | None) -> tuple[Array, ...]:
         """The axes that the type needs, unit vectors; axes of types that need none are not looked at."""

@@ -90,6 +90,14 @@ def quaternions(R: Array) -> Array:
     return np.asarray(found * np.where(found[..., :1] < 0, -1.0, 1.0))
 
 
+def rotation_of(q: Array) -> Array:
+    """The rotation (3, 3) of a unit quaternion (w, x, y, z)."""
+    w, x, y, z = q.tolist()
+    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
+
+
 def _quaternion(R: Array) -> tuple[float, float, float, float]:
     """A quaternion (w, x, y, z) of one rotation, of any length: faster than :func:`quaternions`."""
     (a, b, c), (d, e, f), (g, h, i) = R.tolist()

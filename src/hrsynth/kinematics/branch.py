@@ -1,19 +1,26 @@
-"""Whether a step from one closed configuration to another follows the branch it starts on (theory 9).
+"""Branches and operation modes of a configuration space: whether a step stays on its branch, and what tells one mode
+from another.
 
 Components of the configuration space meet where the loops lose rank, and the smallest singular values fall there in
 proportion to the distance. So a step counts as following where, along it and along its correction, mobility, tangent
 space and all singular values of the loops agree: then it is short beside the distance to the next such place. This is
-measured at four points, not proved between them.
+measured at four points, not proved between them. Source: docs/pages/theory.md, section 5.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import combinations
+
 import numpy as np
 
-from ..geometry.ranks import largest_angle
+from ..geometry.ranks import largest_angle, range_basis, singular_values
 from ..geometry.vectors import Array
-from ..tolerances import NUDGE
+from ..tolerances import NUDGE, SURELY_SOMETHING, SURELY_ZERO
 from .configuration import ClosedConfiguration
+from .relation import Relation
 
 TURNED = 0.3
 """Largest principal angle (radians) between the tangent spaces at both ends of a step."""
@@ -23,6 +30,8 @@ CORRECTED = 0.2
 """Longest correction, as part of the step: what ``TURNED`` lets a smooth branch bend away, with a margin."""
 EVENLY = 0.2
 """Part of the weakest singular value by which its fall to a singularity may depart from an even one."""
+LARGEST_WHOLE = 4
+"""Number of observations up to which all sets of them are compared; beyond, single ones, pairs and all."""
 
 
 def follows(here: ClosedConfiguration, step: Array, there: ClosedConfiguration) -> bool:
@@ -73,3 +82,93 @@ def _values(here: ClosedConfiguration, step: Array, count: int) -> Array:
 
 def _alike(one: Array, other: Array) -> bool:
     return not np.any((other > CHANGED * one) | (one > CHANGED * other))
+
+
+@dataclass(frozen=True)
+class Signature:
+    """What is the same at all generic configurations of one operation mode.
+
+    ``turns`` is the rank of the platform's angular velocities. ``seen`` holds, for each of :func:`sets_of` the
+    observations, the least and the most freedoms that they may be said to see, between singular values that surely
+    count and those that surely do not.
+    """
+
+    mobility: int
+    dimension: int
+    dof: int
+    turns: int
+    seen: tuple[tuple[int, int], ...]
+
+    @classmethod
+    def of(cls, found: Relation) -> Signature:
+        """The signature that ρ shows at one configuration."""
+        turns = range_basis(found.twists[3:], 1.0)[1].value if found.twist_rows == 6 else 0
+        chosen = _chosen(found.sizes)
+        rates = found.rates * chosen[:, :, None]
+        twists = np.broadcast_to(found.twist_part, (len(chosen), *found.twist_part.shape))
+        lost = [singular_values(each) for each in (np.concatenate([twists, rates], axis=1), rates)]
+        # a set S sees dof − (rank [X; Y_S] − rank Y_S) of the platform's freedoms
+        together, alone = ([np.sum(values > zero, axis=1) for zero in (SURELY_SOMETHING, SURELY_ZERO)]
+                           for values in lost)
+        dof = found.dof.value
+        least, most = dof - (together[1] - alone[0]), dof - (together[0] - alone[1])
+        return cls(found.mobility, found.dimension, dof, turns,
+                   tuple(zip(least.tolist(), most.tolist(), strict=True)))
+
+    def agrees(self, other: Signature) -> bool:
+        """Whether both can be of one operation mode."""
+        same = ((self.mobility, self.dimension, self.dof, self.turns)
+                == (other.mobility, other.dimension, other.dof, other.turns))
+        return same and all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(self.seen, other.seen, strict=True))
+
+    @property
+    def motion(self) -> str:
+        """Translations and other motions of the platform: 3T, 2T1R, 1T2R, 3T3R …"""
+        parts = ((self.dof - self.turns, "T"), (self.turns, "R"))
+        return "".join(f"{count}{letter}" for count, letter in parts if count) or "at rest"
+
+
+@dataclass(frozen=True, eq=False)
+class OperationMode:
+    """An operation mode that was met: its signature, and one of its configurations."""
+
+    signature: Signature
+    at: ClosedConfiguration
+
+    def beside(self, other: Signature, labels: Sequence[str]) -> str:
+        """What the platform does in this mode, and what legs (``labels``, by observation) see there and not in the
+        mode of ``other``, or the other way round."""
+        own, sets = self.signature, sets_of(len(labels))
+        text = f"{own.dof} dof ({own.motion}), mobility {own.mobility}"
+        apart = [(places, a[0]) for places, a, b in zip(sets, own.seen, other.seen, strict=False)
+                 if own.dof != other.dof or a[0] > b[1] or b[0] > a[1]]
+        if not apart:
+            return text
+        places, seen = apart[0]
+        return f"{text}, legs {', '.join(labels[i] for i in places)} see {seen} of {own.dof}"
+
+
+def group_modes(found: Sequence[OperationMode]) -> list[list[OperationMode]]:
+    """The configurations, those together whose signatures agree, the largest group first."""
+    groups: list[list[OperationMode]] = []
+    for each in found:
+        home = next((group for group in groups if group[0].signature.agrees(each.signature)), None)
+        if home is None:
+            groups.append([each])
+        else:
+            home.append(each)
+    return sorted(groups, key=len, reverse=True)
+
+
+@lru_cache(maxsize=64)
+def sets_of(count: int) -> tuple[tuple[int, ...], ...]:
+    """The sets of observations whose ranks are compared, by their places."""
+    sizes = range(1, count + 1) if count <= LARGEST_WHOLE else (1, 2, count)
+    return tuple(each for size in sizes for each in combinations(range(count), size))
+
+
+@lru_cache(maxsize=64)
+def _chosen(sizes: tuple[int, ...]) -> Array:
+    """1 in the rows of the rates that belong to each set, (sets, rows)."""
+    owner = np.repeat(np.arange(len(sizes)), sizes)
+    return np.array([np.isin(owner, places) for places in sets_of(len(sizes))], dtype=float).reshape(-1, len(owner))

@@ -1,4 +1,7 @@
-"""The certificate: a hidden robot follows the real one and has the same relation ρ (theory 3.1-3.3)."""
+"""The certificate: a hidden robot follows the real one and has the same relation ρ.
+
+Source: docs/pages/theory.md, section 5.
+"""
 
 from __future__ import annotations
 

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..geometry.balls import Field, around
 from ..geometry.so3 import logarithm
-from ..geometry.vectors import Array, cross, inverse, perpendicular
+from ..geometry.vectors import Array, dot, inverse, perpendicular
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY
 from .ways import Part
 
@@ -134,7 +134,7 @@ def _closures(way: Sequence[Part], end: LegEnd) -> Closures:
         laws = [_distance(first, end.ball(B), T, rod, words) for T, rod in zip(targets, rods, strict=True)]
         # seen from the first part, the rod's far end must be where the U between them can bring it
         return _solved(laws, None, first, B, targets[0], end, lambda q: _tilted(
-            way[1], end.ball(far[0]), _moved(first, targets[0], -q)))
+            way[1], end.ball(far[0]), first.moved(targets[0], -q)))
     if last.axis is not None:
         return UNDECIDED
     # two rods between three centres: |AB| − |BC| ≤ |AC| ≤ |AB| + |BC|
@@ -218,7 +218,7 @@ def _distance(moving: Part | None, x: Field, A: Field, square: Any, words: str) 
     if moving is None or moving.slides:
         along = arb(0) if moving is None else 2 * _dot(x - A, moving.direction)
         return _Law(_square(x - A), along, arb(0 if moving is None else 1), square, False, True, words)
-    centre, v, w = _circle(moving, x)
+    centre, v, w = moving.circle(x)
     C = centre - A
     return _Law(_square(C) + _square(v), 2 * _dot(C, v), 2 * _dot(C, w), square, True, True, words)
 
@@ -231,17 +231,8 @@ def _height(moving: Part | None, x: Field, n: Array, target: Field, words: str, 
     if moving is None or moving.slides:
         along = 0.0 if moving is None or moving.axis is None else float(n @ moving.axis)
         return _Law(_dot(x - A, n), arb(along, SAME_GEOMETRY), arb(0), wanted, False, False, words)
-    centre, v, w = _circle(moving, x)
+    centre, v, w = moving.circle(x)
     return _Law(_dot(centre - A, n), _dot(v, n), _dot(w, n), wanted, True, False, words)
-
-
-def _circle(turning: Part, x: Field) -> tuple[Field, Field, Field]:
-    """A point's circle about an axis: x(q) = centre + v cos q + w sin q."""
-    axis = turning.direction
-    D = x - turning.point
-    along = _dot(D, axis) * axis
-    v = D - along
-    return turning.point + along, v, cross(axis, v)
 
 
 def _solved(laws: Sequence[_Law], first: Part | None, moving: Part | None, x: Array, target: Field, end: LegEnd,
@@ -256,14 +247,14 @@ def _solved(laws: Sequence[_Law], first: Part | None, moving: Part | None, x: Ar
         return UNDECIDED
     sharpest = min(lists, key=lambda roots: max(float(root.rad()) for root in roots))
     failed = [[miss for law in laws if (miss := law.missed(law.at(q), law.at(q))) is not None]
-              + _tilted(first, _moved(moving, end.ball(x), q), target) + more(q) for q in sharpest]
+              + _tilted(first, moving.moved(end.ball(x), q), target) + more(q) for q in sharpest]
     values = tuple(q for q, missed in zip(sharpest, failed, strict=True) if not missed)
     if not values:
         worst = [max(missed, key=lambda miss: miss.by) for missed in failed]
         return Closures(min(worst, key=lambda miss: miss.by))
     found = [] if moving.joint is None else [(moving.joint, values)]
     if first is not None and first.joint is not None:
-        found.append((first.joint, tuple(_carried(first, _moved(moving, end.ball(x), q), target) for q in values)))
+        found.append((first.joint, tuple(_carried(first, moving.moved(end.ball(x), q), target) for q in values)))
     return Closures(None, tuple(found))
 
 
@@ -278,21 +269,13 @@ def _tilted(first: Part | None, x: Field, target: Field) -> list[Miss]:
     return [] if miss is None else [miss]
 
 
-def _moved(part: Part, x: Field, q: Any) -> Field:
-    """Where a part of value q brings x."""
-    if part.slides:
-        return np.asarray(x + np.asarray(part.direction * q))
-    centre, v, w = _circle(part, x)
-    return np.asarray(centre + v * q.cos() + w * q.sin())
-
-
 def _carried(first: Part, x: Field, target: Field) -> Any:
     """The value with which a part brings x to the target."""
     from flint import arb
 
     if first.slides:
         return _dot(target - x, first.direction)
-    _, v, w = _circle(first, x)
+    _, v, w = first.circle(x)
     sine, cosine = _dot(w, target - first.point), _dot(v, target - first.point)
     # a ball across atan2's cut would be a whole turn
     return arb.atan2(sine, cosine) if cosine > 0 else arb.pi() + arb.atan2(-sine, -cosine)
@@ -317,7 +300,7 @@ def _name(part: Part) -> str:
 
 
 def _dot(a: Field, b: Field) -> Any:
-    return sum(x * y for x, y in zip(a, b, strict=True))
+    return dot(a, b).item()
 
 
 def _square(v: Field) -> Any:

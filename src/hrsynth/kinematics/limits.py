@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..geometry.balls import Field, around
-from ..geometry.vectors import Array, cross, dot
+from ..geometry.vectors import Array, dot
 from ..mechanism import JointType, Mechanism
 from ..mechanism.wrist import Wrist
 from ..tolerances import OUT_OF_REACH, SAME_GEOMETRY, SAME_POINT
@@ -107,17 +107,10 @@ def _cosine(wrist: Wrist, before: Sequence[Part], after: Sequence[Part], turns: 
     """E_1 … E_k first · D E_n⁻¹ … E_l⁻¹ last, for the parts before and after the wrist turned by ``turns``."""
     first, last = (around(axis, SAME_GEOMETRY) for axis in (wrist.first, wrist.last))
     for part, q in reversed(list(zip(before, turns, strict=False))):
-        first = _rotated(part, first, q)
+        first = part.rotated(first, q)
     for part, q in zip(after, turns[len(before) :], strict=True):
-        last = _rotated(part, last, -q)
+        last = part.rotated(last, -q)
     return dot(first, dot(end, last))[()]
-
-
-def _rotated(part: Part, v: Field, q: Any) -> Field:
-    """A vector turned by q about a part's axis (Rodrigues)."""
-    axis = part.direction
-    along = dot(axis, v)[()] * axis
-    return np.asarray(along + (v - along) * q.cos() + cross(axis, v) * q.sin())
 
 
 def _outside(wrist: Wrist, cosine: Any) -> bool:

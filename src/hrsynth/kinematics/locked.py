@@ -1,7 +1,9 @@
-"""What a leg still allows its end when what is measured of it is held: the locked twist system T_i (theory 4).
+"""What a leg still allows its end when what is measured of it is held: the locked twist system T_i.
 
 Computed from the screws of the leg's own joints, without the engine's Jacobians: an independent path to the same ranks.
 Lengths in characteristic lengths; twists at the base frame's origin, base axes.
+
+Source: docs/pages/theory.md, section 7.
 """
 
 from __future__ import annotations

@@ -1,4 +1,7 @@
-"""The relation ρ between the platform's twist and the rates of what is observed (theory 1; as a graph, MMT eq. 7)."""
+"""The relation ρ between the platform's twist and the rates of what is observed.
+
+Source: docs/pages/theory.md, section 2; as a graph, MMT eq. 7.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,7 @@ class Measurement:
     """What is asked of a mechanism: the twist t of ``platform`` and the rates of ``observations`` seen from
     ``reference``; ``bodies`` are further links whose twists count too.
 
-    Where ``point`` is given, t is the velocity of that point alone, in the platform's frame (a point body, theory 1).
+    Where ``point`` is given, t is the velocity of that point alone, in the platform's frame (a point body).
     """
 
     platform: str

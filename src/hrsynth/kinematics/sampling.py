@@ -1,8 +1,8 @@
-"""Random closed configurations on the component of the zero configuration (theory 3.1 and 9).
+"""Random closed configurations on the component of the zero configuration (docs/pages/theory.md, section 5).
 
 Each sample is reached from the zero configuration by steps that follow the branch (:mod:`.branch`), halved until they
 do, away from singularities of the loops; and the robot, led again along the poses and directions of the way, arrives.
-What fails is discarded and counted. All samples must agree in what tells operation modes apart (:mod:`.operation`).
+What fails is discarded and counted. All samples must agree in what tells operation modes apart (:mod:`.branch`).
 """
 
 from __future__ import annotations
@@ -19,9 +19,8 @@ from ..geometry.ranks import kernel_basis, largest_angle, range_basis
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..tolerances import CLOSED, EXACT, FOLLOWED, INVERTED, NUDGE, PASSED_BY, RANK_GAP, SHARP, SOLVED, STEADY_TANGENT
-from .branch import CORRECTED, follows
+from .branch import CORRECTED, OperationMode, Signature, follows, group_modes
 from .configuration import ClosedConfiguration
-from .operation import OperationMode, Signature, group_modes
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation
 from .tasks import Target, shortened, solve

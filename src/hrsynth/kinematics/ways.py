@@ -9,12 +9,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import islice
+from typing import Any
 
 import numpy as np
 
 from ..geometry.balls import Field
 from ..geometry.lines import common_perpendicular, distance
-from ..geometry.vectors import Array
+from ..geometry.vectors import Array, cross, dot
 from ..mechanism import Joint, JointType
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.wrist import Wrist
@@ -59,6 +60,25 @@ class Part:
     def joint(self) -> str | None:
         """The joint whose coordinate is the part's, where it is one R or P."""
         return self.joints[0] if self.axis is not None and len(self.joints) == 1 else None
+
+    def circle(self, x: Field) -> tuple[Field, Field, Field]:
+        """The circle of a point about the axis: x(q) = centre + v cos q + w sin q (Rodrigues)."""
+        axis = self.direction
+        arm = x - self.point
+        along = dot(arm, axis) * axis
+        v = arm - along
+        return self.point + along, v, cross(axis, v)
+
+    def moved(self, x: Field, q: Any) -> Field:
+        """Where the part with value q brings a point."""
+        if self.slides:
+            return np.asarray(x + np.asarray(self.direction * q))
+        centre, v, w = self.circle(x)
+        return np.asarray(centre + v * q.cos() + w * q.sin())
+
+    def rotated(self, vector: Field, q: Any) -> Field:
+        """A vector turned with the part by q."""
+        return replace(self, point=np.zeros(3)).moved(vector, q)
 
     def reversed(self) -> Part:
         """The part seen from its other side: the same coordinate, the opposite motion."""

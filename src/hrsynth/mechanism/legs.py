@@ -276,8 +276,8 @@ def _labelled(anatomy: LegDecomposition) -> LegDecomposition:
 
 
 def default_observation(anatomy: LegDecomposition, leg: Leg) -> Direction:
-    """The default segment of a leg (theory 1): the axis of a P that joins two moving links; else the last segment
-    before the platform (of equal parallel rods the first)."""
+    """The default segment of a leg (docs/pages/theory.md, section 2): the axis of a P that joins two moving links;
+    else the last segment before the platform (of equal parallel rods the first)."""
     mechanism = anatomy.mechanism
     path = anatomy.path(leg)
     nodes = [mechanism.base]

@@ -74,7 +74,7 @@ def labels_of(observations: Iterable[Observation]) -> tuple[str, ...]:
 
 @dataclass(frozen=True, eq=False)
 class Direction(Observation):
-    """The unit vector u = R_cᵀ R_ℓ d of a direction d fixed in link ℓ (theory: observation; MMT 2.3.1).
+    """The unit vector u = R_cᵀ R_ℓ d of a direction d fixed in link ℓ (docs/pages/theory.md, section 2; MMT 2.3.1).
 
     ``direction`` is d in the *link's* frame, shape (3,).
     """

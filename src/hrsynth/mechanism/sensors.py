@@ -39,7 +39,7 @@ def _slide(mechanism: Mechanism, joint: Joint, leg: str) -> SlideEncoder:
 
 def line_position(anatomy: LegDecomposition, seen: Direction) -> LinePosition:
     """The position of the line whose direction is ``seen``: the line through the segment's first centre (that of a
-    joint that does not slide, where there is one; theory 1)."""
+    joint that does not slide, where there is one; docs/pages/theory.md, section 2)."""
     mechanism = anatomy.mechanism
     link = mechanism.links[seen.link]
     joints = sorted(mechanism.joints_of(seen.link), key=lambda joint: joint.type.slides)

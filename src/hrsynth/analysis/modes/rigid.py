@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRequest
-from ...geometry.so3 import exponential, logarithm
+from ...geometry.so3 import exponential, logarithm, rotation_of
 from ...geometry.vectors import Array, cross, pose
 from ...tolerances import SAME_DIRECTION, SAME_POINT
 from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, curves_of, extent, length
@@ -339,11 +339,3 @@ def _rotation(e: Any) -> Any:
             [2 * (s(b, c) + s(a, d)), s(a, a) - s(b, b) + s(c, c) - s(d, d), 2 * (s(c, d) - s(a, b))],
             [2 * (s(b, d) - s(a, c)), 2 * (s(c, d) + s(a, b)), s(a, a) - s(b, b) - s(c, c) + s(d, d)]]
     return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)
-
-
-def rotation_of(q: Array) -> Array:
-    """The rotation of a unit quaternion (w, x, y, z); shape (3, 3)."""
-    w, x, y, z = q.tolist()
-    return np.array([[1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-                     [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-                     [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)]])
