@@ -17,9 +17,10 @@ from hrsynth.catalog.entry import model
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
 from hrsynth.geometry.vectors import Array, unit
-from hrsynth.mechanism.legs import decompose, default_observation
+from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.sensors import default_observation
 from oracle import GAP, RANK, NotAssembled, Oracle, Undecided, exponential, split_rank
 
 STATES, STARTS, LONG = 6, 60, 40

@@ -7,9 +7,10 @@ import numpy as np
 from hrsynth.geometry.vectors import Array, inverse, unit
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.carried import Tie
-from hrsynth.mechanism.legs import decompose, default_observation
+from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.relations import Relations, recognise
+from hrsynth.mechanism.sensors import default_observation
 from oracle import Oracle
 
 

@@ -10,8 +10,9 @@ from hrsynth.description import load, shipped
 from hrsynth.errors import BadMechanism, BadRequest, BadRobotFile
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.legs import LegDecomposition, decompose, default_observation, observation_of
+from hrsynth.mechanism.legs import LegDecomposition, decompose
 from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.sensors import default_observation, observation_of
 
 
 def anatomy(name: str) -> LegDecomposition:

@@ -16,8 +16,9 @@ from hrsynth.analysis.derive import derive
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism import JointType, Mechanism
-from hrsynth.mechanism.legs import decompose, default_observation
+from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.sensors import default_observation
 from hrsynth.present.drawings import svg
 from hrsynth.present.drawings.graph import graph_svg
 from hrsynth.present.drawings.plan import Layout, plan

@@ -15,8 +15,8 @@ from ..geometry.ranks import kernel_basis, largest_angle, range_basis, singular_
 from ..geometry.vectors import Array
 from ..kinematics.sampling import Samples
 from ..mechanism import Direction, JointType, Mechanism, Observation
-from ..mechanism.legs import LegDecomposition, observation_of
-from ..mechanism.sensors import encoders, line_position
+from ..mechanism.legs import LegDecomposition
+from ..mechanism.sensors import encoders, line_position, observation_of
 from ..progress import tell
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, SAME_RELATION

@@ -18,11 +18,11 @@ from ..kinematics.platform_motion import PlatformMotion
 from ..kinematics.relation import Measurement, Relation, relation
 from ..kinematics.sampling import Sample, Samples, sample
 from ..mechanism import Mechanism, Observation
-from ..mechanism.legs import LegDecomposition, decompose, default_observation, observation_of
+from ..mechanism.legs import LegDecomposition, decompose
 from ..mechanism.normal import NormalForm, normal_form
 from ..mechanism.observation import Direction, labels_of
 from ..mechanism.pose import Pose
-from ..mechanism.sensors import encoders
+from ..mechanism.sensors import default_observation, encoders, observation_of
 from ..progress import tell
 
 if TYPE_CHECKING:

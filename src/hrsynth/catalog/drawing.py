@@ -5,8 +5,9 @@ from __future__ import annotations
 import re
 
 from ..errors import HrsynthError
-from ..mechanism.legs import decompose, default_observation
+from ..mechanism.legs import decompose
 from ..mechanism.normal import normal_form
+from ..mechanism.sensors import default_observation
 from .geometry import mechanism
 from .words import COMPOSITE, Leg, Word
 

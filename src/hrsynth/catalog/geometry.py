@@ -16,10 +16,11 @@ import numpy as np
 from ..errors import BadRequest
 from ..geometry.vectors import Array, perpendicular, rotation_about, unit
 from ..mechanism.builder import Builder
-from ..mechanism.legs import decompose, default_observation, observation_of
+from ..mechanism.legs import decompose
 from ..mechanism.model import Mechanism
 from ..mechanism.normal import normal_form
 from ..mechanism.observation import Direction
+from ..mechanism.sensors import default_observation, observation_of
 from ..tolerances import SQUARE_AXES
 from .words import COMPOSITE, Joint, Leg, Word
 

@@ -6,9 +6,10 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 from ..errors import BadRequest
-from ..mechanism.legs import decompose, observation_of
+from ..mechanism.legs import decompose
 from ..mechanism.model import JointType, Mechanism, Motor
 from ..mechanism.normal import normal_form
+from ..mechanism.sensors import observation_of
 from .jointgraph import LOOP_TYPES, FrameSpec, JointGraph, comma_list
 
 CLOSURES = {"3d": JointType.SPHERICAL, "6d": JointType.FIXED, **LOOP_TYPES}

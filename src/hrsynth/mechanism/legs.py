@@ -12,18 +12,14 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations, pairwise
 
-import numpy as np
-
 from ..errors import BadMechanism, BadRequest, BadRobotFile, Defect
 from ..geometry import lines
-from ..geometry.vectors import Array, unit
+from ..geometry.vectors import Array
 from ..tolerances import SAME_POINT
 from . import graphs
 from .composites import WordEdge, WordGraph
-from .model import Joint, JointType, Mechanism
-from .normal import centre_pair
+from .model import JointType, Mechanism
 from .notation import Architecture, Bar, Carrier, Letter, Word
-from .observation import Direction
 
 
 @dataclass(frozen=True)
@@ -273,114 +269,3 @@ def _labelled(anatomy: LegDecomposition) -> LegDecomposition:
             labels.append(free.pop(0))
     return replace(anatomy, legs=tuple(replace(leg, label=label)
                                        for leg, label in zip(anatomy.legs, labels, strict=True)))
-
-
-def default_observation(anatomy: LegDecomposition, leg: Leg) -> Direction:
-    """The default segment of a leg (docs/pages/theory.md, section 2): the axis of a P that joins two moving links;
-    else the last segment before the platform (of equal parallel rods the first)."""
-    mechanism = anatomy.mechanism
-    path = anatomy.path(leg)
-    nodes = [mechanism.base]
-    for edge in path:
-        nodes.append(edge.other(nodes[-1]))
-    for i, edge in enumerate(path):
-        joint = _single(mechanism, edge)
-        if joint is not None and joint.type is JointType.PRISMATIC and mechanism.base not in (nodes[i], nodes[i + 1]):
-            return _axis_direction(mechanism, leg, nodes[i], joint, path, i)
-    if leg.takes_platform:
-        return _segment(mechanism, leg, mechanism.platform)
-    last = path[-1]
-    if last.inside:
-        return _segment(mechanism, leg, last.inside[0])
-    if len(nodes) < 3:
-        raise BadRequest(f"leg {leg.label} has no segment to observe: it is one joint", last.joints[0])
-    joint = _single(mechanism, last)
-    if joint is not None and joint.type.slides:
-        return _axis_direction(mechanism, leg, nodes[-2], joint, path, len(path) - 1)
-    before = _single(mechanism, path[-2])
-    if before is not None and before.type.slides:
-        return _axis_direction(mechanism, leg, nodes[-2], before, path, len(path) - 2)
-    return _centres(mechanism, leg, nodes[-2], path[-2], last)
-
-
-def observation_of(anatomy: LegDecomposition, link: str) -> Direction:
-    """The segment direction of any link of a leg: centre to centre, or along the axis of its P."""
-    leg = anatomy.leg_of(link)
-    if leg is None:
-        raise BadRequest(f"{anatomy.mechanism.name}: no leg has the link", link,
-                         [n for each in anatomy.legs for n in each.links])
-    mechanism = anatomy.mechanism
-    path = anatomy.path(leg)
-    nodes = [mechanism.base]
-    for edge in path:
-        nodes.append(edge.other(nodes[-1]))
-    if link in nodes[1:-1]:
-        i = nodes.index(link)
-        for k in (i, i - 1):
-            joint = _single(mechanism, path[k])
-            if joint is not None and joint.type.slides:
-                return _axis_direction(mechanism, leg, link, joint, path, k)
-        return _centres(mechanism, leg, link, path[i - 1], path[i])
-    return _segment(mechanism, leg, link)
-
-
-def _single(mechanism: Mechanism, edge: WordEdge) -> Joint | None:
-    return mechanism.joints[edge.joints[0]] if len(edge.joints) == 1 else None
-
-
-def _edge_centre(mechanism: Mechanism, edge: WordEdge, at: str) -> Joint | Array:
-    """The joint that the edge is, or the mean of the centres of its joints on the link ``at``."""
-    joint = _single(mechanism, edge)
-    if joint is not None:
-        return joint
-    return np.mean([mechanism.joints[n].point for n in edge.joints if at in mechanism.joints[n].links], axis=0)
-
-
-def _centres(mechanism: Mechanism, leg: Leg, link: str, before: WordEdge, after: WordEdge) -> Direction:
-    a, b = _edge_centre(mechanism, before, link), _edge_centre(mechanism, after, link)
-    if isinstance(a, Joint) and isinstance(b, Joint):
-        start, end = centre_pair(a, b)
-    else:
-        start, end = (_foot(x, y) for x, y in ((a, b), (b, a)))
-    return _direction(mechanism, leg, link, end - start)
-
-
-def _foot(of: Joint | Array, seen_from: Joint | Array) -> Array:
-    if not isinstance(of, Joint):
-        return of
-    if of.type is not JointType.REVOLUTE:
-        return of.point
-    return lines.foot(seen_from.point if isinstance(seen_from, Joint) else seen_from, of.point, of.axis)
-
-
-def _segment(mechanism: Mechanism, leg: Leg, link: str) -> Direction:
-    """A binary link: from the joint nearer to the base to the other."""
-    joints = mechanism.joints_of(link)
-    if len(joints) != 2:
-        raise BadRequest(f"link {link!r} of leg {leg.label} has {len(joints)} joints: it has no direction of its own",
-                         None, "an observe element with an axis")
-    own = {mechanism.base, *leg.links} - {link, mechanism.platform}
-    distance = graphs.distances(mechanism.adjacency, mechanism.base, own)
-    a, b = sorted(joints, key=lambda j: distance.get(j.other(link), len(mechanism.links)))
-    for joint in (b, a):
-        if joint.type.slides:
-            return _direction(mechanism, leg, link, joint.axis)
-    start, end = centre_pair(a, b)
-    return _direction(mechanism, leg, link, end - start)
-
-
-def _axis_direction(mechanism: Mechanism, leg: Leg, link: str, joint: Joint, path: list[WordEdge], index: int
-                    ) -> Direction:
-    """Along the P's axis, from the base side to the platform side."""
-    before = mechanism.joints[path[index - 1].joints[0]].point if index else joint.point
-    after = (mechanism.joints[path[index + 1].joints[0]].point if index + 1 < len(path)
-             else mechanism.links[leg.attach].pose[:3, 3])
-    along = float(joint.axis @ (after - before))
-    return _direction(mechanism, leg, link, -joint.axis if along < -SAME_POINT * mechanism.length else joint.axis)
-
-
-def _direction(mechanism: Mechanism, leg: Leg, link: str, vector: Array) -> Direction:
-    if np.linalg.norm(vector) <= SAME_POINT * mechanism.length:
-        raise BadRequest(f"the observed segment {link!r} of leg {leg.label} has no length",
-                         float(np.linalg.norm(vector)), "two joint centres apart from each other")
-    return Direction(leg.label, link, mechanism.links[link].pose[:3, :3].T @ unit(vector))

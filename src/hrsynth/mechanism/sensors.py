@@ -1,14 +1,119 @@
-"""What else could be measured of a mechanism: an encoder on a joint, the position of a line whose direction is seen."""
+"""What can be measured of a mechanism: the direction of a segment of a leg, the position of its line, an encoder on a
+joint."""
 
 from __future__ import annotations
 
-from ..geometry.vectors import Array, frozen, perpendicular
-from .legs import LegDecomposition
+import numpy as np
+
+from ..errors import BadRequest
+from ..geometry import lines
+from ..geometry.vectors import Array, frozen, perpendicular, unit
+from ..tolerances import SAME_POINT
+from . import graphs
+from .composites import WordEdge
+from .legs import Leg, LegDecomposition
 from .model import Joint, JointType, Mechanism
 from .normal import centre_pair
 from .observation import AngleEncoder, Direction, Encoder, LinePosition, SlideEncoder
 
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
+
+
+def default_observation(anatomy: LegDecomposition, leg: Leg) -> Direction:
+    """The default segment of a leg (docs/pages/theory.md, section 2): the axis of a P that joins two moving links;
+    else the last segment before the platform (of equal parallel rods the first)."""
+    segments = _Segments(anatomy, leg)
+    path, nodes, base = segments.path, segments.nodes, anatomy.mechanism.base
+    for i, edge in enumerate(path):
+        joint = segments.joint(edge)
+        if joint is not None and joint.type is JointType.PRISMATIC and base not in (nodes[i], nodes[i + 1]):
+            return segments.along(nodes[i], joint, i)
+    if leg.takes_platform:
+        return segments.binary(anatomy.mechanism.platform)
+    if path[-1].inside:
+        return segments.binary(path[-1].inside[0])
+    if len(nodes) < 3:
+        raise BadRequest(f"leg {leg.label} has no segment to observe: it is one joint", path[-1].joints[0])
+    return segments.at(len(nodes) - 2)
+
+
+def observation_of(anatomy: LegDecomposition, link: str) -> Direction:
+    """The segment direction of any link of a leg: centre to centre, or along the axis of its P."""
+    leg = anatomy.leg_of(link)
+    if leg is None:
+        raise BadRequest(f"{anatomy.mechanism.name}: no leg has the link", link,
+                         [n for each in anatomy.legs for n in each.links])
+    segments = _Segments(anatomy, leg)
+    return segments.at(segments.nodes.index(link)) if link in segments.nodes[1:-1] else segments.binary(link)
+
+
+class _Segments:
+    """The directions of a leg's segments: links on its ``path``, between ``nodes``."""
+
+    def __init__(self, anatomy: LegDecomposition, leg: Leg) -> None:
+        self.mechanism, self.leg, self.path = anatomy.mechanism, leg, anatomy.path(leg)
+        self.nodes = [self.mechanism.base]
+        for edge in self.path:
+            self.nodes.append(edge.other(self.nodes[-1]))
+
+    def at(self, place: int) -> Direction:
+        """That of a node within the path: along the P after or before it, or between the centres of both edges."""
+        for i in (place, place - 1):
+            joint = self.joint(self.path[i])
+            if joint is not None and joint.type.slides:
+                return self.along(self.nodes[place], joint, i)
+        link = self.nodes[place]
+        a, b = (self._end(self.path[i], link) for i in (place - 1, place))
+        start, end = centre_pair(a, b) if isinstance(a, Joint) and isinstance(b, Joint) else (_foot(a, b), _foot(b, a))
+        return self._direction(link, end - start)
+
+    def binary(self, link: str) -> Direction:
+        """That of a binary link: from the joint nearer to the base to the other."""
+        joints = self.mechanism.joints_of(link)
+        if len(joints) != 2:
+            raise BadRequest(f"link {link!r} of leg {self.leg.label} has {len(joints)} joints: it has no direction of "
+                             "its own", None, "an observe element with an axis")
+        own = {self.mechanism.base, *self.leg.links} - {link, self.mechanism.platform}
+        distance = graphs.distances(self.mechanism.adjacency, self.mechanism.base, own)
+        a, b = sorted(joints, key=lambda j: distance.get(j.other(link), len(self.mechanism.links)))
+        for joint in (b, a):
+            if joint.type.slides:
+                return self._direction(link, joint.axis)
+        start, end = centre_pair(a, b)
+        return self._direction(link, end - start)
+
+    def along(self, link: str, joint: Joint, place: int) -> Direction:
+        """That along the axis of the P or C at a place of the path, from the base side to the platform side."""
+        joints, last = self.mechanism.joints, len(self.path) - 1
+        before = joints[self.path[place - 1].joints[0]].point if place else joint.point
+        after = (joints[self.path[place + 1].joints[0]].point if place < last
+                 else self.mechanism.links[self.leg.attach].pose[:3, 3])
+        backwards = float(joint.axis @ (after - before)) < -SAME_POINT * self.mechanism.length
+        return self._direction(link, -joint.axis if backwards else joint.axis)
+
+    def joint(self, edge: WordEdge) -> Joint | None:
+        """The joint that an edge is, if it is one."""
+        return self.mechanism.joints[edge.joints[0]] if len(edge.joints) == 1 else None
+
+    def _end(self, edge: WordEdge, link: str) -> Joint | Array:
+        """The joint that the edge is, or the mean of the centres of its joints on a link."""
+        joints = self.mechanism.joints
+        return self.joint(edge) or np.mean([joints[n].point for n in edge.joints if link in joints[n].links], axis=0)
+
+    def _direction(self, link: str, vector: Array) -> Direction:
+        if np.linalg.norm(vector) <= SAME_POINT * self.mechanism.length:
+            raise BadRequest(f"the observed segment {link!r} of leg {self.leg.label} has no length",
+                             float(np.linalg.norm(vector)), "two joint centres apart from each other")
+        return Direction(self.leg.label, link, self.mechanism.links[link].pose[:3, :3].T @ unit(vector))
+
+
+def _foot(of: Joint | Array, seen_from: Joint | Array) -> Array:
+    """A centre; of an R the foot, on its axis, of the perpendicular from the other."""
+    if not isinstance(of, Joint):
+        return of
+    if of.type is not JointType.REVOLUTE:
+        return of.point
+    return lines.foot(seen_from.point if isinstance(seen_from, Joint) else seen_from, of.point, of.axis)
 
 
 def encoders(mechanism: Mechanism, joint: Joint, leg: str = "") -> tuple[Encoder, ...]:
