@@ -43,11 +43,12 @@ def strings(source: str) -> Iterator[tuple[int, str]]:
 
 
 def visible(page: str) -> str:
-    """A template without comments, expressions, tags and attributes, as many lines as before."""
+    """A template without comments and styles, of its expressions and tags the texts alone, as many lines as before."""
     def blank(match: re.Match[str]) -> str:
         return "\n" * match[0].count("\n")
 
     page = re.sub(r"/\*.*?\*/|<!--.*?-->|\{#.*?#\}|<style.*?</style>", blank, page, flags=re.DOTALL)
+    page = re.sub(r"\{\{.*?\}\}|\{%.*?%\}", lambda match: " ".join(re.findall(r'"[^"]*"', match[0])), page)
     page = re.sub(r"^\s*//.*$", "", page, flags=re.MULTILINE)
     return re.sub(r"print-color-adjust: exact|\blegs\.complete\b|\brow\.exact\b|\brow\.proved\b", "", page)
 

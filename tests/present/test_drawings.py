@@ -20,9 +20,8 @@ from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.sensors import default_observation
 from hrsynth.present.drawings import svg
-from hrsynth.present.drawings.graph import graph_svg
 from hrsynth.present.drawings.plan import Layout, plan
-from hrsynth.present.drawings.schematic import leg_svg, robot_svg
+from hrsynth.present.drawings.schematic import graph_svg, leg_svg, robot_svg
 
 Draw = Callable[..., str]
 DRAWINGS = pytest.mark.parametrize("draw", [graph_svg, robot_svg])

@@ -18,7 +18,7 @@ from hrsynth.cli import execute
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet
 from hrsynth.present.drawings import svg
-from hrsynth.present.report import parts, steps
+from hrsynth.present.report import figures, parts
 from hrsynth.present.report.formulas import barred, collected, formula, indexed
 from hrsynth.present.report.pages import report
 
@@ -137,7 +137,7 @@ def test_a_part_that_fails_leaves_its_reason():
 def test_each_drawn_step_starts_where_the_last_ended(name: str, legs: str | None):
     """The first drawing shows the real robot's motors, the last one the virtual actuators of the hidden robot."""
     found = derive(load(name), None if legs is None else legs.split(","))
-    drawn = steps.scenes(found)
+    drawn = figures.step_figures(found)
     assert [n for scene in drawn for n in scene.steps] == sorted(n for scene in drawn for n in scene.steps)
     assert 'class="motor"' in drawn[0].before
     assert 'class="motor"' not in drawn[0].after
@@ -253,4 +253,4 @@ def test_a_page_that_cannot_be_written_is_refused_at_once(tmp_path: Path, capsys
 def test_accuracy_is_about_directions_that_see_everything():
     found = made(*FAST)[0]
     with pytest.raises(BadRequest, match="infinite"):
-        parts.mapped(found.setting, 0)
+        parts.error_plane(found.setting, 0)

@@ -30,7 +30,7 @@ class Progress:
         if self._bar is not None:
             self._bar.stop()
 
-    def tell(self, what: str = "sets of legs") -> None:
+    def tell(self, what: str) -> None:
         """One more step done."""
         self._steps += 1
         self._show(what, self._steps)

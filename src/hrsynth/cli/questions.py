@@ -11,6 +11,7 @@ from typing import Any
 import typer
 
 from ..present.outputs import OUTPUTS
+from ..progress import following
 from .options import (
     CAMERA,
     JSON,
@@ -52,7 +53,6 @@ class Question:
 
         from ..description.files import require_other
         from ..present.show import record, text
-        from ..progress import following
 
         if self.before is not None:
             self.before()

@@ -144,9 +144,9 @@ def check_table(found: Check) -> bytes:
 
 def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -> Locus:
     """Where a freedom is lost over a plane of poses."""
-    from ..analysis.singularity.locus import locus as over
+    from ..analysis.singularity.locus import locus
 
-    return over(found.setting, plane=plane, steps=steps, seed=seed)
+    return locus(found.setting, plane=plane, steps=steps, seed=seed)
 
 
 def locus_map(found: Singularity, drawn: Locus) -> bytes:

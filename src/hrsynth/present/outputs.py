@@ -35,7 +35,7 @@ class File:
 
     ``part`` names the part of the answer that is written, None where it was not asked for; then ``needs`` are the
     options that ask for it, and ``words`` what it is called. ``computed`` is made of the answer first, with the options
-    that it ``takes`` and a seed; the makers get it too, and the JSON as ``record``.
+    that it ``takes`` and the seed; the makers get it too, and the JSON as ``record``.
     """
 
     refusal: str
@@ -140,7 +140,7 @@ OUTPUTS = {
         File("cannot write the report", dict.fromkeys(HTML, "report.pages:page"),
              "Write a page (.html) with drawings, proof, singularities, assembly modes and accuracy.", "report",
              "report_file", computed="report.parts:parts"),
-        File("cannot draw the robots", {".svg": "drawings.derived:derivation_svg"}, option=None))),
+        File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None))),
     "legs": Outputs("text.robots:legs"),
     "modes": Outputs("text.poses:modes", (
         File("cannot draw the modes", {PNG: "modes:picture"}, "Draw the modes (.png).", nothing="modes:nothing"),)),

@@ -26,6 +26,11 @@ class Box:
     virtual: bool = False
     inside: tuple[str, ...] = ()
 
+    @property
+    def kind(self) -> str:
+        """virtual, motor or joint."""
+        return "virtual" if self.virtual else "motor" if self.driven else "joint"
+
     def other(self, link: str) -> str:
         """The link at the other end."""
         return self.head if link == self.tail else self.tail

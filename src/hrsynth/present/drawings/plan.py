@@ -140,35 +140,18 @@ def _groups(mechanism: Mechanism, anatomy: LegDecomposition | None,
 
 def _columns(groups: Sequence[_Group], base: str) -> dict[str, int]:
     """A column for each link, such that every box has its two links in different ones: longest ways from the left."""
-    after: dict[str, set[str]] = {base: set()}
+    import networkx as nx
+
+    after: nx.DiGraph[str] = nx.DiGraph()
+    after.add_node(base)
     column: dict[str, int] = {base: 0}
     for group in sorted(groups, key=lambda group: group.label is None):
         for ear in group.ears:
             first, last = ear.links[0], ear.links[-1]
             turned = last in column and column[last] < column.get(first, 0)
-            links = ear.links[::-1] if turned else ear.links
-            for a, b in pairwise(links):
-                after.setdefault(a, set()).add(b)
-                after.setdefault(b, set())
-            column = _longest(after)
+            nx.add_path(after, ear.links[::-1] if turned else ear.links)
+            column = {link: i for i, links in enumerate(nx.topological_generations(after)) for link in links}
     return column
-
-
-def _longest(after: dict[str, set[str]]) -> dict[str, int]:
-    """The length of the longest way to each node of a graph without cycles."""
-    incoming = dict.fromkeys(after, 0)
-    for others in after.values():
-        for other in others:
-            incoming[other] += 1
-    found = dict.fromkeys(after, 0)
-    pending = [node for node, count in incoming.items() if not count]
-    for node in pending:
-        for other in after[node]:
-            found[other] = max(found[other], found[node] + 1)
-            incoming[other] -= 1
-            if not incoming[other]:
-                pending.append(other)
-    return found
 
 
 _Way = tuple[str, tuple[Point, ...], int]

@@ -20,13 +20,12 @@ from ...analysis.singularity.singular import Singularity, singular
 from ...errors import BadRequest, HrsynthError
 from ...mechanism.observation import Direction
 from ...mechanism.pose import Pose
-from ...progress import tell
 
 POINTS = 500
 """Random poses at which the singularity condition is checked."""
 CONE = "0.1deg"
 """Half-angle of the cones about the directions."""
-MANY, FEW = 101, 25
+MAP_SIDE, COARSE_MAP_SIDE = 101, 25
 """Poses a side of the map, where many are evaluated together and where they are found one by one."""
 
 Answer = TypeVar("Answer")
@@ -50,14 +49,12 @@ class Parts:
 
 
 def parts(found: Derivation, seed: int) -> Parts:
-    """Ask for each part of a derivation's report of its own observed robot; ``seed`` is that of the derivation."""
-    setting = found.setting
-    name = setting.robot.name
-    told = Parts(
-        asked(name, lambda: legs(setting)), asked(name, lambda: singular(setting, points=POINTS, seed=seed)),
-        asked(name, lambda: modes(setting)), asked(name, lambda: mapped(setting, seed)))
-    tell("drawings")
-    return told
+    """Ask for each part of a derivation's report, of the robot as it was observed for the derivation; ``seed`` is that
+    of the derivation."""
+    setting, name = found.setting, found.robot.name
+    return Parts(asked(name, lambda: legs(setting, seed=seed)),
+                 asked(name, lambda: singular(setting, points=POINTS, seed=seed)),
+                 asked(name, lambda: modes(setting, seed=seed)), asked(name, lambda: error_plane(setting, seed)))
 
 
 def asked(robot: str, question: Callable[[], Answer]) -> Answer | Refused:
@@ -73,12 +70,12 @@ def reason(error: HrsynthError, robot: str) -> str:
     return (error.what if isinstance(error, BadRequest) else str(error)).removeprefix(f"{robot}: ")
 
 
-def mapped(setting: ObservedRobot, seed: int) -> Accuracy:
+def error_plane(setting: ObservedRobot, seed: int) -> Accuracy:
     """The error maxima over a plane of poses through the zero configuration."""
     if not all(isinstance(o, Direction) for o in setting.observed):
         raise BadRequest("cones are about directions, and something else is observed")
     cones = half_angles(CONE, setting.observed)
     sees_all(setting)
     mapper = Mapper(setting, cones)
-    grid = mapper.plane(Pose(), FEW if mapper.batch is None else MANY)
+    grid = mapper.plane(Pose(), COARSE_MAP_SIDE if mapper.batch is None else MAP_SIDE)
     return Accuracy(setting, cones, (), (), mapper.over(grid, seed))

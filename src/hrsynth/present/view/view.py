@@ -13,7 +13,7 @@ from ...analysis.observed import ObservedRobot
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
-from ...progress import tell
+from ...progress import followed, tell
 from ...results import Result
 from .meshes import meshes
 from .mode_outlines import Ghost, ghosts
@@ -109,6 +109,7 @@ class View(Result, shown_as="view"):
         }
 
 
+@followed
 def view(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
          hidden: bool = False, seed: int = 0) -> View:
     """What there is to see of a robot, and with ``hidden`` of its hidden robot too: every position of a slider is a
@@ -118,7 +119,7 @@ def view(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None =
     and meshes that are missing are told in ``notes``.
     """
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
-    derivation = derive(setting) if hidden else None
+    derivation = derive(setting, seed=seed) if hidden else None
     other = None if derivation is None else derivation.hidden
     mover = Mover.of(setting, other)
     tell("sliders")

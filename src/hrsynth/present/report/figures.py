@@ -1,0 +1,118 @@
+"""The drawings of a derivation: legs of the real robot beside those of the hidden one (MMT Table 1), and what each
+accepted step found and left. What is equal but for names is drawn once."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Collection
+from dataclasses import dataclass, replace
+
+from ...analysis.derive import Derivation
+from ...mechanism.legs import LegDecomposition
+from ...rewrite.rules import rules
+from ...rewrite.strategy import Step
+from ..drawings.schematic import graph_svg, leg_svg
+
+SOURCES = {rule.name: rule.source for rule in rules()}
+_NAMES = re.compile(r"<title>.*?</title>|<desc>.*?</desc>|<text[^>]*>leg [^<]*</text>"
+                    r'| (?:data-joint|data-link|aria-label)="[^"]*"', re.DOTALL)
+"""What tells drawings of equal legs apart."""
+
+
+@dataclass(frozen=True)
+class LegPair:
+    """Legs with the same word in both robots: their labels, words and drawings (of the first); the hidden ones None
+    where the hidden robot has no such leg."""
+
+    labels: tuple[str, ...]
+    watched: bool
+    real: str
+    hidden: str | None
+    real_drawing: str
+    hidden_drawing: str | None
+
+
+def actuators(found: Derivation) -> set[str]:
+    """The virtual actuators of the hidden robot: all that drives it."""
+    joints = found.hidden.joints.values() if found.hidden is not None else ()
+    return {joint.name for joint in joints if joint.actuated}
+
+
+def pairs(found: Derivation) -> list[LegPair]:
+    """The legs in order, each kind once."""
+    real, seen = found.setting.anatomy, {o.link for o in found.setting.observed}
+    states = [step.state for step in found.steps if step.state is not None]
+    hidden = states[-1].anatomy() if states and found.hidden is not None else None
+    kinds: dict[tuple[str, str | None, bool], LegPair] = {}
+    for leg in real.legs:
+        other = None if hidden is None or leg.label not in hidden.labels else hidden.leg(leg.label)
+        word = hidden.word(other).text() if hidden is not None and other is not None else None
+        key = real.word(leg).text(), word, leg.label in found.setting.labels
+        if key in kinds:
+            kinds[key] = replace(kinds[key], labels=(*kinds[key].labels, leg.label))
+            continue
+        drawing = None
+        if hidden is not None and other is not None:
+            drawing = leg_svg(hidden, leg.label, observed=seen, virtual=actuators(found),
+                              title=f"Leg {leg.label} of the hidden robot")
+        kinds[key] = LegPair((leg.label,), key[2], key[0], word, leg_svg(
+            real, leg.label, observed=seen, title=f"Leg {leg.label} of the real robot"), drawing)
+    return list(kinds.values())
+
+
+@dataclass(frozen=True)
+class StepFigure:
+    """An accepted step with its drawings; ``steps`` are the numbers, from 1, of all steps that it stands for."""
+
+    rule: str
+    source: str
+    steps: tuple[int, ...]
+    legs: tuple[str, ...]
+    """Empty where the step is about the whole robot."""
+    reasons: tuple[str, ...]
+    largest_angle: float | None
+    before: str
+    after: str
+
+    def alike(self, other: StepFigure) -> bool:
+        """Whether two steps of different legs look the same but for names."""
+        drawings = ((self.before, other.before), (self.after, other.after))
+        return self.rule == other.rule and bool(self.legs and other.legs) and all(
+            _NAMES.sub("", a) == _NAMES.sub("", b) for a, b in drawings)
+
+    def together(self, other: StepFigure) -> StepFigure:
+        """This figure, which stands for another one too."""
+        angles = [angle for angle in (self.largest_angle, other.largest_angle) if angle is not None]
+        return replace(self, steps=self.steps + other.steps, legs=self.legs + other.legs,
+                       reasons=tuple(dict.fromkeys(self.reasons + other.reasons)),
+                       largest_angle=max(angles, default=None))
+
+
+def step_figures(found: Derivation) -> list[StepFigure]:
+    """The accepted steps that changed the robot, in order."""
+    drawn: list[StepFigure] = []
+    seen, anatomy = {o.link for o in found.setting.observed}, found.setting.anatomy
+    virtual: set[str] = set()
+    for number, step in enumerate(found.steps, 1):
+        if step.state is None:
+            continue
+        after, then = step.state.anatomy(), {chain.actuator for chain in step.state.chains}
+        leg = step.leg if step.leg in anatomy.labels and step.leg in after.labels else None
+        one = StepFigure(step.rule, SOURCES.get(step.rule, ""), (number,), (step.leg,) if step.leg else (),
+                         (step.reason,), step.largest_angle, _picture(step, "before", anatomy, leg, seen, virtual),
+                         _picture(step, "after", after, leg, seen, then))
+        alike = next((i for i, other in enumerate(drawn) if one.alike(other)), None)
+        if alike is None:
+            drawn.append(one)
+        else:
+            drawn[alike] = drawn[alike].together(one)
+        anatomy, virtual = after, then
+    return drawn
+
+
+def _picture(step: Step, word: str, anatomy: LegDecomposition, leg: str | None, seen: Collection[str],
+             virtual: Collection[str]) -> str:
+    title = f"{step.rule}: {word}" + (f" (leg {leg})" if leg else "")
+    if leg is None:
+        return graph_svg(anatomy, observed=seen, virtual=virtual, title=title)
+    return leg_svg(anatomy, leg, observed=seen, virtual=virtual, title=title)
