@@ -13,7 +13,7 @@ from ...analysis.observed import ObservedRobot
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
-from ...progress import followed, tell
+from ...progress import tell
 from ...results import Result
 from .meshes import meshes
 from .mode_outlines import Ghost, ghosts
@@ -109,7 +109,6 @@ class View(Result, shown_as="view"):
         }
 
 
-@followed
 def view(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
          hidden: bool = False, seed: int = 0) -> View:
     """What there is to see of a robot, and with ``hidden`` of its hidden robot too: every position of a slider is a
