@@ -83,7 +83,7 @@ def save(mechanism: Mechanism, path: str | Path, dialect: str | None = None) -> 
         For an unknown dialect or ending; where the file cannot be written, or the mechanism not be said in the dialect.
     """
     chosen = _dialect(Path(path), dialect)
-    written = formats.write(mechanism, chosen.name)
+    written = formats.writer(chosen.name)(mechanism)
     contents = dict(zip(chosen.files(Path(path)), (text.encode() for text in written.texts), strict=True))
     for file, content in contents.items():
         if file != Path(path):

@@ -126,9 +126,16 @@ class JointGraph:
         """Add a joint that closes a loop; of ``axes`` it takes as many as its type has."""
         self.joints[name] = JointSpec(name, kind, ends, tuple(axes[: kind.axes]), None, (), line, motor, in_tree=False)
 
-    def connected(self, base: str) -> set[str]:
-        """The links that chains of joints join to ``base``."""
-        return graphs.component(graphs.adjacency(self.links, (e.links for e in self.joints.values())), base)
+    def prune(self, base: str) -> None:
+        """Leave out what no chain of joints joins to ``base``, and record it."""
+        kept = graphs.component(graphs.adjacency(self.links, (joint.links for joint in self.joints.values())), base)
+        lost = [link for link in self.links if link not in kept]
+        if lost:
+            what = f"{len(lost)} links that no joint connects to the base {base!r}"
+            self.note("ignored", f"{what}: {comma_list(lost, 5)}")
+            self.links = {name: link for name, link in self.links.items() if name in kept}
+            self.joints = {name: joint for name, joint in self.joints.items() if set(joint.links) <= kept}
+            self.gears = [gear for gear in self.gears if {gear.driver, gear.driven} <= set(self.joints)]
 
 
 def comma_list(names: Iterable[str], most: int = 8) -> str:

@@ -5,17 +5,17 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
-from ...errors import BadMechanism, BadRequest, LoopsNotClosed, RankUndecided
+from ...errors import BadMechanism, BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array, inverse, unit
 from ...mechanism.model import Coupling, Joint, JointType, Mechanism, Note
-from ...tolerances import FAINT, NOISE, RANK_GAP, SAME_GEOMETRY
+from ...tolerances import NOISE, SAME_GEOMETRY
 from ..jointgraph import JointGraph, JointSpec, comma_list
 from ..overrides import Overrides
 from ..tree import spanning
 from . import closures, guess
-from .coordinates import mobility, without_coordinates
+from .coordinates import with_weighed_motors, without_coordinates
 from .loops import LoopAssembly, LoopSolution, Values, regular_values, solve
-from .relations import exact_geometry
+from .relations import as_meant
 
 MOST_COORDINATES = 240
 """Coordinates of joints in loops above which loops are not solved."""
@@ -35,7 +35,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     overrides.apply(graph)
     closures.merge_points(graph)
     base = graph.base or guess.base(graph)
-    _prune(graph, base)
+    graph.prune(base)
     for role, link in (("base", overrides.base), ("platform", overrides.platform)):
         if link is not None and link not in graph.links:
             raise BadRequest(f"{graph.file}: no such {role} link", link, comma_list(graph.links))
@@ -51,21 +51,11 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
         raise LoopsNotClosed(graph.file, solution.residual, NOISE, assembly.worst(solution.values)[0])
     _note_solution(graph, assembly, solution)
     mechanism = closures.planar_points(_mechanism(graph, base, platform, assembly, solution.values))
-    if all(joint.in_tree for joint in mechanism.joints.values()):
-        return mechanism if graph.platform is not None else without_coordinates(mechanism)
-    regular = _away_from_singular(_as_meant(mechanism, solution.residual))
-    return _with_weighed_motors(regular if graph.platform is not None else without_coordinates(regular))
-
-
-def _prune(graph: JointGraph, base: str) -> None:
-    kept = graph.connected(base)
-    lost = [link for link in graph.links if link not in kept]
-    if lost:
-        graph.note("ignored", f"{len(lost)} links that no joint connects to the base {base!r}: "
-                              + comma_list(lost, 5))
-        graph.links = {name: link for name, link in graph.links.items() if name in kept}
-        graph.joints = {name: joint for name, joint in graph.joints.items() if set(joint.links) <= kept}
-        graph.gears = [gear for gear in graph.gears if {gear.driver, gear.driven} <= set(graph.joints)]
+    if not all(joint.in_tree for joint in mechanism.joints.values()):
+        mechanism = _away_from_singular(as_meant(mechanism, solution.residual))
+    if graph.platform is None:
+        mechanism = without_coordinates(mechanism)
+    return with_weighed_motors(mechanism)
 
 
 def _note_solution(graph: JointGraph, assembly: LoopAssembly, solution: LoopSolution) -> None:
@@ -143,26 +133,6 @@ def _couplings(graph: JointGraph, mechanism: Mechanism) -> list[Coupling]:
     return found
 
 
-def _as_meant(mechanism: Mechanism, residual: float) -> Mechanism:
-    """Geometry that nearly keeps relations keeps them; the gap of the singular values is the evidence."""
-    written = LoopAssembly.of(mechanism)
-    found = exact_geometry(mechanism)
-    if found is None:
-        if residual > SAME_GEOMETRY:
-            raise LoopsNotClosed(str(mechanism.file), residual, SAME_GEOMETRY, written.worst(written.zero())[0])
-        return mechanism
-    meant = LoopAssembly.of(found.mechanism)
-    rank = meant.rank(meant.zero())
-    before, loose = written.rank(written.zero()), written.rank(written.zero(), FAINT)
-    text = (f"{found.mended} relations of joints (parallel, perpendicular, meeting, equal) that hold to {NOISE:g} are "
-            f"made exact, largest change {found.change:.1e}")
-    if before.value != rank.value or residual > SAME_GEOMETRY:
-        if loose.value != rank.value or loose.gap < RANK_GAP:
-            raise RankUndecided(f"{mechanism.file}: loops with rounded numbers", loose.gap, RANK_GAP)
-        text += f"; the loops' singular values as written leave a gap of {loose.gap:.1e} (needed {RANK_GAP:g})"
-    return replace(found.mechanism, notes=(*mechanism.notes, Note("merged", text)))
-
-
 def _away_from_singular(mechanism: Mechanism) -> Mechanism:
     """A zero pose at which the loops have more freedoms than nearby is left for one nearby."""
     assembly = LoopAssembly.of(mechanism)
@@ -189,16 +159,3 @@ def _with_zero_at(mechanism: Mechanism, assembly: LoopAssembly, values: Values) 
         joints[joint.name] = replace(joint, point=X[:3, :3] @ joint.point + X[:3, 3], axes=axes)
     links = {name: replace(link, pose=poses[name]) for name, link in mechanism.links.items()}
     return replace(mechanism, links=links, joints=_with_limits(joints, assembly, values))
-
-
-def _with_weighed_motors(mechanism: Mechanism) -> Mechanism:
-    """A note where more coordinates are driven than there are freedoms: files put actuators on passive joints too."""
-    driven = sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.actuated)
-    if driven == 0 or all(joint.in_tree for joint in mechanism.joints.values()):
-        return mechanism
-    free = mobility(mechanism)
-    if driven <= free:
-        return mechanism
-    note = Note("open", f"{driven} coordinates are driven, but there are {free} freedoms: some motors may stand on "
-                        "passive joints (--motors JOINTS to name the driven ones)")
-    return replace(mechanism, notes=(*mechanism.notes, note))

@@ -53,6 +53,19 @@ def mobility(mechanism: Mechanism) -> int:
     return sum(joint.kind.freedoms for joint, _, _ in assembly.tree) - assembly.rank(assembly.zero()).value
 
 
+def with_weighed_motors(mechanism: Mechanism) -> Mechanism:
+    """A note where more coordinates are driven than there are freedoms: files put actuators on passive joints too."""
+    driven = sum(joint.type.freedoms for joint in mechanism.joints.values() if joint.actuated)
+    if driven == 0 or all(joint.in_tree for joint in mechanism.joints.values()):
+        return mechanism
+    free = mobility(mechanism)
+    if driven <= free:
+        return mechanism
+    note = Note("open", f"{driven} coordinates are driven, but there are {free} freedoms: some motors may stand on "
+                        "passive joints (--motors JOINTS to name the driven ones)")
+    return replace(mechanism, notes=(*mechanism.notes, note))
+
+
 def _chains(mechanism: Mechanism) -> list[list[Joint]]:
     """The passive chains from the base's body to the platform's, through links that hold nothing else."""
     bonds = graphs.adjacency(mechanism.links,

@@ -17,10 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...budgets import LARGEST_RELATED
+from ...errors import LoopsNotClosed, RankUndecided
 from ...geometry.vectors import Array
 from ...mechanism import graphs
-from ...mechanism.model import Joint, JointType, Mechanism
-from ...tolerances import COMPLEX_STEP, EXACT, NOISE
+from ...mechanism.model import Joint, JointType, Mechanism, Note
+from ...tolerances import COMPLEX_STEP, EXACT, FAINT, NOISE, RANK_GAP, SAME_GEOMETRY
+from .loops import LoopAssembly
 
 _LINES = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 _BALLS = (JointType.SPHERICAL, JointType.UNIVERSAL)
@@ -114,6 +116,27 @@ class _JointCoordinates:
             at = self.point[name]
             joints[name] = replace(joint, point=x[at : at + 3] * self.mechanism.length, axes=axes)
         return replace(self.mechanism, joints=joints)
+
+
+def as_meant(mechanism: Mechanism, residual: float) -> Mechanism:
+    """The mechanism, its loops open by ``residual``, with exact relations in place of nearly held ones; the gap of the
+    singular values is the evidence. Raises ``LoopsNotClosed`` or ``RankUndecided`` where it is none."""
+    written = LoopAssembly.of(mechanism)
+    found = exact_geometry(mechanism)
+    if found is None:
+        if residual > SAME_GEOMETRY:
+            raise LoopsNotClosed(str(mechanism.file), residual, SAME_GEOMETRY, written.worst(written.zero())[0])
+        return mechanism
+    meant = LoopAssembly.of(found.mechanism)
+    rank = meant.rank(meant.zero())
+    before, loose = written.rank(written.zero()), written.rank(written.zero(), FAINT)
+    text = (f"{found.mended} relations of joints (parallel, perpendicular, meeting, equal) that hold to {NOISE:g} are "
+            f"made exact, largest change {found.change:.1e}")
+    if before.value != rank.value or residual > SAME_GEOMETRY:
+        if loose.value != rank.value or loose.gap < RANK_GAP:
+            raise RankUndecided(f"{mechanism.file}: loops with rounded numbers", loose.gap, RANK_GAP)
+        text += f"; the loops' singular values as written leave a gap of {loose.gap:.1e} (needed {RANK_GAP:g})"
+    return replace(found.mechanism, notes=(*mechanism.notes, Note("merged", text)))
 
 
 def exact_geometry(mechanism: Mechanism) -> ExactGeometry | None:

@@ -7,7 +7,7 @@ from functools import cache
 from importlib import import_module
 
 from ...mechanism.model import Mechanism
-from ..dialect import Dialect, Read, RobotFile, Write, Written
+from ..dialect import Dialect, Read, RobotFile, Write
 from ..jointgraph import JointGraph
 
 NATIVE = "native"
@@ -34,7 +34,7 @@ def read(file: RobotFile) -> JointGraph | Mechanism:
     return reader(file)
 
 
-def write(mechanism: Mechanism, dialect: str) -> Written:
-    """The texts of a mechanism's files in a dialect."""
-    writer: Write = import_module(f"{__name__}.{dialect}.write").write
-    return writer(mechanism)
+def writer(dialect: str) -> Write:
+    """What writes a mechanism in a dialect."""
+    write: Write = import_module(f"{__name__}.{dialect}.write").write
+    return write

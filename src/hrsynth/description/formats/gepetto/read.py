@@ -25,8 +25,8 @@ TYPES = {"SPHERICAL": JointType.SPHERICAL, "FIXED": JointType.FIXED, "UJOINT": J
 def read(file: RobotFile) -> JointGraph:
     """The joint graph of either file of the two."""
     found = settings_beside(file)
-    path, (beside, settings) = (file.path, found) if found else (_urdf_beside(file.path), (file.path, None))
-    settings = settings or settings_in(beside)
+    path = _urdf_beside(file.path) if found is None else file.path
+    beside, settings = (file.path, settings_in(file.path)) if found is None else found
     if settings is None:
         raise xml.refusal(beside, "none of the keys of this dialect", ", ".join(KEYS))
     root = xml.document(xml.content(path), str(path))
