@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from ..tolerances import SAME_DIRECTION
-from .vectors import Array
+from .vectors import Array, cross
 
 
 def parallel(a: Array, b: Array) -> bool:
     """Whether two unit vectors are parallel (of either sense)."""
-    return bool(np.linalg.norm(np.cross(a, b)) < SAME_DIRECTION)
+    return bool(np.linalg.norm(cross(a, b)) < SAME_DIRECTION)
 
 
 def perpendicular(a: Array, b: Array) -> bool:

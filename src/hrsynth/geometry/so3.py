@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from .vectors import Array, hat
+from .vectors import Array, cross, hat
 
 
 def exponential(vectors: Array) -> Array:
@@ -49,10 +49,10 @@ def logarithm_rate(vector: Array) -> Array:
 def between(a: Array, b: Array) -> Array:
     """The rotation vectors (..., 3) of the smallest turns that bring unit vectors a (..., 3) to b (..., 3); of opposite
     ones half a turn about some normal."""
-    across = np.cross(a, b)
+    across = cross(a, b)
     sines = np.linalg.norm(across, axis=-1)[..., None]
     cosines = np.sum(a * b, axis=-1)[..., None]
-    normals = np.cross(a, np.eye(3)[np.argmin(np.abs(a), axis=-1)])
+    normals = cross(a, np.eye(3)[np.argmin(np.abs(a), axis=-1)])
     opposite = (sines == 0.0) & (cosines < 0.0)
     ways = np.where(opposite, normals / np.linalg.norm(normals, axis=-1)[..., None], across)
     return np.asarray(ways * np.arctan2(sines, cosines) / np.where(sines > 0.0, sines, 1.0))
@@ -68,7 +68,7 @@ def turn_about(normal: Array, R: Array) -> tuple[float, Array]:
     both = w * w + along * along
     if both == 0.0:
         return math.nan, np.zeros(3)
-    return wrap_angle(2 * math.atan2(along, w)), (w * w * normal + w * np.cross(v, normal) + along * v) / both
+    return wrap_angle(2 * math.atan2(along, w)), (w * w * normal + w * cross(v, normal) + along * v) / both
 
 
 def wrap_angle(angle: float) -> float:

@@ -93,7 +93,7 @@ class PinocchioModel:
             case JointType.PLANAR:
                 x = np.linalg.svd(turned.axis[None, :])[2][1]
                 return [pin.JointModelPrismaticUnaligned(x),
-                        pin.JointModelPrismaticUnaligned(np.cross(turned.axis, x)),
+                        pin.JointModelPrismaticUnaligned(cross(turned.axis, x)),
                         pin.JointModelRevoluteUnaligned(turned.axis)]
             case JointType.FREE:
                 return [pin.JointModelFreeFlyer()]

@@ -151,7 +151,7 @@ def _merged(one: Part, other: Part, tolerance: float) -> Part | None:
         near, far = common_perpendicular(one.point, one.axis, other.point, other.axis)
         if np.linalg.norm(far - near) > tolerance:
             return None
-        sine = np.linalg.norm(np.cross(one.axis, other.axis))
+        sine = np.linalg.norm(cross(one.axis, other.axis))
         if sine > OBLIQUE:
             return Part(False, 0.5 * (near + far), None, joints, (one.axis, other.axis))
         return Part(False, one.point, one.axis, (*joints, "")) if sine <= SAME_GEOMETRY else None

@@ -13,7 +13,7 @@ from itertools import combinations
 import numpy as np
 
 from ..geometry import lines
-from ..geometry.vectors import Array
+from ..geometry.vectors import Array, cross
 from ..tolerances import SAME_POINT
 from . import graphs
 from .model import JointType, Mechanism
@@ -203,7 +203,7 @@ class WordGraph:
                 (a, along), (b, beside) = self._vector(one), self._vector(two)
                 flat = np.eye(3) - np.outer(axis, axis)
                 if (np.linalg.norm(flat @ (along - beside)) <= tolerance
-                        and np.linalg.norm(np.cross(flat @ along, flat @ (b - a))) > tolerance**2
+                        and np.linalg.norm(cross(flat @ along, flat @ (b - a))) > tolerance**2
                         and np.linalg.norm(flat @ along) > tolerance):
                     motor = any(joints[n].actuated for c in (one, two) for n in (c.near, c.far))
                     names = tuple(n for c in (one, two) for n in (c.near, c.far))

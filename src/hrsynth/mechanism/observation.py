@@ -11,7 +11,7 @@ import numpy as np
 
 from ..errors import BadMechanism
 from ..geometry.so3 import wrap_angle
-from ..geometry.vectors import Array, frozen, hat, unit
+from ..geometry.vectors import Array, cross, frozen, hat, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +143,7 @@ class LinePosition(Observation):
     def value(self, X_reference: Array, X_link: Array) -> Array:
         """h, shape (3,), in the reference link's frame (m)."""
         u, arm = self._line(X_reference, X_link)
-        return X_reference[:3, :3].T @ np.cross(arm, u)
+        return X_reference[:3, :3].T @ cross(arm, u)
 
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
         """ḣ = ṗ × u + p × u̇ as the reference link sees it, shape (3, n)."""
@@ -191,7 +191,7 @@ class AngleEncoder(Encoder):
         """The angle, shape (1,), in (−π, π]."""
         mark = X_reference[:3, :3].T @ X_link[:3, :3] @ self.mark
         normal = self.start - (self.axis @ self.start) * self.axis
-        return np.array([np.arctan2(self.axis @ np.cross(normal, mark), normal @ mark)])
+        return np.array([np.arctan2(self.axis @ cross(normal, mark), normal @ mark)])
 
     def apart(self, value: Array, wanted: Array) -> Array:
         """The difference without whole turns: at half a turn the angle is π as well as −π."""

@@ -1,0 +1,60 @@
+"""Products of vectors for numbers of any kind, against NumPy; quaternions and rotations are inverse to each other."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+import numpy as np
+import pytest
+
+from hrsynth.geometry.so3 import exponential, quaternions, rotation_of
+from hrsynth.geometry.vectors import angle_between, cross, dot, hat, triple
+
+SHAPES = [((3,), (3,)), ((5, 3), (3,)), ((4, 1, 3), (5, 3))]
+
+
+@pytest.mark.parametrize("shapes", SHAPES)
+def test_products_are_numpys(shapes: tuple[tuple[int, ...], tuple[int, ...]]) -> None:
+    rng = np.random.default_rng(0)
+    a, b = (rng.normal(size=shape) for shape in shapes)
+    assert np.array_equal(cross(a, b), np.cross(a, b))
+    assert dot(a, b) == pytest.approx(np.einsum("...i,...i", *np.broadcast_arrays(a, b)))
+    assert triple(a, b, b) == pytest.approx(0, abs=1e-15)
+    assert (hat(a) @ b[..., None])[..., 0] == pytest.approx(np.cross(a, b))
+
+
+@pytest.mark.parametrize("axis", [-1, -2, -3])
+def test_products_run_along_any_dimension(axis: int) -> None:
+    rng = np.random.default_rng(1)
+    a, b = (np.moveaxis(rng.normal(size=(2, 4, 3)), -1, axis) for _ in range(2))
+    assert np.array_equal(cross(a, b, axis), np.cross(a, b, axis=axis))
+    assert np.array_equal(dot(a, b, axis), (a * b).sum(axis))
+
+
+@pytest.mark.parametrize("count", [(), (4,)])
+def test_products_of_exact_numbers_are_exact(count: tuple[int, ...]) -> None:
+    rng = np.random.default_rng(2)
+    a, b = (np.vectorize(Fraction, otypes=[object])(rng.integers(1, 10**9, (*count, 3)), 10**9 + 7) for _ in range(2))
+    found = cross(a, b)
+    assert found.dtype == object
+    assert not dot(a, found).any()
+    assert not dot(b, found).any()
+    assert all(isinstance(x, Fraction) for x in found.flat)
+
+
+def test_quaternions_and_rotations_are_inverse() -> None:
+    rng = np.random.default_rng(3)
+    q = rng.normal(size=(50, 4))
+    q /= np.linalg.norm(q, axis=1)[:, None] * np.where(q[:, :1] < 0, -1.0, 1.0)
+    R = np.array([rotation_of(each) for each in q])
+    assert quaternions(R) == pytest.approx(q, abs=1e-14)
+    assert R @ R.swapaxes(1, 2) == pytest.approx(np.broadcast_to(np.eye(3), R.shape), abs=1e-14)
+
+
+@pytest.mark.parametrize("angle", [0.0, 1e-9, 1.0, np.pi / 2, np.pi - 1e-9])
+def test_the_angle_between_a_vector_and_its_turn(angle: float) -> None:
+    rng = np.random.default_rng(4)
+    v = rng.normal(size=3)
+    normal = np.cross(v, rng.normal(size=3))
+    turned = exponential(angle * normal / np.linalg.norm(normal)) @ v
+    assert angle_between(v, turned) == pytest.approx(angle, abs=1e-14)
