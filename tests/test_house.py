@@ -58,7 +58,6 @@ NOT_IN_FILES = ["TO" "DO", "FIX" "ME", "/wo" "rk/", "pypi" ".org", "python" "hos
 STILL_TWICE = {
     "Body",
     "Chain",
-    "Claim",
     "Joint",
     "Leg",
     "Limb",

@@ -18,7 +18,7 @@ class PrintedMode:
 
 
 @dataclass(frozen=True)
-class Claim:
+class PrintedClaim:
     """The modes printed for a robot of the families, the legs watched there and the desired pose."""
 
     source: str
@@ -37,31 +37,31 @@ GOAL = "the desired pose itself"
 OFF_PLANE = "at φ = 0 it puts the tip of leg {leg} 88 mm outside the plane of its circle; the second pair has φ = 180°"
 
 CLAIMS = (
-    Claim("MMT 5.1.3", "quattro", ("1", "4"), (-0.2, 0.0, -0.56), (
+    PrintedClaim("MMT 5.1.3", "quattro", ("1", "4"), (-0.2, 0.0, -0.56), (
         PrintedMode((-0.2, 0.0, -0.56), GOAL),
         PrintedMode((-0.2, 0.0, -0.909), "the same mode, with other digits from the printed dimensions"),
         PrintedMode((-0.138, 0.062, -1.019), OFF_PLANE.format(leg=4)),
         PrintedMode((-0.138, 0.062, -0.45), OFF_PLANE.format(leg=4)))),
-    Claim("MMT 5.1.3", "quattro", ("2", "3"), (-0.2, 0.0, -0.56), (
+    PrintedClaim("MMT 5.1.3", "quattro", ("2", "3"), (-0.2, 0.0, -0.56), (
         PrintedMode((-0.2, 0.0, -0.56), GOAL),
         PrintedMode((-0.2, 0.0, -0.296), "a mode of the hidden robot with other digits, but legs 1 and 4 do not "
                     "reach it"),
         PrintedMode((-0.262, 0.062, -0.694), OFF_PLANE.format(leg=3)),
         PrintedMode((-0.262, 0.062, -0.161), OFF_PLANE.format(leg=3)))),
-    Claim("MMT 5.1.3", "quattro", ("1", "2", "3", "4"), (0.03, 0.03, -0.59), (
+    PrintedClaim("MMT 5.1.3", "quattro", ("1", "2", "3", "4"), (0.03, 0.03, -0.59), (
         PrintedMode((0.03, 0.03, -0.59), GOAL),
         PrintedMode((0.03, 0.03, -0.65), "no mode: the directions of legs 1 and 3 differ by 0.53° and 0.56° from "
                     "those at the desired pose, and the error is stationary nowhere near it"))),
-    Claim("IROS V", "quattro_rigid", ("1", "2"), (0.0, -0.25, -0.7), (
+    PrintedClaim("IROS V", "quattro_rigid", ("1", "2"), (0.0, -0.25, -0.7), (
         PrintedMode((0.0, -0.25, -0.7), GOAL),
         PrintedMode((0.0, -0.25, -0.958), "impossible: the circles' centres would lie 829 mm below the base, "
                     "deeper than a rod of 825 mm reaches"))),
-    Claim("IROS V", "quattro_rigid", ("1", "3"), (0.0, -0.25, -0.7), (
+    PrintedClaim("IROS V", "quattro_rigid", ("1", "3"), (0.0, -0.25, -0.7), (
         PrintedMode((0.0, -0.25, -0.7), GOAL),)),
 )
 """All of them, in the order of the papers."""
 
 
-def printed() -> Iterator[tuple[Claim, PrintedMode]]:
+def printed() -> Iterator[tuple[PrintedClaim, PrintedMode]]:
     """Each printed pose with its claim."""
     return ((claim, mode) for claim in CLAIMS for mode in claim.modes)

@@ -8,14 +8,14 @@ from functools import cache
 
 from ..analysis.modes.modes import AssemblyMode, AssemblyModes, modes
 from ..description import load, shipped
-from ..families.printed import CLAIMS, Claim, Place
+from ..families.printed import CLAIMS, Place, PrintedClaim
 
 START = "<!-- generated: printed modes -->"
 HEADS = ("source", "robot", "legs", "printed x, y, z (φ = 0)", "computed x, y, z; φ", "apart", "word")
 
 
 @cache
-def computed(claim: Claim) -> AssemblyModes:
+def computed(claim: PrintedClaim) -> AssemblyModes:
     """All modes with the directions that the claim's legs have at its desired pose."""
     return modes(load(shipped()[claim.robot]), claim.legs, at=claim.at)
 
@@ -31,7 +31,7 @@ def table() -> str:
     return "\n".join([_line(HEADS), rule, *(_line(row) for claim in CLAIMS for row in _rows(claim))]) + "\n"
 
 
-def _rows(claim: Claim) -> Iterator[tuple[str, ...]]:
+def _rows(claim: PrintedClaim) -> Iterator[tuple[str, ...]]:
     found = computed(claim)
     head = (claim.source, f"`{claim.robot}`", ", ".join(claim.legs))
     met = []

@@ -16,7 +16,7 @@ from scipy.optimize import least_squares
 
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
 from hrsynth.description import load, shipped
-from hrsynth.families.printed import CLAIMS, GOAL, Claim, PrintedMode, printed
+from hrsynth.families.printed import CLAIMS, GOAL, PrintedClaim, PrintedMode, printed
 from hrsynth.geometry.vectors import Array
 from hrsynth.present import printed as table
 from hrsynth.present import readme
@@ -92,16 +92,16 @@ def coordinates(found: AssemblyModes, size: int) -> Array:
 listed = table.computed
 
 
-def goal_of(claim: Claim) -> Array:
+def goal_of(claim: PrintedClaim) -> Array:
     return np.array([*claim.goal, 0.0][:4 if claim.robot == "quattro" else 3])
 
 
-def spoken(claim: Claim) -> str:
+def spoken(claim: PrintedClaim) -> str:
     return f"{claim.robot}:{','.join(claim.legs)}"
 
 
 @pytest.mark.parametrize("claim", CLAIMS, ids=spoken)
-def test_the_closed_form_has_the_modes_that_are_listed(claim: Claim):
+def test_the_closed_form_has_the_modes_that_are_listed(claim: PrintedClaim):
     goal, found = goal_of(claim), listed(claim)
     assert found.found.complete
     ours = coordinates(found, len(goal))
@@ -111,8 +111,8 @@ def test_the_closed_form_has_the_modes_that_are_listed(claim: Claim):
 
 
 @pytest.mark.parametrize(("claim", "mode"), list(printed()), ids=lambda each: (
-    spoken(each) if isinstance(each, Claim) else "/".join(map(str, each.place))))
-def test_only_the_desired_poses_are_printed_as_they_are(claim: Claim, mode: PrintedMode):
+    spoken(each) if isinstance(each, PrintedClaim) else "/".join(map(str, each.place))))
+def test_only_the_desired_poses_are_printed_as_they_are(claim: PrintedClaim, mode: PrintedMode):
     nearest = table.nearest(mode.place, listed(claim))
     apart = math.dist(mode.place, (nearest.pose.x, nearest.pose.y, nearest.pose.z))
     assert nearest.goal == (mode.remark == GOAL or claim.legs == ("1", "2", "3", "4"))
