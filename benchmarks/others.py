@@ -22,7 +22,7 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
-from hrsynth.catalog.source import unmoved
+from hrsynth.catalog.build import unmoved
 from hrsynth.catalog.words import parse
 from hrsynth.description import load, shipped
 from hrsynth.description.formats.mjcf.write import write

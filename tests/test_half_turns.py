@@ -31,7 +31,7 @@ from hrsynth.kinematics.tasks import Target
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.pose import Grid, Pose
 from hrsynth.selection import select as selections
-from hrsynth.simulation.desired import whole
+from hrsynth.simulation.law import whole
 from hrsynth.simulation.servo import servo
 from kinematics.robots import state_of
 from oracle import Oracle

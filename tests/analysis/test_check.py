@@ -14,7 +14,7 @@ from hrsynth.analysis import posture as posture_module
 from hrsynth.analysis.check import MEASURES, Check, check
 from hrsynth.analysis.classes import Counts, interaction_matrix, redundant_rows, surplus
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.posture import Examiner, Posture
+from hrsynth.analysis.posture import ConfigurationAnalysis, Posture
 from hrsynth.description import load
 from hrsynth.geometry.ranks import CLEAN
 from hrsynth.geometry.vectors import Array, inverse
@@ -72,7 +72,7 @@ def dims(basis: Array, twist_rows: int) -> tuple[int, int, int]:
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_ranks_are_those_of_the_oracle(robot: str) -> None:
     setting = setting_of(robot)
-    examiner, question = Examiner(setting), setting.samples.question
+    examiner, question = ConfigurationAnalysis(setting), setting.samples.question
     oracle = Oracle(setting.mechanism)
     for at in (setting.everything.start, *(m.configuration for m in setting.everything.members)):
         found = examiner.examine(at)
@@ -99,9 +99,9 @@ def test_ranks_are_those_of_the_oracle(robot: str) -> None:
 def test_singular_values_are_those_of_the_oracle(robot: str) -> None:
     """The extreme ratios |u̇| / |t| over all motions, from the oracle's ρ."""
     setting = setting_of(robot)
-    oracle, examiner = Oracle(setting.mechanism), Examiner(setting)
+    oracle, examiner = Oracle(setting.mechanism), ConfigurationAnalysis(setting)
     for member in setting.everything.members:
-        at, distances = member.configuration, examiner.glance(member.configuration).distances
+        at, distances = member.configuration, examiner.classify(member.configuration).distances
         basis = oracle.relation(state_of(at.twin, at.q), setting.observed)
         directions = np.linalg.svd(basis[:6], full_matrices=False)[0][:, : basis.shape[1]]
         values = np.linalg.svd(basis[6:] @ np.linalg.pinv(basis[:6]) @ directions, compute_uv=False)[: basis.shape[1]]
@@ -120,7 +120,7 @@ def test_singular_values_are_those_of_the_oracle(robot: str) -> None:
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_redundant_rows_add_up(robot: str) -> None:
     """All rows of the loops less their rank, at zero and at samples; what is redundant only here is what is lost."""
-    examiner = Examiner(setting_of(robot))
+    examiner = ConfigurationAnalysis(setting_of(robot))
     for at in (examiner.setting.everything.start, *(m.configuration for m in examiner.setting.everything.members)):
         rows = redundant_rows(at)
         J = at.twin.jacobian(at.q)
@@ -224,7 +224,7 @@ def test_gained_freedoms_are_those_beyond_the_usual_ones() -> None:
     def having(columns: list[int]) -> Relation:
         return Relation(np.eye(6)[:, columns], 6, (), len(columns), CLEAN)
 
-    examiner = Examiner(setting_of("delta"))
+    examiner = ConfigurationAnalysis(setting_of("delta"))
     gained = examiner._gained(having([0, 1, 2, 5]))
     np.testing.assert_allclose(np.abs(gained[:, 0]), [0, 0, 0, 0, 0, 1], atol=1e-9)
     assert gained.shape[1] == 1
@@ -235,7 +235,7 @@ def test_gained_freedoms_are_those_beyond_the_usual_ones() -> None:
 @quick
 def test_random_robots_obey_the_identities(mechanism: Mechanism) -> None:
     setting = ObservedRobot.of(mechanism, samples=3)
-    examiner = Examiner(setting)
+    examiner = ConfigurationAnalysis(setting)
     for at in (setting.everything.start, *(m.configuration for m in setting.everything.members)):
         found = examiner.examine(at)
         check_identities(found)

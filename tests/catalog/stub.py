@@ -14,8 +14,7 @@ import time
 from importlib.util import find_spec
 from typing import Any
 
-from hrsynth.catalog.build import build
-from hrsynth.catalog.source import Source
+from hrsynth.catalog.build import WordSource, build
 from hrsynth.errors import HrsynthError
 
 DELAY = float(os.environ.get("STUB_DELAY", "0"))
@@ -72,9 +71,9 @@ def slowly(word: str) -> dict[str, Any]:
     return entry(word)
 
 
-def source(sizes: tuple[int, ...] = (12, 9)) -> Source:
+def source(sizes: tuple[int, ...] = (12, 9)) -> WordSource:
     """Groups ``c`` and ``d`` with so many pairs of words."""
-    return Source({name: _Words(name, size) for name, size in zip("cd", sizes, strict=True)}, entry, kin)
+    return WordSource({name: _Words(name, size) for name, size in zip("cd", sizes, strict=True)}, entry, kin)
 
 
 class _Words:

@@ -19,10 +19,9 @@ from hypothesis import strategies as st
 
 from catalog.stub import REFUSED, broken, died, entry, source
 from hrsynth.catalog import load
-from hrsynth.catalog.build import build
+from hrsynth.catalog.build import architectures, build
 from hrsynth.catalog.journal import Journal
 from hrsynth.catalog.jsonl import decoded, encoded, line
-from hrsynth.catalog.source import architectures
 from hrsynth.errors import BadRequest, BuildStopped, HrsynthError
 
 TESTS = Path(__file__).resolve().parent.parent

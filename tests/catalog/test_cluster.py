@@ -18,7 +18,7 @@ import pytest
 from catalog.stub import slowly, source
 from catalog.test_build import TESTS, content, lines_in
 from hrsynth.catalog.build import build
-from hrsynth.catalog.executors import crew
+from hrsynth.catalog.executors import executor
 from hrsynth.errors import BadRequest, BuildStopped
 
 pytest.importorskip("distributed")
@@ -111,4 +111,4 @@ def test_a_dead_or_wrong_address_is_one_line(address: str, said: str, status: in
 def test_workers_or_a_cluster_but_some():
     for arguments in ((0, None), (2, "tcp://127.0.0.1:1")):
         with pytest.raises(BadRequest, match="workers"):
-            crew(*arguments)
+            executor(*arguments)

@@ -14,7 +14,7 @@ from hrsynth.catalog.entry import entry, model
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS, words
 from hrsynth.catalog.groups.planar import chains
-from hrsynth.catalog.words import Leg, Word, parse
+from hrsynth.catalog.words import LegWord, RobotWord, parse
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
 from oracle import Oracle
@@ -57,9 +57,9 @@ def _symmetric(platform, motors):
         if platform and letters[-1] != "R":
             continue
         for motor in range(motors):
-            leg = Leg(tuple(joint.__class__(joint.letter, joint.axes, i == motor) for i, joint in
+            leg = LegWord(tuple(joint.__class__(joint.letter, joint.axes, i == motor) for i, joint in
                             enumerate(chain.joints)))
-            table[letters, motor] = entry(str(Word.of([leg] * (2 if platform else 3), platform=platform)))
+            table[letters, motor] = entry(str(RobotWord.of([leg] * (2 if platform else 3), platform=platform)))
     return table
 
 
@@ -89,7 +89,7 @@ def test_the_twelve_symmetric_planar_robots_fall_out():
 def test_what_is_driven_changes_nothing_else():
     for text in random.Random(1).sample(words("planar"), 3):
         word = parse(text)
-        other = str(Word.of([Leg(tuple(joint.__class__(joint.letter, joint.axes, i == 0, joint.watched)
+        other = str(RobotWord.of([LegWord(tuple(joint.__class__(joint.letter, joint.axes, i == 0, joint.watched)
                                        for i, joint in enumerate(leg.joints))) for leg in word.legs],
                             platform=word.platform))
         one, two = entry(text), entry(other)

@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 import hrsynth
 from catalog.stub import CHAINS, REFUSED, VERDICTS, WORKERS, source
 from hrsynth.catalog import Catalog, load
-from hrsynth.catalog.build import build
-from hrsynth.catalog.check import check
+from hrsynth.catalog.build import build, check
 from hrsynth.errors import BadRequest
 
 ASKED = st.fixed_dictionaries({}, optional={

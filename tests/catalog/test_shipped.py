@@ -5,7 +5,7 @@ from __future__ import annotations
 import pytest
 
 from hrsynth.catalog import load
-from hrsynth.catalog.check import check
+from hrsynth.catalog.build import check
 from hrsynth.catalog.groups import GROUPS
 from hrsynth.catalog.store import shipped
 from hrsynth.catalog.words import parse

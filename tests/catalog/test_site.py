@@ -20,10 +20,9 @@ from hrsynth.catalog import Catalog
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.jsonl import line, record
-from hrsynth.catalog.site import Site, build, folder, site, study
-from hrsynth.catalog.site.index import LISTS, NUMBERS, TEXTS, columns
-from hrsynth.catalog.site.pages import trace
-from hrsynth.catalog.site.render import notation, rendered
+from hrsynth.catalog.site import Site, build, folder, site
+from hrsynth.catalog.site.index import LISTS, NUMBERS, TEXTS, columns, notation, rendered
+from hrsynth.catalog.site.pages import study, trace
 from hrsynth.catalog.site.structures import Structure, named, structures
 from hrsynth.catalog.words import parse
 from hrsynth.cli import execute
@@ -229,10 +228,10 @@ def test_what_stands_in_a_page_is_made_safe():
 
 def test_a_derivation_that_does_not_end_in_the_record_is_told(catalog):
     fact = {**catalog.records[0], "hidden": "3-R*R", "rank": 2}
-    found = study.study(fact)
+    found = study(fact)
     assert found.derivation is not None
     assert found.differs == "3-PiR*R, controllable, rank 3"
-    assert not study.study(catalog.records[0]).differs
+    assert not study(catalog.records[0]).differs
 
 
 def refused(target: Path, catalog: Catalog) -> str:

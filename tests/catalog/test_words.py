@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS, group, words
-from hrsynth.catalog.words import COMPOSITE, Leg, Word, parse
+from hrsynth.catalog.words import COMPOSITE, LegWord, RobotWord, parse
 from hrsynth.errors import BadRequest
 from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
@@ -50,14 +50,14 @@ def test_order_of_legs_and_choice_of_names_do_not_count(text, rng):
         rng.shuffle(renamed)
         bodies.append(renamed)
     rng.shuffle(bodies)
-    assert str(Word.of(*bodies, platform=word.platform)) == text
+    assert str(RobotWord.of(*bodies, platform=word.platform)) == text
     assert parse(str(word)) == word
 
 
 def _renamed(leg, rng):
     for kind in ("hjm", "abc"):
         to = "".join(rng.sample(kind, 3))
-        leg = Leg(tuple(joint.__class__(joint.letter, joint.axes.translate(str.maketrans(kind, to)), joint.motor,
+        leg = LegWord(tuple(joint.__class__(joint.letter, joint.axes.translate(str.maketrans(kind, to)), joint.motor,
                                         joint.watched) for joint in leg.joints))
     return leg
 

@@ -25,7 +25,7 @@ from typing import Any
 from hrsynth.analysis.observed import SAMPLES, ObservedRobot
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
-from hrsynth.catalog.words import Word, parse
+from hrsynth.catalog.words import RobotWord, parse
 from hrsynth.errors import HrsynthError
 from hrsynth.kinematics.branch import Signature
 
@@ -48,7 +48,7 @@ def word(number: int) -> str:
         return str(one)
     legs = [leg for _ in range(3) for other in [parse(rng.choice(texts))] if not other.platform for leg in other.legs]
     count = rng.randint(2, 4)
-    return str(Word.of([rng.choice([*one.legs, *legs]) for _ in range(count)]))
+    return str(RobotWord.of([rng.choice([*one.legs, *legs]) for _ in range(count)]))
 
 
 def ranks(setting: ObservedRobot) -> list[int]:

@@ -26,11 +26,10 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction
 from hrsynth.kinematics.relation import relation
 from hrsynth.present.readme import replaced
-from hrsynth.simulation.desired import Step
 from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
-from hrsynth.simulation.law import Law, directions
+from hrsynth.simulation.law import FixedDirections, Law, directions
 from hrsynth.simulation.result import Servo
-from hrsynth.simulation.scene import EXACT, Scene
+from hrsynth.simulation.servo import Conditions, ServoTask
 from kinematics.robots import state_of
 from oracle import Oracle
 from simulation.scenes import CONTROLLABLE, far_pairs, setting
@@ -46,8 +45,8 @@ def run_between(name: str, start: ClosedConfiguration, goal: ClosedConfiguration
     found = setting(name)
     law = Law(found.samples.question, found.dof, gain)
     pose = found.motion.pose(goal.pose(found.motion.link))
-    scene = Scene(found, start, goal, law, Step(directions(goal, law.question)[0]), lambda: modes(load(name), at=pose))
-    return scene.told(scene.loop().simulate(start, scene.horizon(None, noisy=False)), EXACT, None)
+    desired = FixedDirections(directions(goal, law.question)[0])
+    return ServoTask(found, start, goal, law, desired, lambda: modes(load(name), at=pose), Conditions(gain)).run()
 
 
 def untrue(found: Servo) -> Iterator[str]:

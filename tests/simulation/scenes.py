@@ -11,13 +11,13 @@ import pytest
 from _pytest.mark import ParameterSet
 
 from hrsynth.analysis.observed import ObservedRobot
-from hrsynth.analysis.posture import REGULAR, Examiner
+from hrsynth.analysis.posture import REGULAR, ConfigurationAnalysis
 from hrsynth.batch.reach import reach
 from hrsynth.description import load, shipped
 from hrsynth.errors import PoseNotReached
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.sampling import random_walk
-from hrsynth.simulation.scene import Scene
+from hrsynth.simulation.servo import ServoTask
 
 CONTROLLABLE = [
     "3prr_m1", "3prr_m2", "3puu", "3rpr_m1", "3rpr_m2", "3rps", "3rrr_m1", "3rrr_m2", "3ruu", "3upu", "6pus", "delta",
@@ -40,11 +40,11 @@ def setting(name: str) -> ObservedRobot:
 
 
 @cache
-def home(name: str) -> Scene:
+def home(name: str) -> ServoTask:
     """A scene that starts and ends at the first regular pose: parts of it are put to use."""
     found = setting(name)
     pose = next(str(found.motion.pose(at.pose(found.motion.link))) for at in regular(name, 0, 0.4))
-    return Scene.of(load(name), None, None, start=pose, goal=pose, gain=0.8)
+    return ServoTask.of(load(name), None, None, start=pose, goal=pose)
 
 
 def regular(name: str, seed: int, distance: float, steps: int = 12, apart: int = 1,
@@ -53,11 +53,11 @@ def regular(name: str, seed: int, distance: float, steps: int = 12, apart: int =
     from Type 2 singularities (part of the usual distance), ``apart`` steps of a random walk from each other; at most
     ``tried`` steps are made."""
     found = setting(name)
-    examiner = Examiner(found)
+    examiner = ConfigurationAnalysis(found)
     question, start = found.everything.question, found.everything.start
-    usual = np.median([examiner.glance(at).distances.type2 or 0.0 for at in found.configurations])
+    usual = np.median([examiner.classify(at).distances.type2 or 0.0 for at in found.configurations])
     for at in islice(random_walk(start, tried, seed=seed, steps=steps), apart - 1, None, apart):
-        posture = examiner.glance(at)
+        posture = examiner.classify(at)
         if posture.hidden.state != REGULAR or (posture.distances.type2 or 0.0) < distance * usual:
             continue
         try:

@@ -11,8 +11,7 @@ from hrsynth.description import load, shipped
 from hrsynth.errors import BadMechanism, BadRequest, MissingExtra
 from hrsynth.mechanism import Joint, JointType
 from hrsynth.simulation.bench import Bench
-from hrsynth.simulation.desired import Step
-from hrsynth.simulation.law import Law, directions
+from hrsynth.simulation.law import FixedDirections, Law, directions
 from hrsynth.simulation.mockup import mockup
 from hrsynth.simulation.run import Loop
 from hrsynth.simulation.servo import servo
@@ -48,7 +47,7 @@ def check_together(name: str) -> None:
     found = setting(name)
     start, goal = found.everything.start, next(regular(name, 5, 0.4, steps=3))
     law = Law(found.samples.question, found.dof, 2.0)
-    loop = Loop(law, found.everything.question, Step(directions(goal, law.question)[0]))
+    loop = Loop(law, found.everything.question, FixedDirections(directions(goal, law.question)[0]))
     still = loop.simulate(start, 30.0)
     run, moved = Bench.of(found, start).run(loop, 12.0)
     motion = found.motion

@@ -16,7 +16,7 @@ from hrsynth.geometry.vectors import Array, unit
 from hrsynth.simulation import pictures
 from hrsynth.simulation.camera import Camera, Edges, cylinders, edges, placed, rebuilt, sensitivity
 from hrsynth.simulation.law import directions
-from hrsynth.simulation.noise import PERIOD, Amount, Cones, Shocks
+from hrsynth.simulation.noise import PERIOD, Cones, Noise, Shocks
 from hrsynth.simulation.servo import servo
 from simulation.scenes import home
 
@@ -111,13 +111,13 @@ def test_cones_are_filled():
 @pytest.mark.parametrize(("text", "value", "pixels"), [("0.1deg", math.radians(0.1), False), ("0.002", 0.002, False),
                                                        ("0.3px", 0.3, True)])
 def test_amounts(text: str, value: float, pixels: bool):
-    assert (Amount.parse(text).value, Amount.parse(text).pixels) == (pytest.approx(value), pixels)
+    assert (Noise.parse(text).value, Noise.parse(text).pixels) == (pytest.approx(value), pixels)
 
 
 @pytest.mark.parametrize("text", ["", "deg", "much", "-1deg", "0px", "90deg", "nan", "inf"])
 def test_amounts_that_are_none(text: str):
     with pytest.raises(BadRequest):
-        Amount.parse(text)
+        Noise.parse(text)
 
 
 def test_without_opencv_pictures_are_refused_in_one_line(monkeypatch: pytest.MonkeyPatch):
@@ -136,7 +136,7 @@ def test_directions_from_rendered_pictures(name: str):
     mechanism, question = scene.setting.mechanism, scene.law.question
     rods = cylinders(mechanism, question.observations)
     camera = placed(rods, question.reference, (scene.start.pose,))
-    stage = pictures.Stage(mechanism, camera, question.reference, rods)
+    stage = pictures.LegRenderer(mechanism, camera, question.reference, rods)
     try:
         picture = stage.picture(scene.start.pose)
     except NotRendered as error:

@@ -11,9 +11,9 @@ import hrsynth.simulation.run as engine
 from hrsynth.description import load
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.simulation.ending import BOUNDARY, TIME, UNDECIDED
-from hrsynth.simulation.rest import rest_near
 from hrsynth.simulation.result import Servo
-from hrsynth.simulation.scene import EXACT, Scene
+from hrsynth.simulation.run import rest_near
+from hrsynth.simulation.servo import ServoTask
 from simulation.far import run_between
 from simulation.scenes import CONTROLLABLE, far_pairs
 
@@ -23,9 +23,9 @@ LASTS = (30.0, 60.0, 150.0)
 
 def test_a_leg_that_is_stretched_is_a_boundary_however_long_the_run_may_take() -> None:
     """It was *time* after 75 s, and *boundary* with 400 s; at the fold integrators chatter."""
-    scene = Scene.of(load("quattro_rigid"), "1,3", None, start="x=-0.314,y=0.319,z=-0.64",
-                     goal="x=0.342,y=-0.267,z=-0.812", gain=0.8)
-    found = [scene.told(scene.loop().simulate(scene.start, lasts), EXACT, None) for lasts in (25, 75, 400)]
+    scene = ServoTask.of(load("quattro_rigid"), "1,3", None, start="x=-0.314,y=0.319,z=-0.64",
+                     goal="x=0.342,y=-0.267,z=-0.812")
+    found = [scene.result(scene.loop().simulate(scene.start, lasts)) for lasts in (25, 75, 400)]
     assert [each.ended for each in found] == [BOUNDARY] * 3
     assert all("not watched is stretched" in each.ending.reason for each in found)
     assert np.allclose(found[0].way[-1], found[1].way[-1], atol=1e-6)
@@ -36,7 +36,7 @@ def runs(name: str, start: ClosedConfiguration, goal: ClosedConfiguration,
          monkeypatch: pytest.MonkeyPatch) -> Iterator[Servo]:
     """The same run with other times and other tolerances of the integrator."""
     for lasts in LASTS:
-        monkeypatch.setattr("hrsynth.simulation.scene.LASTS", 0.8 * lasts)
+        monkeypatch.setattr("hrsynth.simulation.servo.LASTS", 0.8 * lasts)
         yield run_between(name, start, goal)
     for tolerance in (1e-5, 1e-7):
         monkeypatch.setattr(engine, "INTEGRATED", tolerance)

@@ -15,7 +15,7 @@ from ..progress import tell
 from ..results import Result
 from .classes import Redundancy, listed
 from .observed import ObservedRobot
-from .posture import Examiner, Posture
+from .posture import ConfigurationAnalysis, Posture
 
 UNREACHABLE = "unreachable"
 MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degrees_per_degree")
@@ -91,7 +91,7 @@ def check(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
     poses = [Pose.parse(each) if isinstance(each, str) else each for each in at]
     cells = Grid.parse(grid) if isinstance(grid, str) else grid
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
-    examiner = Examiner(setting)
+    examiner = ConfigurationAnalysis(setting)
     start, question, motion = setting.everything.start, setting.everything.question, setting.motion
     configurations = [reach(start, question, pose, motion) for pose in poses] or [start]
     tell("poses")
@@ -99,5 +99,5 @@ def check(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
     swept = None
     if cells is not None:
         found = sweep(start, question, cells, motion, setting.placer)
-        swept = GridCheck(cells, tuple(None if each is None else examiner.glance(each) for each in found))
+        swept = GridCheck(cells, tuple(None if each is None else examiner.classify(each) for each in found))
     return Check(setting, postures, listed(examiner.redundant, generic=True), swept)

@@ -133,7 +133,7 @@ class Posture:
 
 
 @dataclass(frozen=True, eq=False)
-class Examiner:
+class ConfigurationAnalysis:
     """A setting with its generic values, against which single configurations are held."""
 
     setting: ObservedRobot
@@ -156,7 +156,7 @@ class Examiner:
     def _real(self, at: ClosedConfiguration) -> Relation:
         return relation_of(at, self.setting.samples.question, np.eye(at.twin.nv)[at.twin.actuated()])
 
-    def glance(self, at: ClosedConfiguration) -> Posture:
+    def classify(self, at: ClosedConfiguration) -> Posture:
         """What can be said without names: no freedoms, no redundant constraints."""
         setting = self.setting
         found = relation(at, setting.samples.question)
@@ -168,7 +168,7 @@ class Examiner:
 
     def examine(self, at: ClosedConfiguration) -> Posture:
         """All that can be said of a configuration."""
-        posture = self.glance(at)
+        posture = self.classify(at)
         hidden, real = posture.hidden, posture.real
         found = relation(at, self.setting.samples.question)
         hidden = replace(hidden, lost=self._named(at, found.unobserved_twists) if hidden.classes else ())

@@ -1,4 +1,5 @@
-"""Building the catalog: what the journal does not have yet is made by a crew, then a group is written whole.
+"""Building the catalog: what the journal does not have yet is made, then a group is written whole; and checking whether
+what is stored is what would be built today.
 
 The bytes depend on the words and their records alone: not on who made them, in what order, or how often the build was
 killed on the way.
@@ -6,24 +7,90 @@ killed on the way.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+import random
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from ..errors import BuildStopped
-from .executors import Crew, crew
+from ..errors import BadRequest, BuildStopped, HrsynthError
+from .executors import Executor, Made, Stopped, executor
 from .journal import Journal
-from .source import Made, Source, Stopped, architectures, made
-from .store import Store, store
+from .jsonl import encoded, line, word_of
+from .store import Folder, Store, store
 
 CHUNK = 8
 """Least number of words that a worker is given at a time."""
 
 Tell = Callable[[str, int, int], None]
 """Is told a group, how many of its records are there, and of how many: first of all groups, then of the one at work."""
+
+
+@dataclass(frozen=True)
+class WordSource:
+    """Groups of canonical words; ``entry`` gives the record of one, and can be sent to other processes.
+
+    Words of the same ``sharing_key`` share most of their work, so they are made one after the other in one process.
+    """
+
+    groups: Mapping[str, Callable[[], Iterable[str]]]
+    entry: Callable[[str], dict[str, Any]]
+    sharing_key: Callable[[str], str] = str
+
+    def chosen(self, names: Sequence[str]) -> list[str]:
+        """The groups of these names, all if there are none; raises ``BadRequest``."""
+        for name in names:
+            if name not in self.groups:
+                raise BadRequest("unknown group", name, list(self.groups))
+        return list(dict.fromkeys(names)) or list(self.groups)
+
+    def words(self, group: str) -> list[str]:
+        """The words of a group, sorted."""
+        return sorted(set(self.groups[group]()))
+
+    def chunks(self, words: Iterable[str], size: int) -> Iterator[list[str]]:
+        """The words in parts of at least ``size`` (but for the last); those that share work stay together."""
+        chunk: list[str] = []
+        for _, alike in groupby(sorted((self.sharing_key(word), word) for word in words), key=lambda pair: pair[0]):
+            chunk += [word for _, word in alike]
+            if len(chunk) >= size:
+                yield chunk
+                chunk = []
+        if chunk:
+            yield chunk
+
+
+def architectures() -> WordSource:
+    """The catalog itself."""
+    from .entry import entry
+    from .groups import GROUPS
+
+    return WordSource(GROUPS, entry, unmoved)
+
+
+def unmoved(word: str) -> str:
+    """The word without its motors: what a hidden robot is found from."""
+    from .words import parse
+
+    return str(parse(word).unmoved)
+
+
+def made(entry: Callable[[str], dict[str, Any]], group: str, words: Iterable[str]) -> Made:
+    """The records of words; one that is refused says why, in one line. Raises ``Stopped`` for a defect of our own."""
+    return [(word, line({**_record(entry, word), "word": word, "group": group})) for word in words]
+
+
+def _record(entry: Callable[[str], dict[str, Any]], word: str) -> dict[str, Any]:
+    try:
+        return entry(word)
+    except HrsynthError as error:
+        return {"refused": "; ".join(error.lines())}
+    except Exception as error:
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        raise Stopped(f"{word}: a defect of hrsynth itself, please report it: {what}") from error
 
 
 @dataclass(frozen=True)
@@ -41,7 +108,7 @@ class Built:
                 "file": None if self.file is None else str(self.file)}
 
 
-def build(target: str | Path, groups: Sequence[str] = (), *, source: Source | None = None, workers: int = 1,
+def build(target: str | Path, groups: Sequence[str] = (), *, source: WordSource | None = None, workers: int = 1,
           cluster: str | None = None, limit: int | None = None, anew: bool = False, tell: Tell | None = None
           ) -> tuple[Built, ...]:
     """Build groups (default: all) into a folder, or a file that ends in ``.sqlite``.
@@ -60,7 +127,7 @@ def build(target: str | Path, groups: Sequence[str] = (), *, source: Source | No
         Where joblib or dask is not installed.
     """
     source, tell = source or architectures(), tell or (lambda *_: None)
-    kept, team, done = store(target), crew(workers, cluster), list[Built]()
+    kept, team, done = store(target), executor(workers, cluster), list[Built]()
     with ExitStack() as stack:
         journals = {group: stack.enter_context(kept.journal(group, anew=anew)) for group in source.chosen(groups)}
         words = {group: source.words(group) for group in journals}
@@ -75,7 +142,7 @@ def build(target: str | Path, groups: Sequence[str] = (), *, source: Source | No
     return tuple(done)
 
 
-def _group(kept: Store, group: str, words: Sequence[str], source: Source, journal: Journal, team: Crew,
+def _group(kept: Store, group: str, words: Sequence[str], source: WordSource, journal: Journal, team: Executor,
            limit: int | None, tell: Tell) -> Built:
     wanted = [word for word in words if word not in journal]
     before, now = len(words) - len(wanted), 0
@@ -96,7 +163,7 @@ def _write(kept: Store, group: str, journal: Journal, words: Sequence[str]) -> N
         raise BuildStopped(stopped.reason, str(journal.path)) from None
 
 
-def made_by(team: Crew, source: Source, group: str, words: Sequence[str], kept: str | None = None
+def made_by(team: Executor, source: WordSource, group: str, words: Sequence[str], kept: str | None = None
             ) -> Iterator[Made]:
     """The records of words in parts, in any order; raises ``BuildStopped`` where they cannot be made."""
     try:
@@ -105,3 +172,62 @@ def made_by(team: Crew, source: Source, group: str, words: Sequence[str], kept: 
         raise BuildStopped(str(stopped), kept) from stopped
 
 
+def check(target: str | Path | Store, groups: Sequence[str] = (), *, source: WordSource | None = None, workers: int = 1,
+          cluster: str | None = None, sample: int | None = None, seed: int = 0, tell: Tell | None = None
+          ) -> tuple[str, ...]:
+    """What is stale in a stored catalog, a line each; nothing if it is what ``build`` would write.
+
+    The words of the groups (default: all) are compared one by one, and the records of all of them or of ``sample``
+    words of each group, drawn with ``seed``.
+    """
+    source = source or architectures()
+    kept = store(target) if isinstance(target, str | Path) else target
+    team, chosen = executor(workers, cluster), source.chosen(groups)
+    return tuple(complaint for group in chosen
+                 for complaint in _stale(kept, group, source, team, sample, seed, tell or (lambda *_: None)))
+
+
+def _stale(kept: Store, group: str, source: WordSource, team: Executor, sample: int | None, seed: int, tell: Tell
+           ) -> Iterator[str]:
+    try:
+        lines = kept.lines(group, {})
+        stored = {word_of(line): line for line in lines}
+    except BadRequest as error:
+        yield f"{group}: {error}"
+        return
+    if not lines and not isinstance(kept, Folder):
+        yield f"{group}: not in {kept.path}"
+        return
+    words = source.words(group)
+    if isinstance(kept, Folder) and kept.file(group).read_bytes() != encoded(group, lines):
+        yield f"{group}: {kept.file(group)} is not sorted"
+    yield from _some(group, "missing", [word for word in words if word not in stored])
+    yield from _some(group, "no longer of the group", sorted(stored.keys() - set(words)))
+    both = _drawn([word for word in words if word in stored], sample, seed)
+    differ: list[str] = []
+    for part in _counted(made_by(team, source, group, both), group, len(both), tell):
+        differ += [word for word, line in part if line != stored[word]]
+    yield from _some(group, f"of {len(both)} compared with other records today", sorted(differ))
+
+
+def _some(group: str, what: str, words: Sequence[str]) -> Iterator[str]:
+    """One line for the words of which something is wrong."""
+    if words:
+        yield f"{group}: {len(words)} {what}, the first {words[0]}"
+
+
+def _drawn(words: list[str], count: int | None, seed: int) -> list[str]:
+    if count is None or count >= len(words):
+        return words
+    return random.Random(seed).sample(words, count)
+
+
+def _counted(parts: Iterator[list[tuple[str, str]]], group: str, total: int, tell: Tell
+             ) -> Iterator[list[tuple[str, str]]]:
+    """The parts, told as they pass."""
+    done = 0
+    tell(group, done, total)
+    for part in parts:
+        yield part
+        done += len(part)
+        tell(group, done, total)

@@ -9,7 +9,7 @@ from ..mechanism.legs import decompose
 from ..mechanism.normal import normal_form
 from ..mechanism.sensors import default_observation
 from .geometry import mechanism
-from .words import COMPOSITE, Leg, Word
+from .words import COMPOSITE, LegWord, RobotWord
 
 ENDS = {"": ("platform",), "point": ("platform, a point",), "bar": ("plate 1", "plate 2"),
         "slide": ("plate", "platform")}
@@ -18,10 +18,10 @@ BETWEEN = {"bar": "plate 1 and plate 2 are joined by a bar, the platform, and it
            "slide": "the plate slides on the platform"}
 
 
-def drawing(word: Word) -> str:
+def drawing(word: RobotWord) -> str:
     """A line for all legs that are equal: ``*`` marks a motor, a double line the watched link."""
     watched = _watched(word)
-    groups: dict[tuple[int, Leg], list[int]] = {}
+    groups: dict[tuple[int, LegWord], list[int]] = {}
     number = 0
     for body, legs in enumerate(word.bodies):
         for leg in legs:
@@ -38,7 +38,7 @@ def _head(numbers: list[int]) -> str:
     return f"leg{'s' * (len(numbers) > 1)} {', '.join(map(str, numbers))}"
 
 
-def _chain(leg: Leg, watched: int | None, end: str) -> str:
+def _chain(leg: LegWord, watched: int | None, end: str) -> str:
     """The chain; ``watched`` is the joint inside or after which the observed link lies."""
     text, last = "base", len(leg.joints) - 1
     for i, joint in enumerate(leg.joints):
@@ -46,7 +46,7 @@ def _chain(leg: Leg, watched: int | None, end: str) -> str:
     return f"{text} {_line(leg, last + 1, watched)} {end}"
 
 
-def _line(leg: Leg, place: int, watched: int | None) -> str:
+def _line(leg: LegWord, place: int, watched: int | None) -> str:
     """The link before a joint: double if it is the watched one, and on both sides of a composite whose rod is."""
     if watched is None:
         return "──"
@@ -54,7 +54,7 @@ def _line(leg: Leg, place: int, watched: int | None) -> str:
     return "══" if place == watched + 1 or (inside and place == watched) else "──"
 
 
-def _watched(word: Word) -> dict[int, int]:
+def _watched(word: RobotWord) -> dict[int, int]:
     """The place of the observed link in each leg: the joint inside or after which it lies; nothing where the mechanism
     cannot be made."""
     try:

@@ -27,7 +27,7 @@ from ..rewrite.strategy import Step
 from ..tolerances import PROVED_CHANCE
 from .geometry import mechanism
 from .groups import group
-from .words import Word, parse
+from .words import RobotWord, parse
 
 SAMPLES = 10
 """Closed configurations at which an exact verdict is confirmed."""
@@ -56,7 +56,7 @@ def entry(text: str) -> dict[str, Any]:
             "base_motors": all(drawn.base in joint.links for joint in driven)}
 
 
-def model(word: Word) -> Word:
+def model(word: RobotWord) -> RobotWord:
     """The architecture that is studied for all that differ from it by their motors alone.
 
     It has a motor on the first R or P of each leg; but it is the word itself where that makes other links, since
@@ -101,7 +101,7 @@ def _studied(text: str) -> _Study | str:
     return reason
 
 
-def _study(word: Word, attempt: int) -> _Study:
+def _study(word: RobotWord, attempt: int) -> _Study:
     setting = prepare(mechanism(word, attempt), samples=SAMPLES)
     if not setting.dof:
         raise NotConfirmed(setting.robot.name, "its platform does not move")
@@ -135,7 +135,7 @@ def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
                                                  f"freedoms in exact arithmetic, {found.rank} at samples")
 
 
-def _kinds(word: Word) -> list[str]:
+def _kinds(word: RobotWord) -> list[str]:
     """What each leg is, in the order of the labels: equal legs of one body can be exchanged."""
     return [f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs]
 

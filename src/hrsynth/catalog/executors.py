@@ -13,20 +13,26 @@ from typing import Any
 from .. import __version__
 from ..budgets import PARTS_AHEAD
 from ..errors import BadRequest, MissingExtra
-from .source import Made, Stopped
 
+Made = list[tuple[str, str]]
+"""Words with the lines of their records."""
 Task = Callable[[list[str]], Made]
-Crew = Callable[[Task, Iterable[list[str]]], Iterator[Made]]
+Executor = Callable[[Task, Iterable[list[str]]], Iterator[Made]]
 """Takes a task and the parts to do it on, gives what each part gave as soon as it is done."""
 
 PATIENCE = 10.0
 """Seconds within which a cluster has to answer."""
-LEASH = 0.5
+PARENT_WATCH = 0.5
 """Seconds within which a worker process notices that its parent was killed."""
 
 
-def crew(workers: int = 1, cluster: str | None = None) -> Crew:
-    """The crew for a number of processes, or of the cluster at an address; raises ``MissingExtra``, ``BadRequest``."""
+class Stopped(Exception):
+    """A record that cannot be made, or those who make them are gone: why."""
+
+
+def executor(workers: int = 1, cluster: str | None = None) -> Executor:
+    """The executor of a number of processes, or of the cluster at an address; raises ``MissingExtra`` and
+    ``BadRequest``."""
     if workers < 1:
         raise BadRequest("number of workers", workers, "1 or more")
     if cluster is not None:
@@ -59,29 +65,29 @@ def _together(task: Task, parts: Iterable[list[str]], workers: int) -> Iterator[
 
     pool = Parallel(n_jobs=workers, batch_size=1, pre_dispatch=2 * workers, return_as="generator_unordered")
     try:
-        yield from pool(delayed(_leashed)(os.getpid(), task, part) for part in parts)
+        yield from pool(delayed(_in_child)(os.getpid(), task, part) for part in parts)
     except TerminatedWorkerError:
         raise Stopped("a worker process died") from None
     except BrokenProcessPool as error:
         raise Stopped(f"the worker processes cannot be used: {str(error).splitlines()[0]}") from None
 
 
-def _leashed(parent: int, task: Task, part: list[str]) -> Made:
+def _in_child(parent: int, task: Task, part: list[str]) -> Made:
     """What a part gives, in a process that does not outlive the one that started it."""
-    _leash(parent)
+    _watch_parent(parent)
     return task(part)
 
 
 @cache
-def _leash(parent: int) -> None:
+def _watch_parent(parent: int) -> None:
     from threading import Thread
 
-    Thread(target=_follow, args=(parent,), daemon=True).start()
+    Thread(target=_end_with, args=(parent,), daemon=True).start()
 
 
-def _follow(parent: int) -> None:
+def _end_with(parent: int) -> None:
     while os.getppid() == parent:
-        time.sleep(LEASH)
+        time.sleep(PARENT_WATCH)
     os._exit(1)
 
 

@@ -22,13 +22,13 @@ from ..mechanism.normal import normal_form
 from ..mechanism.observation import Direction
 from ..mechanism.sensors import default_observation, observation_of
 from ..tolerances import SQUARE_AXES
-from .words import COMPOSITE, Joint, Leg, Word
+from .words import COMPOSITE, JointSymbol, LegWord, RobotWord
 
 Z = np.array([0.0, 0.0, 1.0])
 Rng = np.random.Generator
 
 
-def mechanism(word: Word, attempt: int = 0) -> Mechanism:
+def mechanism(word: RobotWord, attempt: int = 0) -> Mechanism:
     """The mechanism of a word: geometry from the word without its motors and the number of the attempt, metres.
 
     Raises ``BadRequest`` where the axes of a U cannot be at right angles.
@@ -36,12 +36,12 @@ def mechanism(word: Word, attempt: int = 0) -> Mechanism:
     return _Draft(word, attempt).build()
 
 
-def planar(word: Word) -> bool:
+def planar(word: RobotWord) -> bool:
     """Whether all that a word's legs do, they do in the plane normal to z."""
     return all(_in_plane(joint) for leg in word.legs for joint in leg.joints)
 
 
-def _in_plane(joint: Joint) -> bool:
+def _in_plane(joint: JointSymbol) -> bool:
     names = {"R": "z", "Pi": "z", "P": "xytrhjml"}.get(joint.letter, "")
     return bool(names) and set(joint.axes) <= set(names)
 
@@ -49,7 +49,7 @@ def _in_plane(joint: Joint) -> bool:
 class _Draft:
     """A mechanism in the making."""
 
-    def __init__(self, word: Word, attempt: int) -> None:
+    def __init__(self, word: RobotWord, attempt: int) -> None:
         self.word = word
         seed = sha256(f"{word.unmoved} {attempt}".encode()).digest()
         self.rng = np.random.default_rng(np.frombuffer(seed, dtype=np.uint32))
@@ -104,7 +104,7 @@ class _Draft:
                 return ("platform",)
 
 
-def _observed(drawn: Mechanism, word: Word, chords: Mapping[str, Direction]) -> Mechanism:
+def _observed(drawn: Mechanism, word: RobotWord, chords: Mapping[str, Direction]) -> Mechanism:
     """The mechanism with the segments that the word marks, and the chord of the last link (``chords``, by leg) where
     a leg has no segment by the rules, since its axes meet in a point."""
     anatomy = decompose(normal_form(drawn).mechanism)
@@ -124,7 +124,7 @@ def _observed(drawn: Mechanism, word: Word, chords: Mapping[str, Direction]) -> 
 class _Limb:
     """A leg in the making: its centres from the foot to the tip, then its joints."""
 
-    def __init__(self, draft: _Draft, leg: Leg, number: int, angle: float, end: str) -> None:
+    def __init__(self, draft: _Draft, leg: LegWord, number: int, angle: float, end: str) -> None:
         self.draft, self.leg, self.number, self.end, self.rng = draft, leg, number, end, draft.rng
         self.radius = np.array([np.cos(angle), np.sin(angle), 0.0])
         self.tangent = np.cross(Z, self.radius)
@@ -205,7 +205,7 @@ class _Limb:
             return starts[i + 1] - ends[i]
         return starts[i] - ends[i - 1]
 
-    def _axes(self, joint: Joint, at: Array, line: Array) -> list[Array]:
+    def _axes(self, joint: JointSymbol, at: Array, line: Array) -> list[Array]:
         """The axes of a joint, unit vectors."""
         if joint.letter != "U":
             return [unit(line) if name in "ln" else self._named(name, at) for name in joint.axes]
@@ -250,8 +250,8 @@ class _Limb:
             return rotation_about(Z, turn + self.rng.uniform(0, 0.3)) @ self.radius
         return unit(self.rng.normal(size=3) + 0.5 * self.tangent)
 
-    def _rods(self, joint: Joint, i: int, before: str, after: str, start: Array, end: Array, axis: Array, loop: bool
-              ) -> str:
+    def _rods(self, joint: JointSymbol, i: int, before: str, after: str, start: Array, end: Array, axis: Array,
+              loop: bool) -> str:
         """Adds two equal parallel rods, a parallelogram or spatial ones; gives the first."""
         b, k, rod = self.draft.builder, self.number, end - start
         side = 0.06 * (unit(np.cross(axis, rod)) + 0.4 * unit(rod) if joint.letter == "Pi" else axis)

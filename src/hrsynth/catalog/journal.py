@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import contextlib
 import fcntl
-import json
 import os
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
 from ..errors import BadRequest, BuildStopped
-from .jsonl import head, require_version, word_of
+from .jsonl import head, read_head, word_of
 
 ENDING = ".part"
 
@@ -30,7 +29,7 @@ class Journal:
         except OSError as error:
             raise BadRequest(f"cannot write the journal: {error.strerror}", str(path)) from None
         try:
-            self._lock()
+            require_alone(self._file, "another build writes this journal", path)
             if anew:
                 os.ftruncate(self._file, 0)
             self._places = self._read(group)
@@ -69,12 +68,6 @@ class Journal:
         """The records are in the store: the journal is no longer needed."""
         self.path.unlink(missing_ok=True)
 
-    def _lock(self) -> None:
-        try:
-            fcntl.flock(self._file, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            raise BadRequest("another build writes this journal", str(self.path), "one build at a time") from None
-
     def _read(self, group: str) -> dict[str, tuple[int, int]]:
         """Where the line of each word starts, and its length."""
         places: dict[str, tuple[int, int]] = {}
@@ -85,7 +78,7 @@ class Journal:
                 if not raw.endswith(b"\n"):
                     break
                 if self._end == 0:
-                    self._require_head(raw)
+                    read_head(raw, str(self.path), "no journal of a build", str(self.path))
                 else:
                     with contextlib.suppress(ValueError, BadRequest):
                         places[word_of(raw.decode("ascii"))] = self._end, len(raw) - 1
@@ -94,14 +87,6 @@ class Journal:
         if self._end == 0:
             self._append(head(group) + "\n")
         return places
-
-    def _require_head(self, raw: bytes) -> None:
-        try:
-            known = json.loads(raw)
-            versions = known["format"], known["catalog"]
-        except (ValueError, TypeError, KeyError):
-            raise BadRequest("no journal of a build: its first line is not a head", str(self.path)) from None
-        require_version(versions, str(self.path))
 
     def _append(self, text: str) -> None:
         content = text.encode("ascii")
@@ -115,3 +100,11 @@ class Journal:
                 os.ftruncate(self._file, self._end)
             raise BuildStopped(f"{self.path}: {error.strerror}", str(self.path)) from None
         self._end += len(content)
+
+
+def require_alone(handle: int, otherwise: str, path: Path) -> None:
+    """Lock an open file or folder until it is closed; raises ``BadRequest`` where another process has it."""
+    try:
+        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise BadRequest(otherwise, str(path), "one build at a time") from None

@@ -29,6 +29,17 @@ def head(group: str, count: int | None = None) -> str:
     return json.dumps({"format": FORMAT, "catalog": VERSION, "group": group, **counted}, separators=(",", ":"))
 
 
+def read_head(text: str | bytes, file: str, otherwise: str, value: str | None, *needed: str) -> Mapping[str, Any]:
+    """What a file's first line says; raises ``BadRequest`` for another version, and in these words for no head."""
+    try:
+        known = json.loads(text)
+        versions, *_ = (known["format"], known["catalog"]), *(known[name] for name in needed)
+    except (ValueError, TypeError, KeyError):
+        raise BadRequest(f"{otherwise}: its first line is not a head", value) from None
+    require_version(versions, file)
+    return dict(known)
+
+
 def record(text: str) -> Record:
     """The record of a line; raises ``BadRequest`` where it holds none."""
     try:
@@ -55,12 +66,9 @@ def decoded(content: bytes, file: str) -> list[str]:
     """The lines of a group's file; raises ``BadRequest`` for another version, a file cut off or of something else."""
     try:
         first, *lines = content.decode("ascii").splitlines() or [""]
-        known = json.loads(first)
-        versions = known["format"], known["catalog"]
-        count = known["count"]
-    except (ValueError, TypeError, KeyError):
-        raise BadRequest(f"{file}: no file of the catalog: its first line is not a head") from None
-    require_version(versions, file)
+    except UnicodeDecodeError:
+        first, lines = "", []
+    count = read_head(first, file, f"{file}: no file of the catalog", None, "count")["count"]
     if len(lines) != count or not content.endswith(b"\n"):
         raise BadRequest(f"{file}: cut off, records", len(lines), str(count))
     return lines

@@ -1,20 +1,26 @@
-"""Asking the catalog: all records of a store, by word, or those that fit."""
+"""Asking the catalog: all records of a store, by word, or those that fit what is asked for."""
 
 from __future__ import annotations
 
 import difflib
+import re
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from ..errors import BadRequest
-from .fits import EXACT, fits, require
 from .jsonl import Record, record
 from .store import DATABASES, Store, shipped, store
 from .words import parse
+
+EXACT = ("group", "dof", "motion", "verdict", "base_motors", "fewest")
+"""Fields that have to be equal to what is asked for."""
+ASKED = (*EXACT, "legs", "text")
+"""What can be asked for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,7 +54,7 @@ class Catalog:
         for the notation or for the chain of one leg, with or without the marks of motors. ``text`` has to occur in
         some field. Several values in a tuple: one of them.
         """
-        require(asked)
+        require_askable(asked)
         return Catalog(tuple(each for each in self.records if fits(each, asked)))
 
     def count(self, *fields: str) -> dict[tuple[Any, ...], int]:
@@ -67,7 +73,7 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     Of a SQLite file only the records that fit are read. Raises ``BadRequest`` where there is none or one of
     another version.
     """
-    require(asked)
+    require_askable(asked)
     kept = shipped() if path is None else store(path)
     _require_there(kept, path)
     exactly = {name: value for name, value in asked.items()
@@ -86,3 +92,48 @@ def _require_there(kept: Store, path: str | Path | None) -> None:
         raise BadRequest("no such catalog", str(path), f"a folder, or a file that ends in {', '.join(DATABASES)}")
     if not kept.groups():
         raise BadRequest("nothing in the catalog", str(kept.path), "one that was built by hrsynth catalog build")
+
+
+def require_askable(asked: Mapping[str, Any]) -> None:
+    """Raise ``BadRequest`` for a name that cannot be asked for."""
+    for name in asked:
+        if name not in ASKED:
+            raise BadRequest("the catalog cannot be asked for", name, ASKED)
+
+
+def fits(record: Record, asked: Mapping[str, Any]) -> bool:
+    """Whether a record fits all that is asked for and not None."""
+    return all(_one(record, name, value) for name, value in asked.items() if value is not None)
+
+
+def _one(record: Record, name: str, value: Any) -> bool:
+    if isinstance(value, tuple):
+        return any(_one(record, name, each) for each in value)
+    match name:
+        case "legs":
+            return _legs(record, value)
+        case "text":
+            return any(str(value).casefold() in str(each).casefold() for each in record.values())
+        case _:
+            return name in record and bool(record[name] == value)
+
+
+def _legs(record: Record, value: int | str) -> bool:
+    """Whether a robot has so many legs, or its notation, its word or a leg's chain the pattern."""
+    if isinstance(value, int) or value.isdecimal():
+        return bool(record.get("legs") == int(value))
+    return any(name == value or fnmatchcase(name, _plain_brackets(value)) for name in names(record))
+
+
+def names(record: Record) -> set[str]:
+    """The names by which legs are found: word, notation and each leg's chain, with and without the marks of motors."""
+    notation = str(record.get("notation", ""))
+    found = {str(record["word"]), notation}
+    for term in re.split(r"\+(?![^{]*})", notation):
+        found.add(re.sub(r"^[0-9]+-", "", term))
+    return {name for each in found if each for name in (each, each.replace("*", ""))}
+
+
+def _plain_brackets(pattern: str) -> str:
+    """A pattern in which brackets stand for themselves."""
+    return pattern.replace("[", "[[]")

@@ -12,13 +12,16 @@ from typing import Any, Protocol
 
 from ..description.files import replacement
 from ..errors import BadRequest, BuildStopped
-from . import tables
 from .journal import ENDING, Journal
-from .jsonl import decoded, encoded
+from .jsonl import FORMAT, decoded, encoded, record, require_version, word_of
+from .words import VERSION
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Endings of a store that is one SQLite file."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
+COLUMNS = {"legs": "INTEGER", "dof": "INTEGER", "motion": "TEXT", "verdict": "TEXT", "base_motors": "INTEGER",
+           "fewest": "INTEGER"}
+"""Fields of a record that have a column and an index."""
 
 
 class Store(Protocol):
@@ -78,18 +81,21 @@ class Database:
 
     def groups(self) -> list[str]:
         with self._read() as file:
-            return tables.groups(file)
+            return [name for name, in file.execute('SELECT DISTINCT "group" FROM records ORDER BY 1')]
 
     def lines(self, group: str, exactly: Mapping[str, Any]) -> list[str]:
+        asked = {name: value for name, value in exactly.items() if name in COLUMNS}
+        where = " AND ".join(['"group" = ?', *(f"{name} = ?" for name in asked)])
         with self._read() as file:
-            return tables.lines(file, group, exactly)
+            rows = file.execute(f"SELECT line FROM records WHERE {where} ORDER BY word", (group, *asked.values()))
+            return [text for text, in rows]
 
     def write(self, group: str, lines: Iterable[str]) -> None:
         kept = {} if not self.path.exists() else {name: self.lines(name, {}) for name in self.groups() if name != group}
         with writable(self.path), replacement(self.path, sync=True) as draft:
             draft.unlink(missing_ok=True)
             try:
-                tables.write(draft, {**kept, group: lines})
+                _write_tables(draft, {**kept, group: lines})
             except sqlite3.Error as error:
                 raise BuildStopped(f"{self.path}: {error}") from None
 
@@ -103,10 +109,16 @@ class Database:
 
     @contextlib.contextmanager
     def _read(self) -> Iterator[sqlite3.Connection]:
+        """The file to read; raises ``BadRequest`` for something else, or another version."""
         with _readable(self.path):
             self.path.open("rb").close()
-        with tables.opened(self.path) as file:
-            yield file
+        try:
+            address = f"{self.path.absolute().as_uri()}?mode=ro"
+            with contextlib.closing(sqlite3.connect(address, uri=True)) as file:
+                require_version(file.execute("SELECT format, catalog FROM versions").fetchone(), str(self.path))
+                yield file
+        except sqlite3.Error as error:
+            raise BadRequest(f"{self.path}: no file of the catalog: {error}") from None
 
 
 def store(path: str | Path) -> Store:
@@ -146,3 +158,26 @@ def writable(file: Path, what: str = "catalog") -> Iterator[None]:
         if error.errno in FULL:
             raise BuildStopped(f"{file}: {error.strerror}") from None
         raise BadRequest(f"cannot write the {what}: {error.strerror}", str(file)) from None
+
+
+def _write_tables(path: Path, groups: Mapping[str, Iterable[str]]) -> None:
+    """Write a new file: the same bytes for the same lines."""
+    with contextlib.closing(sqlite3.connect(path)) as file:
+        file.execute("PRAGMA journal_mode = OFF")
+        columns = ", ".join(f"{name} {kind}" for name, kind in COLUMNS.items())
+        file.execute('CREATE TABLE versions (format INTEGER, catalog INTEGER)')
+        file.execute(f'CREATE TABLE records ("group" TEXT, word TEXT, {columns}, line TEXT, '
+                     'PRIMARY KEY ("group", word)) WITHOUT ROWID')
+        file.execute("INSERT INTO versions VALUES (?, ?)", (FORMAT, VERSION))
+        marks = ", ".join("?" * (len(COLUMNS) + 3))
+        for group, lines in sorted(groups.items()):
+            rows = (_row(group, line) for line in sorted(lines, key=word_of))
+            file.executemany(f"INSERT INTO records VALUES ({marks})", rows)
+        for name in ("word", *COLUMNS):
+            file.execute(f"CREATE INDEX records_{name} ON records ({name})")
+        file.commit()
+
+
+def _row(group: str, line: str) -> tuple[Any, ...]:
+    found = record(line)
+    return (group, found["word"], *(found.get(name) for name in COLUMNS), line)

@@ -61,7 +61,7 @@ _LEGS = re.compile(r"(?P<count>[0-9]*)\((?P<leg>[^()]*)\)")
 
 
 @dataclass(frozen=True, order=True)
-class Joint:
+class JointSymbol:
     """A joint of a leg: its letter, the names of its axes, whether it has a motor, whether the link after it is
     observed."""
 
@@ -75,10 +75,10 @@ class Joint:
 
 
 @dataclass(frozen=True, order=True)
-class Leg:
+class LegWord:
     """A leg from the base to the platform."""
 
-    joints: tuple[Joint, ...]
+    joints: tuple[JointSymbol, ...]
 
     def __str__(self) -> str:
         return f"({'-'.join(map(str, self.joints))})"
@@ -89,22 +89,22 @@ class Leg:
         return sum(FREEDOMS[joint.letter] for joint in self.joints)
 
     @property
-    def unmoved(self) -> Leg:
+    def unmoved(self) -> LegWord:
         """The leg without its motors."""
-        return Leg(tuple(replace(joint, motor=False) for joint in self.joints))
+        return LegWord(tuple(replace(joint, motor=False) for joint in self.joints))
 
     @property
-    def driven(self) -> Leg:
+    def driven(self) -> LegWord:
         """The leg with one motor, on its first R or P."""
         first = next((i for i, joint in enumerate(self.joints) if joint.letter in ("R", "P")), None)
-        return Leg(tuple(replace(joint, motor=i == first) for i, joint in enumerate(self.joints)))
+        return LegWord(tuple(replace(joint, motor=i == first) for i, joint in enumerate(self.joints)))
 
     @property
     def observed(self) -> int | None:
         """The joint after which the observed link follows; None for the default segment."""
         return next((i for i, joint in enumerate(self.joints) if joint.watched), None)
 
-    def canonical(self) -> Leg:
+    def canonical(self) -> LegWord:
         """The leg with names in order and without the mark of a default segment."""
         names: dict[str, str] = {}
         for name in "".join(joint.axes for joint in self.joints):
@@ -117,7 +117,7 @@ class Leg:
             inside = self.joints[mark].letter in COMPOSITE and mark + 1 < len(self.joints)
             mark = mark if inside else self._along(mark)
             mark = None if mark == self._default() and not inside else mark
-        return Leg(tuple(replace(joint, axes=own, watched=i == mark)
+        return LegWord(tuple(replace(joint, axes=own, watched=i == mark)
                          for i, (joint, own) in enumerate(zip(self.joints, axes, strict=True))))
 
     def _along(self, mark: int) -> int:
@@ -135,38 +135,38 @@ class Leg:
         return len(self.joints) - (1 if self.joints[-1].letter in COMPOSITE else 2)
 
 
-def _order(leg: Leg) -> tuple[Leg, Leg]:
+def _order(leg: LegWord) -> tuple[LegWord, LegWord]:
     """The place of a leg among others: as it is without motors, then by its motors."""
     return leg.unmoved, leg
 
 
 @dataclass(frozen=True)
-class Word:
+class RobotWord:
     """An architecture: a platform and, for each of its bodies, the legs that end on it, sorted."""
 
     platform: str
-    bodies: tuple[tuple[Leg, ...], ...]
+    bodies: tuple[tuple[LegWord, ...], ...]
 
     @classmethod
-    def of(cls, legs: list[Leg], *more: list[Leg], platform: str = "") -> Word:
+    def of(cls, legs: list[LegWord], *more: list[LegWord], platform: str = "") -> RobotWord:
         """The canonical word of these legs; ``more``: those of a second body."""
         bodies = (tuple(sorted((leg.canonical() for leg in body), key=_order)) for body in (legs, *more))
         return cls(platform, tuple(sorted(bodies, key=lambda body: ([leg.unmoved for leg in body], body))))
 
     @property
-    def legs(self) -> tuple[Leg, ...]:
+    def legs(self) -> tuple[LegWord, ...]:
         """All legs, in the order of their labels 1, 2, …"""
         return tuple(leg for body in self.bodies for leg in body)
 
     @property
-    def unmoved(self) -> Word:
+    def unmoved(self) -> RobotWord:
         """The architecture without its motors: what the hidden robot is found from."""
-        return Word.of(*[[leg.unmoved for leg in body] for body in self.bodies], platform=self.platform)
+        return RobotWord.of(*[[leg.unmoved for leg in body] for body in self.bodies], platform=self.platform)
 
     @property
-    def driven(self) -> Word:
+    def driven(self) -> RobotWord:
         """The architecture with a motor on the first R or P of each leg: three R that meet in a point are no S then."""
-        return Word.of(*[[leg.driven for leg in body] for body in self.bodies], platform=self.platform)
+        return RobotWord.of(*[[leg.driven for leg in body] for body in self.bodies], platform=self.platform)
 
     def __str__(self) -> str:
         bodies = ["+".join(f"{count if count > 1 else ''}{leg}" for leg, count in Counter(body).items())
@@ -174,7 +174,7 @@ class Word:
         return f"{self.platform}:{'|'.join(bodies)}" if self.platform else bodies[0]
 
 
-def parse(text: str) -> Word:
+def parse(text: str) -> RobotWord:
     """The word that ``text`` writes, canonical; raises ``BadRequest`` with what is wrong in it."""
     platform, colon, rest = text.strip().rpartition(":")
     if platform not in PLATFORMS or bool(colon) != bool(platform):
@@ -183,14 +183,14 @@ def parse(text: str) -> Word:
     if len(bodies) != PLATFORMS[platform]:
         raise BadRequest(f"word {text!r}: bodies on which legs end", len(bodies),
                          str(PLATFORMS[platform]))
-    word = Word.of(*bodies, platform=platform)
+    word = RobotWord.of(*bodies, platform=platform)
     if not 2 <= len(word.legs) <= LARGEST_WORD:
         raise BadRequest(f"word {text!r}: number of legs", len(word.legs), f"2 to {LARGEST_WORD}")
     return word
 
 
-def _legs(text: str, part: str) -> list[Leg]:
-    found: list[Leg] = []
+def _legs(text: str, part: str) -> list[LegWord]:
+    found: list[LegWord] = []
     for term in part.split("+"):
         match = _LEGS.fullmatch(term.strip())
         if match is None:
@@ -202,7 +202,7 @@ def _legs(text: str, part: str) -> list[Leg]:
     return found
 
 
-def _leg(text: str, chain: str) -> Leg:
+def _leg(text: str, chain: str) -> LegWord:
     joints = tuple(_joint(text, part) for part in chain.split("-"))
     if joints[0].letter == "Pi" and joints[0].axes == "n":
         raise BadRequest(f"word {text!r}: the Pi's normal is normal to the axis before it", chain, "a joint before it")
@@ -212,10 +212,10 @@ def _leg(text: str, chain: str) -> Leg:
         raise BadRequest(f"word {text!r}: observed", "the platform", "a link of the leg")
     if len(joints) == 1 and joints[0].letter not in COMPOSITE:
         raise BadRequest(f"word {text!r}: a leg of one joint has no segment to observe", chain, "two joints or more")
-    return Leg(joints)
+    return LegWord(joints)
 
 
-def _joint(text: str, part: str) -> Joint:
+def _joint(text: str, part: str) -> JointSymbol:
     match = _JOINT.fullmatch(part)
     if match is None:
         raise BadRequest(f"word {text!r}: unknown joint", part, f"a letter of {', '.join(AXES)}, axes, * and !")
@@ -229,4 +229,4 @@ def _joint(text: str, part: str) -> Joint:
         raise BadRequest(f"word {text!r}: axis n or q of {part!r}", letter, "a U, whose other axis it is normal to")
     if match["motor"] and letter not in MOVED:
         raise BadRequest(f"word {text!r}: a motor on {part!r}", letter, MOVED)
-    return Joint(letter, axes, bool(match["motor"]), bool(match["watched"]))
+    return JointSymbol(letter, axes, bool(match["motor"]), bool(match["watched"]))

@@ -57,7 +57,7 @@ def build(groups: list[str] | None, output: str | None, workers: int, cluster: s
         if given:
             raise BadRequest(f"{option} {'with' if check else 'without'} --check", None)
     if check:
-        from ..catalog.check import check as run
+        from ..catalog.build import check as run
         from ..catalog.store import shipped
 
         with Progress(counted=True) as progress:
@@ -128,8 +128,8 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
 def _known(word: str, kept: str | None) -> tuple[Any, str]:
     """The record of a word, and where it comes from if not from the catalog."""
     from ..catalog import load
+    from ..catalog.build import architectures, made
     from ..catalog.groups import group
-    from ..catalog.source import architectures, made
     from ..catalog.store import shipped
     from ..catalog.words import parse
 

@@ -7,9 +7,9 @@ import io
 import numpy as np
 
 from ..geometry.vectors import Array, inverse
-from ..simulation.camera import Camera, Rod, cylinders, facing, seen
+from ..simulation.camera import Camera, Cylinder, cylinders, facing, seen
 from ..simulation.mockup import rods as rods_of
-from ..simulation.pictures import GREY, Stage
+from ..simulation.pictures import GREY, LegRenderer
 from ..simulation.result import Servo
 
 FRAMES, PAUSE = 50, 12
@@ -31,7 +31,7 @@ def animation(found: Servo) -> bytes:
     setting, configurations = found.setting, found.run.configurations
     question = setting.samples.question
     rods = cylinders(setting.mechanism, question.observations)
-    stage = Stage(setting.mechanism, _camera(found), question.reference, rods)
+    stage = LegRenderer(setting.mechanism, _camera(found), question.reference, rods)
     wanted = _lit(stage.picture(found.target.pose))
     frames = []
     for number in _moments(np.array([at.pose(setting.motion.link)[:3, 3] for at in configurations]), found.errors):
@@ -52,7 +52,7 @@ def _camera(found: Servo) -> Camera:
     links = []
     for link in set(mechanism.links) - {mechanism.base}:
         X = inverse(mechanism.links[link].pose)
-        links += [Rod(link, np.array(ends) @ X[:3, :3].T + X[:3, 3], 0.0) for ends in rods_of(mechanism, link)]
+        links += [Cylinder(link, np.array(ends) @ X[:3, :3].T + X[:3, 3], 0.0) for ends in rods_of(mechanism, link)]
     configurations = (*found.run.configurations[:: max(1, len(found.run.configurations) // 5)], found.target)
     points = np.array([seen(links, reference, at.pose) for at in configurations])
     ahead = np.array([np.cos(ELEVATION), 0.0, -np.sin(ELEVATION)])

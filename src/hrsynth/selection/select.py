@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -12,12 +12,13 @@ import numpy as np
 
 from ..analysis.accuracy.accuracy import errors_at
 from ..analysis.accuracy.cones import Cones, half_angles
+from ..analysis.accuracy.pose_errors import PoseErrors
 from ..analysis.aspects.answer import SEPARATED
 from ..analysis.aspects.path import Aspects
 from ..analysis.controllability import CONTROLLABLE, verdict_of
-from ..analysis.modes.modes import modes_at
+from ..analysis.modes.modes import AssemblyModes, modes_at
 from ..analysis.observed import ObservedRobot, prepare, silent
-from ..analysis.posture import Examiner
+from ..analysis.posture import ConfigurationAnalysis, Posture
 from ..batch.reach import reach
 from ..budgets import AXIS_SEEN
 from ..errors import BadRequest, HrsynthError, PoseNotReached
@@ -30,21 +31,112 @@ from ..results import Result
 from ..simulation.camera import cylinders, placed
 from ..simulation.ending import GOAL
 from ..simulation.servo import servo
-from .candidate import Candidate, Decision, Modes, singular_at
 from .sight import Sight, camera_at, of_focal
 
-SIZE = 4
-"""Legs of the largest sets."""
-RUNS = 3
-"""Sets that a simulated run is to lead to the goal."""
-EXAMINED = 20
-"""Sets, the most accurate first, that are examined."""
 BUDGET = 2_000
 """Intervals that a path's certificate may take."""
-CONE = "0.1deg"
 FOCAL = 800.0
 """Focal length of the camera (pixels)."""
 AUTO = "auto"
+TYPES = {"type1": "a Type 1 singularity", "type2": "a Type 2 singularity", "type3": "a Type 3 singularity",
+         "constraint": "a constraint singularity", "undecided": "too near to a singularity to be told apart from one"}
+
+
+@dataclass(frozen=True)
+class Search:
+    """What is looked at; :func:`select` takes each of these by its name. Raises ``BadRequest``."""
+
+    size: int = 4
+    """Legs of the largest sets."""
+    examine: int = 20
+    """Sets, the most accurate first, of which modes and aspects are asked."""
+    runs: int = 3
+    """Sets that a simulated run is to lead to the goal."""
+    sight: str | None = None
+    """The pose of a camera on the link that carries it, or ``auto`` for one that sees all legs well."""
+    focal: float = FOCAL
+    """Its focal length (pixels)."""
+    seconds: float | None = None
+    """Deprecated, as what is examined then depends on the machine: time after which no further set is begun."""
+
+    def __post_init__(self) -> None:
+        if self.sight is None and self.focal != FOCAL:
+            raise BadRequest("focal length without a camera", self.focal, "together with --sight")
+        for what, value, least in (("legs of the largest sets", self.size, 1), ("number of runs", self.runs, 0),
+                                   ("sets that are examined", self.examine, 1)):
+            if value < least:
+                raise BadRequest(what, value, f"at least {least}")
+        if self.seconds is not None and not self.seconds > 0:
+            raise BadRequest("seconds", self.seconds, "a positive number")
+
+
+@dataclass(frozen=True)
+class ModeCount:
+    """How many assembly modes there are with the directions of a pose, in how many of them the robot was found
+    assembled, and whether these are proved to be all; ``why`` they are not listed, else empty."""
+
+    count: int | None
+    reachable: int | None
+    complete: bool
+    why: str = ""
+
+    @classmethod
+    def of(cls, found: AssemblyModes) -> ModeCount:
+        """Of a list of modes."""
+        return cls(len(found.modes), sum(mode.reachable is True for mode in found.modes), found.found.complete)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"count": self.count, "reachable": self.reachable, "complete": self.complete, "reason": self.why or None}
+
+
+@dataclass(frozen=True)
+class Decision:
+    """A verdict in a word, and its reason."""
+
+    verdict: str
+    reason: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"verdict": self.verdict, "reason": self.reason}
+
+
+@dataclass(frozen=True, eq=False)
+class Candidate:
+    """What is known of a set of legs; None where it was not asked, because the set was discarded before or was not
+    ``examined``: then it is neither kept nor discarded."""
+
+    legs: tuple[str, ...]
+    verdict: str
+    discarded: str | None = None
+    errors: PoseErrors | None = None
+    seen: Mapping[str, float] | None = None
+    """The least part of each of its legs that the camera sees at start and goal, after a run all along it."""
+    start_modes: ModeCount | None = None
+    goal_modes: ModeCount | None = None
+    aspect: Decision | None = None
+    run: Decision | None = None
+    examined: bool = True
+
+    @property
+    def order(self) -> tuple[float, float, int]:
+        """What the best set has least of: position error, orientation error, legs."""
+        if self.errors is None:
+            return np.inf, np.inf, len(self.legs)
+        return self.errors.position.largest, self.errors.orientation.largest, len(self.legs)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        errors = self.errors
+        return {"legs": list(self.legs), "verdict": self.verdict, "discarded": self.discarded,
+                "examined": self.examined,
+                "position_mm": errors and errors.position.to_dict(1e3)["largest"],
+                "orientation_deg": errors and errors.orientation.to_dict(180 / np.pi)["largest"],
+                "seen": None if self.seen is None else dict(self.seen),
+                "modes": {"start": self.start_modes and self.start_modes.to_dict(),
+                          "goal": self.goal_modes and self.goal_modes.to_dict()},
+                "aspect": self.aspect and self.aspect.to_dict(), "run": self.run and self.run.to_dict()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -92,32 +184,22 @@ class Selection(Result, shown_as="select"):
                 "sets": [each.to_dict() for each in self.candidates]}
 
 
-def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, goal: Pose | str, cones: Cones = CONE,
-           size: int = SIZE, runs: int = RUNS, sight: str | None = None, focal: float = FOCAL,
-           examine: int = EXAMINED, seconds: float | None = None, seed: int = 0,
-           progress: Callable[[str], None] | None = None) -> Selection:
-    """All sets of up to ``size`` legs for the displacement from ``start`` to ``goal``, ranked by the largest position
-    error at the goal for ``cones`` about the directions (MMT A.2).
+def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, goal: Pose | str,
+           cones: Cones = "0.1deg", search: Search | None = None, seed: int = 0,
+           progress: Callable[[str], None] | None = None, **options: Any) -> Selection:
+    """All sets of legs for the displacement from ``start`` to ``goal``, ranked by the largest position error at the
+    goal for ``cones`` about the directions (MMT A.2).
 
-    A set is discarded where it does not see every freedom, where an end is singular, where a camera (``sight``: its
-    pose on the link that carries it, or ``auto`` for one that sees all legs well) sees too little of a leg, where start
-    and goal are proved to lie in different aspects, and where a simulated run ends elsewhere. Modes and aspects are
-    asked for the ``examine`` most accurate sets, the others are neither kept nor discarded. Runs are made from the best
-    set on, until ``runs`` of them ended at the goal. With ``seconds`` (deprecated: what is examined then depends on the
-    machine) no further set is begun after that time.
+    ``options`` are fields of :class:`Search`, by name: ``size``, ``examine``, ``runs``, ``sight``, ``focal``,
+    ``seconds``. A set is discarded where it does not see every freedom, where an end is singular, where the camera
+    (``sight``) sees too little of a leg, where start and goal are proved to lie in different aspects, and where a
+    simulated run ends elsewhere. Modes and aspects are asked for the ``examine`` most accurate sets, the others are
+    neither kept nor discarded. Runs are made from the best set on, until ``runs`` of them ended at the goal.
 
     Raises ``BadRequest``, ``PoseNotReached`` (exit status 2).
     """
     wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
-    if sight is None and focal != FOCAL:
-        raise BadRequest("focal length without a camera", focal, "together with --sight")
-    for what, value, least in (("legs of the largest sets", size, 1), ("number of runs", runs, 0),
-                               ("sets that are examined", examine, 1)):
-        if value < least:
-            raise BadRequest(what, value, f"at least {least}")
-    if seconds is not None and not seconds > 0:
-        raise BadRequest("seconds", seconds, "a positive number")
-    tell = progress or silent
+    given, tell = replace(search or Search(), **options), progress or silent
     tell("sampling")
     setting = prepare(robot, None, camera, seed=seed)
     directions = tuple(o for o in setting.segments if isinstance(o, Direction))
@@ -129,24 +211,24 @@ def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, go
     except PoseNotReached as error:
         error.exit_status = 2
         raise
-    work = _Work(setting, ends[0], ends[1], half, _sight(setting, ends, sight, focal),
-                 np.inf if seconds is None else time.monotonic() + seconds, seed, tell)
-    sets = [legs for count in range(1, min(size, len(directions)) + 1) for legs in combinations(directions, count)]
-    found = sorted((work.first(legs) for legs in sets), key=lambda each: each.order)
-    found, left = work.examined(found, runs, examine)
+    work = _Work(setting, ends[0], ends[1], half, _sight(setting, ends, given), given,
+                 np.inf if given.seconds is None else time.monotonic() + given.seconds, seed, tell)
+    sets = [legs for count in range(1, min(given.size, len(directions)) + 1)
+            for legs in combinations(directions, count)]
+    found, left = work.examined(sorted((work.first(legs) for legs in sets), key=lambda each: each.order))
     found.sort(key=lambda each: (each.discarded is not None, not each.examined,
                                  each.order if each.discarded is None else (0, 0, 0)))
     poses = [setting.motion.pose(at.pose(setting.motion.link)) for at in ends]
     return Selection(setting, poses[0], poses[1], tuple(found), half, work.sight, left)
 
 
-def _sight(setting: ObservedRobot, ends: Sequence[ClosedConfiguration], text: str | None, focal: float) -> Sight | None:
-    if text is None:
+def _sight(setting: ObservedRobot, ends: Sequence[ClosedConfiguration], search: Search) -> Sight | None:
+    if search.sight is None:
         return None
     rods = cylinders(setting.mechanism, setting.observed)
     reference = setting.mechanism.reference
-    camera = (placed(rods, reference, [at.pose for at in ends], of_focal(focal)) if text == AUTO
-              else camera_at(text, focal))
+    camera = (placed(rods, reference, [at.pose for at in ends], of_focal(search.focal)) if search.sight == AUTO
+              else camera_at(search.sight, search.focal))
     return Sight(camera, reference, {o.leg: rod for o, rod in zip(setting.observed, rods, strict=True)})
 
 
@@ -159,14 +241,10 @@ class _Work:
     goal: ClosedConfiguration
     cones: Array
     sight: Sight | None
+    search: Search
     until: float
     seed: int
     tell: Callable[[str], None]
-
-    @property
-    def over(self) -> bool:
-        """Whether the time is over."""
-        return time.monotonic() > self.until
 
     def watching(self, legs: Sequence[str]) -> ObservedRobot:
         """The setting with some legs watched."""
@@ -182,8 +260,8 @@ class _Work:
             if verdict.verdict != CONTROLLABLE:
                 lost = "; ".join(freedom.name for freedom in verdict.lost)
                 return Candidate(legs, verdict.verdict, f"{verdict.verdict}, not seen: {lost}")
-            examiner = Examiner(setting)
-            reasons = [singular_at(name, examiner.glance(at))
+            analysis = ConfigurationAnalysis(setting)
+            reasons = [_singular_at(name, analysis.classify(at))
                        for name, at in (("start", self.start), ("goal", self.goal))]
         except HrsynthError as error:
             return Candidate(legs, "undecided", str(error))
@@ -220,15 +298,16 @@ class _Work:
         return replace(candidate, start_modes=start_modes, goal_modes=goal_modes, aspect=aspect, discarded=why)
 
     @staticmethod
-    def _modes(setting: ObservedRobot, at: ClosedConfiguration) -> Modes:
+    def _modes(setting: ObservedRobot, at: ClosedConfiguration) -> ModeCount:
         try:
-            return Modes.of(modes_at(setting, at))
+            return ModeCount.of(modes_at(setting, at))
         except HrsynthError as error:
-            return Modes(None, None, False, str(error))
+            return ModeCount(None, None, False, str(error))
 
-    def examined(self, candidates: Sequence[Candidate], runs: int, most: int) -> tuple[list[Candidate], str | None]:
-        """The candidates, best first, the ``most`` first that are not discarded with their modes and aspects, and with
-        simulated runs until ``runs`` of them ended at the goal; why the others were left, None where there are none."""
+    def examined(self, candidates: Sequence[Candidate]) -> tuple[list[Candidate], str | None]:
+        """The candidates, best first, as many as are to be examined with their modes and aspects, and with simulated
+        runs until enough of them ended at the goal; why the others were left, None where there are none."""
+        most, runs = self.search.examine, self.search.runs
         found: list[Candidate] = []
         arrived = begun = 0
         left = None
@@ -236,7 +315,7 @@ class _Work:
             if candidate.discarded:
                 found.append(candidate)
                 continue
-            if left is None and (begun == most or self.over):
+            if left is None and (begun == most or time.monotonic() > self.until):
                 left = f"the {begun} most accurate were" if begun == most else (
                     f"the time was over after the {begun} most accurate, on a faster machine there would be more")
             if left is not None:
@@ -264,3 +343,9 @@ class _Work:
         if found.ended != GOAL:
             return replace(candidate, run=run, discarded=f"the simulated run ends in: {found.ended} ({run.reason})")
         return self.looked(replace(candidate, run=run), found.run.configurations)
+
+
+def _singular_at(name: str, posture: Posture) -> str | None:
+    """Why a set is discarded whose hidden robot is singular at the start or the goal, None where it is regular."""
+    kind = TYPES.get(posture.hidden.state)
+    return None if kind is None else f"the {name} is {kind}"

@@ -12,7 +12,7 @@ from ..errors import BadRequest
 from ..geometry.vectors import Array, pose
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Pose
-from ..simulation.camera import Camera, Rod
+from ..simulation.camera import Camera, Cylinder
 
 Flags = NDArray[np.bool_]
 PLACES = 101
@@ -25,7 +25,7 @@ class Sight:
 
     camera: Camera
     reference: str
-    rods: Mapping[str, Rod]
+    rods: Mapping[str, Cylinder]
 
     def seen(self, at: ClosedConfiguration) -> dict[str, float]:
         """The part (0 to 1) of each rod's axis that lies in the picture and is not hidden by another rod."""

@@ -30,7 +30,7 @@ SHORTEST, HALF = 0.05, 0.25
 
 
 @dataclass(frozen=True, eq=False)
-class Rod:
+class Cylinder:
     """The cylinder of an observed direction: ends in its link's frame (2, 3), the second ahead along it, radius (m)."""
 
     link: str
@@ -48,7 +48,7 @@ class Camera:
     width: int = 640
     height: int = 480
 
-    def seen(self, X_reference: Array, poses: Poses, rod: Rod) -> Array:
+    def seen(self, X_reference: Array, poses: Poses, rod: Cylinder) -> Array:
         """The ends of a rod in the camera's frame, (2, 3)."""
         X = inverse(X_reference @ self.place) @ poses(rod.link)
         return np.asarray(rod.ends @ X[:3, :3].T + X[:3, 3])
@@ -83,7 +83,7 @@ def rebuilt(first: Array, second: Array) -> Array:
     return unit(np.cross(first, second))
 
 
-def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tuple[Rod, ...]:
+def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tuple[Cylinder, ...]:
     """The rods of observed directions: as long as their joints are apart."""
     found = []
     for observation in observations:
@@ -95,7 +95,7 @@ def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tupl
         if high - low < SHORTEST * mechanism.length:
             low, high = -HALF * mechanism.length, HALF * mechanism.length
         ends = centres[0] + np.outer([low, high], observation.direction)
-        found.append(Rod(observation.link, ends, RADIUS * mechanism.length))
+        found.append(Cylinder(observation.link, ends, RADIUS * mechanism.length))
     return tuple(found)
 
 
@@ -106,7 +106,7 @@ class Edges:
 
     camera: Camera
     reference: str
-    rods: tuple[Rod, ...]
+    rods: tuple[Cylinder, ...]
     pixels: float
     shocks: Shocks
 
@@ -134,7 +134,7 @@ def _moved(normal: Array, ends: Array, shift: Array) -> Array:
     return found if found @ normal > 0 else -found
 
 
-def placed(rods: Sequence[Rod], reference: str, poses: Sequence[Poses], blank: Camera | None = None) -> Camera:
+def placed(rods: Sequence[Cylinder], reference: str, poses: Sequence[Poses], blank: Camera | None = None) -> Camera:
     """A camera on the reference link from which all rods lie in the picture at all given poses, where the rebuilt
     directions suffer least from errors of pixels: among places on a sphere of directions around them."""
     ends = np.array([seen(rods, reference, X) for X in poses])
@@ -148,7 +148,7 @@ def placed(rods: Sequence[Rod], reference: str, poses: Sequence[Poses], blank: C
     return found
 
 
-def seen(rods: Sequence[Rod], reference: str, poses: Poses) -> Array:
+def seen(rods: Sequence[Cylinder], reference: str, poses: Poses) -> Array:
     """The ends of rods (rods, 2, 3) in the frame of the reference link."""
     frames = [inverse(poses(reference)) @ poses(rod.link) for rod in rods]
     return np.array([rod.ends @ X[:3, :3].T + X[:3, 3] for rod, X in zip(rods, frames, strict=True)])

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..analysis.modes.modes import AssemblyModes
-from ..analysis.posture import Posture
+from ..analysis.posture import ConfigurationAnalysis
 from ..budgets import RUN_EVALUATIONS
 from ..errors import HrsynthError
 from ..geometry.vectors import Array
@@ -35,18 +35,18 @@ class Ending:
 
 
 @dataclass(frozen=True, eq=False)
-class Referee:
-    """Decides endings: the goal's configuration and directions (k, 3), what lists its assembly modes, and what examines
-    a single configuration."""
+class EndingClassifier:
+    """Names endings: by the goal's configuration and directions (k, 3), what lists its assembly modes, and the analysis
+    of single configurations."""
 
     goal: ClosedConfiguration
     directions: Array
     platform: str
     point: Array | None
     modes: Callable[[], AssemblyModes]
-    glance: Callable[[ClosedConfiguration], Posture]
+    analysis: ConfigurationAnalysis
 
-    def judge(self, run: Run, directions: Array) -> Ending:
+    def classify(self, run: Run, directions: Array) -> Ending:
         """The ending of a run whose last directions are (k, 3)."""
         last = run.commands[-1]
         if run.stopped == SERVED_AT:
@@ -89,7 +89,7 @@ class Referee:
                       None, listed)
 
     def _rest(self, at: ClosedConfiguration, last: Command) -> Ending:
-        posture = self.glance(at)
+        posture = self.analysis.classify(at)
         where = f"‖e‖ = {last.size:.3g} and the command vanishes"
         weak = float(last.values[-1]) < DAMPED
         shifted = at.velocity(self.platform) @ last.weak

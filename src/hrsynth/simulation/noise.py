@@ -20,7 +20,7 @@ EXAMPLE = "0.1deg or 0.002 (radians), with edges a number of pixels such as 0.3p
 
 
 @dataclass(frozen=True)
-class Amount:
+class Noise:
     """How large errors are: the half-angle of a cone (radians) or an error of edges in the picture (pixels); of a
     ``bias`` each error stays the same all along a run."""
 
@@ -29,7 +29,7 @@ class Amount:
     bias: bool = False
 
     @classmethod
-    def parse(cls, text: str) -> Amount:
+    def parse(cls, text: str) -> Noise:
         """The amount that ``0.1deg``, ``0.002`` or ``0.3px`` says; raises ``BadRequest``."""
         cleaned = text.strip()
         pixels, degrees = cleaned.endswith("px"), cleaned.endswith("deg")

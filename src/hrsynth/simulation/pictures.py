@@ -15,7 +15,7 @@ from ..errors import MissingExtra, NotRendered
 from ..geometry.vectors import Array, inverse, unit
 from ..mechanism import Mechanism
 from .bench import simulator
-from .camera import Camera, Rod, rebuilt
+from .camera import Camera, Cylinder, rebuilt
 from .law import Poses
 from .mockup import RADIUS, rods
 from .noise import PERIOD
@@ -49,13 +49,13 @@ def drawing() -> Any:
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class LegRenderer:
     """The robot's rods before a camera, each link put where it is told."""
 
     mechanism: Mechanism
     camera: Camera
     reference: str
-    rods: tuple[Rod, ...]
+    rods: tuple[Cylinder, ...]
     fineness: int = 1
     """Drawn pixels a pixel each way."""
 
@@ -114,7 +114,7 @@ class Stage:
         return fine.reshape(self.camera.height, self.fineness, self.camera.width, self.fineness, 3).mean(axis=(1, 3))
 
     @cached_property
-    def finer(self) -> Stage:
+    def finer(self) -> LegRenderer:
         """The same, drawn finely enough to find edges in."""
         return replace(self, fineness=PICTURE_OVERSAMPLING)
 
@@ -129,7 +129,7 @@ class Stage:
 class Pictures:
     """Directions rebuilt from rendered pictures, one each ``noise.PERIOD``; in between their errors are held."""
 
-    stage: Stage
+    stage: LegRenderer
     _held: dict[int, Array] = field(default_factory=dict)
 
     def __call__(self, time: float, poses: Poses, directions: Array) -> Array:

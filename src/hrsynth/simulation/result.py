@@ -15,7 +15,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Pose
 from ..results import Result
 from .ending import Ending
-from .noise import Amount
+from .noise import Noise
 from .run import Run
 from .track import Track
 
@@ -24,7 +24,7 @@ ASIDE = 0.9
 
 
 @dataclass(frozen=True)
-class Spread:
+class Scatter:
     """How far the platform was from the pose at which it settled, over the second half of a noisy run: metres and
     radians, largest and root mean square."""
 
@@ -63,14 +63,14 @@ class Servo(Result, shown_as="servo"):
     desired: Array
     gain: float
     sense: str
-    noise: Amount | None
+    noise: Noise | None
     run: Run
     track: Track
     ending: Ending
     settled: ClosedConfiguration
     target: ClosedConfiguration
     """The goal's configuration."""
-    spread: Spread | None = None
+    spread: Scatter | None = None
     notes: tuple[str, ...] = ()
     """What a bench measured, in words."""
 

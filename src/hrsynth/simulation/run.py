@@ -1,7 +1,13 @@
-"""A servo loop in time, on closed configurations: SciPy's adaptive integrator in charts of the closed loops."""
+"""A servo loop in time, on closed configurations: SciPy's adaptive integrator in charts of the closed loops.
+
+That a command is small does not prove that a loop with steady, exact directions rests: near a fold of a leg, where the
+law is stiff, an integrator's own errors keep it from vanishing. So a rest, a zero of the velocity that draws the state
+to itself, is found itself, from the state and not from the time that a run was given.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,15 +24,18 @@ from ..tolerances import (
     ARRIVED,
     AT_REST,
     INTEGRATED,
+    INVERTED,
     LOOPS_LOST,
+    NEAR_REST,
     NEUTRAL_GROWTH,
+    REST_SLOPE,
+    RESTED,
     RUN_SHORTEST_STEP,
     SERVED,
     STRETCH_END,
 )
 from .law import Command, Desired, Law, Sense
 from .noise import PERIOD
-from .rest import Patience, rest_near
 
 State = tuple[ClosedConfiguration, Command]
 
@@ -34,6 +43,10 @@ SERVED_AT, REST, POISED, LIMIT, OPEN = "served", "rest", "poised", "limit", "ope
 AWAY, TIME, EFFORT, LOST = "away", "time", "effort", "lost"
 HALVINGS = 40
 """Bisections that find the moment at which a joint meets its limit."""
+NEWTON_STEPS = 8
+"""Steps in which a rest is found."""
+PERSISTS = 0.9
+"""Part of an error that is left a time constant later where a rest is looked for: of one that vanishes, 1 / e is."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,6 +207,49 @@ class _Stretch:
 def _loose(at: ClosedConfiguration, start: ClosedConfiguration) -> bool:
     """Whether the loops lose their rank at a configuration."""
     return at.kernel()[1].weakest < LOOPS_LOST * start.kernel()[1].weakest
+
+
+@dataclass(frozen=True, eq=False)
+class Rest:
+    """A zero y (n,) of ẏ, and the largest growth of a motion about it (1/s)."""
+
+    y: Array
+    growth: float
+
+
+class Patience:
+    """Tells when it is time to look for a rest: once a time constant, where the error persists."""
+
+    def __init__(self, constant: float, time: float, size: float) -> None:
+        self.constant, self._time, self._size = constant, time, size
+
+    def over(self, time: float, size: float) -> bool:
+        """Whether to look for a rest now."""
+        if time - self._time < self.constant:
+            return False
+        persists = size > PERSISTS * self._size
+        self._time, self._size = time, size
+        return persists
+
+
+def rest_near(rate: Callable[[Array], Array], y: Array) -> Rest | None:
+    """The rest next to y (n,) by Newton's method on ẏ = rate(y); None where none was found near."""
+    try:
+        for _ in range(NEWTON_STEPS):
+            steps = REST_SLOPE * np.eye(len(y))
+            J = np.array([(rate(y + each) - rate(y - each)) / (2 * REST_SLOPE) for each in steps]).T
+            here = rate(y)
+            step = np.asarray(np.linalg.lstsq(J, -here, rcond=INVERTED)[0], dtype=float)
+            size = float(np.linalg.norm(step))
+            # where J is singular, a velocity outside of its range goes on for ever
+            if not size <= NEAR_REST or np.linalg.norm(here + J @ step) > NEUTRAL_GROWTH:
+                return None
+            y = y + step
+            if size <= RESTED:
+                return Rest(y, float(np.linalg.eigvals(J).real.max()))
+    except LoopsNotClosed:
+        return None
+    return None
 
 
 def clearance(at: ClosedConfiguration) -> float:

@@ -21,8 +21,7 @@ from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.tasks import solve
 from hrsynth.mechanism.pose import Pose
-from hrsynth.simulation.desired import Step
-from hrsynth.simulation.law import Law
+from hrsynth.simulation.law import FixedDirections, Law
 from hrsynth.simulation.run import Loop
 from strategies import parallel_robots
 
@@ -124,7 +123,8 @@ def check_fit(setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fi
         q, residual = solve(there.twin, there.twin.moved(there.q, 1e-3 * kernel @ rng.normal(size=kernel.shape[1])))
         if residual < 1e-10:
             assert size(ClosedConfiguration.of(there.twin, q)) >= size(there) - 1e-12
-    run = Loop(Law(question, setting.dof, 0.8), setting.everything.question, Step(wanted)).simulate(at, 200.0)
+    loop = Loop(Law(question, setting.dof, 0.8), setting.everything.question, FixedDirections(wanted))
+    run = loop.simulate(at, 200.0)
     assert np.allclose(run.last.pose(link), there.pose(link), atol=1e-4 * max(1.0, there.twin.length))
     return fit
 

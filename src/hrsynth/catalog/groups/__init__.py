@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
-from ..words import Word
+from ..words import RobotWord
 from . import deltas, planar, pods, spatial
 
-_LISTED: Mapping[str, Callable[[], Iterable[Word]]] = {
+_LISTED: Mapping[str, Callable[[], Iterable[RobotWord]]] = {
     "planar": planar.words, "pods": pods.words, "deltas": deltas.words, "spatial": spatial.words}
 """What each module lists, in no order, some of it twice or of another group."""
 
 
-def group(word: Word) -> str:
+def group(word: RobotWord) -> str:
     """The group to which a word belongs: the first whose law it obeys."""
     if planar.belongs(word):
         return "planar"

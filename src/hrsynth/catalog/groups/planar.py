@@ -11,7 +11,7 @@ from collections.abc import Iterator
 from itertools import product
 
 from ..geometry import planar as belongs
-from ..words import Leg, Word
+from ..words import LegWord, RobotWord
 from .legs import driven, leg, robots, watched
 
 __all__ = ["belongs", "chains", "words"]
@@ -20,7 +20,7 @@ _OWN = "hj"
 """Names of the P axes of a leg that are not along its line."""
 
 
-def chains(rail: str = "h") -> Iterator[Leg]:
+def chains(rail: str = "h") -> Iterator[LegWord]:
     """The seven chains of R and P; a P between two R lies along the line of their centres, a first P along ``rail``."""
     for letters in product("RP", repeat=3):
         if letters == ("P", "P", "P"):
@@ -30,7 +30,7 @@ def chains(rail: str = "h") -> Iterator[Leg]:
         yield leg("-".join(map("".join, zip(letters, names, strict=True))))
 
 
-def with_parallelograms() -> Iterator[Leg]:
+def with_parallelograms() -> Iterator[LegWord]:
     """Chains of three R, P and Π, with an R, a Π, and a joint of another kind or R or P besides."""
     for letters in product(("R", "P", "Pi"), repeat=3):
         if "R" in letters and "Pi" in letters:
@@ -38,7 +38,7 @@ def with_parallelograms() -> Iterator[Leg]:
             yield leg("-".join(f"P{next(own)}" if letter == "P" else f"{letter}z" for letter in letters))
 
 
-def _kinds(rail: str, motors: int, tip: str = "RP") -> list[Leg]:
+def _kinds(rail: str, motors: int, tip: str = "RP") -> list[LegWord]:
     """Chains with each motor on the first ``motors`` joints and each segment observed; with the rail x only those that
     begin with a P."""
     return [moved for chain in chains(rail) if chain.joints[-1].letter in tip
@@ -46,7 +46,7 @@ def _kinds(rail: str, motors: int, tip: str = "RP") -> list[Leg]:
             for seen in watched(chain) for moved in driven(seen, range(motors))]
 
 
-def words() -> Iterator[Word]:
+def words() -> Iterator[RobotWord]:
     """Robots with three and with two freedoms, of general geometry and with parallel rails."""
     for rail in ("h", "x"):
         yield from robots(_kinds(rail, 3), 3)
@@ -54,6 +54,6 @@ def words() -> Iterator[Word]:
     for chain in with_parallelograms():
         for seen in watched(chain):
             for moved in driven(seen, range(3)):
-                yield Word.of([moved] * 3)
+                yield RobotWord.of([moved] * 3)
                 if chain.joints[-1].letter == "R":
-                    yield Word.of([moved] * 2, platform="point")
+                    yield RobotWord.of([moved] * 2, platform="point")

@@ -1,4 +1,4 @@
-"""Building the site: pages by a crew into a draft, which goes on where it was broken off, then the index."""
+"""Building the site: pages by an executor into a draft, which goes on where it was broken off, then the index."""
 
 from __future__ import annotations
 
@@ -13,10 +13,9 @@ from typing import Any
 from ... import __version__
 from ...errors import BadRequest, BuildStopped
 from ..build import Tell
-from ..executors import Crew, crew
+from ..executors import Executor, Made, Stopped, executor
 from ..jsonl import line
 from ..query import Catalog
-from ..source import Made, Stopped
 from . import index
 from .folder import FOLDERS, draft
 from .pages import written
@@ -59,7 +58,7 @@ def site(catalog: Catalog, target: str | Path, *, workers: int = 1, anew: bool =
     """
     if not len(catalog):
         raise BadRequest("no architectures for a site", 0, "one or more")
-    team, tell = crew(workers), tell or (lambda *_: None)
+    team, tell = executor(workers), tell or (lambda *_: None)
     every = structures(catalog)
     differ: list[tuple[str, str]] = []
     with draft(target, _stamp(every), anew=anew) as folder:
@@ -74,7 +73,7 @@ def site(catalog: Catalog, target: str | Path, *, workers: int = 1, anew: bool =
     return Site(Path(target) / "index.html", len(catalog), len(every), len(wanted), tuple(sorted(differ)))
 
 
-def _made(team: Crew, folder: Path, wanted: Sequence[Structure]) -> Iterator[Made]:
+def _made(team: Executor, folder: Path, wanted: Sequence[Structure]) -> Iterator[Made]:
     packed = [each.packed() for each in wanted]
     try:
         yield from team(partial(written, str(folder)), (packed[i : i + CHUNK] for i in range(0, len(packed), CHUNK)))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import fcntl
 import json
 import os
 import shutil
@@ -12,6 +11,7 @@ from pathlib import Path
 
 from ...description.files import require_folder
 from ...errors import BadRequest
+from ..journal import require_alone
 from ..store import writable
 
 STAMP = "site.json"
@@ -60,10 +60,8 @@ def _locked(folder: Path) -> Iterator[None]:
     folder.mkdir(exist_ok=True)
     handle = os.open(folder, os.O_RDONLY | os.O_CLOEXEC)
     try:
-        fcntl.flock(handle, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        require_alone(handle, "another build writes this site", folder)
         yield
-    except BlockingIOError:
-        raise BadRequest("another build writes this site", str(folder), "one build at a time") from None
     finally:
         os.close(handle)
 

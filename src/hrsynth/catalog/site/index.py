@@ -1,16 +1,22 @@
-"""What the index knows of each architecture, by column: a script that a page loads without a server."""
+"""The templates, filled in, and the index: what it knows of each architecture, by column, as a script that a page loads
+without a server."""
 
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Iterable
+from functools import cache
 from importlib import resources
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ... import __version__
-from .render import rendered
 from .structures import Structure, named
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+    from markupsafe import Markup
 
 TEXTS = ("group", "motion", "verdict", "notation", "hidden", "condition", "cure", "refused")
 """Fields with few values: each value once, and which of them a record has."""
@@ -56,3 +62,25 @@ def _places(values: list[str | None]) -> dict[str, Any]:
 
 def _compact(data: object) -> str:
     return json.dumps(data, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+
+
+def rendered(template: str, **values: Any) -> str:
+    """The text of a template with these values."""
+    return _environment().get_template(template).render(values)
+
+
+def notation(text: str) -> Markup:
+    """An architecture with lines under its motors, as HTML."""
+    from markupsafe import Markup, escape
+
+    return Markup(re.sub(r"(.)\*", r"<u>\1</u>", str(escape(text.replace("Pi", "Π")))))
+
+
+@cache
+def _environment() -> Environment:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    made = Environment(loader=PackageLoader("hrsynth.catalog.site"), autoescape=True, trim_blocks=True,
+                       lstrip_blocks=True, undefined=StrictUndefined)
+    made.filters.update(notation=notation, named=named)
+    return made

@@ -1,12 +1,15 @@
-"""The page of a structure and the robot files of its architectures."""
+"""The page of a structure, with its derivation made again, and the robot files of its architectures."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
+from dataclasses import dataclass
 from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from ...analysis.derive import Derivation, derived
+from ...analysis.observed import prepare
 from ...description import native
 from ...description.files import replacement
 from ...errors import HrsynthError
@@ -14,12 +17,14 @@ from ...mechanism.model import Mechanism
 from ...present.drawings.schematic import robot_svg
 from ...present.text.catalog import facts, motors
 from ...rewrite.strategy import Step
+from ..entry import SAMPLES, model
+from ..executors import Made, Stopped
+from ..geometry import mechanism
 from ..jsonl import Record
-from ..source import Made, Stopped
+from ..words import parse
 from .folder import FOLDERS
-from .render import rendered
+from .index import rendered
 from .structures import Structure, named
-from .study import Study, study
 
 PAGES, ROBOTS = FOLDERS
 """Folders of the pages and of the robot files."""
@@ -94,3 +99,43 @@ def _variant(record: Record, robot: Mechanism | None) -> dict[str, Any]:
     return {"name": named(record["word"]), "word": record["word"], "notation": record.get("notation", ""),
             "motors": motors(record) if "motors" in record else "",
             "joints": [] if robot is None else _driven(robot), "file": robot is not None}
+
+
+@dataclass(frozen=True, eq=False)
+class Study:
+    """The number of the dimensions, the derivation in these (None: there is none), and what it ends in or why there is
+    none, where the record says otherwise."""
+
+    attempt: int
+    derivation: Derivation | None = None
+    differs: str = ""
+
+    @property
+    def observed(self) -> tuple[str, ...] | None:
+        """The observed links; None where nothing is known of them."""
+        return None if self.derivation is None else tuple(each.link for each in self.derivation.setting.observed)
+
+    def real(self, word: str) -> Mechanism:
+        """The robot of an architecture of this structure."""
+        return mechanism(parse(word), self.attempt)
+
+
+def study(record: Record) -> Study:
+    """Derive the hidden robot of a record in its dimensions; none where it is refused."""
+    attempt = record.get("attempt", 0)
+    if "refused" in record:
+        return Study(attempt)
+    try:
+        setting = prepare(mechanism(model(parse(record["word"])), attempt), samples=SAMPLES)
+        found = derived(setting, beside=False)
+    except HrsynthError as error:
+        return Study(attempt, differs=str(error).splitlines()[0])
+    return Study(attempt, found, _difference(found, record))
+
+
+def _difference(found: Derivation, record: Record) -> str:
+    """What a derivation ends in, where that is not what the record says."""
+    hidden = found.hidden_architecture and found.hidden_architecture.ascii
+    same = (hidden, found.verdict.verdict, found.verdict.rank) == (record.get("hidden"), record["verdict"],
+                                                                   record["rank"])
+    return "" if same else f"{hidden or 'no hidden robot'}, {found.verdict.verdict}, rank {found.verdict.rank}"

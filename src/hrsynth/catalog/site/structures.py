@@ -9,7 +9,7 @@ from hashlib import sha256
 from typing import Any
 
 from ..jsonl import Record, line
-from ..words import Leg, Word, parse
+from ..words import LegWord, RobotWord, parse
 
 LENGTH = 12
 """Digits of a name: two of a million words are alike with a probability of 2e-3."""
@@ -74,10 +74,10 @@ def structures(records: Iterable[Record]) -> tuple[Structure, ...]:
                  for word in sorted(own))
 
 
-def _unseen(word: Word) -> Word:
+def _unseen(word: RobotWord) -> RobotWord:
     """The word with no link marked as observed."""
-    return Word.of(*[[_blind(leg) for leg in body] for body in word.bodies], platform=word.platform)
+    return RobotWord.of(*[[_blind(leg) for leg in body] for body in word.bodies], platform=word.platform)
 
 
-def _blind(leg: Leg) -> Leg:
-    return Leg(tuple(replace(joint, watched=False) for joint in leg.joints))
+def _blind(leg: LegWord) -> LegWord:
+    return LegWord(tuple(replace(joint, watched=False) for joint in leg.joints))

@@ -16,8 +16,7 @@ if TYPE_CHECKING:
     from ...analysis.accuracy.field import Field
     from ...analysis.accuracy.pose_errors import Extent, PoseErrors
     from ...analysis.accuracy.sampled import Sampled
-    from ...selection.candidate import Candidate, Modes
-    from ...selection.select import Selection
+    from ...selection.select import Candidate, ModeCount, Selection
     from ...simulation.result import Servo
 
 PARTS_FROM_LINEAR = 0.1
@@ -188,5 +187,5 @@ def _row(each: Candidate, sight: bool) -> list[str]:
             "–" if each.run is None else each.run.verdict]
 
 
-def _modes(modes: Modes | None) -> str:
+def _modes(modes: ModeCount | None) -> str:
     return "–" if modes is None or modes.count is None else f"{modes.count} ({modes.reachable})"

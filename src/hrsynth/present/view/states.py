@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis.observed import ObservedRobot
-from ...analysis.posture import Examiner
+from ...analysis.posture import ConfigurationAnalysis
 from ...geometry.vectors import Array, inverse
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.coordinates import Coordinates
@@ -84,7 +84,7 @@ class Mover:
 
     setting: ObservedRobot
     coordinates: Coordinates
-    examiner: Examiner
+    examiner: ConfigurationAnalysis
     hidden: PinocchioModel | None = None
 
     @classmethod
@@ -92,7 +92,8 @@ class Mover:
         """At the zero configuration."""
         start = setting.everything.start
         twin = None if hidden is None else PinocchioModel(hidden, start.twin.length)
-        return cls(setting, Coordinates.of(start, setting.everything.question, setting.motion), Examiner(setting), twin)
+        coordinates = Coordinates.of(start, setting.everything.question, setting.motion)
+        return cls(setting, coordinates, ConfigurationAnalysis(setting), twin)
 
     @property
     def home(self) -> Posed:
@@ -105,7 +106,7 @@ class Mover:
         if self.hidden is not None and at.hidden is not None:
             q = at.hidden
             places[HIDDEN] = displacements(self.hidden.mechanism, lambda link: self.hidden.pose(q, link))
-        return ViewState(places, self.examiner.glance(at.real).distances.type2)
+        return ViewState(places, self.examiner.classify(at.real).distances.type2)
 
     def sent(self, here: Posed, values: Array) -> tuple[Posed, Array]:
         """Where the robot comes to from ``here`` when the platform is sent to coordinates (n,), and those there."""
