@@ -25,8 +25,7 @@ from hrsynth.cli.progress import Progress
 def run(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
     """The command line on the small catalog: status, output, errors."""
     monkeypatch.delenv("HRSYNTH_DEBUG", raising=False)
-    for module in ("build", "check", "source"):
-        monkeypatch.setattr(f"hrsynth.catalog.{module}.architectures", source)
+    monkeypatch.setattr("hrsynth.catalog.build.architectures", source)
 
     def call(*arguments: str | Path) -> tuple[int, str, str]:
         capsys.readouterr()
@@ -99,7 +98,7 @@ def test_show_draws_and_writes_a_robot(run, tmp_path: Path):
              "exact": True, "instances": 1, "motors": 3, "base_motors": True, "fewest": 3,
              "minimal": [["1", "2", "3"]], "lost": [], "modes_bound": 6, "modes_seen": 2,
              "condition": "the lines meet in a point"}
-    build(store, source=hrsynth.catalog.source.Source({"g": lambda: [word]}, lambda _: facts))
+    build(store, source=hrsynth.catalog.build.WordSource({"g": lambda: [word]}, lambda _: facts))
     file = tmp_path / "robot.urdf"
     status, out, err = run("show", "(Rz*-Rz-Rz)+2(Rz*-Rz-Rz)", "--catalog", store, "-o", file)
     assert (status, err) == (0, "")

@@ -23,7 +23,7 @@ from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.vectors import pose, rotation_from_rpy
 from hrsynth.mechanism.pose import Pose
-from hrsynth.selection.select import Candidate, Search, Selection, _Work, select
+from hrsynth.selection.select import Candidate, Criteria, Selection, _Work, select
 from hrsynth.selection.sight import Sight, camera_at, hidden
 from hrsynth.simulation.camera import Camera, cylinders
 
@@ -42,7 +42,7 @@ def work() -> _Work:
     everything = setting.everything
     ends = [reach(everything.start, everything.question, Pose.parse(text), setting.motion) for text in (START, GOAL)]
     cones = half_angles("0.1deg", setting.observed)
-    return _Work(setting, ends[0], ends[1], cones, None, Search(), math.inf, 0, lambda _: None)
+    return _Work(setting, ends[0], ends[1], cones, None, Criteria(), math.inf, 0, lambda _: None)
 
 
 def first(watched: str) -> Candidate:

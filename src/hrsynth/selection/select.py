@@ -43,7 +43,7 @@ TYPES = {"type1": "a Type 1 singularity", "type2": "a Type 2 singularity", "type
 
 
 @dataclass(frozen=True)
-class Search:
+class Criteria:
     """What is looked at; :func:`select` takes each of these by its name. Raises ``BadRequest``."""
 
     size: int = 4
@@ -185,12 +185,12 @@ class Selection(Result, shown_as="select"):
 
 
 def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, goal: Pose | str,
-           cones: Cones = "0.1deg", search: Search | None = None, seed: int = 0,
+           cones: Cones = "0.1deg", criteria: Criteria | None = None, seed: int = 0,
            progress: Callable[[str], None] | None = None, **options: Any) -> Selection:
     """All sets of legs for the displacement from ``start`` to ``goal``, ranked by the largest position error at the
     goal for ``cones`` about the directions (MMT A.2).
 
-    ``options`` are fields of :class:`Search`, by name: ``size``, ``examine``, ``runs``, ``sight``, ``focal``,
+    ``options`` are fields of :class:`Criteria`, by name: ``size``, ``examine``, ``runs``, ``sight``, ``focal``,
     ``seconds``. A set is discarded where it does not see every freedom, where an end is singular, where the camera
     (``sight``) sees too little of a leg, where start and goal are proved to lie in different aspects, and where a
     simulated run ends elsewhere. Modes and aspects are asked for the ``examine`` most accurate sets, the others are
@@ -199,7 +199,7 @@ def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, go
     Raises ``BadRequest``, ``PoseNotReached`` (exit status 2).
     """
     wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
-    given, tell = replace(search or Search(), **options), progress or silent
+    given, tell = replace(criteria or Criteria(), **options), progress or silent
     tell("sampling")
     setting = prepare(robot, None, camera, seed=seed)
     directions = tuple(o for o in setting.segments if isinstance(o, Direction))
@@ -222,13 +222,13 @@ def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, go
     return Selection(setting, poses[0], poses[1], tuple(found), half, work.sight, left)
 
 
-def _sight(setting: ObservedRobot, ends: Sequence[ClosedConfiguration], search: Search) -> Sight | None:
-    if search.sight is None:
+def _sight(setting: ObservedRobot, ends: Sequence[ClosedConfiguration], criteria: Criteria) -> Sight | None:
+    if criteria.sight is None:
         return None
     rods = cylinders(setting.mechanism, setting.observed)
     reference = setting.mechanism.reference
-    camera = (placed(rods, reference, [at.pose for at in ends], of_focal(search.focal)) if search.sight == AUTO
-              else camera_at(search.sight, search.focal))
+    camera = (placed(rods, reference, [at.pose for at in ends], of_focal(criteria.focal)) if criteria.sight == AUTO
+              else camera_at(criteria.sight, criteria.focal))
     return Sight(camera, reference, {o.leg: rod for o, rod in zip(setting.observed, rods, strict=True)})
 
 
@@ -241,7 +241,7 @@ class _Work:
     goal: ClosedConfiguration
     cones: Array
     sight: Sight | None
-    search: Search
+    criteria: Criteria
     until: float
     seed: int
     tell: Callable[[str], None]
@@ -307,7 +307,7 @@ class _Work:
     def examined(self, candidates: Sequence[Candidate]) -> tuple[list[Candidate], str | None]:
         """The candidates, best first, as many as are to be examined with their modes and aspects, and with simulated
         runs until enough of them ended at the goal; why the others were left, None where there are none."""
-        most, runs = self.search.examine, self.search.runs
+        most, runs = self.criteria.examine, self.criteria.runs
         found: list[Candidate] = []
         arrived = begun = 0
         left = None
