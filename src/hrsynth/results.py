@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
+from functools import wraps
+from inspect import Parameter, signature
 from typing import Any, ClassVar
 
 
@@ -34,3 +37,22 @@ class Result:
 
     def _repr_html_(self) -> str:
         return str(Result.public("html")(self))
+
+
+def by_name(value: type[Any], keyword: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:
+    """A question whose options are one frozen value, its ``keyword``, and that takes that value's fields by their own
+    names as well."""
+    fields = signature(value).parameters
+
+    def named(question: Callable[..., Any]) -> Callable[..., Any]:
+        @wraps(question)
+        def asked(*args: Any, **given: Any) -> Any:
+            own = {name: given.pop(name) for name in fields if name in given}
+            return question(*args, **given | {keyword: replace(given.get(keyword) or value(), **own)})
+
+        known = signature(question)
+        more = [field.replace(kind=Parameter.KEYWORD_ONLY) for field in fields.values()]
+        asked.__signature__ = known.replace(parameters=[*known.parameters.values(), *more])  # type: ignore[attr-defined]
+        return asked
+
+    return named

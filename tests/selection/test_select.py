@@ -42,7 +42,7 @@ def work() -> _Work:
     everything = setting.everything
     ends = [reach(everything.start, everything.question, Pose.parse(text), setting.motion) for text in (START, GOAL)]
     cones = half_angles("0.1deg", setting.observed)
-    return _Work(setting, ends[0], ends[1], cones, None, Criteria(), math.inf, 0, lambda _: None)
+    return _Work(setting, ends[0], ends[1], cones, None, Criteria(), math.inf, 0)
 
 
 def first(watched: str) -> Candidate:

@@ -18,7 +18,6 @@ import numpy as np
 
 from hrsynth.analysis.aspects.answer import SEPARATED
 from hrsynth.analysis.aspects.path import Aspects
-from hrsynth.analysis.modes.modes import modes
 from hrsynth.budgets import RUN_AWAY
 from hrsynth.description import load
 from hrsynth.geometry.vectors import hat, rotation_from_rpy
@@ -44,9 +43,8 @@ def run_between(name: str, start: ClosedConfiguration, goal: ClosedConfiguration
     """A run between two configurations of a shipped robot, all legs watched."""
     found = setting(name)
     law = Law(found.samples.question, found.dof, gain)
-    pose = found.motion.pose(goal.pose(found.motion.link))
     desired = FixedDirections(directions(goal, law.question)[0])
-    return ServoTask(found, start, goal, law, desired, lambda: modes(load(name), at=pose), Conditions(gain)).run()
+    return ServoTask(found, start, goal, law, desired, Conditions(gain)).run()
 
 
 def untrue(found: Servo) -> Iterator[str]:

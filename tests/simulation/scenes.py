@@ -44,7 +44,7 @@ def home(name: str) -> ServoTask:
     """A scene that starts and ends at the first regular pose: parts of it are put to use."""
     found = setting(name)
     pose = next(str(found.motion.pose(at.pose(found.motion.link))) for at in regular(name, 0, 0.4))
-    return ServoTask.of(load(name), None, None, start=pose, goal=pose)
+    return ServoTask.of(found, start=pose, goal=pose)
 
 
 def regular(name: str, seed: int, distance: float, steps: int = 12, apart: int = 1,

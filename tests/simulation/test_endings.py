@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import hrsynth.simulation.run as engine
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.simulation.ending import BOUNDARY, TIME, UNDECIDED
@@ -23,7 +24,7 @@ LASTS = (30.0, 60.0, 150.0)
 
 def test_a_leg_that_is_stretched_is_a_boundary_however_long_the_run_may_take() -> None:
     """It was *time* after 75 s, and *boundary* with 400 s; at the fold integrators chatter."""
-    scene = ServoTask.of(load("quattro_rigid"), "1,3", None, start="x=-0.314,y=0.319,z=-0.64",
+    scene = ServoTask.of(ObservedRobot.of(load("quattro_rigid"), "1,3"), start="x=-0.314,y=0.319,z=-0.64",
                      goal="x=0.342,y=-0.267,z=-0.812")
     found = [scene.result(scene.loop().simulate(scene.start, lasts)) for lasts in (25, 75, 400)]
     assert [each.ended for each in found] == [BOUNDARY] * 3

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -17,7 +17,7 @@ from ..analysis.aspects.answer import SEPARATED
 from ..analysis.aspects.path import Aspects
 from ..analysis.controllability import CONTROLLABLE, verdict_of
 from ..analysis.modes.modes import AssemblyModes, modes_at
-from ..analysis.observed import ObservedRobot, prepare, silent
+from ..analysis.observed import ObservedRobot
 from ..analysis.posture import ConfigurationAnalysis, Posture
 from ..batch.reach import reach
 from ..budgets import AXIS_SEEN
@@ -27,7 +27,8 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Mechanism
 from ..mechanism.observation import Direction
 from ..mechanism.pose import Pose
-from ..results import Result
+from ..progress import tell
+from ..results import Result, by_name
 from ..simulation.camera import cylinders, placed
 from ..simulation.ending import GOAL
 from ..simulation.servo import servo
@@ -184,13 +185,13 @@ class Selection(Result, shown_as="select"):
                 "sets": [each.to_dict() for each in self.candidates]}
 
 
-def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, goal: Pose | str,
-           cones: Cones = "0.1deg", criteria: Criteria | None = None, seed: int = 0,
-           progress: Callable[[str], None] | None = None, **options: Any) -> Selection:
+@by_name(Criteria, "criteria")
+def select(robot: Mechanism | ObservedRobot, camera: str | None = None, *, start: Pose | str, goal: Pose | str,
+           cones: Cones = "0.1deg", criteria: Criteria, seed: int = 0) -> Selection:
     """All sets of legs for the displacement from ``start`` to ``goal``, ranked by the largest position error at the
     goal for ``cones`` about the directions (MMT A.2).
 
-    ``options`` are fields of :class:`Criteria`, by name: ``size``, ``examine``, ``runs``, ``sight``, ``focal``,
+    The fields of :class:`Criteria` can be given by their names: ``size``, ``examine``, ``runs``, ``sight``, ``focal``,
     ``seconds``. A set is discarded where it does not see every freedom, where an end is singular, where the camera
     (``sight``) sees too little of a leg, where start and goal are proved to lie in different aspects, and where a
     simulated run ends elsewhere. Modes and aspects are asked for the ``examine`` most accurate sets, the others are
@@ -199,9 +200,7 @@ def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, go
     Raises ``BadRequest``, ``PoseNotReached`` (exit status 2).
     """
     wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
-    given, tell = replace(criteria or Criteria(), **options), progress or silent
-    tell("sampling")
-    setting = prepare(robot, None, camera, seed=seed)
+    setting = ObservedRobot.of(robot, None, camera, seed=seed)
     directions = tuple(o for o in setting.segments if isinstance(o, Direction))
     setting = replace(setting, observed=directions)
     half = half_angles(cones, directions)
@@ -211,9 +210,9 @@ def select(robot: Mechanism, camera: str | None = None, *, start: Pose | str, go
     except PoseNotReached as error:
         error.exit_status = 2
         raise
-    work = _Work(setting, ends[0], ends[1], half, _sight(setting, ends, given), given,
-                 np.inf if given.seconds is None else time.monotonic() + given.seconds, seed, tell)
-    sets = [legs for count in range(1, min(given.size, len(directions)) + 1)
+    work = _Work(setting, ends[0], ends[1], half, _sight(setting, ends, criteria), criteria,
+                 np.inf if criteria.seconds is None else time.monotonic() + criteria.seconds, seed)
+    sets = [legs for count in range(1, min(criteria.size, len(directions)) + 1)
             for legs in combinations(directions, count)]
     found, left = work.examined(sorted((work.first(legs) for legs in sets), key=lambda each: each.order))
     found.sort(key=lambda each: (each.discarded is not None, not each.examined,
@@ -244,7 +243,6 @@ class _Work:
     criteria: Criteria
     until: float
     seed: int
-    tell: Callable[[str], None]
 
     def watching(self, legs: Sequence[str]) -> ObservedRobot:
         """The setting with some legs watched."""
@@ -252,7 +250,7 @@ class _Work:
 
     def first(self, observations: Sequence[Direction]) -> Candidate:
         """What is quickly said of a set: verdict, singular ends, sight, accuracy."""
-        self.tell("sets of legs")
+        tell("sets of legs")
         legs = tuple(o.leg for o in observations)
         setting = self.watching(legs)
         try:
@@ -285,12 +283,11 @@ class _Work:
         if candidate.discarded:
             return candidate
         setting = self.watching(candidate.legs)
-        self.tell("modes")
+        tell("modes")
         start_modes, goal_modes = self._modes(setting, self.start), self._modes(setting, self.goal)
-        self.tell("aspects")
+        tell("aspects")
         try:
-            answer = Aspects.about(setting).join(self.start, self.goal, seed=self.seed, budget=BUDGET,
-                                                 progress=lambda: self.tell("aspects"))
+            answer = Aspects.about(setting).join(self.start, self.goal, seed=self.seed, budget=BUDGET)
             aspect = Decision(answer.verdict, answer.reason)
         except HrsynthError as error:
             aspect = Decision("undecided", str(error))
@@ -324,7 +321,7 @@ class _Work:
             begun += 1
             candidate = self.decided(candidate)
             if not candidate.discarded and arrived < runs:
-                self.tell("runs")
+                tell("runs")
                 candidate = self.ran(candidate)
                 arrived += candidate.discarded is None
             found.append(candidate)

@@ -1,13 +1,14 @@
-"""Where a run ended, in the words of theory 6: goal, mode, antipodal, local minimum, boundary, time; or undecided."""
+"""Where a run ended, in the words of docs/pages/theory.md, section 11: goal, mode, antipodal, local minimum, boundary,
+time; or undecided."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..analysis.modes.modes import AssemblyModes
+from ..analysis.modes.modes import AssemblyModes, modes
+from ..analysis.observed import ObservedRobot
 from ..analysis.posture import ConfigurationAnalysis
 from ..budgets import RUN_EVALUATIONS
 from ..errors import HrsynthError
@@ -36,15 +37,11 @@ class Ending:
 
 @dataclass(frozen=True, eq=False)
 class EndingClassifier:
-    """Names endings: by the goal's configuration and directions (k, 3), what lists its assembly modes, and the analysis
-    of single configurations."""
+    """Names endings by the goal's configuration and directions (k, 3)."""
 
+    setting: ObservedRobot
     goal: ClosedConfiguration
     directions: Array
-    platform: str
-    point: Array | None
-    modes: Callable[[], AssemblyModes]
-    analysis: ConfigurationAnalysis
 
     def classify(self, run: Run, directions: Array) -> Ending:
         """The ending of a run whose last directions are (k, 3)."""
@@ -71,13 +68,14 @@ class EndingClassifier:
     def _served(self, at: ClosedConfiguration, directions: Array) -> Ending:
         opposite = np.sum(directions * self.directions, axis=1) < 0
         if opposite.any():
-            there = "; the pose is the goal's" if self.same_pose(at, self.goal.pose(self.platform)) else ""
+            there = "; the pose is the goal's" if self.same_pose(at, self.goal.pose(self.setting.motion.link)) else ""
             return Ending(ANTIPODAL, f"{int(opposite.sum())} of {len(opposite)} directions end opposite to the desired "
                                      f"ones, where the error vanishes as well{there}")
-        if self.same_pose(at, self.goal.pose(self.platform)):
+        if self.same_pose(at, self.goal.pose(self.setting.motion.link)):
             return Ending(GOAL, "the directions and the pose are those of the goal")
         try:
-            listed = self.modes()
+            motion = self.setting.motion
+            listed = modes(self.setting, at=motion.pose(self.goal.pose(motion.link)))
         except HrsynthError as error:
             return Ending(MODE, f"the directions are the goal's, the pose is not; modes not listed: {error}")
         for number, mode in enumerate(listed.modes, 1):
@@ -89,10 +87,10 @@ class EndingClassifier:
                       None, listed)
 
     def _rest(self, at: ClosedConfiguration, last: Command) -> Ending:
-        posture = self.analysis.classify(at)
+        posture = ConfigurationAnalysis(self.setting).classify(at)
         where = f"‖e‖ = {last.size:.3g} and the command vanishes"
         weak = float(last.values[-1]) < DAMPED
-        shifted = at.velocity(self.platform) @ last.weak
+        shifted = at.velocity(self.setting.motion.link) @ last.weak
         if weak and float(np.linalg.norm(shifted)) < DAMPED:
             return Ending(BOUNDARY, f"{where}: a leg that is not watched is stretched to its limit")
         far = posture.distances
@@ -108,7 +106,7 @@ class EndingClassifier:
 
     def same_pose(self, at: ClosedConfiguration, X: Array) -> bool:
         """Whether the platform of a configuration is at X (4, 4), to ``SAME_RELATION``."""
-        return self._alike(at.pose(self.platform), X, self.point)
+        return self._alike(at.pose(self.setting.motion.link), X, self.setting.anatomy.point)
 
     def _alike(self, X: Array, other: Array, point: Array | None) -> bool:
         near = SAME_RELATION * self.goal.twin.length

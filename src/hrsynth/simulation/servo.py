@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from ..analysis.controllability import verdict_of
-from ..analysis.modes.modes import AssemblyModes, modes
-from ..analysis.observed import ObservedRobot, prepare, silent
+from ..analysis.observed import ObservedRobot
 from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
 from ..batch.reach import reach
 from ..budgets import LONGEST_RUN, RUN_EVALUATIONS
@@ -21,6 +19,8 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
+from ..progress import tell
+from ..results import by_name
 from ..tolerances import RANK_GAP
 from .bench import Bench
 from .camera import Camera, Edges, cylinders, placed
@@ -107,44 +107,40 @@ class Conditions:
         return self.time or (self.duration or 0.0) + lasts / self.gain
 
 
-def servo(robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-          start: Pose | str, goal: Pose | str, conditions: Conditions | None = None, seed: int = 0,
-          progress: Callable[[str], None] | None = None, **options: Any) -> Servo:
+@by_name(Conditions, "conditions")
+def servo(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+          start: Pose | str, goal: Pose | str, conditions: Conditions, seed: int = 0) -> Servo:
     """The servo loop of MMT 2.3 from the pose ``start`` towards the directions at ``goal``.
 
-    ``observe`` and ``camera`` as for ``derive``. ``options`` are fields of :class:`Conditions`, by name: ``gain``,
-    ``sense``, ``noise``, ``bias``, ``lens``, ``physics``, ``duration``, ``time``.
+    ``observe`` and ``camera`` as for ``derive``. The fields of :class:`Conditions` can be given by their names:
+    ``gain``, ``sense``, ``noise``, ``bias``, ``lens``, ``physics``, ``duration``, ``time``.
 
     Raises ``BadRequest`` for names that there are not, legs that do not see the platform, singular poses;
     ``PoseNotReached`` (exit status 2) for poses out of reach; ``MissingExtra``.
     """
-    given, tell = replace(conditions or Conditions(), **options), progress or silent
-    tell("sampling")
-    task = ServoTask.of(robot, observe, camera, start=start, goal=goal, conditions=given, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    task = ServoTask.of(setting, start=start, goal=goal, conditions=conditions, seed=seed)
     tell("run")
     return task.run()
 
 
 @dataclass(frozen=True, eq=False)
 class ServoTask:
-    """A robot that is about to be servoed: its start and goal configurations, its law, what is desired, and what lists
-    the assembly modes at the goal."""
+    """A robot that is about to be servoed: its start and goal configurations, its law, what is desired."""
 
     setting: ObservedRobot
     start: ClosedConfiguration
     goal: ClosedConfiguration
     law: Law
     desired: FixedDirections | Trajectory
-    modes: Callable[[], AssemblyModes]
     conditions: Conditions = Conditions()
     seed: int = 0
 
     @classmethod
-    def of(cls, robot: Mechanism, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-           start: Pose | str, goal: Pose | str, conditions: Conditions = Conditions(), seed: int = 0) -> ServoTask:
+    def of(cls, setting: ObservedRobot, *, start: Pose | str, goal: Pose | str, conditions: Conditions = Conditions(),
+           seed: int = 0) -> ServoTask:
         """The task of a request; raises what :func:`servo` raises."""
         wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
-        setting = prepare(robot, observe, camera, seed=seed)
         _require_seen(setting)
         question, motion = setting.everything.question, setting.motion
         law = Law(setting.samples.question, setting.dof, conditions.gain)
@@ -160,11 +156,7 @@ class ServoTask:
         analysis = ConfigurationAnalysis(setting)
         for name, at in zip(("start", "goal"), ends, strict=True):
             _require_regular(analysis, name, at)
-
-        def listed() -> AssemblyModes:
-            return modes(robot, observe, camera, at=motion.pose(ends[1].pose(motion.link)), seed=seed)
-
-        return cls(setting, ends[0], ends[1], law, desired, listed, conditions, seed)
+        return cls(setting, ends[0], ends[1], law, desired, conditions, seed)
 
     @property
     def directions(self) -> Array:
@@ -210,8 +202,7 @@ class ServoTask:
             # where the loop without noise and dynamics goes on to: its ending is the one that is told
             still = Loop(self.law, setting.everything.question, FixedDirections(self.directions)).simulate(
                 run.last, LASTS / self.law.gain)
-        classifier = EndingClassifier(self.goal, self.directions, motion.link, setting.anatomy.point, self.modes,
-                                      ConfigurationAnalysis(setting))
+        classifier = EndingClassifier(setting, self.goal, self.directions)
         ending = classifier.classify(still, directions(still.last, self.law.question)[0])
         track = tracked(run.configurations, self.law.question, setting.everything.question, setting.dof)
         return Servo(setting, motion.pose(self.start.pose(motion.link)), motion.pose(self.goal.pose(motion.link)),
