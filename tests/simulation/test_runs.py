@@ -75,7 +75,7 @@ def test_more_far_runs_end_as_they_are_named(name: str):
     check_far(name, 4, int(environ.get("PAIRS", "5")))
 
 
-# ---- the papers' cases (theory 7: what their geometry gives)
+# ---- the papers' cases (docs/pages/papers.md: what their geometry gives)
 
 
 @pytest.mark.parametrize(("legs", "ended", "z"), [

@@ -172,7 +172,7 @@ class Advice(Result, shown_as="advise"):
 
 def advise(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
            most: int | None = None, seed: int = 0) -> Advice:
-    """The smallest sets of further measurements with which u̇ = 0 forces t = 0 (theory 3; MMT 5.3).
+    """The smallest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3).
 
     ``observe`` holds leg labels or link names (default: all legs), ``camera`` the link that carries the camera. Added
     can be the default segment of a further leg, the direction of any other link of a leg, the position of a line whose

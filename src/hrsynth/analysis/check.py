@@ -79,10 +79,10 @@ class Check(Result, shown_as="check"):
 def check(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
           at: Sequence[Pose | str] = (), grid: Grid | str | None = None, seed: int = 0) -> Check:
     """Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six, constraint singularities and redundant constraints
-    (theory 4) at the poses ``at`` (default: the zero configuration) and over ``grid``.
+    (docs/pages/theory.md, section 7) at the poses ``at`` (default: the zero configuration) and over ``grid``.
 
     What is said of the hidden robot is read from the real robot's relation with the observed directions, which is the
-    hidden robot's own (theory 3); the real robot's kinds take its motors' coordinates for what is measured. Generic
+    hidden robot's own (theory.md 3); the real robot's kinds take its motors' coordinates for what is measured. Generic
     values are those of random samples. ``observe`` and ``camera`` as for ``derive``.
 
     Raises ``BadRequest`` for names that there are not and for parts of a pose that the platform cannot change,

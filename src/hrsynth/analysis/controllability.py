@@ -141,7 +141,7 @@ def _lost(setting: ObservedRobot, samples: Samples, legs: tuple[str, ...], count
 
 def legs(robot: Mechanism | ObservedRobot, camera: str | None = None, *, at: Pose | str | None = None, seed: int = 0
          ) -> Legs:
-    """The verdict of every set of legs at their default segments (theory 3, verdicts), on the branch of the zero
+    """The verdict of every set of legs at their default segments (theory.md 6), on the branch of the zero
     configuration, or of the pose ``at``."""
     setting = ObservedRobot.of(robot, None, camera, at=at, seed=seed)
     anatomy = setting.anatomy

@@ -1,4 +1,4 @@
-"""Exact verdicts of an architecture: ranks over the rationals at random instances of its geometry (theory 3.4).
+"""Exact verdicts of an architecture: ranks over the rationals at random instances of its geometry (theory.md 12).
 
 Instantaneous kinematics depends on joint centres, joint axes and observed directions alone, and any choice of them *is*
 an assembled mechanism; link lengths do not matter. F is the irreducible family of geometries with all relations that

@@ -227,7 +227,7 @@ def _observed_robot(robot: Mechanism, observe: Sequence[str] | str | None, camer
 
 
 def defaults_of(anatomy: LegDecomposition) -> dict[str, Observation]:
-    """The segment of each leg that has one: the file's choice, else the theory's."""
+    """The segment of each leg that has one: the file's choice, else the default one."""
     table: dict[str, Observation] = {}
     given = {o.leg: o for o in reversed(anatomy.mechanism.observations)}
     for leg in anatomy.legs:

@@ -1,4 +1,4 @@
-"""The words of a verdict (theory 3, verdicts)."""
+"""The words of a verdict (docs/pages/theory.md, section 6)."""
 
 from __future__ import annotations
 

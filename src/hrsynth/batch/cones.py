@@ -1,4 +1,4 @@
-"""Error maxima: how far the platform can be off when each direction is off by up to its cone's half-angle (theory 6).
+"""Error maxima: how far the platform can be off when each direction is off by up to a cone's half-angle (theory.md 10).
 
 With B_i = ψ_i² A_i A_iᵀ (A_i: from the error of direction i to the platform's), the largest error is the maximum over
 unit w of Σ √(wᵀ B_i w). For weights t of the simplex, √λmax(Σ B_i / t_i) is an upper bound, Σ √(wᵀ B_i w) at its

@@ -1,4 +1,4 @@
-"""A mechanism compiled for batches of poses: inverse kinematics, Mᵀ, singular values, error maxima, reach (theory 6).
+"""A mechanism compiled for batches: inverse kinematics, Mᵀ, singular values, error maxima, reach (theory.md 10).
 
 Only the working mode of the zero configuration is followed. Twists have coordinates: along ``Stage.shifts`` in
 characteristic lengths, about ``Stage.spins`` in radians.

@@ -1,7 +1,7 @@
 """The Type 2 condition of a pattern: rows that must lose rank, a SymPy expression that must vanish, and words.
 
 Feasible motions of the platform have coordinates x (d of them); held leg i allows those for which its tip's velocity
-J_i x lies along its line: N_i J_i x = 0. A freedom is lost where the stacked rows have a kernel (theory 4).
+J_i x lies along its line: N_i J_i x = 0. A freedom is lost where the stacked rows have a kernel (theory.md 7).
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """The pattern of a robot's wrench systems with its measurements held, recognised over samples, never at one pose.
 
 With what is measured held, leg i lets its end translate along V_i and turn about axes through a point B_i; what the
-whole platform can still do must be in all of them (theory 4). This module finds V_i, B_i and their names.
+whole platform can still do must be in all of them (theory.md 7). This module finds V_i, B_i and their names.
 """
 
 from __future__ import annotations

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
 
 
 class JointType(StrEnum):
-    """The joint types of the theory, by their letter; the value is what notation prints."""
+    """The joint types, by their letter (docs/pages/theory.md, section 1); the value is what notation prints."""
 
     REVOLUTE = "R"
     PRISMATIC = "P"

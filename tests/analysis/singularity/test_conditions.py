@@ -138,7 +138,7 @@ def test_words_and_expression(robot: str, legs: str | None, real: bool) -> None:
 
 
 def test_with_the_camera_on_the_platform_the_tips_are_the_lower_joints() -> None:
-    """Theory 4: the planes go through A_i, and A1A2A3 is the fourth."""
+    """docs/pages/theory.md, section 7: the planes go through A_i, and A1A2A3 is the fourth."""
     answer = found("gough_stewart", "1,2,3", camera="platform")
     assert (answer.pattern.motion, answer.words, str(answer.condition.expression)) == spatial("u", "A")
     mechanism = load("gough_stewart")

@@ -1,1 +1,1 @@
-"""Accuracy: how far the platform can be off when the observed directions are off by up to given angles (theory 6)."""
+"""Accuracy: how far off the platform can be when the observed directions are wrong by given angles (theory.md 10)."""

@@ -63,7 +63,7 @@ def accuracy(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | No
              cones: Cones, at: Sequence[Pose | str] = (), plane: Pose | str | None = None,
              grid: Grid | str | None = None, steps: int | None = None, samples: int = 0, seed: int = 0) -> Accuracy:
     """The largest position and orientation error of the platform over all errors of the directions inside ``cones``
-    (theory 6; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
+    (docs/pages/theory.md, section 10; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
 
     At the poses ``at``, over ``plane`` (what is reached of it, ``steps`` poses a side), or over ``grid``; default: the
     zero configuration. In a grid free parts stay as at the zero configuration where legs are known subproblems.

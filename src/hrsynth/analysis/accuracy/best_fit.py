@@ -1,6 +1,6 @@
 """The pose at which a controller rests when its directions are wrong, followed from the pose where they are right.
 
-The law rests at critical points of F = ½ Σ ‖u_i × û_i‖² over the closed configurations (theory 11). û_i(s) is u_i
+The law rests at critical points of F = ½ Σ ‖u_i × û_i‖² over the closed configurations (theory.md 11). û_i(s) is u_i
 turned by the part s of its error. At s = 0 the pose itself is a strict minimum, F = 0, where all freedoms are seen; by
 the implicit function theorem it goes on as one smooth curve of strict minima while the Hessian of F is positive
 definite. The curve is followed by Newton steps with the whole Hessian, not that of Gauss and Newton, which need not

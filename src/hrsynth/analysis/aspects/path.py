@@ -1,4 +1,4 @@
-"""Whether two poses lie in one aspect: joined by a certified path, separated by a proof, or undecided (theory 5)."""
+"""Whether two poses lie in one aspect: joined by a certified path, separated by a proof, or undecided (theory.md 9)."""
 
 from __future__ import annotations
 
@@ -150,7 +150,7 @@ class Aspects:
 
 def path(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
          start: Pose | str, goal: Pose | str, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
-    """Whether a path without Type 2 singularity of the hidden robot joins two poses (theory 5, aspects).
+    """Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
 
     Both are reached from the zero configuration in its working mode; on the way legs may pass their limits into other
     working modes (Type 1). A certificate encloses, by interval arithmetic, the condition's value away from zero, the

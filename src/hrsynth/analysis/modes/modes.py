@@ -148,7 +148,7 @@ def modes(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
           at: Pose | str | ClosedConfiguration | None = None, real: bool = False, as_written: bool = False,
           seed: int = 0) -> AssemblyModes:
     """All poses with the directions that are observed at ``at`` (default: the zero configuration), or with ``real`` the
-    motors' coordinates: complex solutions counted, real ones enclosed (theory 5; MMT 3.3, 4.1.2, 4.2).
+    motors' coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).
 
     A Π counts as a parallelogram throughout, never crossed; where legs or measurements keep the platform from turning,
     poses that are turned all the same (another operation mode) are not looked for. ``observe`` and ``camera`` as for

@@ -1,4 +1,4 @@
-"""All assembly modes of a platform whose tips are confined to curves (theory 5)."""
+"""All assembly modes of a platform whose tips are confined to curves (docs/pages/theory.md, section 8)."""
 
 from __future__ import annotations
 
@@ -216,7 +216,7 @@ def _same(system: System, q: Array, goal: Array) -> bool:
 
 
 def _bounded(system: System, part: PoseSystem, roots: Roots) -> tuple[str, str]:
-    """By what there are no more solutions than msolve proposes, and the proof in words (theory 10)."""
+    """By what there are no more solutions than msolve proposes, and the proof in words (theory.md 8)."""
     most, proof = system.bound(part.legs), _proof(system, roots)
     if most is not None and roots.apart and roots.complex == most[0]:
         return "class", (f"{proof}; the complex ones are enclosed too, apart from each other, and there are at most "

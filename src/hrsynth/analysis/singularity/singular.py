@@ -91,7 +91,7 @@ class Singularity(Result, shown_as="singular"):
 
 def singular(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
              real: bool = False, points: int = POINTS, seed: int = 0) -> Singularity:
-    """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory 4; MMT 3.3.
+    """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory.md 7; MMT 3.3.
 
     Words, expression and rank are compared at ``points`` random reachable poses and at singular poses constructed from
     the expression; raises ``Disagreement`` where they do not agree, ``BadRequest`` where a robot has no motor.
