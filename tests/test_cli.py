@@ -286,7 +286,8 @@ def test_check_writes_a_picture_or_a_table(run, tmp_path: Path):
     (["--at", ""], 2, ["name=value"]), (["--at", "phi=1deg"], 2, ["cannot change phi", "allowed: x, y, z"]),
     (["--at", "x=9"], 3, ["x=9", "is not reached", "leg ", " mm", "% of the way"]),
     (["--grid", "x=0"], 2, ["number of ranges"]), (["--grid", "phi=0:1:3"], 2, ["cannot change phi"]),
-    (["-o", "map.png"], 2, ["--grid"]), (["--grid", "x=0:1:3", "-o", "map.pdf"], 2, ["unknown ending", ".png, .csv"]),
+    (["-o", "map.png"], 2, ["--grid"]),
+    (["--grid", "x=0:1:3", "-o", "map.pdf"], 2, ["unknown extension", ".png, .csv"]),
     (["--grid", "x=5:6:2", "-o", "map.png"], 2, ["no pose of the grid is reached"]),
     (["--observe", "9"], 2, ["legs 1, 2, 3"]), (["--camera", "moon"], 2, ["'moon'"]),
 ])
@@ -422,7 +423,7 @@ def test_singular_draws_the_locus(run, tmp_path: Path):
 
 
 @pytest.mark.parametrize(("robot", "arguments", "status", "words"), [
-    ("delta", ["-o", "x.txt"], 2, ["unknown ending", "'x.txt'", ".png"]),
+    ("delta", ["-o", "x.txt"], 2, ["unknown extension", "'x.txt'", ".png"]),
     ("delta", ["--plane", "z=-0.6"], 2, ["--output"]),
     ("delta", ["--plane", "phi=0", "-o", "x.png"], 2, ["cannot change phi", "x, y, z"]),
     ("delta", ["--plane", "z=5", "-o", "x.png"], 3, ["no pose of the plane z=5 is reached"]),

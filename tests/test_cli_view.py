@@ -49,7 +49,7 @@ def test_the_record_says_what_is_shown(capfd: pytest.CaptureFixture[str], tmp_pa
 
 @pytest.mark.parametrize("file", ["view.png", "view", "view.html.txt"])
 def test_other_endings_are_refused(capfd: pytest.CaptureFixture[str], tmp_path: Path, file: str):
-    assert_refused(ask(capfd, "rrrrr_m1", "--static", str(tmp_path / file)), 2, "unknown ending")
+    assert_refused(ask(capfd, "rrrrr_m1", "--static", str(tmp_path / file)), 2, "unknown extension")
     assert not list(tmp_path.iterdir())
 
 

@@ -217,7 +217,7 @@ class BuildStopped(Unanswered):
 
     def __init__(self, reason: str, kept: str | None = None) -> None:
         self.reason, self.kept = reason, kept
-        rest = "" if kept is None else f"; what was built is kept in {kept}, the same command goes on"
+        rest = "" if kept is None else f"; what was built is kept in {kept}, the same command continues"
         super().__init__(f"the build stopped: {reason}{rest}")
 
 

@@ -56,7 +56,7 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     "unknown loop type": ([('<loop name="d" type="revolute">', '<loop name="d" type="screw">')], [
         (25, "unknown loop type, screw, revolute, continuous, prismatic, cylindrical, universal")]),
     "joint of a missing parent": ([(14, '<parent link="cranc"/>')], [
-        (14, "joint 'b': unknown link, cranc, a name that is there, such as crank")]),
+        (14, "joint 'b': unknown link, cranc, an existing name, such as crank")]),
     "joint of a missing child": ([(15, '<child link="zzz"/>')], [
         (4, "second root beside 'base': no joint's child, bar"), (15, "joint 'b': unknown link, zzz"),
     ]),
@@ -90,7 +90,7 @@ DEFECTS: dict[str, tuple[list, list[tuple[int, str]]]] = {
     "two own elements": ([(40, "</hrsynth><hrsynth/>")], [(40, "second <hrsynth>")]),
     "two platforms": ([(39, '<platform link="crank"/>')], [(39, "second <platform>")]),
     "unknown platform": ([(38, '<platform link="bra"/>')], [
-        (38, "platform: unknown link, bra, a name that is there, such as bar")]),
+        (38, "platform: unknown link, bra, an existing name, such as bar")]),
     "platform without link": ([(38, '<platform/>')], [(38, "<platform> without link")]),
     "platform is the base": ([(38, '<platform link="base"/>')], [(38, "the platform is the base, base")]),
     "platform elsewhere": ([(5, '<link name="rocker"/><link name="moon"/>'), (38, '<platform link="moon"/>')],

@@ -142,7 +142,7 @@ def test_a_bias_holds_the_platform_where_the_measured_directions_are_the_desired
     assert found.spread.aside
     assert found.spread.metres > 1e-3
     assert last.speed < 1e-4 < last.size
-    assert "the same all along" in str(found.noise)
+    assert "constant over time" in str(found.noise)
 
 
 def test_a_joint_limit_is_a_boundary():

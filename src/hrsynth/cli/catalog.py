@@ -21,16 +21,16 @@ catalog = typer.Typer(name="catalog", invoke_without_command=True, rich_markup_m
                       help="The catalog of architectures: what can be controlled by watching legs.")
 KEPT = Option("kept", "A folder or SQLite file (default: what is shipped).", "PATH", flags=("--catalog",))
 WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
-ANEW = flag("anew", "Forget what a build that was broken off has made.")
+ANEW = flag("anew", "Discard the results of an interrupted build.")
 FILTER = (
     Option("legs", "Number of legs, or a pattern of the notation or of one leg's chain: 3-R*, PUS.", "LEGS"),
     Option("dof", "Freedoms of the platform.", kind=int),
-    Option("motion", "Its translations and turns, as 3T or 2T1R."),
+    Option("motion", "Its translations and rotations, as 3T or 2T1R."),
     Option("verdict", "controllable, partially controllable, uncontrollable."),
     Option("group", "planar, pods, deltas, spatial."),
     Option("base_motors", "All motors on the base, or not.", kind=bool, flags=("--base-motors/--moving-motors",)),
-    Option("fewest", "Legs to watch to see all that can be seen.", kind=int),
-    Option("text", "What occurs in any field."),
+    Option("fewest", "Number of legs that must be watched.", kind=int),
+    Option("text", "Text that occurs in any field."),
 )
 """Which architectures are asked for."""
 
@@ -160,12 +160,12 @@ COMMANDS = (
     ("build", "Build the catalog, or go on where a build was broken off; the bytes do not depend on who builds.", build,
      (Option("groups", "Groups (default: all).", "[GROUP]...", list[str], argument=True),
       output("A folder, or a file that ends in .sqlite (default: catalog/ of the checkout).", "PATH"), WORKERS,
-      Option("cluster", "A dask cluster that shares it.", "ADDRESS"),
+      Option("cluster", "A dask cluster that shares the work.", "ADDRESS"),
       flag("check", "Build nothing: compare what is stored (default: what is shipped) with what would be built; exit 3 "
            "if it is stale."),
       Option("sample", "With --check: compare so many records of each group, drawn at random, and all words.", "N", int,
              low=0),
-      Option("limit", "Make so many new records and stop; the same command goes on.", "N", int, low=0), ANEW, JSON,
+      Option("limit", "Stop after this many new records; the same command continues.", "N", int, low=0), ANEW, JSON,
       Option("seed", "Seed of --sample.", None, int, 0, low=0))),
     ("list", "The architectures that fit.", entries, (*FILTER, KEPT, JSON)),
     ("show", "One architecture, drawn and in full; one that is not in the catalog is studied now.", show,

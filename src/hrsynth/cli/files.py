@@ -52,6 +52,6 @@ def add(app: typer.Typer) -> None:
     add_command(app, "robots", "The shipped robots.", (JSON,), robots)
     add_command(app, "convert", "Read a robot in any dialect and write it in another: .urdf native, .yaml Gepetto, "
                 ".xml MJCF, .sdf SDFormat.",
-                (*SOURCE, Option("target", "The file to write; its ending says the dialect.", "OUT", default=NEEDED,
+                (*SOURCE, Option("target", "The file to write; its extension says the dialect.", "OUT", default=NEEDED,
                                  argument=True),
                  Option("to", "native, gepetto, mjcf or sdf, whatever the ending.", "DIALECT"), JSON), convert)

@@ -107,5 +107,5 @@ def listed(text: str) -> list[str]:
 
     names = [name.strip() for name in text.split(",")]
     if not all(names):
-        raise BadRequest("--observe: an empty name", text, "labels or links set apart by commas, or all")
+        raise BadRequest("--observe: an empty name", text, "labels or links with commas between them, or all")
     return names

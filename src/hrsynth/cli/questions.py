@@ -148,7 +148,7 @@ def _goal(help: str) -> Option:
 
 POSES = "again for more (default: the zero configuration)."
 BEGIN = Option("at", "Start there instead of at the zero configuration, in another operation mode if need be.", "POSE")
-START = Option("start", "Where it starts, as x=0.02,y=0.1,z=-0.7.", "POSE", default=NEEDED, flags=("--from",))
+START = Option("start", "Start pose, such as x=0.02,y=0.1,z=-0.7.", "POSE", default=NEEDED, flags=("--from",))
 QUESTIONS = (
     Question("derive", "The hidden robot of a robot, how it is derived, its certificate, and what the controller can "
              "see.",
@@ -168,7 +168,7 @@ QUESTIONS = (
              (*WATCHED, flag("real", "The real robot with its own motors instead of the hidden one."),
               Option("plane", "Plane of poses to draw, as z=-0.7.", "PART=VALUE"), _file("singular"),
               Option("points", "Random poses at which the condition is checked.", None, int, 10_000, low=1),
-              Option("steps", "Poses a side of the drawn plane.", None, int, 51, low=5, high=300))),
+              Option("steps", "Poses along each side of the plane.", None, int, 51, low=5, high=300))),
     Question("advise", "What is missing: the smallest sets of further measurements that make a robot controllable.",
              WATCHED),
     Question("modes", "All assembly modes: every pose of the platform with the same directions, each proved.",
@@ -185,8 +185,8 @@ QUESTIONS = (
              (START, _goal("Pose whose directions are desired."), *WATCHED,
               Option("gain", "λ of the control law (1/s).", None, float, 0.8),
               Option("noise", "Error of measured directions, as 0.1deg; of edges, as 0.3px.", "AMOUNT"),
-              flag("bias", "The error of each direction or edge stays the same all along."),
-              Option("duration", "Lead the desired directions along the straight way in this time (default: at once).",
+              flag("bias", "Keep the error of each direction or edge constant."),
+              Option("duration", "Move the desired directions along the straight line in this time (default: at once).",
                      "SECONDS", float),
               Option("time", "Longest run.", "SECONDS", float),
               flag("physics", "Drive a mock-up with rods, masses and velocity servos."),
@@ -200,21 +200,21 @@ QUESTIONS = (
               Option("plane", "Plane of poses, as z=-0.7: all of it that is reached.", "PART=VALUE"),
               Option("grid", "A line, plane or box of poses, such as x=-0.3:0.3:21,y=0,z=-0.7 (from:to:count).",
                      "GRID"),
-              Option("steps", "Poses a side of the plane.", None, int, low=5, high=300),
-              Option("samples", "Try so many true errors (four at least) at each pose, of a plane or grid at its worst "
+              Option("steps", "Poses along each side of the plane.", None, int, low=5, high=300),
+              Option("samples", "Try this many errors (four at least) at each pose; of a plane or grid, at its worst "
                      "ones.", "COUNT", int, 0, ("--nonlinear",), low=0),
               _file("accuracy"))),
     Question("select", "Which legs to watch for a displacement: all sets, ranked by accuracy, and why the others are "
              "discarded.",
-             (START, _goal("Where it is to end."),
+             (START, _goal("Goal pose."),
               Option("cones", "Half-angle of the cone about each direction, or one a leg: 1=0.1deg,2=0.2deg,…", "ANGLE",
                      default="0.1deg", flags=("--cone",)),
               CAMERA, Option("size", "Legs of the largest sets.", None, int, 4, low=1),
-              Option("runs", "Sets that a simulated run is to lead to the goal, best first.", None, int, 3, low=0),
+              Option("runs", "How many sets must pass a simulated run, best first.", None, int, 3, low=0),
               Option("sight", "Pose of the camera on the link that carries it (x right, y down, z ahead), as "
                      "x=0,y=0,z=0.5,rpy=180deg/0/0; or auto.", "POSE"),
               Option("focal", "Focal length of the camera, of 640 by 480 pixels.", "PIXELS", float, 800.0),
-              Option("examine", "Sets, the most accurate first, whose modes, aspects and runs are asked for.", None,
+              Option("examine", "Sets, the most accurate first, whose modes, aspects and runs are computed.", None,
                      int, 20, low=1),
               Option("seconds", "Deprecated, as the answer then depends on the machine: time after which no further "
                      "set is examined.", None, float)), after=_deprecated),

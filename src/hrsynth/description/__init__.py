@@ -97,7 +97,7 @@ def _dialect(target: Path, name: str | None) -> Dialect:
     dialects = formats.writable()
     endings = {ending: each.name for each in dialects for ending in each.endings}
     if name is None and target.suffix.lower() not in endings:
-        raise BadRequest("cannot write the file: its ending says no dialect", str(target),
+        raise BadRequest("cannot write the file: its extension is not that of a known dialect", str(target),
                          ", ".join(endings) + "; or the dialect given")
     wanted = name or endings[target.suffix.lower()]
     found = next((each for each in dialects if each.name == wanted), None)

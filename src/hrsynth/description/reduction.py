@@ -76,7 +76,7 @@ def _lost(mechanism: Mechanism, content: bool) -> list[Note]:
     found = []
     other = [o.leg for o in mechanism.observations if type(o) is not Direction]
     if other:
-        found.append(Note("warning", "observations that are no directions are not written: legs " + ", ".join(other)))
+        found.append(Note("warning", "observations that are not directions are not written: legs " + ", ".join(other)))
     if not content and (mechanism.xml or any(link.xml for link in mechanism.links.values())
                         or any(joint.xml for joint in mechanism.joints.values())):
         found.append(Note("warning", "geometry, inertia and other content of links and joints is not written"))

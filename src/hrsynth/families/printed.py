@@ -50,7 +50,7 @@ CLAIMS = (
         PrintedMode((-0.262, 0.062, -0.161), OFF_PLANE.format(leg=3)))),
     PrintedClaim("MMT 5.1.3", "quattro", ("1", "2", "3", "4"), (0.03, 0.03, -0.59), (
         PrintedMode((0.03, 0.03, -0.59), GOAL),
-        PrintedMode((0.03, 0.03, -0.65), "no mode: the directions of legs 1 and 3 differ by 0.53° and 0.56° from "
+        PrintedMode((0.03, 0.03, -0.65), "not a mode: the directions of legs 1 and 3 differ by 0.53° and 0.56° from "
                     "those at the desired pose, and the error is stationary nowhere near it"))),
     PrintedClaim("IROS V", "quattro_rigid", ("1", "2"), (0.0, -0.25, -0.7), (
         PrintedMode((0.0, -0.25, -0.7), GOAL),

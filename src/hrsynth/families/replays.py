@@ -33,8 +33,8 @@ _DOWN = ("x=0.05,y=0.05,z=-0.8,phi=0", "x=0.03,y=0.03,z=-0.65,phi=0")
 _RIGID = ("x=0.1,y=0.04,z=-0.93", "x=0,y=-0.25,z=-0.7")
 _RIGID_2 = ("x=0.1,y=0.04,z=-0.93", "x=0,y=-0.3,z=-0.85")
 _TURNS = "in position: this noise averages out but for a shift in z, see below; in orientation it is"
-_HELD = "no mode, but this noise holds the run there; without noise it goes on to the goal"
-_NEAR_MODE = "(0.03, 0.03, −0.65) is no mode: two of its directions are 0.5° off"
+_HELD = "not a mode, but this noise holds the run there; without noise it continues to the goal"
+_NEAR_MODE = "(0.03, 0.03, −0.65) is not a mode: two of its directions are 0.5° off"
 
 
 def _bench(table: str, legs: tuple[str, ...], way: tuple[str, str], ended: str, said: str, remark: str = "",

@@ -171,7 +171,7 @@ class PlatformMotion:
             turn, normal = rotation @ self.home[:3, :3].T, self.rotations[:, 0]
             phi, rotation = turn_about(normal, turn)[0], None
             if np.linalg.norm(turn @ normal - normal) > AS_PRINTED:
-                raise BadRequest(f"{robot}: the platform turns about one axis only, rpy is no such turn", str(pose),
+                raise BadRequest(f"{robot}: the platform turns about one axis only, rpy is not such a turn", str(pose),
                                  "phi, or a turn about " + " ".join(f"{x:.4g}" for x in self.rotations[:, 0]))
         placed = [i for i, name in enumerate("xyz") if name in pose.given]
         values = np.array([getattr(pose, "xyz"[i]) for i in placed], dtype=float)

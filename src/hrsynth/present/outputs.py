@@ -69,7 +69,7 @@ class File:
             options = " or ".join(f"--{name}" for name in self.needs)
             raise BadRequest(f"only {self.words} is written", path, f"--output together with {options}")
         if ending not in self.makers:
-            raise BadRequest(f"{self.refusal}: unknown ending", path, self.allowed or tuple(self.makers))
+            raise BadRequest(f"{self.refusal}: unknown extension", path, self.allowed or tuple(self.makers))
         if self.installed is not None and ending == self.installed[0]:
             function(self.installed[1])()
         require_folder(path)
@@ -150,7 +150,7 @@ OUTPUTS = {
     "servo": Outputs("text.runs:servo", (
         File("cannot draw the run", {PNG: "runs:picture", ".gif": "animations:animation"},
              "Draw the run: curves (.png) or an animation (.gif).",
-             allowed=".png (curves) or .gif (what a camera sees)",
+             allowed=".png (curves) or .gif (camera view)",
              installed=(".gif", ".simulation.pictures:drawing")),)),
     "singular": Outputs("text.poses:singularity", (
         File("cannot draw the locus", {PNG: "maps:locus_map"}, "Draw the locus (.png).", computed="maps:locus",

@@ -40,7 +40,7 @@ FOCAL = 800.0
 """Focal length of the camera (pixels)."""
 AUTO = "auto"
 TYPES = {"type1": "a Type 1 singularity", "type2": "a Type 2 singularity", "type3": "a Type 3 singularity",
-         "constraint": "a constraint singularity", "undecided": "too near to a singularity to be told apart from one"}
+         "constraint": "a constraint singularity", "undecided": "too close to a singularity to decide"}
 
 
 @dataclass(frozen=True)

@@ -56,9 +56,9 @@ class EndingClassifier:
             joint, _ = min(margins(run.last.twin, run.last.q).items(), key=lambda item: item[1])
             return Ending(BOUNDARY, f"joint {joint} is at its limit")
         if run.stopped == OPEN:
-            return Ending(BOUNDARY, "the loops lose their rank here, and the integrator found no way on")
+            return Ending(BOUNDARY, "the loops lose their rank here, and the integrator could not continue")
         if run.stopped == LOST:
-            return Ending(UNDECIDED, "the integrator found no way on, which says nothing of the robot")
+            return Ending(UNDECIDED, "the integrator could not continue, which says nothing about the robot")
         if run.stopped == AWAY:
             return Ending(BOUNDARY, "the platform runs away, nothing limits its slides")
         over = (f"more than {RUN_EVALUATIONS:,} configurations would be needed" if run.stopped == EFFORT

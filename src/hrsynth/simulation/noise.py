@@ -46,7 +46,7 @@ class Noise:
 
     def __str__(self) -> str:
         return ((f"{self.value:g}px" if self.pixels else f"{math.degrees(self.value):.4g}deg")
-                + (", the same all along" if self.bias else ""))
+                + (", constant over time" if self.bias else ""))
 
 
 @dataclass(frozen=True, eq=False)

@@ -213,7 +213,7 @@ class ServoTask:
     def _notes(self, run: Run, still: Run, simulated: Array | None) -> Iterator[str]:
         """What was measured on the benches."""
         if run.stopped == EFFORT:
-            yield f"the run was broken off after {RUN_EVALUATIONS:,} configurations, at {run.times[-1]:.3g} s"
+            yield f"the run was stopped after {RUN_EVALUATIONS:,} configurations, at {run.times[-1]:.3g} s"
         if self.conditions.noisy:
             angles = np.degrees(np.array([np.arccos(np.clip(np.sum(each.directions * each.seen, axis=1), -1, 1))
                                           for each in run.commands]))

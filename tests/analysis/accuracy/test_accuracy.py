@@ -217,7 +217,7 @@ def test_singular_poses_of_a_plane_are_singular() -> None:
     ("1,4", "wide", {}, "not a number"),
     ("1,4", "nan", {}, "half-angle"),
     ("1,4", "1=0.1deg", {}, "leg 4 has no cone"),
-    ("1,4", "1=0.1deg,2=0.1deg", {}, "nothing that is observed"),
+    ("1,4", "1=0.1deg,2=0.1deg", {}, "that is not observed"),
     ("1,4", "1=0.1deg,1=0.1deg", {}, "twice"),
     ("1,4", "0.1deg,0.2deg", {}, "not leg=angle"),
     ("1,9", "0.1deg", {}, "no leg or link"),

@@ -85,7 +85,7 @@ def test_lines_of_one_plane_count_as_such_though_rounding_tilts_them(seed: int):
     system = Spatial(tuple(Line(G @ tip + p, d) for tip, d in zip(tips, along, strict=True)), tips)
     found = solve(system)
     assert (found.complex, found.complete) == (4, True)
-    assert "at infinity, but for rounding" in found.proof
+    assert "at infinity, up to rounding" in found.proof
     assert solve(replace(system, as_written=True)).complex == 8
 
 

@@ -89,5 +89,5 @@ def test_what_is_not_found_is_not_said_not_to_be():
     answer = found("quattro_rigid", "1,3")
     assert answer.checked is not None
     text = singularity(replace(answer, examples=()))
-    assert f"not found by {answer.checked.searches} searches, which does not say that there is none" in text
+    assert f"not found by {answer.checked.searches} searches, which does not mean that there are none" in text
     assert "no pose" not in text

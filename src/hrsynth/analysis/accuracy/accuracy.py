@@ -84,7 +84,7 @@ def accuracy(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | No
     cells = Grid.parse(grid, LARGEST_FIELD) if isinstance(grid, str) else grid
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     if not all(isinstance(o, Direction) for o in setting.observed):
-        raise BadRequest("cones are about directions", ", ".join(setting.labels), "directions of legs")
+        raise BadRequest("cones apply to directions only", ", ".join(setting.labels), "directions of legs")
     half = half_angles(cones, setting.observed)
     sees_all(setting)
     mapper = Mapper(setting, half)

@@ -38,7 +38,7 @@ Wanted = Callable[[float], Array]
 class Fit:
     """A curve of best fits: the configurations on it, up to the part ``reached`` of the error, the smallest singular
     value of Mᵀ met, and how it ended: at the whole error (``fit``), where the minimum becomes flat, which is where a
-    controller slips away (``ends``), or where the solver gave up, which says nothing of the robot (``not found``)."""
+    controller slips away (``ends``), or where the solver gave up (``not found``)."""
 
     way: tuple[ClosedConfiguration, ...]
     reached: float

@@ -12,7 +12,7 @@ from ...geometry.vectors import Array
 from ...mechanism import Observation
 from ...tolerances import NARROWEST_CONE
 
-EXAMPLE = "0.1deg, 0.002 (radians), or one a leg such as 1=0.1deg,2=0.2deg"
+EXAMPLE = "0.1deg, 0.002 (radians), or one for each leg such as 1=0.1deg,2=0.2deg"
 ALLOWED = "more than 0 and less than 90deg"
 
 Cones = float | str | Mapping[str, float]
@@ -28,7 +28,7 @@ def half_angles(cones: Cones, observed: Sequence[Observation]) -> Array:
     names = {name for o in observed for name in (o.leg, o.link)}
     unknown = [name for name in given if name not in names]
     if unknown:
-        raise BadRequest("a cone of nothing that is observed", unknown[0],
+        raise BadRequest("a cone for something that is not observed", unknown[0],
                          "legs " + ", ".join(dict.fromkeys(o.leg for o in observed)))
     found = []
     for o in observed:

@@ -98,7 +98,7 @@ class Aspects:
         if self.lost:
             return replace(answer, reason=f"every pose is singular, never seen: {'; '.join(self.lost)}")
         if min(abs(end.value) for end in ends) < CLEAR:
-            return replace(answer, reason="a pose lies on the singular locus, or too near to it to be told apart")
+            return replace(answer, reason="a pose lies on the singular locus, or too near to it to be distinguished")
         try:
             readings = [self.reading(end.configuration) for end in ends]
         except NoChart as why:
@@ -186,9 +186,9 @@ def _gap(one: Place, other: Place) -> float:
 
 def _unproved(found: Plan, readings: Sequence[Reading], budget: int) -> str:
     """Why a plan decides nothing."""
-    used = "the intervals allowed are used up" if found.boxes >= budget else "the road map does not join the poses"
+    used = "the number of intervals is used up" if found.boxes >= budget else "the road map does not join the poses"
     if found.ways:
-        return f"no path was proved: {used}; the path shown is proved but for its last part"
+        return f"no path was proved: {used}; the path shown is proved except for its last part"
     pairs = zip(*(reading.chart.limbs for reading in readings), strict=True)
     legs = dict.fromkeys(one.leg for one, other in pairs if one.branch != other.branch)
     return f"no path was proved: {used}; leg {', '.join(legs)} is in different working modes at the two poses"

@@ -170,7 +170,7 @@ def _together(found: Sequence[SystemModes], tips: Sequence[Tip], size: float) ->
     proofs = [f"{count} × ({text})" if count > 1 else text for text, count in Counter(e.proof for e in found).items()]
     proof = (f"{len(found)} choices of the held legs' branches ({legs}), {', '.join(counts)}"
              + (f", {twice} in two of them" if twice else "")
-             + (f", {unclear} pairs not told apart" if unclear else "") + f": {'; '.join(proofs)}")
+             + (f", {unclear} pairs not distinguished" if unclear else "") + f": {'; '.join(proofs)}")
     special = found[0].degenerate or next((f"on other branches of the legs: {each.degenerate}" for each in found
                                            if each.degenerate is not None), None)
     complete = not unclear and all(each.complete for each in found)

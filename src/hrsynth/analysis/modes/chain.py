@@ -108,7 +108,7 @@ class _Walk:
             elif isinstance(each, Direction) and (each.seen_from or anatomy.mechanism.reference) == base:
                 self.watched.setdefault(each.link, []).append(goal.pose(each.link)[:3, :3] @ each.direction)
             else:
-                raise Underived("what is measured is no direction seen from the base")
+                raise Underived("what is measured is not a direction seen from the base")
 
     def bodies(self, tip: Array) -> tuple[ChainBody, ...]:
         """The bodies, shifts included; every measurement must be met on the way."""

@@ -277,9 +277,9 @@ def _proof(system: System, roots: Roots) -> str:
         return "tips at rest, which leave one pose"
     text = f"{roots.method} of degree {roots.degree}"
     if roots.extraneous:
-        text += f" (besides {roots.extraneous} roots at infinity, which are no poses)"
+        text += f" (besides {roots.extraneous} roots at infinity, which are not poses)"
     if roots.far:
-        text += f" (besides {roots.far} beyond {FARTHEST:g} sizes: at infinity, but for rounding)"
+        text += f" (besides {roots.far} beyond {FARTHEST:g} sizes: at infinity, up to rounding)"
     text += f", {roots.complex} {'root' if roots.complex == 1 else 'roots'} isolated"
     if roots.real:
         thin = sum(root.unique and not root.thick for root in roots.real)

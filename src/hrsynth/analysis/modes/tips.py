@@ -88,7 +88,7 @@ def tip_loci(anatomy: LegDecomposition, question: Measurement, pattern: Constrai
     """
     name = anatomy.mechanism.name
     if pattern.motion == "other":
-        raise NotConfined(name, "the pattern of its legs is none of those known")
+        raise NotConfined(name, "the pattern of its legs is not a known one")
     plane = None if pattern.plane is None else _value(pattern.plane, goal)
     end = (plane if plane is not None and pattern.motion == "planar" else
            "free" if pattern.motion == "spatial" or anatomy.point is not None else "kept")
@@ -130,7 +130,7 @@ def _fitted(anatomy: LegDecomposition, own: Sequence[Observation], reference: st
         if miss <= SAME_RELATION:
             return replace(tip, curve=curve)
         worst = min(worst, miss)
-    what = ("is confined to no curve or surface that has a name" if worst == np.inf else
+    what = ("is not confined to a curve or surface of a known kind" if worst == np.inf else
             f"leaves its curve or surface by {worst:.2g} characteristic lengths")
     raise NotConfined(anatomy.mechanism.name, f"the tip of leg {leg.label} {what}")
 

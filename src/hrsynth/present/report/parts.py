@@ -73,7 +73,7 @@ def reason(error: HrsynthError, robot: str) -> str:
 def error_plane(setting: ObservedRobot, seed: int) -> Accuracy:
     """The error maxima over a plane of poses through the zero configuration."""
     if not all(isinstance(o, Direction) for o in setting.observed):
-        raise BadRequest("cones are about directions, and something else is observed")
+        raise BadRequest("cones apply to directions, and something else is observed")
     cones = half_angles(CONE, setting.observed)
     sees_all(setting)
     mapper = Mapper(setting, cones)

@@ -101,7 +101,7 @@ def singularity(found: Singularity, file: str | None = None) -> str:
                          "poses"))
     if condition is not None and not condition.never and not found.examples:
         searches = 0 if checked is None else checked.searches
-        rows.append(("singular at", f"not found by {searches} searches, which does not say that there is none"))
+        rows.append(("singular at", f"not found by {searches} searches, which does not mean that there are none"))
     rows.append(("singular at", [line for each in found.examples for line in (
         str(each.pose), f"  singular value {each.sigma:.1e}, a centimetre away up to {each.nearby:.1e}; lost: "
         + "; ".join(freedom.name for freedom in each.lost))]))

@@ -120,12 +120,12 @@ def _samples(errors: PoseErrors, true: Sampled) -> Rows:
              + (": a singularity is near" if not true.weakest >= max(NEAR_SINGULARITY * true.usual, DAMPED) else "")]
     if true.ended:
         lines.append(f"for {len(true.ended)} of them the best fit becomes flat on the way, first at "
-                     f"{true.ended[0]:.2g} of the error: a controller slips away there, and further than is told")
+                     f"{true.ended[0]:.2g} of the error: a controller slips away there, farther than computed")
     if true.not_found:
         lines.append(f"{true.not_found} of them were not followed to the end: the solver gave up, which says nothing "
                      "of the robot")
     if _apart(true.position, errors.position) or _apart(true.orientation, errors.orientation):
-        lines.append("they part from the maxima above, which are not to be relied on here")
+        lines.append("they differ from the maxima above, which are unreliable here")
     return [("samples", lines)]
 
 
@@ -167,7 +167,7 @@ def selection(found: Selection) -> str:
         heads = ["legs", "mm", "degrees", "modes", "aspect", *(["seen"] if sight else []), "run"]
         blocks.append(table([_row(each, sight) for each in found.kept], heads))
         blocks.append("mm, degrees: largest errors at the goal; modes: those of the start / of the goal, in brackets\n"
-                      "those that the robot was found to take; – not asked")
+                      "those that the robot was found to reach; – not computed")
     if found.unexamined:
         blocks.append(table([_row(each, sight)[:3] for each in found.unexamined], ["not examined", "mm", "degrees"]))
     discarded = [each for each in found.candidates if each.discarded is not None]

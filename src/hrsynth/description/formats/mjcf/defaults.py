@@ -139,7 +139,7 @@ def with_includes(root: xml.Element, file: str) -> xml.Element:
         try:
             path = (folder / name).resolve()
         except (OSError, ValueError):
-            raise refuse("an include that is no file", "a file in the model's folder") from None
+            raise refuse("an include that is not a file", "a file in the model's folder") from None
         if not name or not path.is_relative_to(folder):
             raise refuse("an include outside of the model's folder", "a file in the model's folder")
         if path in read or len(read) > MOST_INCLUDES:

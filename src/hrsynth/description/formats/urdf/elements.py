@@ -61,7 +61,7 @@ class UrdfReader(XmlReader):
             return False
         if link not in table:
             close = difflib.get_close_matches(link, table, n=3) if len(table) < 1000 else []
-            self.defect(line, what, link, "a name that is there" + (", such as " + ", ".join(close) if close else ""))
+            self.defect(line, what, link, "an existing name" + (", such as " + ", ".join(close) if close else ""))
         return link in table
 
     def link(self, element: xml.Element) -> None:
