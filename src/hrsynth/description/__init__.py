@@ -98,7 +98,7 @@ def _dialect(target: Path, name: str | None) -> Dialect:
     endings = {ending: each.name for each in dialects for ending in each.endings}
     if name is None and target.suffix.lower() not in endings:
         raise BadRequest("cannot write the file: its extension is not that of a known dialect", str(target),
-                         ", ".join(endings) + "; or the dialect given")
+                         ", ".join(sorted(endings)) + "; or the dialect given")
     wanted = name or endings[target.suffix.lower()]
     found = next((each for each in dialects if each.name == wanted), None)
     if found is None:
