@@ -16,6 +16,30 @@ FARTHEST_POSE = 1e9
 there."""
 LARGEST_NUMBER = 1e9
 """Largest magnitude of a number that a robot file may hold (metres, radians)."""
+LARGEST_FILE = 20_000_000
+"""Bytes above which a robot file is not read at all."""
+MOST_ELEMENTS = 100_000
+"""Elements above which an XML document is not parsed."""
+MOST_LINKS = 1000
+"""Links above which a foreign file is refused."""
+MOST_INCLUDES = 50
+"""Files that an MJCF model may include."""
+MOST_NESTED_MODELS = 20
+"""Models in models above which an SDFormat file is refused."""
+XACRO_SECONDS = 4
+"""Seconds after which expanding a xacro file is given up."""
+MOST_LOOP_COORDINATES = 240
+"""Coordinates of joints in loops above which the loops of a foreign file are not solved."""
+LOOP_STRIDE = 0.4
+"""Largest change of a coordinate in one step where they are (characteristic lengths, radians)."""
+LOOP_EFFORT = 100_000
+"""Joints visited there (and their like) after which solving is given up: some seconds."""
+LOOP_TRIES = 24
+"""Random pushes and steps before the best pose found has to do."""
+FIRMER_BY = 2.0
+"""Factor by which another pose must be firmer to take the place of a nearly singular one."""
+MOST_RELATED_ON_LINK = 40
+"""Joints of one link above which relations among them are not looked for."""
 LARGEST_YAML = 1_000_000
 """Bytes of a YAML file above which it is not read."""
 LARGEST_GUESSED = 150

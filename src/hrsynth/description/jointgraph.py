@@ -20,8 +20,6 @@ LOOP_TYPES = {
     "planar": JointType.PLANAR, "fixed": JointType.FIXED,
 }
 """The names that a ``<loop>`` has for joint types."""
-MOST_LINKS = 1000
-"""Links above which a foreign file is refused."""
 
 _COST = {JointType.FIXED: 0, JointType.REVOLUTE: 1, JointType.PRISMATIC: 1, JointType.UNIVERSAL: 2,
          JointType.CYLINDRICAL: 2, JointType.PLANAR: 3, JointType.SPHERICAL: 3, JointType.FREE: 5}

@@ -5,12 +5,13 @@ from __future__ import annotations
 import os
 from pathlib import Path
 
+from ..budgets import MOST_LINKS
 from ..mechanism.model import Mechanism
 from ..mechanism.part import between
 from . import formats, xml
 from .dialect import RobotFile
 from .formats.urdf import xacro
-from .jointgraph import MOST_LINKS, JointGraph
+from .jointgraph import JointGraph
 from .overrides import Overrides, observe_links
 from .tree import spanning
 

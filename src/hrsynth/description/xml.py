@@ -10,14 +10,10 @@ from typing import TypeAlias
 
 from lxml import etree
 
+from ..budgets import LARGEST_FILE, MOST_ELEMENTS
 from ..errors import BadRequest, BadRobotFile, Defect
 
 Element: TypeAlias = etree._Element
-
-LARGEST_FILE = 20_000_000
-"""Bytes above which a file is not read at all."""
-MOST_ELEMENTS = 100_000
-"""Elements above which a document is not parsed."""
 
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
 _DECLARATION = re.compile(rb"<!\s*(DOCTYPE|ENTITY)")

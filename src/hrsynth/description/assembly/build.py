@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import replace
 
+from ...budgets import MOST_LOOP_COORDINATES
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array, inverse, unit
 from ...mechanism.model import Coupling, Joint, JointType, Mechanism, Note
@@ -16,9 +17,6 @@ from . import closures, guess
 from .coordinates import with_weighed_motors, without_coordinates
 from .loops import LoopAssembly, LoopSolution, Values, regular_values, solve
 from .relations import as_meant
-
-MOST_COORDINATES = 240
-"""Coordinates of joints in loops above which loops are not solved."""
 
 
 def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
@@ -43,9 +41,9 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     if platform == base and overrides.base is None:
         raise BadRequest(f"{graph.file}: the platform is the base", platform, "another link")
     assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears)
-    if assembly.size > MOST_COORDINATES or len(assembly.loops) > MOST_COORDINATES:
+    if assembly.size > MOST_LOOP_COORDINATES or len(assembly.loops) > MOST_LOOP_COORDINATES:
         raise BadRequest(f"{graph.file}: {len(assembly.loops)} loops through joints with {assembly.size} coordinates",
-                         None, f"up to {MOST_COORDINATES} of each")
+                         None, f"up to {MOST_LOOP_COORDINATES} of each")
     solution = solve(assembly)
     if not solution.residual <= NOISE:
         raise LoopsNotClosed(graph.file, solution.residual, NOISE, assembly.worst(solution.values)[0])

@@ -11,6 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...budgets import FIRMER_BY, LOOP_EFFORT, LOOP_STRIDE, LOOP_TRIES
 from ...geometry.gauss_newton import Damping, Residual, descend
 from ...geometry.ranks import Rank, rank_of
 from ...geometry.vectors import Array, inverse, pose
@@ -20,14 +21,6 @@ from ..jointgraph import FrameSpec, GearSpec, JointSpec, TreeJoint, spanning_tre
 from ..jointmotion import displacement, opening, screws, step_along, zero
 
 DAMPING = Damping(start=1.0, eased=0.1, least=1e-3, most=1e6)
-STRIDE = 0.4
-"""Largest change of a coordinate in one step."""
-EFFORT = 100_000
-"""Joints visited (and their like) after which solving is given up: some seconds."""
-BETTER = 2.0
-"""Factor by which another pose must be firmer to take the place of a nearly singular one."""
-TRIES = 24
-"""Random pushes and steps before the best found has to do."""
 Values = dict[str, Array]
 """The value of every tree joint."""
 
@@ -134,7 +127,7 @@ class LoopAssembly:
             nonlocal before
             gain, before = before - at.size, at.size
             stalled = 0 < gain < 1e-6 * at.size and at.size < NOISE
-            return at.size <= SOLVED or stalled or not self.size or self._spent > EFFORT
+            return at.size <= SOLVED or stalled or not self.size or self._spent > LOOP_EFFORT
 
         def propose(values: Values, at: Residual, factor: float) -> Values:
             return self.step(values, self._damped(at, factor))
@@ -156,7 +149,7 @@ class LoopAssembly:
         return start
 
     def _damped(self, at: Residual, factor: float) -> Array:
-        """The damped step, no longer than ``STRIDE``; near the solution the plain one without faint directions."""
+        """The damped step, no longer than ``LOOP_STRIDE``; near the solution the plain one without faint directions."""
         U, s, Vt = np.linalg.svd(at.J, full_matrices=False)
         if at.size < NOISE and factor <= 1.0:
             kept = s > FAINT * s[0]
@@ -164,7 +157,7 @@ class LoopAssembly:
         else:
             step = -(Vt.T @ (s / (s**2 + factor * max(at.size**2, 1e-12)) * (U.T @ at.error)))
         largest = float(np.max(np.abs(step), initial=0.0))
-        return np.asarray(step * min(1.0, STRIDE / largest) if largest > 0 else step)
+        return np.asarray(step * min(1.0, LOOP_STRIDE / largest) if largest > 0 else step)
 
     def rank(self, values: Values, cutoff: float = RANK_CUTOFF) -> Rank:
         """The rank of the loops' and gears' constraints on the joints in loops."""
@@ -214,7 +207,7 @@ def solve(assembly: LoopAssembly, seed: int = 0) -> LoopSolution:
     """Close all loops from zero; where that stalls (flat and collinear poses), from randomly pushed values too."""
     best = LoopSolution(*assembly.close(assembly.zero()))
     rng = np.random.default_rng(seed)
-    for number in range(TRIES):
+    for number in range(LOOP_TRIES):
         if best.residual <= NOISE:
             break
         amplitude = (0.1, 0.3, 0.6, 1.0)[min(3, number // 6)]
@@ -232,8 +225,8 @@ def regular_values(assembly: LoopAssembly, values: Values, seed: int = 0) -> Val
     if assembly.freedoms(here) == 0:
         return None
     rng = np.random.default_rng(seed)
-    best, found, origin = replace(here, weakest=BETTER * here.weakest), None, values
-    for number in range(TRIES):
+    best, found, origin = replace(here, weakest=FIRMER_BY * here.weakest), None, values
+    for number in range(LOOP_TRIES):
         if found is not None and best.weakest > FIRM:
             break
         if number >= 3 and found is None and here.weakest > NEARLY_SINGULAR:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import LARGEST_RELATED
+from ...budgets import LARGEST_RELATED, MOST_RELATED_ON_LINK
 from ...errors import LoopsNotClosed, RankUndecided
 from ...geometry.vectors import Array
 from ...mechanism import graphs
@@ -26,8 +26,6 @@ from .loops import LoopAssembly
 
 _LINES = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 _BALLS = (JointType.SPHERICAL, JointType.UNIVERSAL)
-MOST_ON_A_LINK = 40
-"""Joints of one link above which relations among them are not looked for."""
 
 Vectors = NDArray[Any]
 """Vectors (..., 3), real or complex."""
@@ -177,7 +175,7 @@ def _relations(mechanism: Mechanism, at: _JointCoordinates) -> Iterator[Geometri
         if joint.type is JointType.UNIVERSAL:
             yield GeometricRelation(_normal, *at.axes[joint.name])
     for joints in on.values():
-        if len(joints) <= MOST_ON_A_LINK:
+        if len(joints) <= MOST_RELATED_ON_LINK:
             yield from _within(joints, at)
     yield from _rods(body, on, at)
 

@@ -7,13 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
+from ....budgets import LARGEST_FILE, MOST_INCLUDES
 from ....errors import BadRobotFile
 from ....geometry.vectors import Array, pose, rotation_about
 from ... import xml
 from ...elements import XmlReader
-
-MOST_INCLUDES = 50
-"""Files that a model may include."""
 
 
 class Defaults:
@@ -150,8 +148,8 @@ def with_includes(root: xml.Element, file: str) -> xml.Element:
         except BadRobotFile as error:
             raise refuse(f"an include of what is {error.defects[0].what}", "a file in the model's folder") from None
         size += len(content)
-        if size > xml.LARGEST_FILE:
-            raise refuse("included files too large", f"up to {xml.LARGEST_FILE} bytes together")
+        if size > LARGEST_FILE:
+            raise refuse("included files too large", f"up to {LARGEST_FILE} bytes together")
         parent, included = element.getparent(), xml.document(content, str(path))
         if parent is None:
             raise refuse("an include in place of the model", "<mujoco>")

@@ -6,6 +6,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from ....budgets import MOST_NESTED_MODELS
 from ....errors import BadRobotFile
 from ....geometry.vectors import Array, inverse
 from ....mechanism.model import Link
@@ -19,8 +20,6 @@ from .joint import JointFrames, add, guess_motors, name_gears, pose_of, text
 
 MODEL, WORLD = "__model__", "world"
 VERSIONS = "1.4 to 1.12"
-MOST_LEVELS = 20
-"""Models in models above which a file is refused."""
 
 
 def read(file: RobotFile) -> JointGraph:
@@ -93,8 +92,8 @@ class _SdfReader(XmlReader):
 
     def _collect(self, model: xml.Element, prefix: str, depth: int) -> None:
         """The frames of a model and of those in it; ``prefix`` is what the names in it begin with."""
-        if depth > MOST_LEVELS:
-            self.defect(xml.line(model), "models nested too deeply", None, f"{MOST_LEVELS} levels")
+        if depth > MOST_NESTED_MODELS:
+            self.defect(xml.line(model), "models nested too deeply", None, f"{MOST_NESTED_MODELS} levels")
             return
         for element in xml.children(model):
             if element.tag == "include":

@@ -6,10 +6,8 @@ import importlib.util
 import sys
 from pathlib import Path
 
+from ....budgets import XACRO_SECONDS
 from ... import xml
-
-TIME_LIMIT = 4
-"""Seconds after which expanding is given up."""
 
 
 def is_needed(root: xml.Element) -> bool:
@@ -27,9 +25,9 @@ def expand(path: Path) -> xml.Element:
                           "the extra hrsynth[xacro], or the URDF that it expands to")
     command = [sys.executable, "-P", str(Path(__file__).with_name("xacro_process.py")), str(path.resolve())]
     try:
-        run = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
+        run = subprocess.run(command, capture_output=True, text=True, timeout=XACRO_SECONDS, check=False)
     except subprocess.TimeoutExpired:
-        raise xml.refusal(path, "xacro does not come to an end", f"{TIME_LIMIT} seconds") from None
+        raise xml.refusal(path, "xacro does not come to an end", f"{XACRO_SECONDS} seconds") from None
     if run.returncode:
         lines = [line for line in run.stderr.splitlines() if line.strip()]
         raise xml.refusal(path, "xacro refuses it: " + " ".join(lines[-1:])[:200],
