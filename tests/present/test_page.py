@@ -84,7 +84,7 @@ def test_what_is_switched_off_is_gone(tab: Tab, tmp_path: Path):
     tab.open(file, READY)
     before = drawn(tab)
     boxes = tab.page.locator("aside input[type=checkbox]")
-    assert boxes.count() == 3 + len(seen("quattro").ghosts)
+    assert boxes.count() == 3 + len(seen("quattro").mode_outlines)
     for number in range(boxes.count()):
         boxes.nth(number).uncheck()
         after = drawn(tab)

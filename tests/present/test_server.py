@@ -63,7 +63,7 @@ def test_several_coordinates_at_once_with_closed_loops(found: View, address: str
     assert reply["state"]["hidden"]
     back = ask(address, {"values": home.tolist(), "home": True, "modes": True})
     assert np.array(back["state"]["real"]) == pytest.approx(found.home.places["real"], abs=1e-6)
-    assert len(back["ghosts"]) == len(found.ghosts)
+    assert len(back["ghosts"]) == len(found.mode_outlines)
 
 
 def test_a_tilted_planar_robot_turns_by_the_angle_that_its_slider_shows():

@@ -128,13 +128,13 @@ def test_there_is_a_ghost_for_each_mode_but_the_pose_itself(name: str):
     found = seen(name)
     listed = modes(load(name), list(found.setting.labels))
     if listed.found.continuum is not None:
-        assert not found.ghosts
+        assert not found.mode_outlines
         assert any("continuum" in note for note in found.notes)
         return
-    assert len(found.ghosts) == len(listed.modes) - 1
-    for ghost in found.ghosts:
-        for observed in found.setting.observed if ghost.reachable else ():
-            place = ghost.places[list(found.setting.mechanism.links).index(observed.link)]
+    assert len(found.mode_outlines) == len(listed.modes) - 1
+    for outline in found.mode_outlines:
+        for observed in found.setting.observed if outline.reachable else ():
+            place = outline.places[list(found.setting.mechanism.links).index(observed.link)]
             d = found.setting.mechanism.links[observed.link].pose[:3, :3] @ observed.direction
             assert turned(place, d) == pytest.approx(d, abs=1e-5)
 

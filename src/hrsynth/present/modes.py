@@ -35,36 +35,36 @@ WIDEST, SIGN = 112, 6
 
 
 def picture(found: AssemblyModes) -> bytes:
-    """The modes as PNG; its text ``Description`` holds :func:`described` as JSON."""
+    """The modes as PNG; its text ``Description`` holds :func:`description` as JSON."""
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
 
-    drawn = shown(found)
+    drawn = drawable(found)
     canvas = figure(found, drawn).canvas
     canvas.draw()
     texts, stream = PngInfo(), io.BytesIO()
-    texts.add_text("Description", json.dumps(described(found, drawn)))
+    texts.add_text("Description", json.dumps(description(found, drawn)))
     image = Image.fromarray(np.asarray(canvas.buffer_rgba())).convert("RGB")
     image.quantize(SHADES, dither=Image.Dither.NONE).save(stream, "PNG", optimize=True, pnginfo=texts, dpi=(DPI, DPI))
     return stream.getvalue()
 
 
-def nothing(found: AssemblyModes) -> str | None:
+def why_undrawn(found: AssemblyModes) -> str | None:
     """Why there is nothing to draw: a continuum of modes, or none at all."""
     if found.confined is None or found.found.continuum is not None or not (found.modes or found.near):
         return found.found.degenerate or "there is no mode"
     return None
 
 
-def shown(found: AssemblyModes) -> ModesScene:
+def drawable(found: AssemblyModes) -> ModesScene:
     """What there is to draw; raises ``BadRequest`` where there is nothing."""
-    why = nothing(found)
+    why = why_undrawn(found)
     if why is not None:
         raise BadRequest(f"{found.setting.robot.name}: there is nothing to draw: {why}", None, "isolated modes")
     return scene(found)
 
 
-def described(found: AssemblyModes, drawn: ModesScene) -> dict[str, Any]:
+def description(found: AssemblyModes, drawn: ModesScene) -> dict[str, Any]:
     """What was asked for and what is drawn, in a few numbers: enough to tell whether a picture is out of date."""
     return {"robot": found.setting.robot.name, "observe": list(found.setting.labels), "real": found.kind == "real",
             "at": str(found.pose), "complex": found.found.complex, **drawn.to_dict()}

@@ -143,7 +143,7 @@ OUTPUTS = {
         File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None))),
     "legs": Outputs("text.robots:legs"),
     "modes": Outputs("text.poses:modes", (
-        File("cannot draw the modes", {PNG: "modes:picture"}, "Draw the modes (.png).", nothing="modes:nothing"),)),
+        File("cannot draw the modes", {PNG: "modes:picture"}, "Draw the modes (.png).", nothing="modes:why_undrawn"),)),
     "path": Outputs("text.poses:path"),
     "robot": Outputs("text.robots:robot"),
     "select": Outputs("text.runs:selection"),

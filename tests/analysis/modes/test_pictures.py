@@ -21,7 +21,7 @@ from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import rotation_about
 from hrsynth.present.coupler import chains, points, swept, traced
-from hrsynth.present.modes import MARKS, described, figure, picture, shown
+from hrsynth.present.modes import MARKS, description, drawable, figure, picture
 from hrsynth.present.scenes import CLOSES, GOAL, NEAR, OPEN, ModesScene, scene
 from hrsynth.present.sketch import Sketch
 from hrsynth.present.text.poses import modes as text
@@ -243,7 +243,7 @@ def test_bad_files_are_refused_before_any_work(path: str, tmp_path: Path, monkey
 @pytest.mark.parametrize(("name", "observe"), [("quattro", "1,2"), ("i4l", None)])
 def test_a_continuum_is_not_drawn(name: str, observe: str | None, tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     with pytest.raises(BadRequest, match=r"nothing to draw: .*continuum"):
-        shown(found(name, observe))
+        drawable(found(name, observe))
     arguments = [] if observe is None else ["--observe", observe]
     assert execute(["modes", name, *arguments, "-o", str(tmp_path / "x.png")]) == 0
     out, err = capsys.readouterr()
@@ -256,7 +256,7 @@ def test_the_command_draws_and_the_file_says_what_it_holds(tmp_path: Path, capsy
     file = tmp_path / "x.png"
     assert execute(["modes", "3rrr_m1", "-o", str(file), "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["file"] == str(file)
-    assert held(file) == json.loads(json.dumps(described(found("3rrr_m1"), drawn("3rrr_m1"))))
+    assert held(file) == json.loads(json.dumps(description(found("3rrr_m1"), drawn("3rrr_m1"))))
 
 
 def held(file: Path) -> dict:
@@ -308,7 +308,7 @@ def test_kept_pictures_are_fresh_and_small(file: Path):
     valued = [option for option in options if option != "--real"]
     given = dict(zip(valued[::2], valued[1::2], strict=True))
     result = modes(load(shipped()[robot]), given.get("--observe"), at=given.get("--at"), real="--real" in options)
-    fresh, kept = json.loads(json.dumps(described(result, shown(result)))), held(file)
+    fresh, kept = json.loads(json.dumps(description(result, drawable(result)))), held(file)
     assert words(fresh) == words(kept), "stale: make pictures"
     assert numbers(fresh) == pytest.approx(numbers(kept), abs=1e-6 * result.goal.twin.length), "stale: make pictures"
     assert file.stat().st_size < 150_000

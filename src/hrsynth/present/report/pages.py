@@ -11,7 +11,7 @@ from ...analysis.derive import Derivation
 from ...tolerances import RANK_GAP, SAME_RELATION
 from ..drawings.schematic import graph_svg
 from ..maps import error_map
-from ..modes import nothing, picture
+from ..modes import picture, why_undrawn
 from ..text.poses import all_of, at_mode, proved
 from ..text.robots import exact_cell, exact_words
 from ..text.runs import field_rows
@@ -42,7 +42,7 @@ def page(found: Derivation, told: Parts) -> bytes:
         hidden=found.hidden_architecture and str(found.hidden_architecture), pairs=pairs(found),
         cone=CONE.replace("deg", "°"),
         watched=[f"leg {o.leg} ({o.link})" for o in found.setting.observed],
-        scenes=step_figures(found), modes_picture=None if isinstance(modes, Refused) or nothing(modes) is not None
+        scenes=step_figures(found), modes_picture=None if isinstance(modes, Refused) or why_undrawn(modes) is not None
         else _png(picture(modes)),
         map=errors if isinstance(errors, Refused) else asked(name, lambda: _png(error_map(errors))))).encode()
 

@@ -199,5 +199,5 @@ def view(found: View, file: str | None = None) -> str:
         ("robot", f"{found.setting.robot.name}   {found.machines[0].words}"),
         ("observed", ", ".join(f"{arrow.leg} ({arrow.link})" for arrow in found.arrows) or "nothing"),
         *(("hidden robot", machine.words) for machine in found.machines[1:]), ("sliders", sliders),
-        ("other modes", ", ".join(outline.label for outline in found.ghosts) or []),
+        ("other modes", ", ".join(outline.label for outline in found.mode_outlines) or []),
         *(("note", note) for note in found.notes), *known("page", file)])

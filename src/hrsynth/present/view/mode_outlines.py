@@ -13,11 +13,11 @@ from ...errors import HrsynthError
 from ...geometry.vectors import Array, inverse
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import Pose
-from .states import listed, place
+from .states import page_values, place
 
 
 @dataclass(frozen=True, eq=False)
-class Ghost:
+class ModeOutline:
     """An assembly mode that is not the pose itself: its number as in ``modes``, its pose, whether the robot can be
     assembled there, as ``AssemblyMode`` says it twice, and the displacement (7,) of each link, None of those whose
     place is not known."""
@@ -38,13 +38,13 @@ class Ghost:
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
-        places = [None if each is None else listed(each[None])[0] for each in self.places]
+        places = [None if each is None else page_values(each[None])[0] for each in self.places]
         return {"label": self.label, "words": self.words, "reachable": self.reachable,
                 "assembly": self.assembly, "places": places}
 
 
-def ghosts(setting: ObservedRobot,
-           goal: ClosedConfiguration | None = None) -> tuple[tuple[Ghost, ...], tuple[str, ...]]:
+def mode_outlines(setting: ObservedRobot,
+           goal: ClosedConfiguration | None = None) -> tuple[tuple[ModeOutline, ...], tuple[str, ...]]:
     """All modes but the pose itself (default: the zero configuration's), and why there are none or not all."""
     try:
         found = modes(setting, at=goal)
@@ -53,11 +53,11 @@ def ghosts(setting: ObservedRobot,
     if found.found.continuum is not None:
         return (), (f"assembly modes are not shown: {found.found.degenerate}",)
     notes = () if found.found.complete else ("perhaps not all assembly modes are shown",)
-    return tuple(_ghost(setting, str(number), mode) for number, mode in enumerate(found.modes, 1)
+    return tuple(_outline(setting, str(number), mode) for number, mode in enumerate(found.modes, 1)
                  if not mode.goal), notes
 
 
-def _ghost(setting: ObservedRobot, label: str, mode: AssemblyMode) -> Ghost:
+def _outline(setting: ObservedRobot, label: str, mode: AssemblyMode) -> ModeOutline:
     def where(link: str) -> Array | None:
         if mode.configuration is not None:
             X = mode.configuration.pose(link)
@@ -68,4 +68,4 @@ def _ghost(setting: ObservedRobot, label: str, mode: AssemblyMode) -> Ghost:
         return place(X @ inverse(setting.mechanism.links[link].pose))
 
     places = tuple(where(link) for link in setting.mechanism.links)
-    return Ghost(label, mode.pose, mode.reachable, mode.assembly, places)
+    return ModeOutline(label, mode.pose, mode.reachable, mode.assembly, places)

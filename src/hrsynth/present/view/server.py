@@ -20,7 +20,7 @@ import numpy as np
 
 from ...errors import BadRequest
 from ...tolerances import SLIDER_ARRIVED
-from .mode_outlines import ghosts
+from .mode_outlines import mode_outlines
 from .page import page
 from .states import Posed
 from .view import View
@@ -59,9 +59,9 @@ class Session:
                 self.here, reached = mover.sent(self.here, wanted)
             reply: dict[str, Any] = {"state": mover.state(self.here).scene(),
                                      "stopped": bool(np.max(np.abs(reached - wanted), initial=0.0) > SLIDER_ARRIVED)}
-            if asked.get("modes") and self.found.ghosts:
-                others, _ = ghosts(self.found.setting, self.here.real)
-                reply["ghosts"] = [ghost.scene() for ghost in others]
+            if asked.get("modes") and self.found.mode_outlines:
+                others, _ = mode_outlines(self.found.setting, self.here.real)
+                reply["ghosts"] = [outline.scene() for outline in others]
         return reply
 
 

@@ -44,7 +44,7 @@ class ViewState:
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
-        return {**{key: listed(places) for key, places in self.places.items()},
+        return {**{key: page_values(places) for key, places in self.places.items()},
                 "distance": None if self.distance is None else float(f"{self.distance:.5g}")}
 
 
@@ -170,6 +170,6 @@ def place(X: Array) -> Array:
     return np.concatenate([X[:3, 3], Rotation.from_matrix(X[:3, :3]).as_quat(canonical=True)])
 
 
-def listed(places: Array) -> list[list[float]]:
+def page_values(places: Array) -> list[list[float]]:
     """Places (links, 7) with the digits that the page is given."""
     return (np.round(places, PAGE_DIGITS) + 0.0).tolist()

@@ -16,9 +16,9 @@ from ...mechanism.observation import Direction
 from ...progress import tell
 from ...results import Result
 from .meshes import meshes
-from .mode_outlines import Ghost, ghosts
+from .mode_outlines import ModeOutline, mode_outlines
 from .shapes import PAGE_DIGITS, RADIUS, Drawer, Shape
-from .states import HIDDEN, REAL, Mover, Slider, ViewState, listed, place
+from .states import HIDDEN, REAL, Mover, Slider, ViewState, page_values, place
 
 ARROW = (0.35, 0.7)
 """Length of an arrow at least and at most (characteristic lengths); between these, a part ``SHARE`` of its link's."""
@@ -45,7 +45,7 @@ class Machine:
         return {"key": self.key, "words": self.words, "links": list(self.links),
                 "platform": [places[link] for link in self.platform],
                 "shapes": [shape.scene(places) for shape in self.shapes],
-                "frames": [{"link": places[link], "place": listed(X[None])[0]} for link, X in self.frames]}
+                "frames": [{"link": places[link], "place": page_values(X[None])[0]} for link, X in self.frames]}
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +68,13 @@ class View(Result, shown_as="view"):
     home: ViewState
     sliders: tuple[Slider, ...]
     arrows: tuple[Arrow, ...]
-    ghosts: tuple[Ghost, ...]
+    mode_outlines: tuple[ModeOutline, ...]
     normal: Array | None
     notes: tuple[str, ...]
 
     def headline(self) -> str:
         """The robot, and how much there is to see of it."""
-        return f"{self.setting.robot.name}, {len(self.sliders)} sliders, {len(self.ghosts)} other assembly modes"
+        return f"{self.setting.robot.name}, {len(self.sliders)} sliders, {len(self.mode_outlines)} other assembly modes"
 
     @property
     def largest(self) -> float | None:
@@ -89,8 +89,8 @@ class View(Result, shown_as="view"):
             "shown": {machine.key: machine.words for machine in self.machines},
             "distance": self.home.distance, "largest_distance": self.largest,
             "sliders": [slider.to_dict() for slider in self.sliders],
-            "modes": [{"label": ghost.label, "pose": ghost.pose.to_dict(), "reachable": ghost.reachable}
-                      for ghost in self.ghosts],
+            "modes": [{"label": outline.label, "pose": outline.pose.to_dict(), "reachable": outline.reachable}
+                      for outline in self.mode_outlines],
             "notes": list(self.notes),
         }
 
@@ -105,7 +105,7 @@ class View(Result, shown_as="view"):
             "home": self.home.scene(), "sliders": [slider.scene() for slider in self.sliders],
             "arrows": [{"leg": a.leg, "link": places[a.link], "ends": np.round(a.ends, PAGE_DIGITS).tolist()}
                        for a in self.arrows],
-            "ghosts": [ghost.scene() for ghost in self.ghosts], "notes": list(self.notes),
+            "ghosts": [outline.scene() for outline in self.mode_outlines], "notes": list(self.notes),
         }
 
 
@@ -124,7 +124,7 @@ def view(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None =
     tell("sliders")
     sliders = mover.sliders()
     tell("modes")
-    found, notes = ghosts(setting)
+    found, notes = mode_outlines(setting)
     shapes, missing = meshes(setting)
     home = mover.state(mover.home)
     states = (home, *(state for slider in sliders for state in slider.states))
