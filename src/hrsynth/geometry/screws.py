@@ -6,7 +6,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .vectors import Numbers, cross
+from .vectors import Array, Numbers, cross, hat
 
 
 def normals(axis: Numbers) -> tuple[Numbers, Numbers]:
@@ -34,3 +34,8 @@ def rotation(axis: Numbers, point: Numbers) -> Numbers:
 def translation(direction: Numbers) -> Numbers:
     """The twist of a translation, (d, 0)."""
     return np.concatenate([direction, 0 * direction])
+
+
+def point_velocity(V: Array, arm: Array) -> Array:
+    """v + ω × r, (3, n): the velocities of the point at ``arm`` (3,) from where twists V (6, n) are told."""
+    return V[:3] - hat(arm) @ V[3:]

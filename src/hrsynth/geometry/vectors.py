@@ -83,6 +83,11 @@ def pose(position: ArrayLike = (0.0, 0.0, 0.0), rotation: ArrayLike | None = Non
     return matrix
 
 
+def transform(X_AB: Array, p_B: Array) -> Array:
+    """p_A of a point p_B (3,)."""
+    return np.asarray(X_AB[:3, :3] @ p_B + X_AB[:3, 3])
+
+
 def inverse(X_AB: Array) -> Array:
     """X_BA of X_AB; shape (4, 4)."""
     rotation = X_AB[:3, :3].T

@@ -13,7 +13,7 @@ import numpy as np
 
 from ..errors import LoopsNotClosed
 from ..geometry.ranks import Rank, Spectrum, spectrum
-from ..geometry.vectors import Array, frozen, hat
+from ..geometry.vectors import Array, frozen
 from ..mechanism.observation import Observation
 from ..tolerances import CLOSED
 from .pinocchio_model import PinocchioModel
@@ -105,8 +105,3 @@ def _grouped(reference: str, observations: tuple[Observation, ...], links: tuple
         chosen = [observations[i] for i in members]
         groups.append(_Group(kind, place[view], members, chosen, [place[o.link] for o in chosen]))
     return names, groups
-
-
-def point_velocity(V: Array, X: Array, point: Array, length: float) -> Array:
-    """The linear rows of V moved from a link frame's origin to ``point`` (3,) in that frame; X is the link's pose."""
-    return V[:3] - hat(X[:3, :3] @ point / length) @ V[3:]

@@ -12,10 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..budgets import SLIDER_PART
+from ..geometry.screws import point_velocity
 from ..geometry.so3 import logarithm, logarithm_rate, turn_about, wrap_angle
 from ..geometry.vectors import Array
 from ..tolerances import NO_SLIDER, SAME_DIRECTION
-from .configuration import ClosedConfiguration, point_velocity
+from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .platform_motion import PlatformMotion
 from .relation import Measurement, relation
@@ -89,7 +90,7 @@ class Coordinates:
         """Error (reached − wanted) in characteristic lengths and radians, and its Jacobian."""
         frames, velocities = twin.frames(q, (self.motion.link,))
         X, V = frames[0], velocities[0]
-        J = np.vstack([point_velocity(V, X, self.motion.point, twin.length),
+        J = np.vstack([point_velocity(V, X[:3, :3] @ self.motion.point / twin.length),
                        self._turn(X)[1] @ V[3:]])
         scale = np.where(np.array(self.places) < 3, twin.length, 1.0)
         return self.apart(X) / scale, J[list(self.places)]

@@ -14,12 +14,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..geometry.ranks import kernel_basis, range_basis
+from ..geometry.screws import point_velocity
 from ..geometry.vectors import Array, hat, inverse
 from ..mechanism import Joint, Mechanism, Observation
 from ..mechanism.legs import Leg
 from ..mechanism.screws import constraints
 from ..tolerances import INVERTED
-from .configuration import ClosedConfiguration, point_velocity
+from .configuration import ClosedConfiguration
 from .relation import Measurement
 
 
@@ -78,7 +79,7 @@ def interaction(at: ClosedConfiguration, question: Measurement) -> Array:
     kernel, _ = kernel_basis(bodies.A)
     V = bodies.velocity(question.platform)
     if question.point is not None:
-        V = point_velocity(V, at.pose(question.platform), question.point, at.twin.length)
+        V = point_velocity(V, at.pose(question.platform)[:3, :3] @ question.point / at.twin.length)
     moving, rates = V @ kernel, bodies.rates(question.observations, question.reference) @ kernel
     still, _ = kernel_basis(moving, 1.0)
     hidden = range_basis(rates @ still, 1.0)[0] if still.shape[1] else np.zeros((len(rates), 0))
@@ -136,7 +137,7 @@ class Split:
 def split(twists: Array, point: Array) -> Split:
     """Take a twist system (6, k) apart at a point (3,)."""
     at_point = twists.copy()
-    at_point[:3] += -hat(point) @ twists[3:]
+    at_point[:3] = point_velocity(twists, point)
     still, _ = kernel_basis(at_point[3:], 1.0)
     fixed, _ = kernel_basis(at_point[:3], 1.0)
     translations = range_basis(at_point[:3] @ still, 1.0)[0]

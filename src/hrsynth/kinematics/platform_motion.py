@@ -12,11 +12,12 @@ import numpy as np
 
 from ..errors import BadRequest
 from ..geometry.ranks import range_basis
+from ..geometry.screws import point_velocity
 from ..geometry.so3 import between, exponential, logarithm, turn_about, wrap_angle
-from ..geometry.vectors import Array
+from ..geometry.vectors import Array, transform
 from ..mechanism.pose import Pose
 from ..tolerances import AS_PRINTED, RANK_CUTOFF
-from .configuration import ClosedConfiguration, point_velocity
+from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, relation
 
@@ -43,7 +44,7 @@ class Goal:
         X, V = frames[0], velocities[0]
         R = X[:3, :3]
         errors = [(self.directions @ (R @ self.point + X[:3, 3]) - self.values) / twin.length]
-        blocks = [self.directions @ point_velocity(V, X, self.point, twin.length)]
+        blocks = [self.directions @ point_velocity(V, X[:3, :3] @ self.point / twin.length)]
         if self.phi is not None:
             angle, row = turn_about(self.normal, R @ self.zero.T)
             errors.append(np.array([wrap_angle(angle - self.phi)]))
@@ -81,7 +82,7 @@ class Goal:
         """The goal that lies ``fraction`` of the way from the pose X (4, 4) to this one."""
         if fraction >= 1:
             return self
-        R, here = X[:3, :3], X[:3, :3] @ self.point + X[:3, 3]
+        R, here = X[:3, :3], transform(X, self.point)
         start = self.directions @ here
         phi, rotation = self.phi, self.rotation
         if phi is not None:
@@ -153,7 +154,7 @@ class PlatformMotion:
 
     def position(self, X: Array) -> Array:
         """The position of the point at a platform pose X (4, 4), (3,)."""
-        return np.asarray(X[:3, :3] @ self.point + X[:3, 3])
+        return transform(X, self.point)
 
     def pose(self, X: Array) -> Pose:
         """A platform pose X (4, 4) as a user writes it; of a point body the position alone."""

@@ -11,10 +11,11 @@ from functools import cached_property
 import numpy as np
 
 from ..geometry.ranks import Rank, kernel_basis, range_basis
+from ..geometry.screws import point_velocity
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..tolerances import INVERTED
-from .configuration import ClosedConfiguration, measure, point_velocity
+from .configuration import ClosedConfiguration, measure
 from .tasks import Target
 
 
@@ -49,7 +50,7 @@ class Measurement:
         seen = tuple(o for o in self.observations if o.link not in blind)
         X, V, _, rates = measure(at.twin, at.q, self.reference, seen, (self.platform, *self.bodies))
         found = iter(rates)
-        parts = [V[0] if self.point is None else point_velocity(V[0], X[0], self.point, at.twin.length)]
+        parts = [V[0] if self.point is None else point_velocity(V[0], X[0][:3, :3] @ self.point / at.twin.length)]
         parts += [np.zeros((o.size, at.twin.nv)) if o.link in blind else next(found) for o in self.observations]
         return np.vstack([*parts, *V[1:]])
 

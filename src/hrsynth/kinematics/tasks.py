@@ -11,11 +11,12 @@ from typing import Protocol
 import numpy as np
 
 from ..geometry.gauss_newton import Damping, Residual, descend
+from ..geometry.screws import point_velocity
 from ..geometry.so3 import logarithm
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..tolerances import CLOSED
-from .configuration import measure, point_velocity
+from .configuration import measure
 from .pinocchio_model import PinocchioModel
 
 DAMPING = Damping(start=1.0, eased=0.1, least=0.1, most=1e8)
@@ -55,7 +56,7 @@ class Target:
         if self.point is not None:
             errors = [(X[:3, :3] @ self.point + X[:3, 3] - self.pose[:3, :3] @ self.point - self.pose[:3, 3])
                       / twin.length]
-            blocks = [point_velocity(V, X, self.point, twin.length)]
+            blocks = [point_velocity(V, X[:3, :3] @ self.point / twin.length)]
         else:
             errors = [(X[:3, 3] - self.pose[:3, 3]) / twin.length, logarithm(X[:3, :3] @ self.pose[:3, :3].T)]
             blocks = [V]

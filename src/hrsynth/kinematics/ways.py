@@ -15,7 +15,7 @@ import numpy as np
 
 from ..geometry.balls import Field
 from ..geometry.lines import common_perpendicular, distance
-from ..geometry.vectors import Array, cross, dot
+from ..geometry.vectors import Array, cross, dot, transform
 from ..mechanism import Joint, JointType
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.wrist import Wrist
@@ -92,7 +92,7 @@ def ways(anatomy: LegDecomposition, leg: Leg) -> Iterator[tuple[Part, ...]]:
     the platform is a point, any turn about it is their last part."""
     mechanism = anatomy.mechanism
     frame, point = mechanism.links[mechanism.platform].pose, anatomy.point
-    last = () if point is None else (Part(False, frame[:3, :3] @ point + frame[:3, 3], None, ()),)
+    last = () if point is None else (Part(False, transform(frame, point), None, ()),)
     joints = [mechanism.joints[name] for name in leg.joints]
 
     def onward(link: str, been: tuple[str, ...], parts: tuple[Part, ...]) -> Iterator[tuple[Part, ...]]:

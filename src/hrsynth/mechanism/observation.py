@@ -10,8 +10,9 @@ from typing import ClassVar
 import numpy as np
 
 from ..errors import BadMechanism
+from ..geometry.screws import point_velocity
 from ..geometry.so3 import wrap_angle
-from ..geometry.vectors import Array, cross, frozen, hat, unit
+from ..geometry.vectors import Array, cross, frozen, hat, transform, unit
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,11 +150,12 @@ class LinePosition(Observation):
         """ḣ = ṗ × u + p × u̇ as the reference link sees it, shape (3, n)."""
         u, arm = self._line(X_reference, X_link)
         turn = V_link[3:] - V_reference[3:]
-        slip = _velocity(V_link, X_link, self._at(X_link)) - _velocity(V_reference, X_reference, self._at(X_link))
+        at = self._at(X_link)
+        slip = point_velocity(V_link, at - X_link[:3, 3]) - point_velocity(V_reference, at - X_reference[:3, 3])
         return X_reference[:3, :3].T @ -(hat(u) @ slip + hat(arm) @ hat(u) @ turn)
 
     def _at(self, X_link: Array) -> Array:
-        return X_link[:3, :3] @ self.point + X_link[:3, 3]
+        return transform(X_link, self.point)
 
     def _line(self, X_reference: Array, X_link: Array) -> tuple[Array, Array]:
         """u, and p seen from the reference link's origin, in base axes."""
@@ -217,16 +219,11 @@ class SlideEncoder(Encoder):
 
     def value(self, X_reference: Array, X_link: Array) -> Array:
         """The length, shape (1,), in metres."""
-        arm = X_link[:3, :3] @ self.point + X_link[:3, 3] - X_reference[:3, 3]
+        arm = transform(X_link, self.point) - X_reference[:3, 3]
         return np.array([self.axis @ (X_reference[:3, :3].T @ arm - self.start)])
 
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
         """a · (velocity of the centre as one link carries it − as the other does), shape (1, n)."""
-        centre = X_link[:3, :3] @ self.point + X_link[:3, 3]
-        slip = _velocity(V_link, X_link, centre) - _velocity(V_reference, X_reference, centre)
+        centre = transform(X_link, self.point)
+        slip = point_velocity(V_link, centre - X_link[:3, 3]) - point_velocity(V_reference, centre - X_reference[:3, 3])
         return (X_reference[:3, :3] @ self.axis)[None] @ slip
-
-
-def _velocity(V: Array, X: Array, point: Array) -> Array:
-    """The velocity (3, n) of the point of a link that is at ``point`` (3,), base axes."""
-    return V[:3] - hat(point - X[:3, 3]) @ V[3:]

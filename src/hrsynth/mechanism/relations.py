@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from ..geometry import lines
 from ..geometry.incidences import Incidence, Sieve, choices, incidences
-from ..geometry.vectors import Array, cross, dot, inverse, triple, unit
+from ..geometry.vectors import Array, cross, dot, inverse, transform, triple, unit
 from ..tolerances import RANK_GAP, SAME_DIRECTION, SAME_PLANE, SAME_POINT
 from . import graphs
 from .model import Joint, JointType, Mechanism
@@ -160,7 +160,7 @@ class _Drawing:
             self.carriers.append(link)
         if point is not None:
             X = mechanism.links[mechanism.platform].pose
-            self.points.append(self._at(mechanism.platform, X[:3, :3] @ point + X[:3, 3]))
+            self.points.append(self._at(mechanism.platform, transform(X, point)))
             self.hosts.append((mechanism.platform,))
             self.carriers.append(mechanism.platform)
 

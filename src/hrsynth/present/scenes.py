@@ -15,7 +15,7 @@ import numpy as np
 from ..analysis.modes.curves import Circle, Curve, Line, Point, Reach, Sphere, shifted
 from ..analysis.modes.modes import AssemblyMode, AssemblyModes
 from ..analysis.modes.tips import Tip, TipLoci
-from ..geometry.vectors import Array, inverse
+from ..geometry.vectors import Array, inverse, transform
 from .coupler import chains, points, swept, traced
 from .skeleton import legs_of, outline
 
@@ -82,7 +82,7 @@ class _Plot:
     def marked(self, mode: AssemblyMode) -> Array:
         assert mode.bodies is not None
         X = mode.bodies[self.body]
-        return np.asarray(X[:3, :3] @ self.place + X[:3, 3])
+        return transform(X, self.place)
 
 
 def scene(found: AssemblyModes) -> ModesScene:
@@ -128,7 +128,7 @@ def _normal(found: AssemblyModes) -> Array | None:
 def _at_goal(found: AssemblyModes, tip: Tip) -> Array:
     """A tip at the goal, (3,)."""
     X = found.goal.pose(tip.body)
-    return np.asarray(X[:3, :3] @ tip.place + X[:3, 3])
+    return transform(X, tip.place)
 
 
 def _platform(found: AssemblyModes, confined: TipLoci) -> _Plot:
@@ -143,7 +143,7 @@ def _translating(found: AssemblyModes, confined: TipLoci) -> _Plot:
     """What the platform's position can be by each leg alone: they meet in the modes (MMT Fig. 5)."""
     plot = _platform(found, confined)
     X = found.goal.pose(plot.body)
-    p = X[:3, :3] @ plot.place + X[:3, 3]
+    p = transform(X, plot.place)
     curves = [(tip, curve) for tip in confined.tips for curve in (tip.curve, *(each for each, _ in tip.others))]
     reaches = tuple((shifted(curve, p - _at_goal(found, tip)), f"platform on leg {tip.leg}")
                     for tip, curve in curves if not isinstance(curve, Point))

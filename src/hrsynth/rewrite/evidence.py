@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from ..geometry.ranks import kernel_basis
-from ..geometry.vectors import Array, unit
+from ..geometry.vectors import Array, transform, unit
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.sampling import Samples
@@ -214,7 +214,7 @@ def _moved(mechanism: Mechanism, reference: str, nodes: set[str], joints: Sequen
                 q, _ = solve(twin, twin.moved(q, 0.12 * kernel @ rng.normal(size=kernel.shape[1])), tolerance=SOLVED)
         X = twin.pose(q, before)
         rotations.append(X[:3, :3] @ home[:3, :3].T)
-        anchors.append(X[:3, :3] @ local + X[:3, 3])
+        anchors.append(transform(X, local))
     return np.asarray(rotations), np.asarray(anchors)
 
 

@@ -13,7 +13,7 @@ from itertools import product
 import numpy as np
 
 from ..errors import BadRequest
-from ..geometry.vectors import Array, inverse, perpendicular, pose, unit
+from ..geometry.vectors import Array, inverse, perpendicular, pose, transform, unit
 from ..mechanism import Mechanism
 from ..mechanism.observation import Direction, Observation
 from ..tolerances import NUDGE
@@ -89,7 +89,7 @@ def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tupl
     for observation in observations:
         assert isinstance(observation, Direction)
         X = inverse(mechanism.links[observation.link].pose)
-        centres = np.array([X[:3, :3] @ joint.point + X[:3, 3] for joint in mechanism.joints_of(observation.link)])
+        centres = np.array([transform(X, joint.point) for joint in mechanism.joints_of(observation.link)])
         along = (centres - centres[0]) @ observation.direction
         low, high = float(along.min()), float(along.max())
         if high - low < SHORTEST * mechanism.length:

@@ -10,7 +10,7 @@ from itertools import combinations, islice, product
 import numpy as np
 
 from ...budgets import BRANCH_CHOICES
-from ...geometry.vectors import Array, inverse, perpendicular, pose
+from ...geometry.vectors import Array, inverse, perpendicular, pose, transform
 from ...tolerances import RANK_GAP, SAME_POINT
 from .curves import Reach
 from .rigid import Planar, Spatial
@@ -107,7 +107,7 @@ def _curves(confined: TipLoci) -> tuple[Reach, ...]:
 
 def _point(X: Array, place: Array) -> Array:
     """A body's point (3,) in the frame of its pose."""
-    return np.asarray(X[:3, :3] @ place + X[:3, 3])
+    return transform(X, place)
 
 
 def _moved(X: Array, by: Array) -> Array:

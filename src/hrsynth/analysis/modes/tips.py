@@ -18,7 +18,7 @@ from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector, Tan
 from ...constraints.pattern import ConstraintPattern, LockedLeg
 from ...errors import NotConfined
 from ...geometry.ranks import kernel_basis
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.leg_reach import alone
 from ...kinematics.locked import joint_at, rezero
@@ -249,7 +249,7 @@ def _held_paths(anatomy: LegDecomposition, own: Sequence[Observation], reference
             q, residual = solve(twin, twin.moved(start.q, size * direction), held, tolerance=SOLVED)
             X = twin.pose(q, leg.body)
             if residual <= CLOSED:
-                found.append(X[:3, :3] @ place + X[:3, 3])
+                found.append(transform(X, place))
     return found
 
 
