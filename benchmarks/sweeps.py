@@ -21,7 +21,7 @@ from measure import Row, Run, compiled, least, plane, same, threads, told
 
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.engine import Batch
-from hrsynth.batch.spread import spreads
+from hrsynth.batch.error_bounds import bounds_of
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
@@ -59,7 +59,7 @@ def exact_maxima() -> Iterator[Row]:
     assert setting.placer is not None
     some = [at for at in setting.placer.configurations(X[:: len(X) // LOOPED]) if at is not None]
     twin = PinocchioModel(setting.mechanism)
-    basis = batch.stage.twists
+    basis = batch.coordinates.twists
 
     def loop() -> None:
         found = []
@@ -69,7 +69,7 @@ def exact_maxima() -> Iterator[Row]:
             wanted = np.vstack([np.zeros((len(loops), basis.shape[1])), basis])
             rates = np.linalg.lstsq(np.vstack([loops, rows[:6]]), wanted, rcond=1e-9)[0]
             found.append(rows[6:] @ rates)
-        spreads(np.array(found).transpose(1, 2, 0), basis, np.full(2, CONE))
+        bounds_of(np.array(found).transpose(1, 2, 0), basis, np.full(2, CONE))
 
     (looped,) = least(loop, turns=3)
     what = "Mᵀ and both exact error maxima, quattro, two legs, 40,401 poses"
@@ -92,9 +92,9 @@ def matrices() -> Iterator[Row]:
              ("orthoglide", 0.1, ("1", "2"), glide), ("3rrr_m1", 0.05, ("1", "2", "3"), planar))
     for robot, size, legs, hand in cases:
         setting, batch = compiled(robot)
-        X = plane(batch, size, 0.1 if batch.stage.spins.shape[1] else 0.0)
+        X = plane(batch, size, 0.1 if batch.coordinates.rotations.shape[1] else 0.0)
         theirs = hand(setting, X, legs)
-        M = batch.evaluate(X, legs, compiled=True).matrix
+        M = batch.evaluate(X, legs, compiled=True).interaction_matrix
         same(np.linalg.norm(M, axis=(1, 2)), np.linalg.norm(theirs() * units(batch, theirs()), axis=(1, 2)), 1e-9)
         numba, plain, by = least(lambda b=batch, X=X, legs=legs: b.evaluate(X, legs, compiled=True),
                                  lambda b=batch, X=X, legs=legs: b.evaluate(X, legs, compiled=False), theirs)
@@ -105,7 +105,7 @@ def matrices() -> Iterator[Row]:
 
 def units(batch: Batch, M: Array) -> Array:
     """Columns per metre become columns per characteristic length."""
-    shifts = batch.stage.shifts.shape[1]
+    shifts = batch.coordinates.translations.shape[1]
     return np.where(np.arange(M.shape[2]) < shifts, batch.length, 1.0)
 
 

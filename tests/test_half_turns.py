@@ -20,7 +20,7 @@ from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot, motors
 from hrsynth.analysis.singularity.agreement import weakest
 from hrsynth.analysis.singularity.locus import locus
-from hrsynth.batch.chain import Chain
+from hrsynth.batch.iterative_leg import IterativeLeg
 from hrsynth.batch.reach import reach
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet, PoseNotReached
@@ -254,17 +254,17 @@ def test_a_link_that_has_turned_over_does_not_close_its_leg() -> None:
     """Half a turn about the line through its two joints keeps the joints' centres and leaves their axes parallel."""
     setting = case_of("3rrr_m1").setting
     leg, seen = setting.anatomy.legs[0], setting.segments[0]
-    chain = Chain.of(setting.mechanism, leg, seen, None)
+    chain = IterativeLeg.of(setting.mechanism, leg, seen, None)
     place = chain.links.index(seen.link)
     one, two = (joint.point / chain.length for joint in setting.mechanism.joints_of(seen.link))
     state = chain.start(1)
     ends = state[:, 1].copy()
-    assert chain.led(state, ends, 1)[1] == pytest.approx([0], abs=1e-12)
+    assert chain.closed(state, ends, 1)[1] == pytest.approx([0], abs=1e-12)
     turn = half_turn((two - one) / np.linalg.norm(two - one))
     state[0, place, :3, 3] = one + turn @ (state[0, place, :3, 3] - one)
     state[0, place, :3, :3] = turn @ state[0, place, :3, :3]
     assert np.linalg.norm(chain.ties.evaluate(state)[0]) < 1e-12
-    assert chain.led(state, ends, 1)[1] == [np.inf]
+    assert chain.closed(state, ends, 1)[1] == [np.inf]
 
 
 @pytest.fixture(autouse=True)

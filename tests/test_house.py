@@ -26,6 +26,7 @@ FOLDERS = [
     {"description"},
     {"families"},
     {"kinematics"},
+    {"legs"},
     {"batch"},
     {"rewrite"},
     {"constraints"},
@@ -38,8 +39,8 @@ FOLDERS = [
 ]
 LEVEL = {name: level for level, names in enumerate(FOLDERS) for name in names}
 
-ENGINE = {"geometry", "mechanism", "description", "batch", "kinematics", "rewrite", "constraints", "analysis"} | {
-    "simulation", "selection", "present"}
+ENGINE = {"geometry", "mechanism", "description", "kinematics", "legs", "batch", "rewrite", "constraints"} | {
+    "analysis", "simulation", "selection", "present"}
 ROBOTS = re.compile(
     r"(?<![a-z])(quattro|delta|orthoglide|gough|stewart|hexaglide|uranesx|i4l|tsai)(?![a-z])", re.IGNORECASE
 )
@@ -71,7 +72,7 @@ STILL_TWICE = {
     "Word",
 }
 STILL_OUTSIDE: set[str] = set()
-STILL_IN_CIRCLES = {"batch.limb batch.plain"}
+STILL_IN_CIRCLES: set[str] = set()
 
 TYPE_CHECKING = "from typing import TYPE_CHECKING"
 

@@ -78,8 +78,12 @@ LARGEST_BATCH = 1 << 29
 """Bytes that the result of one evaluation may take; more poses are asked for in parts (``Batch.sweep``)."""
 FAST_DIRECTIONS = 20.0
 """How much larger than at home the rates of the directions may become on a walk of poses in a batch."""
-POSES_FOR_NUMBA = 500_000
-"""Poses of a sweep that make up for numba's start."""
+POSES_FOR_NUMBA = 20_000
+"""Poses of a batch from which compiled kernels are worth numba's start (half a second) in a run with many batches."""
+POSES_FOR_NUMBA_ONCE = 500_000
+"""The same in a run with this batch alone."""
+POSES_FOR_COMPILING = 5_000_000
+"""Poses from which it pays that numba compiles a robot's kernels first."""
 
 # Singularities, paths, modes
 

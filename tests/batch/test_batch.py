@@ -42,10 +42,10 @@ def poses_near(batch: Batch, count: int, size: float = 0.2, seed: int = 0) -> Ar
     from hrsynth.geometry.so3 import exponential
 
     rng = np.random.default_rng(seed)
-    stage = batch.stage
+    coordinates = batch.coordinates
     X = np.tile(batch.home, (count, 1, 1))
-    spins = rng.uniform(-size, size, (count, stage.spins.shape[1])) @ stage.spins.T
-    shifts = rng.uniform(-size, size, (count, stage.shifts.shape[1])) @ stage.shifts.T
+    spins = rng.uniform(-size, size, (count, coordinates.rotations.shape[1])) @ coordinates.rotations.T
+    shifts = rng.uniform(-size, size, (count, coordinates.translations.shape[1])) @ coordinates.translations.T
     X[:, :3, 3] += batch.length * shifts
     X[:, :3, :3] = exponential(spins) @ X[:, :3, :3]
     return X
@@ -76,7 +76,7 @@ def check_law(setting: ObservedRobot, legs: Sequence[str], count: int, seed: int
         twists = twists / np.repeat([batch.length, 1.0], 3)[:, None]
         change = theirs.twists.T @ twists[: theirs.twist_rows]
         assert np.max(np.abs(change.T @ change - np.eye(len(change)))) < CLOSE
-        assert np.max(np.abs(M @ change - found.matrix[i])) < CLOSE * scale
+        assert np.max(np.abs(M @ change - found.interaction_matrix[i])) < CLOSE * scale
         values = np.linalg.svd(M, compute_uv=False)
         assert np.max(np.abs(values - found.singular_values[i])) < CLOSE * scale
         compared += 1
@@ -88,7 +88,7 @@ def test_a_batch_is_the_relation_at_every_pose(robot: str) -> None:
     setting, batch = shipped_batch(robot)
     known = [name for name, leg in batch.legs.items() if leg is not None]
     assert batch.complete or robot == "i4l"
-    assert batch.stage.constant == (robot not in SOLVED)
+    assert batch.coordinates.constant == (robot not in SOLVED)
     assert check_law(setting, known, POSES) >= POSES // 2
     assert check_law(setting, known[-2:], 3) >= 1
 
@@ -119,7 +119,8 @@ def test_numba_gives_the_same_numbers(robot: str, watched: int) -> None:
     assert plain.reached.any()
     here = plain.reached
     assert np.max(np.abs(plain.directions - quick.directions)[here]) < 1e-12
-    assert np.max(np.abs(plain.matrix - quick.matrix)[here]) < 1e-12 * np.max(np.abs(plain.matrix[here]))
+    M = plain.interaction_matrix
+    assert np.max(np.abs(M - quick.interaction_matrix)[here]) < 1e-12 * np.max(np.abs(M[here]))
     for one, two in ((plain.position, quick.position), (plain.orientation, quick.orientation)):
         assert one is not None
         assert two is not None
@@ -144,7 +145,7 @@ def test_a_pose_that_is_not_finite_is_not_reached(robot: str, bad: float) -> Non
         found = batch.evaluate(X, cones=0.01, compiled=compiled)
         assert found.position is not None
         assert found.reached.tolist() == 12 * [False] + 2 * [True]
-        for values in (found.directions, found.matrix, found.position.largest):
+        for values in (found.directions, found.interaction_matrix, found.position.largest):
             assert np.isnan(values[:12]).all()
             assert np.isfinite(values[12:]).all()
 
@@ -161,19 +162,17 @@ def test_legs_and_cones_that_are_none_are_refused(legs: str | list[str], cones: 
 
 def test_threads_change_no_digit(monkeypatch: pytest.MonkeyPatch) -> None:
     pytest.importorskip("numba")
-    from hrsynth.batch import compiled
-
     _, batch = shipped_batch("quattro")
     X = poses_near(batch, 10_000, 0.6)
     found = []
     for count in (1, 3):
-        monkeypatch.setattr(compiled, "THREADS", count)
+        monkeypatch.setattr("hrsynth.batch.program.threads", lambda count=count: count)
         found.append(batch.evaluate(X, ["1", "4"], 0.01, compiled=True))
     one, several = found
     assert one.position is not None
     assert several.position is not None
     assert 0 < one.reached.sum() < len(X)
-    assert np.array_equal(one.matrix, several.matrix, equal_nan=True)
+    assert np.array_equal(one.interaction_matrix, several.interaction_matrix, equal_nan=True)
     assert np.array_equal(one.position.largest, several.position.largest, equal_nan=True)
 
 
@@ -197,7 +196,7 @@ def test_error_maxima_bound_all_admissible_errors_and_are_nearly_met(robot: str,
     assert found.orientation is not None
     for i in np.flatnonzero(found.reached):
         for spread, rows in ((found.position, found.twists[:3]), (found.orientation, found.twists[3:])):
-            met = sampled_error(found.matrix[i], rows, found.directions[i], 0.01, rng)
+            met = sampled_error(found.interaction_matrix[i], rows, found.directions[i], 0.01, rng)
             assert met <= spread.largest[i] * (1 + 1e-9)
             assert met >= 0.7 * spread.lower[i]
             assert spread.lower[i] <= spread.largest[i]
@@ -223,7 +222,7 @@ def test_a_lost_freedom_has_an_infinite_error_and_the_others_a_finite_one() -> N
 @pytest.mark.parametrize("robot", ["3rpr_m1", "3rrr_m1", "3rps", "rrrrr_m1"])
 def test_the_determinant_has_the_size_of_the_singular_values_and_one_sign_around_home(robot: str) -> None:
     _, batch = shipped_batch(robot)
-    X = poses_near(batch, 6, 0.02) if batch.stage.constant else np.repeat(batch.home[None], 3, axis=0)
+    X = poses_near(batch, 6, 0.02) if batch.coordinates.constant else np.repeat(batch.home[None], 3, axis=0)
     found = batch.evaluate(X)
     assert found.determinant is not None
     assert found.reached.all()
@@ -237,7 +236,7 @@ def test_the_determinant_changes_its_sign_where_a_singular_value_vanishes() -> N
     X = np.tile(batch.home, (400, 1, 1))
     from hrsynth.geometry.so3 import exponential
 
-    X[:, :3, :3] = exponential(np.linspace(0, np.pi, 400)[:, None] * batch.stage.spins[:, 0]) @ X[:, :3, :3]
+    X[:, :3, :3] = exponential(np.linspace(0, np.pi, 400)[:, None] * batch.coordinates.rotations[:, 0]) @ X[:, :3, :3]
     found = batch.evaluate(X)
     assert found.determinant is not None
     flips = np.flatnonzero(np.diff(np.sign(found.determinant)))
@@ -251,14 +250,15 @@ def test_parts_of_a_sweep_are_the_whole(monkeypatch: pytest.MonkeyPatch) -> None
     _, batch = shipped_batch("quattro")
     X = poses_near(batch, 40, 0.5)
     whole = batch.evaluate(X, cones=0.01)
-    monkeypatch.setattr("hrsynth.batch.engine.CHUNK", 7)
+    monkeypatch.setattr("hrsynth.batch.program.CHUNK", 7)
     check_same(whole, batch.evaluate(X, cones=0.01))
     for i, part in enumerate(batch.sweep((X[:15], X[15:]), cones=0.01)):
-        assert np.array_equal(part.matrix, whole.matrix[15 * i : 15 if i == 0 else 40], equal_nan=True)
+        rows = whole.interaction_matrix[15 * i : 15 if i == 0 else 40]
+        assert np.array_equal(part.interaction_matrix, rows, equal_nan=True)
 
 
 def check_same(one: Evaluation, two: Evaluation) -> None:
-    for name in ("reached", "directions", "matrix", "singular_values"):
+    for name in ("reached", "directions", "interaction_matrix", "singular_values"):
         assert np.array_equal(getattr(one, name), getattr(two, name), equal_nan=True)
     assert one.position is not None
     assert two.position is not None
@@ -271,17 +271,17 @@ def test_no_pose_one_pose_and_poses_out_of_reach(compiled: bool) -> None:
         pytest.importorskip("numba")
     _, batch = shipped_batch("quattro")
     none = batch.evaluate(np.zeros((0, 4, 4)), cones=0.01, compiled=compiled)
-    assert none.matrix.shape == (0, 12, 4)
+    assert none.interaction_matrix.shape == (0, 12, 4)
     assert none.singular_values.shape == (0, 4)
     one = batch.evaluate(batch.home[None], cones=0.01, compiled=compiled)
     assert one.reached.all()
-    assert np.isfinite(one.matrix).all()
+    assert np.isfinite(one.interaction_matrix).all()
     far = np.tile(batch.home, (3, 1, 1))
     far[:, :3, 3] += 10.0
     away = batch.evaluate(far, cones=0.01, compiled=compiled)
     assert not away.reached.any()
     assert away.position is not None
-    assert np.isnan(away.matrix).all()
+    assert np.isnan(away.interaction_matrix).all()
     assert np.isnan(away.position.largest).all()
 
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from hrsynth.batch.cones import _weighed, largest
+from hrsynth.batch.cones import trace_two
+from hrsynth.batch.error_bounds import largest_errors
+from hrsynth.batch.program import Program
 from hrsynth.geometry.vectors import Array
 
 KINDS = ("any", "nearly alike", "long axes across", "one axis each", "one of them nothing", "round")
@@ -44,25 +46,29 @@ def entries(B: Array) -> Array:
     return np.stack([B[:, i, j] for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))])
 
 
+def dual_bound(B: Array, C: Array) -> Array:
+    """The least upper bound over the weights, whatever Newton's method says."""
+    program = Program.of(B=6, C=6)
+    program.apply(lambda: {"always": [1.0]}, state=["always"])
+    trace_two(program, ["B", "C"], "always", "maximum", direct=False)
+    return program.run(np.vstack([B, C]).T, ["maximum"])[0]
+
+
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_ascent_ends_higher_and_one_ends_there(kind: str) -> None:
     rng = np.random.default_rng(KINDS.index(kind))
     B, C = forms(kind, rng)
-    found, lower = largest([entries(B), entries(C)])
+    found, lower = largest_errors([entries(B), entries(C)])
     best = climbed(B, C, rng)
     assert np.array_equal(found, lower)
     assert np.all(best <= found * (1 + 1e-12))
     assert np.max(1 - best / found) < 1e-7
-    assert found == pytest.approx(_weighed(entries(B), entries(C)), rel=1e-12)
+    assert found == pytest.approx(dual_bound(entries(B), entries(C)), rel=1e-12)
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_numba_finds_the_same(kind: str) -> None:
     pytest.importorskip("numba")
-    from hrsynth.batch.compiled import two
-
-    B, C = (entries(each) for each in forms(kind, np.random.default_rng(KINDS.index(kind))))
-    plain = largest([B, C])[0]
-    near, S, w = np.array([1.0, 0.0, 0.0]), np.zeros(6), np.zeros(3)
-    quick = [two(np.ascontiguousarray(B[:, i]), np.ascontiguousarray(C[:, i]), S, w, near) for i in range(COUNT)]
-    assert np.array(quick) == pytest.approx(plain, rel=1e-12)
+    forms_ = [entries(each) for each in forms(kind, np.random.default_rng(KINDS.index(kind)))]
+    plain, quick = (largest_errors(forms_, compiled=compiled)[0] for compiled in (False, True))
+    assert quick == pytest.approx(plain, rel=1e-12)

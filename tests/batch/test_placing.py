@@ -42,7 +42,7 @@ def test_every_pose_that_is_reached_becomes_a_closed_configuration(robot: str) -
         if at is None:
             continue
         assert at.residual <= CLOSED
-        assert np.max(np.abs(at.pose(batch.stage.link) - X[i])) < 1e-9
+        assert np.max(np.abs(at.pose(batch.coordinates.link) - X[i])) < 1e-9
         u = [at.pose(o.link)[:3, :3] @ o.direction for o in setting.placer.seen.values()]
         assert np.max(np.abs(np.array(u) - found.directions[i])) < 1e-9
 
@@ -62,12 +62,12 @@ def test_coordinates_are_those_of_the_poses_of_all_links(robot: str) -> None:
 @pytest.mark.parametrize("robot", ["orthoglide", "3prr_m1", "hexa"])
 def test_walks_give_as_many_different_configurations_as_asked_for(robot: str) -> None:
     setting, placer = placer_of(robot)
-    walk = list(placer.wander(60, seed=2))
+    walk = list(placer.random_walk(60, seed=2))
     assert len(walk) == 60
     assert all(at.residual <= CLOSED for at in walk)
     places = [at.pose(setting.mechanism.platform)[:3, 3] for at in walk]
     assert np.std(places, axis=0).max() > 0.02 * placer.batch.length
-    again = list(placer.wander(60, seed=2))
+    again = list(placer.random_walk(60, seed=2))
     assert all(np.array_equal(one.q, two.q) for one, two in zip(walk, again, strict=True))
 
 
@@ -78,7 +78,7 @@ def test_a_grid_is_the_same_with_and_without_closed_forms(robot: str, grid: str)
     setting, placer = placer_of(robot)
     everything, cells = setting.everything, Grid.parse(grid)
     slow = sweep(everything.start, everything.question, cells, setting.motion)
-    fast = sweep(everything.start, everything.question, cells, setting.motion, None, placer)
+    fast = sweep(everything.start, everything.question, cells, setting.motion, placer)
     assert [at is None for at in slow] == [at is None for at in fast]
     assert any(at is not None for at in slow)
     for one, two in zip(slow, fast, strict=True):
@@ -91,7 +91,7 @@ def test_singular_values_are_pinocchios_also_where_another_working_mode_is_met()
     setting, placer = placer_of("3rrr_m1")
     everything, question = setting.everything, setting.samples.question
     walk = [reach(everything.start, everything.question, setting.motion.pose(at.pose(setting.mechanism.platform)),
-                  setting.motion) for at in placer.wander(6, seed=1)]
+                  setting.motion) for at in placer.random_walk(6, seed=1)]
     other = ObservedRobot.of(load("3rrr_m1"), samples=3, seed=7).everything.members[0].configuration
     quick = Quick.of(placer, question)
     assert quick is not None

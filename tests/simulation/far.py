@@ -16,8 +16,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hrsynth.analysis.aspects.answer import SEPARATED
-from hrsynth.analysis.aspects.path import Aspects
+from hrsynth.analysis.aspects.path import SEPARATED, Aspects
 from hrsynth.budgets import RUN_AWAY
 from hrsynth.description import load
 from hrsynth.geometry.vectors import hat, rotation_from_rpy

@@ -34,7 +34,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from ..batch.stage import frames_at
+from ..batch.platform_coordinates import frames_at
 from ..budgets import LARGEST_RANDOM
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Measurement, Relation

@@ -1,268 +1,193 @@
-"""Error maxima: how far the platform can be off when each direction is off by up to a cone's half-angle (theory.md 10).
+"""How far the platform can be off when each direction is off by up to its cone's half-angle (docs/pages/theory.md,
+section 10).
 
 With B_i = ψ_i² A_i A_iᵀ (A_i: from the error of direction i to the platform's), the largest error is the maximum over
-unit w of Σ √(wᵀ B_i w). For weights t of the simplex, √λmax(Σ B_i / t_i) is an upper bound, Σ √(wᵀ B_i w) at its
-eigenvector w a lower one. For one cone and for two the least upper bound is the maximum itself: the bound is that over
-the convex hull of the points (wᵀ B₁ w, wᵀ B₂ w), and on the unit sphere of ℝ³ these make up a convex set (L. Brickman,
-On the field of values of a matrix, Proc. AMS 12, 1961).
+unit w of E(w) = Σ √(wᵀ B_i w). One cone: √λmax(B). Two cones: exact, here. Three and more: bounds, ``three_cones``.
 
-Symmetric matrices are given by their six entries xx, yy, zz, xy, xz, yz, shape (6, n).
+Upper bounds. For positive weights t of sum one, by Cauchy and Schwarz,
+
+    E(w)² = (Σ √t_i · √(wᵀ B_i w / t_i))² ≤ Σ wᵀ B_i w / t_i ≤ λmax(Σ B_i / t_i).                               (1)
+
+For two cones the least of these bounds is the maximum itself: it is that over the convex hull of the points
+(wᵀ B₁ w, wᵀ B₂ w), and on the unit sphere of ℝ³ these make up a convex set (L. Brickman, On the field of values of a
+matrix, Proc. AMS 12, 1961).
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from typing import Any
 
-import numpy as np
+from ..geometry.components import Components, dot, normalised, plus, scaled, sqrt, tangents, times, where
+from ..tolerances import CONES_MET, FLAT_CONE
+from .program import Program
 
-from ..geometry.vectors import Array
-from ..tolerances import CONES_MET, CONES_TIGHT, FLAT_CONE
-
-NEWTON = 12
+NEWTON_STEPS = 12
 """Steps after which the direct way to the maximum of two cones is given up."""
 STARTS = 3
 """Starts of that way: the later ones from the end of the one before, where another maximum is larger."""
 HALVINGS = 60
 """Evaluations after which the search of two cones' weights ends."""
-MEETING = -0.9
-"""Cosine (of three times the angle of the eigenvalues' circle) below which the two largest ones count as close."""
-ROUNDS = 30
-"""Rounds in which the upper bound of three cones and more is lowered."""
-BISECTIONS = 10
-"""Halvings with which the way of a round is found."""
-CLIMBS = 10
-"""Steps of the ascent from each of its starts to the lower bound of three cones and more; four times as many follow."""
 
 
-def largest(B: Sequence[Array]) -> tuple[Array, Array]:
-    """The largest error and a lower bound of it, (n,) each; they are the same for one and two cones."""
-    if len(B) == 1:
-        found = np.sqrt(np.maximum(top(B[0])[0], 0.0))
-        return found, found
-    return _two(B[0], B[1]) if len(B) == 2 else _several(B)
+def error_along(B: Components, w: Components) -> Any:
+    """√(wᵀ B w)."""
+    return root_of(dot(w, times(B, w)))
 
 
-def along(B: Array, w: Array) -> Array:
-    """√(wᵀ B w), (n,)."""
-    x, y, z = w
-    square = B[0] * x * x + B[1] * y * y + B[2] * z * z + 2 * (B[3] * x * y + B[4] * x * z + B[5] * y * z)
-    return np.asarray(np.sqrt(np.maximum(square, 0.0)))
+def larger(a: Any, b: Any) -> Any:
+    """The larger of two numbers."""
+    return where(a > b, a, b)
 
 
-def top(B: Array) -> tuple[Array, Array]:
-    """The largest eigenvalue (n,) and its eigenvector (3, n) of symmetric matrices, in closed form.
+def positive(x: Any) -> Any:
+    """A number by which one may divide: itself, or 1 where it is not positive."""
+    return where(x > 0.0, x, 1.0)
 
-    Where the two largest nearly meet, they are found in the plane normal to the third one's eigenvector.
+
+def trace_root(B: Components) -> Any:
+    """√tr B."""
+    return sqrt(B[0] + B[1] + B[2])
+
+
+def root_of(x: Any) -> Any:
+    return sqrt(larger(x, 0.0))
+
+
+def largest_eigenvalue(B: Components) -> tuple[Any, list[Any]]:
+    """The largest eigenvalue and its eigenvector of a symmetric matrix, without branches.
+
+    N, the matrix without its mean and of unit spread, has the eigenvalues 2 cos(φ + 2πk/3), 2 cos 3φ = det N. Of these
+    the one with the sign of det N, ±y, is apart from the others by √3 at least: y³ − 3 y = |det N| by Newton's method
+    from its chord. Its eigenvector v is a column of the adjugate; the other two lie in the plane normal to v.
     """
-    mean = (B[0] + B[1] + B[2]) / 3
-    x, y, z = B[0] - mean, B[1] - mean, B[2] - mean
-    f, g, h = B[3], B[4], B[5]
-    spread = np.sqrt((x * x + y * y + z * z + 2 * (f * f + g * g + h * h)) / 6)
-    safe = np.where(spread > 0, spread, 1.0)
-    third = np.clip((x * (y * z - h * h) - f * (f * z - g * h) + g * (f * h - g * y)) / (2 * safe**3), -1.0, 1.0)
-    turn = np.arccos(third) / 3
-    above = 2 * spread * np.cos(turn)
-    w = _null(x - above, y - above, z - above, f, g, h)
-    value = mean + above
-    close = third < MEETING
-    if close.any():
-        value[close], w[:, close] = _upper_two(B[:, close], (mean + 2 * spread * np.cos(turn + 2 * np.pi / 3))[close])
-    return value, w
+    mean = (B[0] + B[1] + B[2]) * (1 / 3)
+    x, y, z, f, g, h = B[0] - mean, B[1] - mean, B[2] - mean, B[3], B[4], B[5]
+    spread = sqrt((x * x + y * y + z * z + 2.0 * (f * f + g * g + h * h)) * (1 / 6))
+    x, y, z, f, g, h = N = [entry / positive(spread) for entry in (x, y, z, f, g, h)]
+    half = 0.5 * (x * (y * z - h * h) - f * (f * z - g * h) + g * (f * h - g * y))
+    upper, size = half >= 0.0, abs(half)
+    root = 3**0.5 + (2 - 3**0.5) * size
+    for _ in range(3):
+        square = root * root
+        root = 2.0 * (root * square + size) / (3.0 * square - 3.0)
+    apart = where(upper, root, -root)
+    v = _null_vector([x - apart, y - apart, z - apart, f, g, h])
+    e, t = tangents(v)
+    Ne = times(N, e)
+    ee, et = dot(e, Ne), dot(t, Ne)
+    gap = ee + 0.5 * apart  # half of ee − tt, as the trace is zero
+    reach = sqrt(gap * gap + et * et)
+    cosine, sine = where(gap >= 0.0, gap + reach, et), where(gap >= 0.0, et, reach - gap)
+    length = sqrt(cosine * cosine + sine * sine)
+    cosine = where(length > 0.0, cosine, 1.0) / positive(length)
+    sine = sine / positive(length)
+    w = [where(upper, a, b * cosine + c * sine) for a, b, c in zip(v, e, t, strict=True)]
+    return mean + spread * where(upper, apart, reach - 0.5 * apart), w
 
 
-def _null(x: Array, y: Array, z: Array, f: Array, g: Array, h: Array) -> Array:
-    """The unit null vector (3, n) of singular symmetric matrices: the longest column of the adjugate."""
-    xx, yy, zz, xy, xz, yz = y * z - h * h, x * z - g * g, x * y - f * f, g * h - f * z, f * h - g * y, f * g - h * x
-    sizes = np.abs(xx), np.abs(yy), np.abs(zz)
-    first = (sizes[0] >= sizes[1]) & (sizes[0] >= sizes[2])
-    second = ~first & (sizes[1] >= sizes[2])
-    w = np.stack((np.where(first, xx, np.where(second, xy, xz)), np.where(first, xy, np.where(second, yy, yz)),
-                  np.where(first, xz, np.where(second, yz, zz))))
-    size = np.sqrt(w[0] * w[0] + w[1] * w[1] + w[2] * w[2])
-    w[0] = np.where(size > 0, w[0], 1.0)
-    return w / np.where(size > 0, size, 1.0)
+def _null_vector(N: Components) -> list[Any]:
+    """The unit null vector of a singular symmetric matrix: the adjugate's column with the largest diagonal entry."""
+    x, y, z, f, g, h = N
+    xx, yy, zz = y * z - h * h, x * z - g * g, x * y - f * f
+    xy, xz, yz = g * h - f * z, f * h - g * y, f * g - h * x
+    a, b, c = abs(xx), abs(yy), abs(zz)
+    first, second = (a >= b) & (a >= c), b >= c
+    w = [where(first, *pair) for pair in ((xx, where(second, xy, xz)), (xy, where(second, yy, yz)),
+                                          (xz, where(second, yz, zz)))]
+    square = dot(w, w)
+    size = sqrt(positive(square))
+    return [where(square > 0.0, w[0] / size, 1.0), w[1] / size, w[2] / size]
 
 
-def _upper_two(B: Array, smallest: Array) -> tuple[Array, Array]:
-    """The largest eigenvalue and its eigenvector from the smallest eigenvalue."""
-    v = _null(B[0] - smallest, B[1] - smallest, B[2] - smallest, B[3], B[4], B[5])
-    e, f = tangents(v)
-    Be = _times(B, e)
-    ee, ef = _dot(e, Be), _dot(f, Be)
-    half = (ee - (B[0] + B[1] + B[2] - smallest - ee)) / 2
-    size = np.sqrt(half * half + ef * ef)
-    cosine, sine = np.where(half >= 0, half + size, ef), np.where(half >= 0, ef, size - half)
-    length = np.sqrt(cosine * cosine + sine * sine)
-    cosine = np.where(length > 0, cosine, 1.0) / np.where(length > 0, length, 1.0)
-    return ee - half + size, e * cosine + f * (sine / np.where(length > 0, length, 1.0))
+def trace_two(program: Program, forms: list[str], go: str, name: str, *, direct: bool = True) -> None:
+    """Add the maximum of two cones where the flag ``go`` is positive: by Newton's method, started again where another
+    maximum is larger, and by the weights of its dual where that proves nothing (or not ``direct``)."""
+    w, value, open_, rest, bracket, least = (f"{name}_{part}" for part in ("w", "value", "open", "rest", "t", "least"))
+    state, dual = (w, value, open_), (bracket, least, rest)
+
+    def begin(B: Components, C: Components, go: Components, *before: Components) -> dict[str, Components]:
+        """w of the largest eigenvalue of B / √tr B + C / √tr C, or of B / a + C / b at the w before."""
+        a, b = (error_along(B, before[0]), error_along(C, before[0])) if before else (trace_root(B), trace_root(C))
+        start = largest_eigenvalue(_weighted(B, C, positive(a), positive(b)))[1]
+        if not before:
+            return {w: start, value: [-1.0], open_: go}
+        return {w: start, value: before[1], open_: [where(before[1][0] >= 0.0, 0.0, go[0])]}
+
+    def unproved(go: Components, value: Components) -> dict[str, Components]:
+        return {rest: [where(value[0] >= 0.0, 0.0, go[0])]}
+
+    def chosen(value: Components, least: Components) -> dict[str, Components]:
+        return {name: 2 * [where(value[0] >= 0.0, value[0], least[0])]}
+
+    program.apply(begin, *forms, go, state=state)
+    program.repeat(lambda *given: dict(zip(state, _newton(*given), strict=True)), NEWTON_STEPS * direct, forms, state)
+    program.apply(unproved, go, value, state=[rest])
+    program.apply(lambda value: {name: 2 * [value[0]]}, value, state=[name])
+    with program.where(rest):
+        for _ in range((STARTS - 1) * direct):
+            program.apply(begin, *forms, go, *state, state=state)
+            program.repeat(lambda *given: dict(zip(state, _newton(*given), strict=True)), NEWTON_STEPS, forms, state)
+        program.apply(unproved, go, value)
+        program.apply(lambda *given: dict(zip(dual, _bracket(*given), strict=False)), *forms, state=dual[:2])
+        program.repeat(lambda *given: dict(zip(dual, _halved(*given), strict=True)), HALVINGS, forms, dual)
+        program.apply(chosen, value, least)
 
 
-def tangents(v: Array) -> tuple[Array, Array]:
-    """Two unit vectors (3, n) that make a right-handed triad with unit vectors v."""
-    flat = np.abs(v[2]) < 0.7
-    zero = np.zeros_like(v[0])
-    e = np.stack((np.where(flat, -v[1], zero), np.where(flat, v[0], -v[2]), np.where(flat, zero, v[1])))
-    e /= np.sqrt(_dot(e, e))
-    return e, np.stack((v[1] * e[2] - v[2] * e[1], v[2] * e[0] - v[0] * e[2], v[0] * e[1] - v[1] * e[0]))
+def _weighted(B: Components, C: Components, a: Any, b: Any) -> list[Any]:
+    """B / a + C / b."""
+    return [x / a + y / b for x, y in zip(B, C, strict=True)]
 
 
-def _dot(v: Array, w: Array) -> Array:
-    return np.asarray(v[0] * w[0] + v[1] * w[1] + v[2] * w[2])
-
-
-def _times(B: Array, w: Array) -> Array:
-    """B w, (3, n)."""
-    x, y, z = w
-    return np.stack((B[0] * x + B[3] * y + B[4] * z, B[3] * x + B[1] * y + B[5] * z, B[4] * x + B[5] * y + B[2] * z))
-
-
-def _two(B: Array, C: Array) -> tuple[Array, Array]:
-    """The exact maximum of two cones: by Newton's method, started again where another maximum is larger, and by the
-    weights of its dual where that proves nothing."""
-    value, rest, here, there = np.full(B.shape[1], np.nan), np.arange(B.shape[1]), B, C
-    a, b = np.sqrt(B[0] + B[1] + B[2]), np.sqrt(C[0] + C[1] + C[2])
-    for _ in range(STARTS):
-        w = top(here / np.where(a > 0, a, 1.0) + there / np.where(b > 0, b, 1.0))[1]
-        value[rest], w = _direct(here, there, w)
-        open_ = np.isnan(value[rest])
-        if not open_.any():
-            return value, value
-        rest, here, there, w = rest[open_], here[:, open_], there[:, open_], w[:, open_]
-        a, b = along(here, w), along(there, w)
-    value[rest] = _weighed(here, there)
-    return value, value
-
-
-@np.errstate(divide="ignore", invalid="ignore")
-def _direct(B: Array, C: Array, w: Array) -> tuple[Array, Array]:
-    """The maximum of two cones by Newton's method on the sphere from w (3, n), NaN where it is not proved, and the w
-    where it ended; where the sum is not concave, a step of the ascent is made instead.
+def _newton(B: Components, C: Components, w: Components, value: Components, _: Components) -> tuple[Components, ...]:
+    """A step of Newton's method on the sphere from w; where the sum is not concave, one of the ascent instead. The next
+    w, the maximum where it is proved, and 1 where it goes on.
 
     A stationary w is an eigenvector of S = B / a + C / b, a = √(wᵀBw) and b = √(wᵀCw), to the eigenvalue a + b; it is
     the maximum if no other is larger.
     """
-    value, ends, live = np.full(B.shape[1], np.nan), w.copy(), np.arange(B.shape[1])
-    for _ in range(NEWTON):
-        Bw, Cw = _times(B, w), _times(C, w)
-        aa, bb = _dot(w, Bw), _dot(w, Cw)
-        sound = (aa > FLAT_CONE * (B[0] + B[1] + B[2])) & (bb > FLAT_CONE * (C[0] + C[1] + C[2]))
-        a, b = np.sqrt(aa), np.sqrt(bb)
-        total, S, (e, f) = a + b, B / a + C / b, tangents(w)
-        be, bf, ce, cf = _dot(Bw, e) / a, _dot(Bw, f) / a, _dot(Cw, e) / b, _dot(Cw, f) / b
-        Se = _times(S, e)
-        ee, ef, ff = _dot(Se, e) - total, _dot(Se, f), _dot(_times(S, f), f) - total
-        hee, hef, hff = ee - be * be / a - ce * ce / b, ef - be * bf / a - ce * cf / b, ff - bf * bf / a - cf * cf / b
-        ge, gf, det = be + ce, bf + cf, hee * hff - hef * hef
-        onto_e, onto_f = (hef * gf - hff * ge) / det, (hef * ge - hee * gf) / det
-        rising = sound & (det > 0) & (hee < 0)
-        there = rising & (onto_e * ge + onto_f * gf <= CONES_MET * total)
-        proved = there & (ee * ff >= ef * ef) & (ee <= 0)
-        value[live[proved]] = total[proved]
-        open_ = sound & ~there
-        if not open_.any():
-            break
-        w = np.where(rising, w + onto_e * e + onto_f * f, Bw / a + Cw / b)
-        w = w / np.sqrt(_dot(w, w))
-        ends[:, live] = w
-        if not open_.all():
-            live, B, C, w = live[open_], B[:, open_], C[:, open_], w[:, open_]
-    return value, ends
+    Bw, Cw = times(B, w), times(C, w)
+    aa, bb = dot(w, Bw), dot(w, Cw)
+    sound = (aa > FLAT_CONE * (B[0] + B[1] + B[2])) & (bb > FLAT_CONE * (C[0] + C[1] + C[2]))
+    a, b = sqrt(aa), sqrt(bb)
+    total, S, (e, f) = a + b, _weighted(B, C, a, b), tangents(w)
+    be, bf, ce, cf = dot(Bw, e) / a, dot(Bw, f) / a, dot(Cw, e) / b, dot(Cw, f) / b
+    Se = times(S, e)
+    # S − (a + b) on the tangents, then the Hessian of the sum and its gradient
+    ee, ef, ff = dot(Se, e) - total, dot(Se, f), dot(times(S, f), f) - total
+    hee, hef, hff = ee - be * be / a - ce * ce / b, ef - be * bf / a - ce * cf / b, ff - bf * bf / a - cf * cf / b
+    ge, gf, det = be + ce, bf + cf, hee * hff - hef * hef
+    onto_e, onto_f = (hef * gf - hff * ge) / det, (hef * ge - hee * gf) / det
+    rising = sound & (det > 0.0) & (hee < 0.0)
+    there = rising & (onto_e * ge + onto_f * gf <= CONES_MET * total)
+    proved = there & (ee * ff >= ef * ef) & (ee <= 0.0)
+    step = plus(w, plus(scaled(onto_e, e), scaled(onto_f, f)))
+    ahead = normalised([where(rising, x, u / a + v / b) for x, u, v in zip(step, Bw, Cw, strict=True)])
+    on = where(sound, where(there, 0.0, 1.0), 0.0)
+    return ([where(on > 0.0, x, y) for x, y in zip(ahead, w, strict=True)], [where(proved, total, value[0])], [on])
 
 
-def _weighed(B: Array, C: Array) -> Array:
-    """The exact maximum of two cones, the least upper bound: at the weight t where a (1 − t) − b t changes its sign, by
-    the rule of false position on a bracket; a and b are the two terms at the eigenvector. Where the largest eigenvalue
-    is double there, the sign changes by a jump."""
-    n = B.shape[1]
-    value = np.full(n, np.inf)
-    live = np.arange(n)
-    first, second = np.sqrt(B[0] + B[1] + B[2]), np.sqrt(C[0] + C[1] + C[2])
-    t = first / np.where(first + second > 0, first + second, 1.0)
-    low, high = np.zeros(n), np.ones(n)
-    below, above = first, -second
-    for step in range(HALVINGS):
-        t = np.clip(t, 1e-12, 1 - 1e-12)
-        square, w = top(B / t + C / (1 - t))
-        a, b = along(B, w), along(C, w)
-        total = a + b
-        value[live] = np.minimum(value[live], np.sqrt(np.maximum(square, 0.0)))
-        off = a * (1 - t) - b * t
-        rising = off > 0
-        low, high = np.where(rising, t, low), np.where(rising, high, t)
-        below, above = np.where(rising, off, below / 2), np.where(rising, above / 2, off)
-        open_ = (off * off > CONES_MET * t * (1 - t) * total * total) & (high - low > 1e-15)
-        if not open_.any():
-            break
-        fixed = a / np.where(total > 0, total, 1.0)
-        straight = low + (high - low) * below / np.where(below - above > 0, below - above, 1.0)
-        inside = (fixed > low) & (fixed < high)
-        t = np.where(inside & (step % 3 == 0), fixed, straight)
-        if not open_.all():
-            live, B, C = live[open_], B[:, open_], C[:, open_]
-            t, low, high, below, above = t[open_], low[open_], high[open_], below[open_], above[open_]
-    return value
+def _bracket(B: Components, C: Components) -> tuple[Components, Components]:
+    """The weight t to begin with, a bracket of it with the values of a (1 − t) − b t there, a count; no bound yet."""
+    first, second = trace_root(B), trace_root(C)
+    return [first / positive(first + second), 0.0, 1.0, first, -second, 0.0], [float("inf")]
 
 
-def _several(B: Sequence[Array]) -> tuple[Array, Array]:
-    """An upper and a lower bound for three cones and more: an ascent from several starts, and where it is not proved to
-    have found the maximum, the least bound over weights.
-
-    That bound is the maximum of Σ √tr(B_i Z) over Z ⪰ 0 of trace one; from Z = w wᵀ, each round goes as far towards the
-    best dyad as raises it most.
-    """
-    stack = np.array(B)
-    traces = np.maximum(stack[:, :3].sum(axis=1), 1e-300)
-    starts = [top(_weighted(stack, 1 / np.sqrt(traces)))[1], *np.eye(3)[..., None]]
-    best, lower = np.zeros(starts[0].shape), np.full(stack.shape[2], -1.0)
-    for start in starts:
-        w = np.broadcast_to(start, best.shape)
-        for _ in range(CLIMBS):
-            w = _climbed(stack, w)
-        total = sum(along(each, w) for each in stack)
-        best, lower = np.where(total > lower, w, best), np.maximum(total, lower)
-    for _ in range(4 * CLIMBS):
-        best = _climbed(stack, best)
-    terms = np.array([along(each, best) for each in stack])
-    lower = np.maximum(terms.sum(axis=0), lower)
-    upper, live = np.full(lower.shape, np.inf), np.arange(len(lower))
-    for _ in range(ROUNDS):
-        roots = np.maximum(terms, 1e-12 * terms.sum(axis=0) + 1e-300)
-        total = roots.sum(axis=0)
-        square, w = top(_weighted(stack, total / roots))
-        upper[live] = np.minimum(upper[live], np.sqrt(np.maximum(square, 0.0)))
-        open_ = upper[live] > lower[live] * (1 + CONES_TIGHT)
-        if not open_.any():
-            break
-        live, stack, roots, w = live[open_], stack[..., open_], roots[:, open_], w[:, open_]
-        ahead = np.array([along(each, w) for each in stack])
-        share = _share(roots**2, ahead**2)
-        terms = np.sqrt(roots**2 + share * (ahead**2 - roots**2))
-    return np.maximum(upper, lower), lower
-
-
-def _weighted(stack: Array, weights: Array) -> Array:
-    """Σ weight_i B_i, (6, n)."""
-    return np.asarray(np.einsum("kcn,kn->cn", stack, weights))
-
-
-def _share(here: Array, there: Array) -> Array:
-    """The γ of [0, 1] that makes Σ √(here + γ (there − here)) largest, by halving: its slope falls."""
-    low, high = np.zeros(here.shape[1]), np.ones(here.shape[1])
-    for _ in range(BISECTIONS):
-        middle = (low + high) / 2
-        slope = np.sum((there - here) / np.sqrt(here + middle * (there - here)), axis=0)
-        low, high = np.where(slope > 0, middle, low), np.where(slope > 0, high, middle)
-    return low
-
-
-def _climbed(stack: Array, w: Array) -> Array:
-    """One step of the ascent, w ← Σ B_i w / √(wᵀ B_i w), normalised."""
-    pull = np.zeros(w.shape)
-    for each in stack:
-        gain = along(each, w)
-        share = 1 / np.where(gain > 0, gain, np.inf)
-        pull += share * np.stack((each[0] * w[0] + each[3] * w[1] + each[4] * w[2],
-                                  each[3] * w[0] + each[1] * w[1] + each[5] * w[2],
-                                  each[4] * w[0] + each[5] * w[1] + each[2] * w[2]))
-    size = np.sqrt(pull[0] ** 2 + pull[1] ** 2 + pull[2] ** 2)
-    return np.where(size > 0, pull / np.where(size > 0, size, 1.0), w)
+def _halved(B: Components, C: Components, bracket: Components, least: Components, _: Components
+            ) -> tuple[Components, ...]:
+    """A step to the least bound (1) of two cones: at the weight t where a (1 − t) − b t changes its sign, by the rule
+    of false position on a bracket; a and b are the two terms at the eigenvector. Where the largest eigenvalue is double
+    there, the sign changes by a jump."""
+    t, low, high, below, above, count = bracket
+    t = where(t < 1e-12, 1e-12, where(t > 1 - 1e-12, 1 - 1e-12, t))
+    square, w = largest_eigenvalue(_weighted(B, C, t, 1.0 - t))
+    a, b = error_along(B, w), error_along(C, w)
+    total, off, bound = a + b, a * (1.0 - t) - b * t, root_of(square)
+    rising = off > 0.0
+    low, high = where(rising, t, low), where(rising, high, t)
+    below, above = where(rising, off, below / 2), where(rising, above / 2, off)
+    on = (off * off > CONES_MET * t * (1.0 - t) * total * total) & (high - low > 1e-15)
+    fixed = a / positive(total)
+    straight = low + (high - low) * below / positive(below - above)
+    third = (fixed > low) & (fixed < high) & (count < 0.5)
+    return ([where(third, fixed, straight), low, high, below, above, where(count > 1.5, 0.0, count + 1.0)],
+            [where(bound < least[0], bound, least[0])], [where(on, 1.0, 0.0)])

@@ -1,89 +1,93 @@
-"""A mechanism compiled for batches: inverse kinematics, Mᵀ, singular values, error maxima, reach (theory.md 10).
+"""A mechanism compiled for batches of poses: inverse kinematics, Mᵀ, singular values, error maxima, reach.
 
-Only the working mode of the zero configuration is followed. Twists have coordinates: along ``Stage.shifts`` in
-characteristic lengths, about ``Stage.spins`` in radians.
+Only the working mode of the zero configuration is followed. Twists have coordinates: along
+``PlatformCoordinates.translations`` in characteristic lengths, about its ``rotations`` in radians.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
-from functools import cached_property
+from dataclasses import dataclass, field
+from functools import cached_property, partial
 from importlib.util import find_spec
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
-from ..budgets import LARGEST_BATCH
+from ..budgets import LARGEST_BATCH, POSES_FOR_COMPILING, POSES_FOR_NUMBA
 from ..errors import BadRequest
+from ..geometry.components import Components, plus, tangents, transformed, where
 from ..geometry.vectors import Array, frozen
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
+from ..legs.closed_forms import ClosedFormLeg
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.observation import Direction, Observation
 from ..tolerances import RANK_CUTOFF
-from .chain import Chain, Ends
-from .cones import tangents
-from .limb import Limb, recognised
-from .plain import Flags, Poses, block, within
-from .spread import Spread, freedom, spreads
-from .stage import Stage, frames_at
+from .direction_rows import direction_rows
+from .error_bounds import ErrorBound, bounds_compiled, bounds_of
+from .iterative_leg import IterativeLeg, IterativeLegStates
+from .platform_coordinates import PlatformCoordinates, frames_at
+from .program import CHUNK, Program
+from .recognition import recognised
 
-CHUNK = 4096
-"""Poses that are worked on together: their arrays stay in the cache, and what is not kept is freed."""
-COMPILED_FROM = 20_000
-"""Poses from which numba's start (about half a second) is worth its while."""
+Flags = NDArray[np.bool_]
+ROWS = ("reached", "u", "M")
+"""What the program of closed forms says at each pose."""
 
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
     """What a batch says of n poses with k legs watched; NaN where a pose is not reached.
 
-    ``matrix`` is Mᵀ (n, 3 k, d): the rates of the directions for the twists of ``twists`` ((6, d) or (n, 6, d), m and
-    rad). ``position`` (m) and ``orientation`` (rad) are the error maxima, None where no cones are given.
+    ``interaction_matrix`` is Mᵀ (n, 3 k, d): the rates of the directions for the twists of ``twists`` ((6, d) or
+    (n, 6, d), m and rad). ``position`` (m) and ``orientation`` (rad) are the error maxima, None without cones.
     """
 
     reached: Flags
     directions: Array
-    matrix: Array
+    interaction_matrix: Array
     twists: Array
-    position: Spread | None
-    orientation: Spread | None
+    position: ErrorBound | None
+    orientation: ErrorBound | None
     normals: tuple[Array | None, ...]
     """For each watched leg whose direction only turns about a fixed axis: that axis."""
 
     @cached_property
     def singular_values(self) -> Array:
         """The singular values of Mᵀ, descending, (n, min(3 k, d))."""
-        found = np.full((len(self.matrix), min(self.matrix.shape[1:])), np.nan)
-        found[self.reached] = np.linalg.svd(self.matrix[self.reached], compute_uv=False)
+        M = self.interaction_matrix
+        found = np.full((len(M), min(M.shape[1:])), np.nan)
+        found[self.reached] = np.linalg.svd(M[self.reached], compute_uv=False)
         return found
 
     @cached_property
     def determinant(self) -> Array | None:
         """The determinant (n,) of the directions' independent rates, None where they are not as many as freedoms; its
         sign changes where a path crosses a Type 2 singularity."""
-        u, M = self.directions, self.matrix.reshape(len(self.matrix), len(self.normals), 3, -1)
+        u, M = self.directions, self.interaction_matrix.reshape(len(self.reached), len(self.normals), 3, -1)
         rows = []
         for i, normal in enumerate(self.normals):
             bases = [np.cross(normal, u[:, i]).T] if normal is not None else tangents(u[:, i].T)
-            rows += [np.einsum("rn,nrd->nd", basis, M[:, i]) for basis in bases]
+            rows += [np.einsum("rn,nrd->nd", np.array(basis), M[:, i]) for basis in bases]
         square = np.stack(rows, axis=1)
         return np.linalg.det(square) if square.shape[1] == square.shape[2] else None
 
 
 @dataclass(frozen=True, eq=False)
 class Batch:
-    """A compiled mechanism: each leg a subproblem or a chain, None where it hangs on a link that does not go with the
-    platform's pose; ``chains`` are those by which the platform's freedoms follow from its pose."""
+    """A compiled mechanism: each leg a closed form or solved by iteration, None where it hangs on a link that does not
+    go with the platform's pose; ``iterative`` are those by which the platform's freedoms follow from its pose."""
 
-    stage: Stage
+    coordinates: PlatformCoordinates
     home: Array
     """The platform's pose at the zero configuration, (4, 4)."""
-    legs: Mapping[str, Limb | Chain | None]
-    chains: Mapping[str, Chain]
+    legs: Mapping[str, ClosedFormLeg | IterativeLeg | None]
+    iterative: Mapping[str, IterativeLeg]
     normals: Mapping[str, Array | None]
     length: float
+    programs: dict[tuple[str, ...], Program] = field(default_factory=dict, repr=False)
+    """What was traced so far, by the legs that are watched."""
 
     @classmethod
     def of(cls, anatomy: LegDecomposition, observations: Sequence[Observation], motion: PlatformMotion,
@@ -99,23 +103,28 @@ class Batch:
                 or len(seen) < len(observations) or set(seen) != set(anatomy.labels)):
             return None
         frames = frames_at(configurations)
-        stage = Stage.of(motion, frames, tuple(dict.fromkeys((*anatomy.platform, mechanism.platform))),
-                         mechanism.length)
-        legs: dict[str, Limb | Chain | None] = {}
-        chains: dict[str, Chain] = {}
+        names = tuple(dict.fromkeys((*anatomy.platform, mechanism.platform)))
+        coordinates = PlatformCoordinates.of(motion, frames, names, mechanism.length)
+        legs: dict[str, ClosedFormLeg | IterativeLeg | None] = {}
+        iterative: dict[str, IterativeLeg] = {}
         for leg in anatomy.legs:
-            found: Limb | Chain | None = recognised(anatomy, leg, seen[leg.label], stage, frames)
-            placed = anatomy.point is not None or leg.attach in stage.bodies
-            if placed and (found is None or not stage.constant):
-                chains[leg.label] = Chain.of(mechanism, leg, seen[leg.label], anatomy.point)
-            legs[leg.label] = found or chains.get(leg.label)
+            found = recognised(anatomy, leg, seen[leg.label], coordinates, frames)
+            placed = anatomy.point is not None or leg.attach in coordinates.links
+            if placed and (found is None or not coordinates.constant):
+                iterative[leg.label] = IterativeLeg.of(mechanism, leg, seen[leg.label], anatomy.point)
+            legs[leg.label] = found or iterative.get(leg.label)
         normals = {o.leg: _axis_of(frames[o.link][:, :3, :3] @ o.direction) for o in seen.values()}
-        return cls(stage, frozen(motion.home), legs, chains, normals, mechanism.length)
+        return cls(coordinates, frozen(motion.home), legs, iterative, normals, mechanism.length)
 
     @property
     def complete(self) -> bool:
         """Whether every leg is compiled: then ``reached`` says whether the robot reaches a pose."""
         return all(leg is not None for leg in self.legs.values())
+
+    @property
+    def closed(self) -> bool:
+        """Whether closed forms alone give everything."""
+        return self.coordinates.constant and not self.iterative
 
     def evaluate(self, X: ArrayLike, legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None, *,
                  compiled: bool | None = None) -> Evaluation:
@@ -123,35 +132,36 @@ class Batch:
         (rad; one, or one a leg).
 
         X are poses that the platform can take as far as its own freedoms go; that is not checked. A pose that is not
-        finite is not reached. ``compiled`` asks for numba, or forbids it (default: where it is installed, from many
-        poses on). Raises ``BadRequest`` for legs that are not compiled, poses of another shape, cones that are none,
-        and results that are too large.
+        finite is not reached. ``compiled`` asks for numba, or forbids it (default: where its kernels are compiled
+        already and worth their start). Raises ``BadRequest`` for legs that are not compiled, poses of another shape,
+        half-angles of cones that are not between 0 and a right angle, and results that are too large.
         """
         X = np.asarray(X, dtype=float)
         if X.ndim != 3 or X.shape[1:] != (4, 4):
             raise BadRequest("poses of a batch: shape", X.shape, "(n, 4, 4)")
         watched = self._watched(legs)
         half = None if cones is None else _half_angles(cones, len(watched))
-        need = 8 * len(X) * (3 * len(watched) * (self.stage.dof + 1) + 5)
+        need = 8 * len(X) * (3 * len(watched) * (self.coordinates.dof + 1) + 5)
         if need > LARGEST_BATCH:
             raise BadRequest("the result of a batch takes too much memory (bytes)", need,
                              f"at most {LARGEST_BATCH}; sweep goes through any number of poses in parts")
-        if self._quick(len(X), compiled):
-            return self._compiled(X, watched, half)
-        return self._plain(X, watched, half)
+        k, n = len(watched), len(X)
+        quick = self.compiled(n, watched, half) if compiled is None else compiled and self._can_be_compiled()
+        rows = self._program(watched).run(X, ROWS, compiled=quick)
+        twists = self._span
+        reached, u = rows[0] > 0, rows[1 : 1 + 3 * k].reshape(k, 3, n)
+        M = rows[1 + 3 * k :].reshape(3 * k, twists.shape[1], n)
+        if not self.closed:
+            M, twists = self._iterated(X, watched, reached, u, M)
+        position, orientation = (None, None) if half is None else bounds_of(M, twists, half, reached, compiled=quick)
+        if not reached.all():
+            u[..., ~reached], M[..., ~reached] = np.nan, np.nan
+        return Evaluation(reached, u.transpose(2, 0, 1), M.transpose(2, 0, 1), twists, position, orientation,
+                          tuple(self.normals[name] for name in watched))
 
     def reached(self, X: Array) -> Flags:
-        """Where known subproblems alone reach the poses X (n, 4, 4); what else ``evaluate`` says is left out."""
-        found = [self._reached(X[start : start + CHUNK]) for start in range(0, len(X), CHUNK)]
-        return np.concatenate(found) if found else np.zeros(0, dtype=bool)
-
-    def _reached(self, X: Array) -> Flags:
-        poses = Poses.of(*self.stage.place(X))
-        there = np.ones(len(X), dtype=bool)
-        for leg in self.legs.values():
-            if isinstance(leg, Limb):
-                there &= within(leg, poses)
-        return there
+        """Where closed forms alone reach the poses X (n, 4, 4); what else ``evaluate`` says is left out."""
+        return np.asarray(self._program(()).run(X, ROWS[:1])[0] > 0)
 
     def sweep(self, parts: Iterable[Array], legs: Sequence[str] | str | None = None, cones: ArrayLike | None = None
               ) -> Iterator[Evaluation]:
@@ -172,103 +182,97 @@ class Batch:
 
     @cached_property
     def _span(self) -> Array:
-        """The stage's twists (m, rad) for its coordinates, (6, D)."""
-        return self.stage.twists * np.repeat([self.length, 1.0], 3)[:, None]
+        """The coordinates' twists (m, rad), (6, D)."""
+        return self.coordinates.twists * np.repeat([self.length, 1.0], 3)[:, None]
 
-    def _quick(self, n: int, compiled: bool | None) -> bool:
-        """Whether numba does n poses: it takes known subproblems alone."""
-        known = self.stage.constant and all(isinstance(leg, Limb) for leg in self.legs.values() if leg is not None)
-        if compiled is None:
-            return known and n >= COMPILED_FROM and find_spec("numba") is not None
-        if compiled and find_spec("numba") is None:
+    def compiled(self, n: int, legs: Sequence[str], cones: Array | None, enough: int = POSES_FOR_NUMBA) -> bool:
+        """Whether numba is to do n poses by default: its kernels are there already, and they are ``enough``, or they
+        are so many that compiling pays."""
+        if not self.closed or n < enough or find_spec("numba") is None:
+            return False
+        return n >= POSES_FOR_COMPILING or (self._program(legs).compiled(ROWS) and (
+            cones is None or bounds_compiled(len(legs), self._span, cones)))
+
+    def _can_be_compiled(self) -> bool:
+        """True; raises ``BadRequest`` where numba is not there, or does not take this batch."""
+        if find_spec("numba") is None:
             raise BadRequest("numba is not installed", True, "compiled=False, or the extra fast")
-        if compiled and not known:
+        if not self.closed:
             raise BadRequest("a batch whose legs are solved by iteration is not compiled", True, "compiled=False")
-        return compiled
+        return True
 
-    def _compiled(self, X: Array, watched: Sequence[str], cones: Array | None) -> Evaluation:
-        from concurrent.futures import ThreadPoolExecutor
+    def _program(self, watched: Sequence[str]) -> Program:
+        """What closed forms say at a pose X: where it is ``reached``, the directions ``u`` and rows ``M`` of the
+        watched legs; zero for those that are solved by iteration."""
+        key = tuple(watched)
+        if key not in self.programs:
+            self.programs[key] = self._traced(key)
+        return self.programs[key]
 
-        from .compiled import THREADS, swept
+    def _traced(self, watched: tuple[str, ...]) -> Program:
+        program, d = Program.of(X=12), self._span.shape[1]
 
-        limbs = {name: leg for name, leg in self.legs.items() if isinstance(leg, Limb)}
-        n, k, d = len(X), len(watched), self._span.shape[1]
-        names = list(limbs)
-        reached, clear = np.empty(n, dtype=bool), np.ones(n, dtype=bool)
-        U, M, found = np.empty((n, k, 3)), np.empty((n, 3 * k, d)), np.empty((n, 4))
-        half = np.zeros(0) if cones is None else np.ascontiguousarray(cones)
-        only = [freedom(part[:, :, None]) for part in (self._span[:3], self._span[3:])]
-        single = np.array([2 if each is None else int(each.any()) for each in only])
-        robot = (np.array([int(limb.kind) for limb in limbs.values()]),
-                 np.array([limb.row() for limb in limbs.values()]),
-                 np.array([names.index(name) for name in watched]), self._span)
-        cone = (np.array(self.stage.point), half,
-                np.array([np.zeros(3) if each is None else each for each in only]), single)
-        X = np.ascontiguousarray(X)
+        def pose(X: Components) -> dict[str, Components]:
+            """p and R; a sum of numbers that are not all finite is not its own double's half."""
+            R, whole = [X[i] for i in (0, 1, 2, 4, 5, 6, 8, 9, 10)], sum(X)
+            p = plus([X[3], X[7], X[11]], transformed(R, program.number(self.coordinates.point)))
+            return {"p": p, "R": R, "finite": [where(abs(whole - whole) <= 0.0, 1.0, 0.0)]}
 
-        def part(start: int) -> None:
-            here = slice(start, start + CHUNK)
-            swept(*robot, X[here], *cone, *(each[here] for each in (reached, clear, U, M, found)))
+        def leg_rows(p: Components, R: Components, *, name: str, leg: ClosedFormLeg) -> dict[str, Components]:
+            twists = program.number(self._span.ravel())
+            margin, u, M = direction_rows(leg, p, R, twists, program.number)
+            found: dict[str, Components] = {f"margin_{name}": [margin]}
+            return found | ({f"u_{name}": u, f"M_{name}": M} if name in watched else {})
 
-        with ThreadPoolExecutor(THREADS) as pool:
-            list(pool.map(part, range(0, n, CHUNK)))
-        position = orientation = None
-        if cones is not None:
-            if not clear.all():
-                lost = spreads(np.ascontiguousarray(M[~clear].transpose(1, 2, 0)), self._span, cones)
-                found[~clear] = np.stack([each for spread in lost for each in (spread.largest, spread.lower)], axis=1)
-            position, orientation = Spread(found[:, 0], found[:, 1]), Spread(found[:, 2], found[:, 3])
-        return Evaluation(reached, U, M, self._span, position, orientation, tuple(self.normals[x] for x in watched))
+        def reached(finite: Components, *margins: Components) -> dict[str, Components]:
+            there = finite[0]
+            for (margin,) in margins:
+                there = where(margin > 0.0, there, 0.0) if not isinstance(margin, float) else there
+            return {ROWS[0]: [there]}
 
-    def _plain(self, X: Array, watched: Sequence[str], cones: Array | None) -> Evaluation:
-        """In NumPy, part by part; what all poses have in one shape is filled in where it stays."""
-        n, k = len(X), len(watched)
-        u, M = np.empty((k, 3, n)), np.empty((k, 3, self._span.shape[1], n))
-        parts = [self._part(X[start : start + CHUNK], watched, cones, u[..., start : start + CHUNK],
-                            M[..., start : start + CHUNK]) for start in range(0, max(n, 1), CHUNK)]
-        whole = {"directions": u.transpose(2, 0, 1)}
-        if self.stage.constant:
-            whole["matrix"] = M.reshape(3 * k, M.shape[2], n).transpose(2, 0, 1)
-        return _joined(parts, whole)
-
-    def _part(self, X: Array, watched: Sequence[str], cones: Array | None, u: Array, M: Array) -> Evaluation:
-        """The directions u (k, 3, n) and M (k, 3, D, n) are filled in."""
-        finite: Flags = np.asarray(np.isfinite(X[:, :3]).all(axis=(1, 2)))
-        if not finite.all():
-            X = np.where(finite[:, None, None], X, self.home)
-        poses = Poses.of(*self.stage.place(X))
-        ends = {name: self._led(chain, X) for name, chain in self.chains.items()}
-        reached = finite
+        program.apply(pose, "X")
+        margins = []
         for name, leg in self.legs.items():
-            places = [i for i, other in enumerate(watched) if other == name]
-            if isinstance(leg, Limb):
-                for i in places:
-                    there = block(leg, self._span, poses, u[i], M[i])
-                reached &= there if places else within(leg, poses)
-            elif leg is not None:
-                found, rows, there = ends[name].rows()
-                u[places], M[places] = found, rows
-                reached &= there
-        twists, rows = self._span, M.reshape(3 * len(watched), *M.shape[2:])
-        if not self.stage.constant:
-            feasible, there = self._feasible(list(ends.values()))
-            reached &= there
-            rows, twists = np.einsum("rcn,ncd->rdn", rows, feasible), twists @ feasible
-        position, orientation = (None, None) if cones is None else _where(reached, rows, twists, cones)
-        if not reached.all():
-            u[..., ~reached], rows[..., ~reached] = np.nan, np.nan
-        return Evaluation(reached, u.transpose(2, 0, 1), rows.transpose(2, 0, 1), twists, position, orientation,
-                          tuple(self.normals[name] for name in watched))
+            if isinstance(leg, ClosedFormLeg):
+                program.apply(partial(leg_rows, name=name, leg=leg), "p", "R")
+                margins.append(f"margin_{name}")
+        program.apply(reached, "finite", *margins)
+        for name, size in zip(ROWS[1:], (3, 3 * d), strict=True):
+            program.places[name] = [place for leg in watched
+                                    for place in program.places.get(f"{name}_{leg}", [0.0] * size)]
+        return program
 
-    def _led(self, chain: Chain, X: Array) -> Ends:
-        return chain.led_from_zero(self.stage, self.home, X, self._span)
+    def _iterated(self, X: Array, watched: Sequence[str], reached: Flags, u: Array, M: Array) -> tuple[Array, Array]:
+        """Fill in the rows of legs that are solved by iteration, and ``reached``; Mᵀ (3 k, d, n) and its twists."""
+        n, constant = len(X), self.coordinates.constant
+        basis = np.empty((n, self._span.shape[1], self.coordinates.dof))
+        X = np.where(reached[:, None, None], X, self.home)
+        for start in range(0, n, CHUNK):
+            here = slice(start, start + CHUNK)
+            states = {name: self._followed(leg, X[here]) for name, leg in self.iterative.items()}
+            for name in states:
+                if self.legs[name] is self.iterative[name]:
+                    found, rows, there = states[name].rows()
+                    reached[here] &= there
+                    if name in watched:
+                        place = list(watched).index(name)
+                        u[place, :, here], M[3 * place : 3 * place + 3, :, here] = found, rows
+            if not constant:
+                basis[here], there = self._feasible(list(states.values()))
+                reached[here] &= there
+        if constant:
+            return M, self._span
+        return np.einsum("rcn,ncd->rdn", M, basis), self._span @ basis
 
-    def _feasible(self, ends: Sequence[Ends]) -> tuple[Array, Flags]:
+    def _followed(self, leg: IterativeLeg, X: Array) -> IterativeLegStates:
+        return leg.followed_from_zero(self.coordinates, self.home, X, self._span)
+
+    def _feasible(self, states: Sequence[IterativeLegStates]) -> tuple[Array, Flags]:
         """An orthonormal basis (n, D, d) of the coordinates of the twists that all legs allow, and where it has the
         generic dimension."""
-        rows = np.concatenate([each.wrenches() for each in ends], axis=1)
+        rows = np.concatenate([each.wrenches() for each in states], axis=1)
         _, s, right = np.linalg.svd(rows, full_matrices=False)
-        kept = rows.shape[2] - self.stage.dof
+        kept = rows.shape[2] - self.coordinates.dof
         clear = s[:, kept - 1] > RANK_CUTOFF
         if kept < s.shape[1]:
             clear &= s[:, kept] <= RANK_CUTOFF
@@ -280,19 +284,9 @@ class Batch:
     @cached_property
     def _reference(self) -> Array:
         """The twists at home: which way round every other basis is."""
-        ends = [self._led(chain, self.home[None]) for chain in self.chains.values()]
-        rows = np.concatenate([each.wrenches() for each in ends], axis=1)[0]
-        return np.linalg.svd(rows)[2][rows.shape[1] - self.stage.dof :].T
-
-
-def _where(reached: Flags, rows: Array, twists: Array, cones: Array) -> tuple[Spread, Spread]:
-    """The error maxima at the poses that are reached, NaN at the others."""
-    if reached.all():
-        return spreads(rows, twists, cones)
-    found = spreads(rows[..., reached], twists if twists.ndim == 2 else twists[reached], cones)
-    columns = np.full((4, len(reached)), np.nan)
-    columns[:, reached] = [each for spread in found for each in (spread.largest, spread.lower)]
-    return Spread(*columns[:2]), Spread(*columns[2:])
+        states = [self._followed(leg, self.home[None]) for leg in self.iterative.values()]
+        rows = np.concatenate([each.wrenches() for each in states], axis=1)[0]
+        return np.linalg.svd(rows)[2][rows.shape[1] - self.coordinates.dof :].T
 
 
 def _half_angles(cones: ArrayLike, k: int) -> Array:
@@ -310,21 +304,3 @@ def _axis_of(u: Array) -> Array | None:
     """The axis about which directions (m, 3) turn, where they keep their angle to it (a plane or a cone)."""
     _, s, right = np.linalg.svd(u - u[0])
     return right[2] if s[1] > RANK_CUTOFF > s[2] else None
-
-
-def _joined(parts: Sequence[Evaluation], whole: Mapping[str, Array]) -> Evaluation:
-    """One evaluation of all poses; ``whole`` holds what is there in one piece."""
-    if len(parts) == 1:
-        return parts[0]
-
-    def column(name: str) -> object:
-        values = [getattr(part, name) for part in parts]
-        if name in whole:
-            return whole[name]
-        if name == "normals" or values[0] is None or (name == "twists" and values[0].ndim == 2):
-            return values[0]
-        if isinstance(values[0], Spread):
-            return Spread(*(np.concatenate([getattr(v, f.name) for v in values]) for f in fields(Spread)))
-        return np.concatenate(values)
-
-    return Evaluation(**{f.name: column(f.name) for f in fields(Evaluation)})  # type: ignore[arg-type]

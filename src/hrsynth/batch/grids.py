@@ -12,8 +12,8 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..mechanism.pose import Grid
 from ..tolerances import FOLLOWED, RANK_CUTOFF
+from .engine import Flags
 from .placing import Placer
-from .plain import Flags
 
 TURNS = 180
 """Values of a free turn that are tried before a pose counts as out of reach."""

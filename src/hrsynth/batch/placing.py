@@ -18,14 +18,14 @@ from ..geometry.so3 import between, exponential, quaternions
 from ..geometry.vectors import Array, frozen, inverse
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
+from ..legs.closed_forms import ClosedFormLeg, OnCrank, OnRail, PlatformDirection
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.observation import Direction
 from ..tolerances import CLOSED
-from .chain import Chain
-from .engine import CHUNK, Batch
-from .limb import Kind, Limb
-from .plain import Flags, Poses, rod, turning
+from .engine import Batch, Flags
+from .iterative_leg import IterativeLeg
+from .program import CHUNK
 
 STEP = 0.15
 """Length of a step of a walk (characteristic lengths, radians)."""
@@ -41,21 +41,21 @@ class Placer:
     twin: PinocchioModel
     anatomy: LegDecomposition
     seen: Mapping[str, Direction]
-    chains: Mapping[str, Chain]
+    legs: Mapping[str, IterativeLeg]
 
     @classmethod
     def of(cls, batch: Batch, twin: PinocchioModel, anatomy: LegDecomposition,
            observations: Sequence[Direction]) -> Placer | None:
         """None where a leg is no known subproblem, or a link belongs neither to a leg nor to the platform."""
         mechanism = anatomy.mechanism
-        placed = {mechanism.base, *batch.stage.bodies, *(name for leg in anatomy.legs for name in leg.links)}
-        known = all(isinstance(leg, Limb) for leg in batch.legs.values())
-        if not (known and batch.stage.constant and placed == set(mechanism.links)) or any(
+        placed = {mechanism.base, *batch.coordinates.links, *(name for leg in anatomy.legs for name in leg.links)}
+        known = all(isinstance(leg, ClosedFormLeg) for leg in batch.legs.values())
+        if not (known and batch.coordinates.constant and placed == set(mechanism.links)) or any(
                 joint.type is JointType.FREE for joint in mechanism.joints.values()):
             return None
         seen = {o.leg: o for o in observations}
-        chains = {leg.label: Chain.of(mechanism, leg, seen[leg.label], None) for leg in anatomy.legs}
-        return cls(batch, twin, anatomy, seen, chains)
+        legs = {leg.label: IterativeLeg.of(mechanism, leg, seen[leg.label], None) for leg in anatomy.legs}
+        return cls(batch, twin, anatomy, seen, legs)
 
     def configurations(self, X: Array) -> list[ClosedConfiguration | None]:
         """The closed configurations at platform poses X (n, 4, 4), None where there is none in the working mode of the
@@ -69,7 +69,7 @@ class Placer:
                 found.append(ClosedConfiguration(self.twin, here, residual) if residual <= CLOSED else None)
         return found
 
-    def wander(self, count: int, seed: int = 0, steps: int = 40) -> Iterator[ClosedConfiguration]:
+    def random_walk(self, count: int, seed: int = 0, steps: int = 40) -> Iterator[ClosedConfiguration]:
         """``count`` random configurations: walks of up to ``steps`` small steps of the platform from its home, side by
         side; a walk ends where the robot does not reach on, or comes near to a Type 1 singularity."""
         rng, batch = np.random.default_rng(seed), self.batch
@@ -93,19 +93,19 @@ class Placer:
 
     def _walks(self, rng: np.random.Generator, walks: int, steps: int, limit: float) -> list[Array]:
         """The platform poses (k, 4, 4) of each walk."""
-        stage, length = self.batch.stage, self.batch.length
+        coordinates, length = self.batch.coordinates, self.batch.length
         ways: list[list[Array]] = [[] for _ in range(walks)]
         X = np.repeat(self.batch.home[None], walks, axis=0)
-        velocity = np.zeros((walks, stage.dof))
+        velocity = np.zeros((walks, coordinates.dof))
         live = np.arange(walks)
         for _ in range(steps):
             velocity += rng.normal(size=velocity.shape) / 2
             velocity /= np.linalg.norm(velocity, axis=1, keepdims=True)
-            shift, spin = np.split(STEP * velocity, [stage.shifts.shape[1]], axis=1)
-            p, R = stage.place(X)
+            shift, spin = np.split(STEP * velocity, [coordinates.translations.shape[1]], axis=1)
+            p, R = coordinates.place(X)
             X = X.copy()
-            X[:, :3, :3] = exponential(spin @ stage.spins.T) @ R
-            X[:, :3, 3] = p + length * (shift @ stage.shifts.T) - X[:, :3, :3] @ stage.point
+            X[:, :3, :3] = exponential(spin @ coordinates.rotations.T) @ R
+            X[:, :3, 3] = p + length * (shift @ coordinates.translations.T) - X[:, :3, :3] @ coordinates.point
             found = self.batch.evaluate(X, compiled=False)
             kept = np.flatnonzero(found.reached & ~(found.singular_values[:, 0] > limit))
             X, velocity, live = X[kept], velocity[kept], live[kept]
@@ -116,49 +116,41 @@ class Placer:
     def frames(self, X: Array) -> tuple[dict[str, Array], Flags]:
         """Poses (n, 4, 4) of all links, metres, and where the legs are closed (n,)."""
         batch, mechanism = self.batch, self.anatomy.mechanism
-        p, R = batch.stage.place(X)
+        p, R = batch.coordinates.place(X)
         frames = {mechanism.base: np.broadcast_to(mechanism.links[mechanism.base].pose, (len(X), 4, 4))}
-        for name, body in batch.stage.bodies.items():
-            frames[name] = np.tile(np.eye(4), (len(X), 1, 1))
-            frames[name][:, :3, 3] = p + R @ body.b + body.c
-            frames[name][:, :3, :3] = R @ body.Q if body.turns else body.Q
+        frames |= {name: link.poses(p, R) for name, link in batch.coordinates.links.items()}
         reached = np.ones(len(X), dtype=bool)
-        poses = Poses.of(p, R)
         for leg in self.anatomy.legs:
-            chain, limb = self.chains[leg.label], batch.legs[leg.label]
-            assert isinstance(limb, Limb)
-            guess, there = self._guess(leg, limb, poses, frames, p, R)
+            chain, form = self.legs[leg.label], batch.legs[leg.label]
+            assert isinstance(form, ClosedFormLeg)
+            guess, there = self._guess(leg, form, frames, p, R)
             state = np.stack([guess[name] for name in chain.links], axis=1)
             state[:, :, :3, 3] /= batch.length
             state[~there] = chain.zero
             end = state[:, 1].copy()
-            state, residual = chain.led(state, end, CLOSING)
+            state, residual = chain.closed(state, end, CLOSING)
             reached &= there & (residual <= CLOSED)
             state[:, :, :3, 3] *= batch.length
             frames.update({name: state[:, i] for i, name in enumerate(chain.links) if name in leg.links})
         return frames, reached
 
-    def _guess(self, leg: Leg, limb: Limb, poses: Poses, frames: Mapping[str, Array], p: Array, R: Array
+    def _guess(self, leg: Leg, form: ClosedFormLeg, frames: Mapping[str, Array], p: Array, R: Array
                ) -> tuple[dict[str, Array], Flags]:
         """Where the leg's links start: its first link on its circle or line, the others turned as the observed one."""
         mechanism, seen = self.anatomy.mechanism, self.seen[leg.label]
         n = len(p)
-        first = np.tile(np.eye(4), (n, 1, 1))
-        there = np.ones(n, dtype=bool)
         zero = mechanism.links[seen.link].pose[:3, :3] @ seen.direction
-        u = np.broadcast_to(limb.axis, (n, 3))
-        if limb.kind is Kind.TURNING:
-            columns, there, B = turning(limb, poses)
-            u, first = columns.T, _first(limb, B.T, there)
-        elif limb.kind is not Kind.CONSTANT:
-            found = rod(limb, poses)
-            there, u = found.reached, np.where(found.reached, found.u, zero[:, None]).T
-            first = _first(limb, limb.tip(p, R) - u * (limb.sense * limb.rod), there)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            u, there = form.direction(p, R)
+            ends = form.ends(p, R)
+        if not isinstance(form, PlatformDirection):
+            u = np.where(there[:, None], u, zero)
+        first = _first(form, ends, there)
         turn = exponential(between(zero, u))
         guess = {name: frames[name] for name in (mechanism.base, leg.attach)}
-        for name in _outwards(mechanism, leg, limb.crank):
+        for name in _outwards(mechanism, leg, form.crank):
             pose = mechanism.links[name].pose
-            if name == limb.crank:
+            if name == form.crank:
                 guess[name] = first @ pose
                 continue
             joint, held = _hold(mechanism, leg, name, guess)
@@ -170,16 +162,16 @@ class Placer:
         return guess, there
 
 
-def _first(limb: Limb, B: Array, there: Flags) -> Array:
+def _first(form: ClosedFormLeg, B: Array | None, there: Flags) -> Array:
     """The displacement (n, 4, 4) that brings the point of the leg's first link to B."""
-    X = np.tile(np.eye(4), (len(B), 1, 1))
-    if limb.kind is Kind.LINE:
-        X[:, :3, 3] = B - limb.place
-    elif limb.radius:
-        a, start, arm = limb.pivot, limb.place - limb.centre, B - limb.centre
+    X = np.tile(np.eye(4), (len(there), 1, 1))
+    if isinstance(form, OnRail) and B is not None:
+        X[:, :3, 3] = B - form.place
+    elif isinstance(form, OnCrank | PlatformDirection) and B is not None:
+        a, start, arm = form.pivot, form.place - form.centre, B - form.centre
         angle = np.arctan2(arm @ np.cross(a, start), arm @ start)
         X[:, :3, :3] = exponential(angle[:, None] * a)
-        X[:, :3, 3] = limb.centre - X[:, :3, :3] @ limb.centre
+        X[:, :3, 3] = form.centre - X[:, :3, :3] @ form.centre
     X[~there] = np.eye(4)
     return X
 

@@ -13,8 +13,7 @@ import numpy as np
 from ..analysis.accuracy.accuracy import errors_at
 from ..analysis.accuracy.cones import Cones, half_angles
 from ..analysis.accuracy.pose_errors import PoseErrors
-from ..analysis.aspects.answer import SEPARATED
-from ..analysis.aspects.path import Aspects
+from ..analysis.aspects.path import SEPARATED, Aspects
 from ..analysis.controllability import CONTROLLABLE, verdict_of
 from ..analysis.modes.modes import AssemblyModes, modes_at
 from ..analysis.observed import ObservedRobot

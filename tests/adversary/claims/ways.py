@@ -58,15 +58,15 @@ def same(case: Case, told: Any, start: State, goal: State, items: Items) -> None
     if told.crossings:
         case.say("path", UNCLEAR, "through other working modes")
         return
-    at, least, motion = start, np.inf, told.carriage.motion
+    at, least, motion = start, np.inf, told.coordinates.motion
     for way in told.ways:
         angle = float(np.linalg.norm(way.turn))
 
         def place(part: float, way: Any = way, angle: float = angle) -> tuple[Array, Array]:
             R = turn(way.turn, part * angle) @ way.R if angle > 0 else way.R
-            return (way.p + part * way.shift) * told.carriage.length, R
+            return (way.p + part * way.shift) * told.coordinates.length, R
 
-        followed = follow(case, at, items, motion.link, motion.point, place, told.carriage.turning)
+        followed = follow(case, at, items, motion.link, motion.point, place, told.coordinates.turning)
         if followed is None:
             case.say("path", WRONG, "the robot does not follow the certified path")
             return

@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from hrsynth.analysis.aspects.answer import PathAnswer
-from hrsynth.analysis.aspects.crossing import Crossing
-from hrsynth.analysis.aspects.path import Aspects
+from hrsynth.analysis.aspects.path import Aspects, PathAnswer
+from hrsynth.analysis.aspects.path_segments import WorkingModeChange
 from hrsynth.analysis.singularity.agreement import smallest_of, weakest
 from hrsynth.constraints.condition import Condition
 from hrsynth.constraints.named_vectors import unit_rows
@@ -21,14 +20,14 @@ FEWEST = 25
 def followed(aspects: Aspects, answer: PathAnswer, points: int) -> list[ClosedConfiguration]:
     """The real robot's configurations along a path, found by closing its loops, small step after small step; where a
     leg crosses its limit, with the direction of its rod."""
-    assert answer.carriage is not None
-    carriage, question = answer.carriage, aspects.setting.samples.question
+    assert answer.coordinates is not None
+    carriage, question = answer.coordinates, aspects.setting.samples.question
     here, found = answer.start.configuration, []
     for way in answer.ways:
         fractions = np.linspace(0, 1, max(points // len(answer.ways), FEWEST) + 1)
         p, R = way.at(fractions)[:2]
         held = [() for _ in fractions]
-        if isinstance(way, Crossing):
+        if isinstance(way, WorkingModeChange):
             (seen,) = [o for o in question.observations if o.leg == way.leg]
             values = measure(here.twin, here.q, question.reference, [seen])[2]
             rods = unit_rows(way.rod.at(fractions))

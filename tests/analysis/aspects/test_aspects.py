@@ -14,14 +14,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from analysis.aspects.certified import check_certified
-from hrsynth.analysis.aspects.answer import SAME, SEPARATED, UNDECIDED
-from hrsynth.analysis.aspects.carriage import Stretch
-from hrsynth.analysis.aspects.crossing import crossing
-from hrsynth.analysis.aspects.path import BUDGET, Aspects, path
-from hrsynth.analysis.aspects.pattern import Pattern
-from hrsynth.analysis.aspects.plan import plan
-from hrsynth.analysis.aspects.proof import Reading, enclosed, prove
-from hrsynth.analysis.aspects.region import Region
+from hrsynth.analysis.aspects.condition_enclosure import ConditionEnclosure, enclosed, prove
+from hrsynth.analysis.aspects.leg_forms import LegPattern
+from hrsynth.analysis.aspects.path import BUDGET, SAME, SEPARATED, UNDECIDED, Aspects, path
+from hrsynth.analysis.aspects.path_segments import StraightSegment, mode_change
+from hrsynth.analysis.aspects.road_map import PoseRegion, plan
 from hrsynth.analysis.singularity.agreement import smallest_of
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
@@ -49,8 +46,8 @@ def walk(robot: str, observe: str | None, count: int = 24, seed: int = 0) -> tup
     """Random configurations in the working mode of the first of them."""
     aspects = aspects_of(robot, observe)
     found = tuple(random_walk(aspects.setting.samples.start, count, seed))
-    modes = aspects.reading(found[0]).chart.modes
-    return tuple(at for at in found if aspects.reading(at).chart.modes == modes)
+    modes = aspects.enclosure(found[0]).forms.modes
+    return tuple(at for at in found if aspects.enclosure(at).forms.modes == modes)
 
 
 def pairs(robot: str, observe: str | None, count: int, seed: int = 0) -> list[tuple[ClosedConfiguration, ...]]:
@@ -90,11 +87,11 @@ def test_a_thousand_points_of_each_certified_path(robot: str, observe: str | Non
 @pytest.mark.parametrize(("robot", "observe"), KNOWN)
 def test_enclosures_hold_the_values_of_all_poses_in_them(robot: str, observe: str | None):
     aspects, rng = aspects_of(robot, observe), np.random.default_rng(0)
-    assert isinstance(aspects.pattern, Pattern)
+    assert isinstance(aspects.pattern, LegPattern)
     for start, goal in pairs(robot, observe, 3):
-        reading = aspects.reading(start)
-        p, R = aspects.pattern.carriage.of([start, goal])
-        way = Stretch.between((p[0], R[0]), (p[1], R[1]))
+        reading = aspects.enclosure(start)
+        p, R = aspects.pattern.coordinates.of([start, goal])
+        way = StraightSegment.between((p[0], R[0]), (p[1], R[1]))
         low = rng.uniform(0, 1)
         high = min(1.0, low + 10 ** rng.uniform(-5, -2))
         sure, value = reading.at(*way.at(balls([low], [high])))
@@ -112,9 +109,9 @@ def test_enclosures_hold_the_values_of_all_poses_in_them(robot: str, observe: st
 @pytest.mark.parametrize(("robot", "observe"), KNOWN)
 def test_poses_decide_the_values_that_configurations_have(robot: str, observe: str | None):
     aspects = aspects_of(robot, observe)
-    assert isinstance(aspects.pattern, Pattern)
+    assert isinstance(aspects.pattern, LegPattern)
     for at in walk(robot, observe)[:6]:
-        reached, value = aspects.reading(at).at(*aspects.pattern.carriage.of([at]))
+        reached, value = aspects.enclosure(at).at(*aspects.pattern.coordinates.of([at]))
         scene = aspects.structure.values_at([at])
         exact = aspects.condition.expressed(scene) if aspects.condition.signed else smallest_of(
             aspects.condition.rows(scene))
@@ -146,16 +143,16 @@ def test_nine_of_ten_pairs_on_one_side_are_joined():
     ("quattro_rigid", None)])
 def test_poses_anywhere_on_one_side_are_joined(robot: str, observe: str | None):
     aspects, rng = aspects_of(robot, observe), np.random.default_rng(1)
-    assert isinstance(aspects.pattern, Pattern)
-    carriage, reading = aspects.pattern.carriage, aspects.reading(aspects.setting.samples.start)
+    assert isinstance(aspects.pattern, LegPattern)
+    carriage, reading = aspects.pattern.coordinates, aspects.enclosure(aspects.setting.samples.start)
     p, R = carriage.of(aspects.members)
-    near = Region.around(carriage, p, R)
+    near = PoseRegion.around(carriage, p, R)
     P, Q = replace(near, shift=2.5 * near.shift, turn=np.minimum(3 * near.turn, np.pi)).draw(rng, 2000)
     reached, values = reading.at(P, Q)
     proved = []
     for side in (1, -1) if reading.signed else (1,):
         for i, j in rng.choice(np.flatnonzero(reached & (np.sign(values) == side)), (6, 2)):
-            region = Region.around(carriage, np.concatenate([P[[i, j]], p]), np.concatenate([Q[[i, j]], R]))
+            region = PoseRegion.around(carriage, np.concatenate([P[[i, j]], p]), np.concatenate([Q[[i, j]], R]))
             found = plan((reading, reading), region, (P[i], Q[i]), (P[j], Q[j]), seed=0, budget=BUDGET)
             proved.append(found.proved)
             for way, after in pairwise(found.ways):
@@ -166,13 +163,14 @@ def test_poses_anywhere_on_one_side_are_joined(robot: str, observe: str | None):
 
 def test_a_way_across_the_locus_is_never_proved():
     aspects = aspects_of("3rrr_m1")
-    assert isinstance(aspects.pattern, Pattern)
+    assert isinstance(aspects.pattern, LegPattern)
     crossed = 0
     for start, goal in pairs("3rrr_m1", None, 60, seed=4):
         if signs(aspects, start, goal).prod() < 0:
-            p, R = aspects.pattern.carriage.of([start, goal])
+            p, R = aspects.pattern.coordinates.of([start, goal])
             crossed += 1
-            assert not prove(aspects.reading(start), Stretch.between((p[0], R[0]), (p[1], R[1])), 10_000).proved
+            segment = StraightSegment.between((p[0], R[0]), (p[1], R[1]))
+            assert not prove(aspects.enclosure(start), segment, 10_000).proved
     assert crossed >= 5
 
 
@@ -182,9 +180,9 @@ def test_a_way_that_crosses_the_locus_twice_is_led_around_it():
     for pair in pairs("gough_stewart", "1,2,3", 16, seed=6):
         answer = aspects.join(*pair)
         if answer.verdict == SAME and len(answer.ways) > 1:
-            p, R = answer.carriage.of(pair)
-            straight = Stretch.between((p[0], R[0]), (p[1], R[1]))
-            reached, values = aspects.reading(pair[0]).at(*straight.at(np.linspace(0, 1, 2001)))
+            p, R = answer.coordinates.of(pair)
+            straight = StraightSegment.between((p[0], R[0]), (p[1], R[1]))
+            reached, values = aspects.enclosure(pair[0]).at(*straight.at(np.linspace(0, 1, 2001)))
             around += int(not reached.all() or np.min(values * values[0]) < 0)
             check_certified(aspects, answer, 60)
     assert around
@@ -194,15 +192,15 @@ def test_a_way_that_crosses_the_locus_twice_is_led_around_it():
     ("rrrrr_m1", None), ("3prr_m1", None), ("quattro_rigid", "1,3"), ("prrrp_m1", None), ("delta", None)])
 def test_a_way_that_leaves_the_workspace_is_never_proved(robot: str, observe: str | None):
     aspects, rng = aspects_of(robot, observe), np.random.default_rng(0)
-    assert isinstance(aspects.pattern, Pattern)
-    reading = aspects.reading(aspects.setting.samples.start)
-    p, R = aspects.pattern.carriage.of(aspects.members)
-    region = Region.around(aspects.pattern.carriage, p, R)
+    assert isinstance(aspects.pattern, LegPattern)
+    reading = aspects.enclosure(aspects.setting.samples.start)
+    p, R = aspects.pattern.coordinates.of(aspects.members)
+    region = PoseRegion.around(aspects.pattern.coordinates, p, R)
     places = replace(region, shift=6 * region.shift).draw(rng, 4000)
     inside = reading.at(*places)[0]
     left = 0
     for i, j in zip(rng.choice(np.flatnonzero(inside), 40), rng.choice(np.flatnonzero(~inside), 40), strict=True):
-        way = Stretch.between((places[0][i], places[1][i]), (places[0][j], places[1][j]))
+        way = StraightSegment.between((places[0][i], places[1][i]), (places[0][j], places[1][j]))
         beyond = replace(way, shift=2 * way.shift, turn=2 * way.turn)
         for each in (way, beyond):
             left += 1
@@ -216,36 +214,36 @@ def test_a_way_that_leaves_the_workspace_is_never_proved(robot: str, observe: st
 def test_a_path_crosses_the_limit_of_a_leg_into_its_other_working_mode(robot: str):
     aspects = aspects_of(robot)
     places = list(random_walk(aspects.setting.samples.start, 150, 0))
-    modes = [aspects.reading(at).chart.modes for at in places]
+    modes = [aspects.enclosure(at).forms.modes for at in places]
     others = [at for at, mode in zip(places, modes, strict=True) if mode != modes[0]]
     assert others
     for at in others[:: max(1, len(others) // 3)][:3]:
         answer = aspects.join(places[0], at)
         assert answer.verdict == SAME
-        apart = sum(a != b for a, b in zip(modes[0], aspects.reading(at).chart.modes, strict=True))
+        apart = sum(a != b for a, b in zip(modes[0], aspects.enclosure(at).forms.modes, strict=True))
         assert len(answer.crossings) == apart
-        assert isinstance(answer.ways[0], Stretch)
-        assert isinstance(answer.ways[-1], Stretch)
-        assert prove(aspects.reading(places[0]), answer.ways[0], 10_000).margin >= answer.margin
-        assert prove(aspects.reading(at), answer.ways[-1], 10_000).margin >= answer.margin
+        assert isinstance(answer.ways[0], StraightSegment)
+        assert isinstance(answer.ways[-1], StraightSegment)
+        assert prove(aspects.enclosure(places[0]), answer.ways[0], 10_000).margin >= answer.margin
+        assert prove(aspects.enclosure(at), answer.ways[-1], 10_000).margin >= answer.margin
         check_certified(aspects, answer, 200)
 
 
 def test_a_crossing_leads_from_one_working_mode_to_the_other():
     aspects = aspects_of("3rrr_m1")
-    assert isinstance(aspects.pattern, Pattern)
-    carriage, fractions = aspects.pattern.carriage, np.linspace(0, 1, 11)
+    assert isinstance(aspects.pattern, LegPattern)
+    carriage, fractions = aspects.pattern.coordinates, np.linspace(0, 1, 11)
     for at in walk("3rrr_m1", None)[:5]:
-        chart, (p, R) = aspects.reading(at).chart, carriage.of([at])
+        chart, (p, R) = aspects.enclosure(at).forms, carriage.of([at])
         for number, limb in enumerate(chart.limbs):
-            found = crossing(carriage, limb, number, (p[0], R[0]))
+            found = mode_change(carriage, limb, number, (p[0], R[0]))
             assert found is not None
             places, turns, (_, ends) = found.at(fractions)
             tips = limb.tip.value(places, turns)
             assert np.allclose(np.linalg.norm(tips - ends, axis=1), limb.rod, atol=1e-12)
-            assert np.allclose(np.linalg.norm(ends - limb.centre, axis=1), limb.crank, atol=1e-12)
+            assert np.allclose(np.linalg.norm(ends - limb.centre, axis=1), limb.radius, atol=1e-12)
             assert np.allclose(places[[0, -1]], p[0], atol=1e-12)
-            for branch, end in ((limb.branch, ends[0]), (-limb.branch, ends[-1])):
+            for branch, end in ((limb.mode, ends[0]), (-limb.mode, ends[-1])):
                 assert np.allclose(limb.solve(tips[:1], branch)[1][0], end, atol=1e-9)
             with np.errstate(invalid="ignore"):
                 reserves = limb.solve(tips, 1.0)[0]
@@ -259,11 +257,11 @@ def test_a_crossing_leads_from_one_working_mode_to_the_other():
 @given(words=st.lists(st.sampled_from(["RRR", "RPR", "PRR"]), min_size=3, max_size=3), seed=st.integers(0, 10**6))
 def test_random_planar_robots(words: list[str], seed: int):
     aspects = Aspects.of(planar(words, np.random.default_rng(seed), [{0}] * 3))
-    assert isinstance(aspects.pattern, Pattern)
+    assert isinstance(aspects.pattern, LegPattern)
     places = list(random_walk(aspects.setting.samples.start, 4, seed))
     for start, goal in pairwise(places):
         answer, sides = aspects.join(start, goal), signs(aspects, start, goal)
-        same = aspects.reading(start).chart.modes == aspects.reading(goal).chart.modes
+        same = aspects.enclosure(start).forms.modes == aspects.enclosure(goal).forms.modes
         if sides[0] != sides[1]:
             assert answer.verdict in (SEPARATED, UNDECIDED)
         else:
@@ -329,15 +327,15 @@ def test_a_pose_on_the_locus_is_undecided():
     from scipy.optimize import brentq
 
     aspects = aspects_of("3rrr_m1")
-    assert isinstance(aspects.pattern, Pattern)
+    assert isinstance(aspects.pattern, LegPattern)
     start, goal = next(pair for pair in pairs("3rrr_m1", None, 60, seed=4) if signs(aspects, *pair).prod() < 0)
-    reading: Reading = aspects.reading(start)
-    p, R = aspects.pattern.carriage.of([start, goal])
-    way = Stretch.between((p[0], R[0]), (p[1], R[1]))
+    reading: ConditionEnclosure = aspects.enclosure(start)
+    p, R = aspects.pattern.coordinates.of([start, goal])
+    way = StraightSegment.between((p[0], R[0]), (p[1], R[1]))
     root = brentq(lambda x: float(reading.at(*way.at(np.array([x])))[1][0]), 0, 1, xtol=1e-14)
     place = way.at(np.array([root]))
     assert enclosed(reading, place[0][0], place[1][0]) == (True, 0.0)
-    on = str(aspects.motion.pose(aspects.pattern.carriage.frame(place[0][0], place[1][0]))).replace("z=0,", "")
+    on = str(aspects.motion.pose(aspects.pattern.coordinates.frame(place[0][0], place[1][0]))).replace("z=0,", "")
     answer = path(load("3rrr_m1"), start="x=0,y=0", goal=on)
     assert answer.verdict == UNDECIDED
     assert "locus" in answer.reason

@@ -9,13 +9,12 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from hrsynth.analysis.aspects.answer import SAME, SEPARATED
-from hrsynth.analysis.aspects.limbs import Limb
-from hrsynth.analysis.aspects.path import Aspects, leads
-from hrsynth.analysis.aspects.pattern import Pattern
+from hrsynth.analysis.aspects.leg_forms import LegPattern
+from hrsynth.analysis.aspects.path import SAME, SEPARATED, Aspects, leads
 from hrsynth.description import load
 from hrsynth.geometry.balls import balls
 from hrsynth.kinematics.sampling import random_walk
+from hrsynth.legs.closed_forms import ClosedFormLeg
 from strategies import deltas, planar, pods
 
 SHIPPED = ("3rrr_m1", "3rpr_m1", "3prr_m1", "rrrrr_m1", "rprpr_m1", "prrrp_m1", "gough_stewart", "quattro",
@@ -35,8 +34,8 @@ def aspects_of(name: str) -> Aspects:
     return Aspects.of(deltas(["R"] * 3, ["2-SS"] * 3, rng, True) if name == "R2-SS" else load(name))
 
 
-def known(aspects: Aspects) -> Pattern:
-    assert isinstance(aspects.pattern, Pattern)
+def known(aspects: Aspects) -> LegPattern:
+    assert isinstance(aspects.pattern, LegPattern)
     return aspects.pattern
 
 
@@ -48,11 +47,11 @@ def test_forms_are_read_from_the_joints_and_hold_at_other_poses(name: str):
     pattern = known(aspects)
     assert pattern.fitted == ()
     for at in random_walk(aspects.setting.samples.start, 5, 77):
-        p, R = pattern.carriage.of([at])
-        chart = pattern.chart(at)
+        p, R = pattern.coordinates.of([at])
+        chart = pattern.forms(at)
         for limb, feature in zip(chart.limbs, pattern.carried, strict=True):
             poses = {link: _scaled(at.pose(link), at.twin.length) for link in feature.links}
-            assert limb.solve(limb.tip.value(p, R), limb.branch)[1] == pytest.approx(feature.value(poses), abs=1e-7)
+            assert limb.solve(limb.tip.value(p, R), limb.mode)[1] == pytest.approx(feature.value(poses), abs=1e-7)
 
 
 def _scaled(X: np.ndarray, length: float) -> np.ndarray:
@@ -66,7 +65,7 @@ def test_what_is_fitted_is_not_certified(name: str):
     free = aspects_of(name)
     aspects = Aspects(free.setting, free.motion, free.structure, free.condition, free.lost)
     pattern = known(free)
-    fitted = replace(pattern, limbs=tuple(replace(limb, fitted=limb.leg == "2") for limb in pattern.limbs))
+    fitted = replace(pattern, limbs=tuple(replace(limb, fitted=limb.label == "2") for limb in pattern.limbs))
     aspects.__dict__["pattern"] = fitted
     met = set()
     for start, goal in pairwise(list(random_walk(free.setting.samples.start, 12, 3))):
@@ -88,13 +87,13 @@ def test_ways_with_a_gap_lead_nowhere():
         if answer.verdict != SAME:
             continue
         joined += 1
-        readings = [aspects.reading(start), aspects.reading(goal)]
-        p, R = known(aspects).carriage.of([start, goal])
+        readings = [aspects.enclosure(start), aspects.enclosure(goal)]
+        p, R = known(aspects).coordinates.of([start, goal])
         ends = (p[0], R[0]), (p[1], R[1])
         assert leads(answer.ways, *ends, readings)
         assert not leads(answer.ways, ends[0], (p[1] + 1e-9, R[1]), readings)
         assert not leads(answer.ways[1:], *ends, readings)
-        other = replace(readings[1], chart=readings[1].chart.flipped(0))
+        other = replace(readings[1], forms=readings[1].forms.flipped(0))
         assert not leads(answer.ways, *ends, [readings[0], other])
     assert joined
 
@@ -104,21 +103,21 @@ def test_balls_hold_limbs_whose_numbers_were_rounded(name: str):
     """The reserve and what is carried, of limbs with numbers moved by less than 1e-10, lie in the balls."""
     aspects, rng = aspects_of(name), np.random.default_rng(0)
     start = aspects.setting.samples.start
-    p, R = known(aspects).carriage.of([start])
-    for limb in aspects.reading(start).chart.limbs:
+    p, R = known(aspects).coordinates.of([start])
+    for limb in aspects.enclosure(start).forms.limbs:
         tip = limb.tip.value(np.array([balls(row, row) for row in p]), R.astype(object))
-        reserve, carried = limb.solve(tip, limb.branch)
+        reserve, carried = limb.solve(tip, limb.mode)
         for _ in range(20):
             near = _moved(limb, rng)
-            exact, end = near.solve(near.tip.value(p, R), near.branch)
+            exact, end = near.solve(near.tip.value(p, R), near.mode)
             assert all(x.overlaps(x * 0 + float(y)) for x, y in zip(np.ravel(reserve), np.ravel(exact), strict=True))
             assert all(x.overlaps(x * 0 + float(y)) for x, y in zip(np.ravel(carried), np.ravel(end), strict=True))
 
 
-def _moved(limb: Limb, rng: np.random.Generator) -> Limb:
+def _moved(limb: ClosedFormLeg, rng: np.random.Generator) -> ClosedFormLeg:
     def off(value):
         return value if value is None else value + 1e-10 * rng.uniform(-1, 1, np.shape(value))
 
-    names = [name for name in ("centre", "start", "axis", "crank", "rod", "aside") if hasattr(limb, name)]
+    names = [name for name in ("centre", "axis", "radius", "rod", "aside") if hasattr(limb, name)]
     tip = replace(limb.tip, turned=off(limb.tip.turned), constant=off(limb.tip.constant))
     return replace(limb, tip=tip, **{name: off(getattr(limb, name)) for name in names})

@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 
 from analysis.aspects.certified import check_certified, followed
-from hrsynth.analysis.aspects.answer import SAME, SEPARATED, UNDECIDED
-from hrsynth.analysis.aspects.limits import Slide, Turn
-from hrsynth.analysis.aspects.path import Aspects
-from hrsynth.analysis.aspects.pattern import Pattern
+from hrsynth.analysis.aspects.joint_limits import SlideLimit, TurnLimit
+from hrsynth.analysis.aspects.leg_forms import LegPattern
+from hrsynth.analysis.aspects.path import SAME, SEPARATED, UNDECIDED, Aspects
 from hrsynth.description import load
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.sampling import random_walk
@@ -53,22 +52,22 @@ def limited(robot: str, observe: str | None) -> Aspects:
 @pytest.mark.parametrize(("robot", "observe"), KNOWN)
 def test_a_reserve_tells_how_far_a_coordinate_is_from_its_limits(robot: str, observe: str | None):
     aspects = limited(robot, observe)
-    assert isinstance(aspects.pattern, Pattern)
+    assert isinstance(aspects.pattern, LegPattern)
     assert {bound.joint for bound in aspects.pattern.bounds} == set(single(aspects.setting.mechanism))
     beyond = 0
     for at in random_walk(aspects.setting.samples.start, 12, 1):
-        chart = aspects.reading(at).chart
-        reserves = chart.at(*aspects.pattern.carriage.of([at])).reserves[0, len(chart.limbs) :]
+        chart = aspects.enclosure(at).forms
+        reserves = chart.at(*aspects.pattern.coordinates.of([at])).reach_margins[0, len(chart.limbs) :]
         for bound, reserve in zip(chart.bounds, reserves, strict=True):
             joint = at.twin.mechanism.joints[bound.joint]
             assert joint.limits is not None
             middle, half = np.array([[0.5, 0.5], [-0.5, 0.5]]) @ [joint.limits.lower, joint.limits.upper]
             away = coordinates(at, bound.joint) - middle
             beyond += int(reserve < 0)
-            if isinstance(bound, Turn):
+            if isinstance(bound, TurnLimit):
                 assert reserve == pytest.approx(bound.size * (np.cos(away) - np.cos(half)), abs=1e-6)
             else:
-                assert isinstance(bound, Slide)
+                assert isinstance(bound, SlideLimit)
                 assert reserve == pytest.approx((half**2 - away**2) / at.twin.length**2, abs=1e-6)
     assert beyond
 

@@ -9,9 +9,8 @@ import pytest
 
 from analysis.aspects.certified import check_certified
 from analysis.aspects.six_modes import LEGS, SixModes, determinants, six_modes, tips_at
-from hrsynth.analysis.aspects.answer import SAME, SEPARATED, UNDECIDED, PathAnswer
-from hrsynth.analysis.aspects.crossing import Crossing
-from hrsynth.analysis.aspects.path import BUDGET, Aspects
+from hrsynth.analysis.aspects.path import BUDGET, SAME, SEPARATED, UNDECIDED, Aspects, PathAnswer
+from hrsynth.analysis.aspects.path_segments import WorkingModeChange
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.configuration import measure
 
@@ -29,7 +28,7 @@ def joined(instance: SixModes) -> tuple[Aspects, dict[tuple[int, int], PathAnswe
 def check_path(instance: SixModes, answer: PathAnswer, pair: tuple[int, int], points: int) -> None:
     """Along a path, by two circles a leg alone: each leg reaches, the determinant keeps its sign and its margin, and
     the cranks end at the goal's."""
-    robot, carriage = instance.robot, answer.carriage
+    robot, carriage = instance.robot, answer.coordinates
     assert carriage is not None
     assert answer.margin is not None
     feet, knees, homes = (np.array([robot.joints[f"joint_{i}_{k}"].point for i in LEGS]) for k in (1, 2, 3))
@@ -44,7 +43,7 @@ def check_path(instance: SixModes, answer: PathAnswer, pair: tuple[int, int], po
         assert np.max(np.abs(X[0] - at)) < 1e-9
         at, tips = X[-1], tips_at(instance, X)
         ends = _ends(instance, tips, feet, cranks, rods, branch)
-        if isinstance(way, Crossing):
+        if isinstance(way, WorkingModeChange):
             limb, carried = leading[0]
             assert np.max(np.abs(ends[[0], limb] - carriage.length * carried[0])) < 1e-7
             ends[:, limb] = carriage.length * carried

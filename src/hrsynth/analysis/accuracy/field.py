@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...batch.engine import Batch, Evaluation
 from ...batch.grids import poses_over
 from ...batch.reach import reach, sweep
-from ...budgets import LARGEST_GRID, POSES_FOR_NUMBA
+from ...budgets import LARGEST_GRID, POSES_FOR_NUMBA_ONCE
 from ...errors import BadRequest, Disagreement, HrsynthError, PlaneNotMet
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -132,7 +132,7 @@ class Mapper:
         if not all(id(o) in defaults for o in self.setting.observed):
             return None
         batch = self.setting.batch
-        return batch if batch is not None and batch.complete and batch.stage.constant else None
+        return batch if batch is not None and batch.complete and batch.coordinates.constant else None
 
     def plane(self, plane: Pose, steps: int | None) -> Grid:
         """The grid over what is reached of a plane."""
@@ -199,11 +199,11 @@ class Mapper:
         do not make up for numba's start."""
         assert self.batch is not None
         size = -(-len(places) // max(1, len(places) // PART))
+        compiled = self.batch.compiled(len(places), self.setting.labels, cones, POSES_FOR_NUMBA_ONCE)
         for start in range(0, len(places), size):
             tell("poses")
             X, possible = poses_over(self.setting.motion, grid, self.setting.robot.name, places[start : start + size])
-            yield possible, self.batch.evaluate(X, self.setting.labels, cones,
-                                                compiled=None if len(places) >= POSES_FOR_NUMBA else False)
+            yield possible, self.batch.evaluate(X, self.setting.labels, cones, compiled=compiled)
 
     def _one_by_one(self, grid: Grid) -> Seen:
         everything = self.setting.everything

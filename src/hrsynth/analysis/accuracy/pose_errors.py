@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...batch.spread import spreads
+from ...batch.error_bounds import bounds_of
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, relation
@@ -77,14 +77,14 @@ def reading(at: ClosedConfiguration, question: Measurement) -> tuple[Array, Arra
 def maxima(at: ClosedConfiguration, question: Measurement, cones: Array) -> tuple[float, float]:
     """The largest position (m) and orientation error (rad) at a configuration; infinite where a freedom is lost."""
     rates, twists = reading(at, question)
-    position, orientation = spreads(rates[:, :, None], twists, cones)
+    position, orientation = bounds_of(rates[:, :, None], twists, cones)
     return float(position.largest[0]), float(orientation.largest[0])
 
 
 def measured(at: ClosedConfiguration, question: Measurement, cones: Array, pose: Pose) -> PoseErrors:
     """The error maxima at a configuration with their directions, for half-angles (k,)."""
     rates, twists = reading(at, question)
-    found = spreads(rates[:, :, None], twists, cones)
+    found = bounds_of(rates[:, :, None], twists, cones)
     inverse = np.linalg.pinv(rates, rcond=RANK_CUTOFF)
     position, orientation = (
         _extent(part @ inverse, cones, float(spread.largest[0]), float(spread.lower[0]))

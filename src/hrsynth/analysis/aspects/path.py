@@ -12,23 +12,127 @@ import numpy as np
 from ...batch.reach import reach
 from ...constraints.condition import Condition, Named
 from ...constraints.pattern import ConstraintPattern
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
+from ...kinematics.steps import track
 from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...progress import tell
+from ...results import Result
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
 from ..singularity.agreement import smallest_of
-from .answer import SAME, SEPARATED, UNDECIDED, End, PathAnswer, between
-from .carriage import Place, carriages
-from .crossing import Crossing
-from .pattern import Pattern, pattern
-from .plan import Plan, plan
-from .proof import Reading, Way, enclosed, sign_of
-from .region import Region
-from .sources import NoChart
+from .condition_enclosure import ConditionEnclosure, PathSegment, enclosed, sign_of
+from .leg_forms import LegPattern, pattern
+from .path_segments import PathCoordinates, Place, WorkingModeChange, path_coordinates
+from .road_map import PlannedPath, PoseRegion, plan
+from .vector_expressions import NoLegForm
+
+SAME, SEPARATED, UNDECIDED = "same aspect", "separated", "undecided"
+
+
+@dataclass(frozen=True, eq=False)
+class PathEnd:
+    """A pose that was asked for: the whole pose reached, its configuration, and the condition's value there."""
+
+    pose: Pose
+    configuration: ClosedConfiguration
+    value: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"pose": self.pose.to_dict(), "value": self.value}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PathAnswer(Result, shown_as="path"):
+    """``same aspect`` (with a certified path), ``separated`` or ``undecided``, and why.
+
+    Between its poses the path moves the told ``point`` on straight lines and turns the platform about one axis;
+    where a leg passes from one working mode to the other (``crossings``), its rod and its crank or coordinates lead to
+    the leg's limit and back. ``margin`` bounds the condition's |value| along a certified path, at the ends where
+    they are separated; ``boxes`` are the intervals of all proofs tried.
+    """
+
+    setting: ObservedRobot
+    verdict: str
+    certified: bool
+    poses: tuple[Pose, ...]
+    margin: float | None
+    boxes: int
+    start: PathEnd
+    goal: PathEnd
+    reason: str
+    signed: bool
+    coordinates: PathCoordinates | None = None
+    ways: tuple[PathSegment, ...] = ()
+    limits: tuple[str, ...] = ()
+    """Joints whose limits hold all along a certified path."""
+    unlimited: tuple[str, ...] = ()
+    """Joints whose limits are not considered."""
+
+    def headline(self) -> str:
+        """The robot and the verdict."""
+        return f"{self.setting.headline()}: {self.verdict}"
+
+    @property
+    def not_proved(self) -> str:
+        """What a certificate says nothing about."""
+        joints = f"limits of joints {', '.join(self.unlimited)}; " if self.unlimited else ""
+        return f"{joints}collisions and constraint singularities of the loops are not considered"
+
+    @property
+    def crossings(self) -> tuple[tuple[str, int], ...]:
+        """The legs that change their working mode, each with the place of its limit in ``poses``."""
+        found, place = [], 0
+        for way in self.ways:
+            if isinstance(way, WorkingModeChange):
+                found.append((way.leg, place + 1))
+            place += len(_marks(way))
+        return tuple(found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        point = None if self.coordinates is None else self.coordinates.motion.point.tolist()
+        return {"observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
+                "verdict": self.verdict, "certified": self.certified, "path": [pose.to_dict() for pose in self.poses],
+                "crossings": [{"leg": leg, "at": place} for leg, place in self.crossings], "point": point,
+                "margin": self.margin, "boxes": self.boxes,
+                "value": "expression" if self.signed else "smallest singular value",
+                "start": self.start.to_dict(), "goal": self.goal.to_dict(), "reason": self.reason,
+                "limits": list(self.limits), "not_considered": self.not_proved}
+
+
+def between(answer: PathAnswer, coordinates: PathCoordinates, ways: Sequence[PathSegment]) -> list[Pose]:
+    """The platform's poses between the ways, and that at a leg's limit in the middle of a mode_change."""
+    motion = coordinates.motion
+    here = answer.start.configuration
+    found = []
+    for p, R in [place for way in ways for place in _marks(way)][:-1]:
+        if coordinates.turning:
+            found.append(motion.pose(coordinates.frame(p, R)))
+            continue
+        here = _led(here, coordinates, p)
+        found.append(Pose.of(here.pose(motion.link), None if answer.setting.anatomy.point is None else motion.point))
+    return found
+
+
+def _marks(way: PathSegment) -> list[tuple[Array, Array]]:
+    if not isinstance(way, WorkingModeChange):
+        return [way.end]
+    p, R, _ = way.at(np.array([0.5]))
+    return [(p[0], R[0]), way.end]
+
+
+def _led(here: ClosedConfiguration, coordinates: PathCoordinates, p: Array) -> ClosedConfiguration:
+    """The configuration with the coordinates's point at ``p``."""
+    motion = coordinates.motion
+    directions = motion.translations.T
+    goal = replace(motion.at_home(), directions=directions, values=coordinates.length * directions @ p)
+    return track(here, motion, goal)[0]
+
 
 BUDGET = 10_000
 """Intervals that are enclosed in all before a path is given up."""
@@ -64,7 +168,7 @@ class Aspects:
         return [self.setting.everything.start, *self.setting.configurations]
 
     @cached_property
-    def pattern(self) -> Pattern | str:
+    def pattern(self) -> LegPattern | str:
         """The forms of legs and vectors, or why there are none."""
         if not isinstance(self.condition, Named):
             return "the condition has no named vectors"
@@ -73,25 +177,26 @@ class Aspects:
         many = self.motion.translations.shape[1] + self.motion.rotations.shape[1]
         reason = (f"the {many} parts of the platform's pose that change depend on each other, {self.setting.dof} are "
                   "free: ways that move a point straight and turn about one axis do not keep to the others")
-        for each in carriages(self.setting.anatomy, self.setting.samples.question, self.setting.dof, self.members):
+        question = self.setting.samples.question
+        for each in path_coordinates(self.setting.anatomy, question, self.setting.dof, self.members):
             try:
                 return pattern(self.setting.anatomy, features, each, self.members)
-            except NoChart as why:
+            except NoLegForm as why:
                 reason = str(why)
         return reason
 
-    def reading(self, at: ClosedConfiguration) -> Reading:
-        """The condition as a function of the pose, in the working mode of a configuration; raises ``NoChart``."""
+    def enclosure(self, at: ClosedConfiguration) -> ConditionEnclosure:
+        """The condition as a function of the pose, in the working mode of a configuration; raises ``NoLegForm``."""
         if isinstance(self.pattern, str) or not isinstance(self.condition, Named):
-            raise NoChart(str(self.pattern))
-        return Reading(self.condition, self.pattern.chart(at))
+            raise NoLegForm(str(self.pattern))
+        return ConditionEnclosure(self.condition, self.pattern.forms(at))
 
     def join(self, start: ClosedConfiguration, goal: ClosedConfiguration, *, seed: int = 0, budget: int = BUDGET,
              progress: Any = None) -> PathAnswer:
         """Whether a path without Type 2 singularity joins two configurations."""
         found, scene = self.condition, self.structure.values_at([start, goal])
         values = found.expressed(scene) if found.signed else smallest_of(found.rows(scene))
-        ends = [End(self.motion.pose(at.pose(self.motion.link)), at, float(value))
+        ends = [PathEnd(self.motion.pose(at.pose(self.motion.link)), at, float(value))
                 for at, value in zip((start, goal), values, strict=True)]
         answer = PathAnswer(self.setting, UNDECIDED, False, tuple(end.pose for end in ends), None, 0, ends[0], ends[1],
                             "", found.signed)
@@ -100,43 +205,45 @@ class Aspects:
         if min(abs(end.value) for end in ends) < CLEAR:
             return replace(answer, reason="a pose lies on the singular locus, or too near to it to be distinguished")
         try:
-            readings = [self.reading(end.configuration) for end in ends]
-        except NoChart as why:
+            enclosures = [self.enclosure(end.configuration) for end in ends]
+        except NoLegForm as why:
             return _pointwise(answer, str(why))
-        return self._decided(answer, readings, seed, budget)
+        return self._decided(answer, enclosures, seed, budget)
 
-    def _decided(self, answer: PathAnswer, readings: Sequence[Reading], seed: int, budget: int) -> PathAnswer:
+    def _decided(self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], seed: int, budget: int
+                 ) -> PathAnswer:
         """The verdict where poses decide what the legs do."""
-        assert isinstance(self.pattern, Pattern)
-        carriage = self.pattern.carriage
-        p, R = carriage.of([answer.start.configuration, answer.goal.configuration, *self.members])
-        sure, values = zip(*(enclosed(readings[i].unlimited, p[i], R[i]) for i in range(2)), strict=True)
+        assert isinstance(self.pattern, LegPattern)
+        coordinates = self.pattern.coordinates
+        p, R = coordinates.of([answer.start.configuration, answer.goal.configuration, *self.members])
+        sure, values = zip(*(enclosed(enclosures[i].unlimited, p[i], R[i]) for i in range(2)), strict=True)
         margin = min(map(abs, values))
         fitted = self.pattern.fitted
         forms = f", for forms that are fitted to samples: {', '.join(fitted)}" if fitted else ""
         if not all(sure) or margin == 0:
             return replace(answer, reason="at a pose reach or value cannot be enclosed away from zero")
-        if readings[0].signed and values[0] * values[1] < 0:
+        if enclosures[0].signed and values[0] * values[1] < 0:
             return replace(answer, verdict=SEPARATED, certified=not fitted, margin=margin, boxes=2, reason=(
                 "the expression is enclosed with opposite signs at the two configurations: every path between them "
                 f"crosses its zeros{forms}"))
         if answer.signed and answer.start.value * answer.goal.value < 0:
             return _pointwise(answer, "its sign is that of a determinant")
-        for end, reading, place, turn in zip(("start", "goal"), readings, p, R, strict=False):
-            beyond = reading.chart.beyond(place, turn)
+        for end, enclosure, place, turn in zip(("start", "goal"), enclosures, p, R, strict=False):
+            beyond = enclosure.forms.beyond(place, turn)
             if beyond:
                 return replace(answer, reason=f"at the {end} beyond its limits: joint {', '.join(beyond)}")
-        found = plan((readings[0], readings[1]), Region.around(carriage, p, R), (p[0], R[0]), (p[1], R[1]), seed=seed,
-                     budget=budget)
+        region = PoseRegion.around(coordinates, p, R)
+        region = PoseRegion.around(coordinates, p, R)
+        found = plan((enclosures[0], enclosures[1]), region, (p[0], R[0]), (p[1], R[1]), seed=seed, budget=budget)
         answer = self._shown(answer, found, self.pattern)
         if not found.proved:
-            return replace(answer, reason=_unproved(found, readings, budget))
-        if not leads(found.ways, (p[0], R[0]), (p[1], R[1]), readings):
+            return replace(answer, reason=_unproved(found, enclosures, budget))
+        if not leads(found.ways, (p[0], R[0]), (p[1], R[1]), enclosures):
             return replace(answer, reason="no path was proved: what was found does not lead from pose to pose")
         return replace(answer, verdict=SAME, certified=not fitted, margin=found.margin, reason=(
             f"the condition and the reach of all legs are enclosed away from zero along the path{forms}"))
 
-    def _shown(self, answer: PathAnswer, found: Plan, known: Pattern) -> PathAnswer:
+    def _shown(self, answer: PathAnswer, found: PlannedPath, known: LegPattern) -> PathAnswer:
         """The answer with a plan's ways, and the joints whose limits these keep."""
         kept = tuple(bound.joint for bound in known.bounds)
         answer = replace(answer, boxes=found.boxes, limits=kept,
@@ -144,8 +251,8 @@ class Aspects:
                                     *self.setting.mechanism.wrists))
         if not found.ways:
             return answer
-        poses = answer.start.pose, *between(answer, known.carriage, found.ways), answer.goal.pose
-        return replace(answer, carriage=known.carriage, ways=found.ways, poses=poses)
+        poses = answer.start.pose, *between(answer, known.coordinates, found.ways), answer.goal.pose
+        return replace(answer, coordinates=known.coordinates, ways=found.ways, poses=poses)
 
 
 def path(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
@@ -168,29 +275,29 @@ def path(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None =
     return aspects.join(*ends, seed=seed, budget=budget)
 
 
-def leads(ways: Sequence[Way], start: Place, goal: Place, readings: Sequence[Reading]) -> bool:
+def leads(ways: Sequence[PathSegment], start: Place, goal: Place, enclosures: Sequence[ConditionEnclosure]) -> bool:
     """Whether ways lead from pose to pose and from working mode to working mode without a gap."""
-    here, modes = start, list(readings[0].chart.modes)
+    here, modes = start, list(enclosures[0].forms.modes)
     for way in ways:
         if _gap(here, (way.p, way.R)) > SOLVED:
             return False
         here = way.end
-        if isinstance(way, Crossing):
+        if isinstance(way, WorkingModeChange):
             modes[way.limb] *= -1
-    return _gap(here, goal) <= SOLVED and tuple(modes) == readings[1].chart.modes
+    return _gap(here, goal) <= SOLVED and tuple(modes) == enclosures[1].forms.modes
 
 
 def _gap(one: Place, other: Place) -> float:
     return max(float(np.max(np.abs(a - b))) for a, b in zip(one, other, strict=True))
 
 
-def _unproved(found: Plan, readings: Sequence[Reading], budget: int) -> str:
+def _unproved(found: PlannedPath, enclosures: Sequence[ConditionEnclosure], budget: int) -> str:
     """Why a plan decides nothing."""
     used = "the number of intervals is used up" if found.boxes >= budget else "the road map does not join the poses"
     if found.ways:
         return f"no path was proved: {used}; the path shown is proved except for its last part"
-    pairs = zip(*(reading.chart.limbs for reading in readings), strict=True)
-    legs = dict.fromkeys(one.leg for one, other in pairs if one.branch != other.branch)
+    pairs = zip(*(enclosure.forms.limbs for enclosure in enclosures), strict=True)
+    legs = dict.fromkeys(one.label for one, other in pairs if one.mode != other.mode)
     return f"no path was proved: {used}; leg {', '.join(legs)} is in different working modes at the two poses"
 
 

@@ -76,7 +76,7 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
     low: list[tuple[float, ClosedConfiguration]] = []
     parts: list[tuple[float, ClosedConfiguration]] = []
     quick = Quick.of(placer, question)
-    walks = random_walk(start, count, seed) if quick is None else quick.placer.wander(count, seed)
+    walks = random_walk(start, count, seed) if quick is None else quick.placer.random_walk(count, seed)
     for number, chunk in enumerate(_chunks(walks)):
         here = pattern.values_at(chunk)
         if quick is None:

@@ -49,7 +49,7 @@ class Quick:
         u = np.stack([X[:, i, :3, :3] @ o.direction for i, o in enumerate(seen, 1)], axis=1)
         away = np.where(found.reached, np.max(np.abs(u - found.directions), axis=(1, 2)), np.inf)
         same = away <= SAME_RELATION
-        d = found.matrix.shape[2]
+        d = found.interaction_matrix.shape[2]
         values = np.zeros((len(X), d))
         values[:, : found.singular_values.shape[1]] = found.singular_values
         here = np.flatnonzero(same)

@@ -14,7 +14,7 @@ from .robots import NO_MATRIX
 from .tables import GAP, Rows, camera, head, known, listing
 
 if TYPE_CHECKING:
-    from ...analysis.aspects.answer import PathAnswer
+    from ...analysis.aspects.path import PathAnswer
     from ...analysis.check import Check
     from ...analysis.modes.modes import AssemblyMode, AssemblyModes
     from ...analysis.posture import Kinds, Posture

@@ -1,4 +1,4 @@
-"""Joint limits: the coordinates of R and P joints as functions of the pose, with a reserve that is positive within."""
+"""Joint limits: the coordinates of R and P joints as functions of the pose, with a margin that is positive within."""
 
 from __future__ import annotations
 
@@ -15,39 +15,39 @@ from ...geometry.so3 import wrap_angle
 from ...geometry.vectors import Array, cross, dot
 from ...mechanism import Joint, JointType
 from ...tolerances import FOLLOWED, SAME_RELATION, TURNING_ARM
-from .sources import NoChart, Source
+from .vector_expressions import NoLegForm, VectorExpression
 
 if TYPE_CHECKING:
-    from .pattern import Sight
+    from .leg_forms import SampledMechanism
 
-Value = Callable[[Source], Field]
+Value = Callable[[VectorExpression], Field]
 
 
 @dataclass(frozen=True, eq=False)
-class Arm:
+class LinkVector:
     """A vector fixed in a link: from one source to another, or one source alone."""
 
-    end: Source
-    start: Source | None = None
+    end: VectorExpression
+    start: VectorExpression | None = None
 
     def value(self, of: Value) -> Field:
         return of(self.end) if self.start is None else np.asarray(of(self.end) - of(self.start))
 
 
 @dataclass(frozen=True, eq=False)
-class Turn:
+class TurnLimit:
     """An R joint's angle, from ``one`` in its predecessor to ``two`` in its successor about ``axis``, is nearer than
     ``half`` to ``middle``. ``size`` is the product of the two vectors' parts normal to the axis."""
 
     joint: str
-    axis: Source
-    one: Arm
-    two: Arm
+    axis: VectorExpression
+    one: LinkVector
+    two: LinkVector
     middle: float
     half: float
     size: float
 
-    def reserve(self, of: Value) -> Field:
+    def reach_margin(self, of: Value) -> Field:
         """size (cos(angle − middle) − cos half), (n,)."""
         cosine, sine = _turned(self.one.value(of), self.two.value(of), of(self.axis))
         along = cosine * float(np.cos(self.middle)) + sine * float(np.sin(self.middle))
@@ -55,26 +55,26 @@ class Turn:
 
 
 @dataclass(frozen=True, eq=False)
-class Slide:
+class SlideLimit:
     """A P joint's shift along ``axis``, from a point of its predecessor to one of its successor (characteristic
     lengths): |shift − middle| < half."""
 
     joint: str
-    axis: Source
-    arm: Arm
+    axis: VectorExpression
+    arm: LinkVector
     middle: float
     half: float
 
-    def reserve(self, of: Value) -> Field:
+    def reach_margin(self, of: Value) -> Field:
         """half² − (shift − middle)², (n,)."""
         shift = dot(self.arm.value(of), of(self.axis)) - self.middle
         return np.asarray(self.half**2 - shift * shift)
 
 
-Bound = Turn | Slide
+JointLimit = TurnLimit | SlideLimit
 
 
-def bounds(sight: Sight, source: Callable[..., Source]) -> Iterator[Bound]:
+def bounds(sight: SampledMechanism, source: Callable[..., VectorExpression]) -> Iterator[JointLimit]:
     """The limits of joints that can be told from the pose."""
     for name, (lower, upper) in sight.mechanism.limited.items():
         if not -np.inf < lower < upper < np.inf:
@@ -85,7 +85,8 @@ def bounds(sight: Sight, source: Callable[..., Source]) -> Iterator[Bound]:
             yield found
 
 
-def _bound(sight: Sight, source: Callable[..., Source], joint: Joint, middle: float, half: float) -> Bound | None:
+def _bound(sight: SampledMechanism, source: Callable[..., VectorExpression], joint: Joint, middle: float, half: float
+           ) -> JointLimit | None:
     twin = sight.configurations[0].twin
     (place,) = twin.coordinates[joint.name] if joint.type.freedoms == 1 else (None,)
     if place is None:
@@ -100,8 +101,9 @@ def _bound(sight: Sight, source: Callable[..., Source], joint: Joint, middle: fl
         for (one, start), (two, end) in product(known.points(joint.predecessor), known.points(joint.successor)):
             offsets = np.einsum("ij,ij->i", two - one, along) - coordinates
             if np.ptp(offsets) < SAME_RELATION:
-                length = sight.carriage.length
-                return Slide(joint.name, axis, Arm(end, start), middle / length + float(offsets[0]), half / length)
+                length = sight.coordinates.length
+                shift = middle / length + float(offsets[0])
+                return SlideLimit(joint.name, axis, LinkVector(end, start), shift, half / length)
     elif joint.type is JointType.REVOLUTE and half < np.pi:
         for (one, first), (two, second) in product(known.arms(joint.predecessor), known.arms(joint.successor)):
             cosine, sine = _turned(one, two, along)
@@ -109,7 +111,7 @@ def _bound(sight: Sight, source: Callable[..., Source], joint: Joint, middle: fl
             size = np.hypot(cosine, sine)
             apart = [wrap_angle(x - offsets[0]) for x in offsets]
             if np.max(np.abs(apart)) < SAME_RELATION and np.ptp(size) < FOLLOWED < TURNING_ARM**2 < size[0]:
-                return Turn(joint.name, axis, first, second, middle + offsets[0], half, float(size[0]))
+                return TurnLimit(joint.name, axis, first, second, middle + offsets[0], half, float(size[0]))
     return None
 
 
@@ -117,28 +119,28 @@ def _bound(sight: Sight, source: Callable[..., Source], joint: Joint, middle: fl
 class _Known:
     """Points and vectors of links that the pose decides, with their values at the configurations seen."""
 
-    sight: Sight
-    of: Callable[..., Source]
+    sight: SampledMechanism
+    of: Callable[..., VectorExpression]
 
-    def source(self, feature: object) -> Source | None:
+    def source(self, feature: object) -> VectorExpression | None:
         try:
             return self.of(feature)
-        except NoChart:
+        except NoLegForm:
             return None
 
-    def points(self, link: str) -> list[tuple[Array, Source]]:
+    def points(self, link: str) -> list[tuple[Array, VectorExpression]]:
         spots = [self.sight.centre(joint, link) for joint in self.sight.mechanism.joints_of(link)]
         return [(self.sight.values(spot), found) for spot in spots if (found := self.source(spot)) is not None]
 
-    def arms(self, link: str) -> Iterator[tuple[Array, Arm]]:
+    def arms(self, link: str) -> Iterator[tuple[Array, LinkVector]]:
         for (one, start), (two, end) in combinations(self.points(link), 2):
-            yield two - one, Arm(end, start)
+            yield two - one, LinkVector(end, start)
         for joint in self.sight.mechanism.joints_of(link):
             if joint.type is JointType.PRISMATIC:
                 axis = axis_of(self.sight.mechanism, joint, "p")
                 found = self.source(axis)
                 if found is not None:
-                    yield self.sight.values(axis), Arm(found)
+                    yield self.sight.values(axis), LinkVector(found)
 
 
 def _turned(one: Field, two: Field, axis: Field) -> tuple[Field, Field]:

@@ -1,5 +1,5 @@
-"""Rules read from the joints of a file: which point or direction is fixed in several links at once, and how those that
-the platform carries follow from its pose.
+"""Where a vector comes from: the pose, a leg that carries it, or both; and rules read from the joints of a file: which
+point or direction is fixed in several links at once, and how those that the platform carries follow from its pose.
 
 A point is fixed in both links of a joint if it lies on the R's axis or is the centre of a U or S; a direction, if the
 joint is a P, or an R or C along it. All of it holds at the zero configuration to ``EXACT``, and hence in motion.
@@ -13,45 +13,89 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector
+from ...geometry.balls import Field, normed
 from ...geometry.lines import distance
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, cross
 from ...kinematics.configuration import ClosedConfiguration
+from ...legs.platform_points import ORIGIN, PlatformPoint
 from ...mechanism import Joint, JointType, Mechanism
 from ...mechanism.legs import LegDecomposition
 from ...tolerances import EXACT, FOLLOWED
-from .carriage import Carriage, Rigid
+from .path_segments import PathCoordinates
+
+
+class NoLegForm(Exception):
+    """Why a pose does not decide what the legs do: the reason, for the answer."""
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class LegVector:
+    """A vector that a limb carries: ``sense`` · its vector + ``offset``."""
+
+    limb: int
+    sense: float
+    offset: Array
+    fitted: bool = False
+
+
+SimpleVector = PlatformPoint | LegVector
+
+
+@dataclass(frozen=True, eq=False)
+class DerivedVector:
+    """The unit vector from ``start`` to ``end``, or of ``axis`` × it."""
+
+    start: SimpleVector
+    end: SimpleVector
+    axis: SimpleVector | None
+
+    @property
+    def fitted(self) -> bool:
+        """Whether one of its parts was."""
+        return any(part is not None and part.fitted for part in (self.start, self.end, self.axis))
+
+
+VectorExpression = PlatformPoint | LegVector | DerivedVector
+
+
+def value_of(each: VectorExpression, p: Field, R: Field, carried: Sequence[Field]) -> Field:
+    if isinstance(each, PlatformPoint):
+        return each.value(p, R)
+    if isinstance(each, LegVector):
+        return np.asarray(each.sense * carried[each.limb] + each.offset)
+    along = value_of(each.end, p, R, carried) - value_of(each.start, p, R, carried)
+    return normed(along if each.axis is None else cross(value_of(each.axis, p, R, carried), along))
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedLink:
     """A link that the pose carries: the rule of its ``anchor`` (3,) (at zero, characteristic lengths), and whether it
     turns with the platform (True), not at all (False), or otherwise (None)."""
 
-    rule: Rigid
+    rule: PlatformPoint
     anchor: Array
     turns: bool | None
 
 
 @dataclass(frozen=True, eq=False)
-class Derived:
+class JointRules:
     """What the joints of a mechanism say of its points and directions; ``bodies``: links that the pose carries."""
 
     mechanism: Mechanism
     length: float
-    bodies: Mapping[str, Body]
+    bodies: Mapping[str, CarriedLink]
 
     @classmethod
-    def of(cls, anatomy: LegDecomposition, carriage: Carriage, configurations: Sequence[ClosedConfiguration]
-           ) -> Derived:
+    def of(cls, anatomy: LegDecomposition, coordinates: PathCoordinates, configurations: Sequence[ClosedConfiguration]
+           ) -> JointRules:
         """The base, and the platform's links from joint to joint. Which of these turn is seen at configurations; that
         the joints between them allow it follows from the joints."""
-        mechanism, length, link = anatomy.mechanism, carriage.length, carriage.motion.link
+        mechanism, length, link = anatomy.mechanism, coordinates.length, coordinates.motion.link
         frame = mechanism.links[link].pose
-        anchor = (frame[:3, :3] @ carriage.motion.point + frame[:3, 3]) / length
-        follows = Rigid(True, np.zeros(3), np.zeros(3))
-        bodies = {mechanism.base: Body(Rigid(False, np.zeros(3), np.zeros(3)), np.zeros(3), False)}
+        anchor = (frame[:3, :3] @ coordinates.motion.point + frame[:3, 3]) / length
+        bodies = {mechanism.base: CarriedLink(PlatformPoint(False, np.zeros(3), np.zeros(3)), np.zeros(3), False)}
         known = cls(mechanism, length, bodies)
-        bodies[link] = Body(follows, anchor, _turns(mechanism, link, carriage, configurations))
+        bodies[link] = CarriedLink(ORIGIN, anchor, _turns(mechanism, link, coordinates, configurations))
         reached = [link]
         for one in reached:
             for joint in mechanism.joints_of(one):
@@ -59,12 +103,12 @@ class Derived:
                 if other in anatomy.platform and other not in bodies and _points(joint):
                     rule = known.point(one, joint.point / length)
                     if rule is not None:
-                        turns = _turns(mechanism, other, carriage, configurations)
-                        bodies[other] = Body(rule, joint.point / length, turns)
+                        turns = _turns(mechanism, other, coordinates, configurations)
+                        bodies[other] = CarriedLink(rule, joint.point / length, turns)
                         reached.append(other)
         return known
 
-    def rule(self, feature: NamedVector) -> Rigid | None:
+    def rule(self, feature: NamedVector) -> PlatformPoint | None:
         """The rule of a point or direction, where a link that the pose carries holds it too."""
         if isinstance(feature, BodyPoint):
             x = self.zero(feature)
@@ -74,12 +118,12 @@ class Derived:
             d = self.zero(feature)
             turns = [self.bodies[link].turns for link in self.holders(feature) if link in self.bodies]
             if False in turns:
-                return Rigid(False, np.zeros(3), d)
+                return PlatformPoint(False, np.zeros(3), d)
             if True in turns:
-                return Rigid(False, self._turned(d), np.zeros(3))
+                return PlatformPoint(False, self._turned(d), np.zeros(3))
         return None
 
-    def point(self, link: str, x: Array) -> Rigid | None:
+    def point(self, link: str, x: Array) -> PlatformPoint | None:
         """The rule of a point (3,) (at zero, characteristic lengths) of a link that the pose carries."""
         body = self.bodies[link]
         arm = x - body.anchor
@@ -88,7 +132,7 @@ class Derived:
         if body.turns is None:
             return None
         turned, constant = (self._turned(arm), np.zeros(3)) if body.turns else (np.zeros(3), arm)
-        return Rigid(body.rule.follows, body.rule.turned + turned, body.rule.constant + constant)
+        return PlatformPoint(body.rule.follows, body.rule.turned + turned, body.rule.constant + constant)
 
     def zero(self, feature: BodyPoint | BodyVector) -> Array:
         """A point (characteristic lengths) or direction at the zero configuration."""
@@ -143,11 +187,11 @@ def _same_direction(joint: Joint, d: Array) -> bool:
     return along and bool(np.linalg.norm(np.cross(joint.axis, d)) <= EXACT)
 
 
-def _turns(mechanism: Mechanism, link: str, carriage: Carriage, configurations: Sequence[ClosedConfiguration]
+def _turns(mechanism: Mechanism, link: str, coordinates: PathCoordinates, configurations: Sequence[ClosedConfiguration]
            ) -> bool | None:
-    zero, platform = mechanism.links[link].pose[:3, :3], mechanism.links[carriage.motion.link].pose[:3, :3]
+    zero, platform = mechanism.links[link].pose[:3, :3], mechanism.links[coordinates.motion.link].pose[:3, :3]
     turns = np.array([at.pose(link)[:3, :3] @ zero.T for at in configurations])
     if np.max(np.abs(turns - np.eye(3))) < FOLLOWED:
         return False
-    with_it = np.array([at.pose(carriage.motion.link)[:3, :3] @ platform.T for at in configurations])
-    return True if carriage.turning and np.max(np.abs(turns - with_it)) < FOLLOWED else None
+    with_it = np.array([at.pose(coordinates.motion.link)[:3, :3] @ platform.T for at in configurations])
+    return True if coordinates.turning and np.max(np.abs(turns - with_it)) < FOLLOWED else None

@@ -15,6 +15,7 @@ import numpy as np
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
+from ..legs.platform_points import PlatformPoint
 from ..tolerances import SAME_DIRECTION, SAME_GEOMETRY
 
 Frames = Mapping[str, Array]
@@ -22,7 +23,7 @@ Frames = Mapping[str, Array]
 
 
 @dataclass(frozen=True, eq=False)
-class Body:
+class PlatformLink:
     """A link that goes with the platform: its origin is p + R b + c, its rotation R Q (``turns``) or Q."""
 
     turns: bool
@@ -30,38 +31,46 @@ class Body:
     b: Array
     c: Array
 
-    def point(self, place: Array) -> tuple[Array, Array]:
-        """b and c of a point that the link's frame has at ``place`` (3,)."""
+    def point(self, place: Array) -> PlatformPoint:
+        """A point that the link's frame has at ``place`` (3,)."""
         moved = self.Q @ place
-        return (self.b + moved, self.c) if self.turns else (self.b, self.c + moved)
+        b, c = (self.b + moved, self.c) if self.turns else (self.b, self.c + moved)
+        return PlatformPoint(True, b, c)
+
+    def poses(self, p: Array, R: Array) -> Array:
+        """Its poses (n, 4, 4) at poses (n, 3), (n, 3, 3) of the platform."""
+        X = np.tile(np.eye(4), (len(p), 1, 1))
+        X[:, :3, 3] = p + R @ self.b + self.c
+        X[:, :3, :3] = R @ self.Q if self.turns else self.Q
+        return X
 
 
 @dataclass(frozen=True, eq=False)
-class Stage:
+class PlatformCoordinates:
     """The platform: its reference point, a basis of its twists, the links that go with it.
 
-    ``shifts`` (3, k) and ``spins`` (3, m) are orthonormal: the twist with coordinates (x, y) is the velocity
-    ``shifts`` x of the point and the angular velocity ``spins`` y. Where not every one of these twists is one of the
-    platform's (``constant`` is false), the legs say at each pose which are.
+    ``translations`` (3, k) and ``rotations`` (3, m) are orthonormal: the twist with coordinates (x, y) is the velocity
+    ``translations`` x of the point and the angular velocity ``rotations`` y. Where not every one of these twists is one
+    of the platform's (``constant`` is false), the legs say at each pose which are.
     """
 
     link: str
     point: Array
-    shifts: Array
-    spins: Array
-    bodies: Mapping[str, Body]
+    translations: Array
+    rotations: Array
+    links: Mapping[str, PlatformLink]
     dof: int
 
     @property
     def constant(self) -> bool:
         """Whether the platform has the same twists at every pose."""
-        return int(self.shifts.shape[1] + self.spins.shape[1]) == self.dof
+        return int(self.translations.shape[1] + self.rotations.shape[1]) == self.dof
 
     @property
     def twists(self) -> Array:
         """The basis (6, d), along the base frame's axes where these span it: linear rows are the velocity of the
         point."""
-        shifts, spins, zero = _along_axes(self.shifts), _along_axes(self.spins), np.zeros((3, 3))
+        shifts, spins, zero = _along_axes(self.translations), _along_axes(self.rotations), np.zeros((3, 3))
         return np.block([[shifts, zero[:, : spins.shape[1]]], [zero[:, : shifts.shape[1]], spins]])
 
     def place(self, X: Array) -> tuple[Array, Array]:
@@ -70,8 +79,8 @@ class Stage:
         return X[:, :3, 3] + R @ self.point if self.point.any() else X[:, :3, 3], R
 
     @classmethod
-    def of(cls, motion: PlatformMotion, frames: Frames, names: Sequence[str], length: float) -> Stage:
-        """The stage of a platform and those of the links ``names`` that go with it."""
+    def of(cls, motion: PlatformMotion, frames: Frames, names: Sequence[str], length: float) -> PlatformCoordinates:
+        """Those of a platform, and those of the links ``names`` that go with it."""
         X = frames[motion.link]
         p = X[:, :3, 3] + X[:, :3, :3] @ motion.point
         found = {name: body for name in names if motion.body
@@ -86,7 +95,7 @@ def _along_axes(basis: Array) -> Array:
     return np.eye(3)[:, kept] if np.max(np.abs(onto - np.diag(kept)), initial=0.0) < SAME_DIRECTION else basis
 
 
-def _body(p: Array, R: Array, X: Array, length: float) -> Body | None:
+def _body(p: Array, R: Array, X: Array, length: float) -> PlatformLink | None:
     """The law that a link's frames (m, 4, 4) obey, or None."""
     eye = np.broadcast_to(np.eye(3), R.shape)
     for turns, Q in ((True, R[0].T @ X[0, :3, :3]), (False, X[0, :3, :3])):
@@ -96,7 +105,7 @@ def _body(p: Array, R: Array, X: Array, length: float) -> Body | None:
         away = (X[:, :3, 3] - p).ravel()
         b, c = np.linalg.lstsq(rows, away, rcond=SAME_GEOMETRY)[0].reshape(2, 3)
         if np.max(np.abs(rows @ np.concatenate([b, c]) - away)) <= SAME_GEOMETRY * length:
-            return Body(turns, Q, b, c)
+            return PlatformLink(turns, Q, b, c)
     return None
 
 

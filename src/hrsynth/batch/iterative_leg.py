@@ -20,7 +20,7 @@ from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg
 from ..mechanism.observation import Direction
 from ..tolerances import CLOSED, RANK_CUTOFF, SOLVED
-from .stage import Stage
+from .platform_coordinates import PlatformCoordinates
 
 ITERATIONS = 25
 """Steps at the end of the way to a pose."""
@@ -96,7 +96,7 @@ class Ties:
 
 
 @dataclass(frozen=True, eq=False)
-class Chain:
+class IterativeLeg:
     """A leg between the base and the link on which it ends.
 
     ``links`` are the base, the end, then the leg's own; ``free`` numbers those whose poses are sought. Where the end is
@@ -113,7 +113,7 @@ class Chain:
     length: float
 
     @classmethod
-    def of(cls, mechanism: Mechanism, leg: Leg, seen: Direction, point: Array | None) -> Chain:
+    def of(cls, mechanism: Mechanism, leg: Leg, seen: Direction, point: Array | None) -> IterativeLeg:
         """The chain of a leg; ``point`` where the platform is a point body."""
         own = [link for link in dict.fromkeys((*leg.links, seen.link)) if link not in (mechanism.base, leg.attach)]
         links = (mechanism.base, leg.attach, *own)
@@ -140,7 +140,7 @@ class Chain:
         """The zero configuration, n times."""
         return np.repeat(self.zero[None], n, axis=0)
 
-    def led(self, X: Array, ends: Array, iterations: int) -> tuple[Array, Array]:
+    def closed(self, X: Array, ends: Array, iterations: int) -> tuple[Array, Array]:
         """States nearest to X (n, links, 4, 4) with the end at ``ends`` (n, 4, 4), characteristic lengths, and the
         residuals left (n,), infinite where a joint's axis has turned over."""
         X = X.copy()
@@ -181,48 +181,48 @@ class Chain:
         _, s, right = np.linalg.svd(np.concatenate([wrenches, np.zeros((len(X), 6, 6))], axis=1), full_matrices=False)
         return u, minus @ twists[:, number, 3:], right * (s > RANK_CUTOFF)[:, :, None]
 
-    def led_from_zero(self, stage: Stage, home: Array, X: Array, span: Array) -> Ends:
-        """The chain at platform poses X (n, 4, 4), led there from ``home`` in small steps, all poses abreast."""
-        p, R = stage.place(X)
-        (p0,), (R0,) = stage.place(home[None])
-        turn = logarithm(R @ R0.T) if self.turns(stage) else np.zeros_like(p)
+    def followed_from_zero(self, coordinates: PlatformCoordinates, home: Array, X: Array, span: Array
+                           ) -> IterativeLegStates:
+        """The chain at platform poses X (n, 4, 4), followed from ``home`` in small steps, all poses abreast."""
+        p, R = coordinates.place(X)
+        (p0,), (R0,) = coordinates.place(home[None])
+        turn = logarithm(R @ R0.T) if self.turns(coordinates) else np.zeros_like(p)
         far = np.max(np.linalg.norm(p - p0, axis=1) / self.length + np.linalg.norm(turn, axis=1), initial=0.0)
         steps = max(1, int(np.ceil(far / STRIDE)))
         state, residual = self.start(len(X)), np.zeros(len(X))
         for step in range(1, steps + 1):
             part = step / steps
-            there = self.end(stage, p0 + part * (p - p0), exponential(part * turn) @ R0 if step < steps else R)
-            state, residual = self.led(state, there, ITERATIONS if step == steps else CHAIN_STEPS)
-        return Ends(self, stage, state, residual, R, span)
+            there = self.end(coordinates, p0 + part * (p - p0), exponential(part * turn) @ R0 if step < steps else R)
+            state, residual = self.closed(state, there, ITERATIONS if step == steps else CHAIN_STEPS)
+        return IterativeLegStates(self, coordinates, state, residual, R, span)
 
-    def turns(self, stage: Stage) -> bool:
+    def turns(self, coordinates: PlatformCoordinates) -> bool:
         """Whether the end's rotation is given."""
-        return self.end_link in stage.bodies
+        return self.end_link in coordinates.links
 
     @property
     def end_link(self) -> str:
         """The link on which the chain ends."""
         return self.links[1]
 
-    def end(self, stage: Stage, p: Array, R: Array) -> Array:
+    def end(self, coordinates: PlatformCoordinates, p: Array, R: Array) -> Array:
         """Poses (n, 4, 4) of what the platform gives: the end, or its point; characteristic lengths."""
+        link = coordinates.links.get(self.end_link)
+        if link is not None:
+            X = link.poses(p, R)
+            X[:, :3, 3] /= self.length
+            return X
         X = np.tile(np.eye(4), (len(p), 1, 1))
-        body = stage.bodies.get(self.end_link)
-        if body is None:
-            X[:, :3, 3] = p / self.length
-            X[:, :3, :3] = self.zero[-1, :3, :3]
-        else:
-            X[:, :3, 3] = (p + R @ body.b + body.c) / self.length
-            X[:, :3, :3] = R @ body.Q if body.turns else body.Q
+        X[:, :3, 3], X[:, :3, :3] = p / self.length, self.zero[-1, :3, :3]
         return X
 
 
 @dataclass(frozen=True, eq=False)
-class Ends:
+class IterativeLegStates:
     """A chain at n poses of its end; ``span`` (6, D) are the platform's twists (m, rad)."""
 
-    chain: Chain
-    stage: Stage
+    leg: IterativeLeg
+    coordinates: PlatformCoordinates
     state: Array
     residual: Array
     R: Array
@@ -230,19 +230,19 @@ class Ends:
 
     @cached_property
     def _answers(self) -> tuple[Array, Array, Array]:
-        return self.chain.answers(self.state)
+        return self.leg.answers(self.state)
 
     @cached_property
     def _motions(self) -> Array:
         """The end's twists (n, 6, D), characteristic lengths, for those of the platform."""
         v, w = self.span[:3], self.span[3:]
-        body = self.stage.bodies.get(self.chain.end_link)
+        body = self.coordinates.links.get(self.leg.end_link)
         moves = np.broadcast_to(v, (len(self.R), *v.shape))
         if body is None:
-            return np.concatenate([moves / self.chain.length, np.zeros_like(moves)], axis=1)
+            return np.concatenate([moves / self.leg.length, np.zeros_like(moves)], axis=1)
         moves = moves - hat(self.R @ body.b) @ w
         turns = np.broadcast_to(w if body.turns else np.zeros_like(w), moves.shape)
-        return np.concatenate([moves / self.chain.length, turns], axis=1)
+        return np.concatenate([moves / self.leg.length, turns], axis=1)
 
     def rows(self) -> tuple[Array, Array, NDArray[np.bool_]]:
         """u (3, n), the leg's rows of Mᵀ (3, D, n), and where the leg closes."""

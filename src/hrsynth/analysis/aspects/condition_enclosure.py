@@ -14,21 +14,20 @@ from ...budgets import FINEST_INTERVAL, FIRST_INTERVALS
 from ...constraints.condition import Named, rows
 from ...geometry.balls import Field, above_zero, balls, below, centred, finite, jets
 from ...geometry.vectors import Array, cross, dot, triple
-from .carriage import Stretch
-from .chart import Chart
-from .crossing import Crossing
+from .leg_forms import LegForms
+from .path_segments import StraightSegment, WorkingModeChange
 
-Way = Stretch | Crossing
+PathSegment = StraightSegment | WorkingModeChange
 Leading = tuple[int, Field] | None
 
 
 @dataclass(frozen=True, eq=False)
-class Reading:
+class ConditionEnclosure:
     """The value of the condition at poses: of a signed condition its expression, else the smallest singular value of
     its rows (of balls, a lower bound of it)."""
 
     condition: Named
-    chart: Chart
+    forms: LegForms
 
     @property
     def signed(self) -> bool:
@@ -36,24 +35,24 @@ class Reading:
         return sign_of(self.condition)
 
     @property
-    def unlimited(self) -> Reading:
+    def unlimited(self) -> ConditionEnclosure:
         """The same without joint limits."""
-        return replace(self, chart=replace(self.chart, bounds=()))
+        return replace(self, forms=replace(self.forms, bounds=()))
 
     def raw(self, p: Field, R: Field, leading: Leading = None) -> tuple[Field, Field]:
         """Reserves (n, limbs) and the expression (n,) of a condition with a sign, for numbers, balls or jets."""
-        found = self.chart.at(p, R, leading)
+        found = self.forms.at(p, R, leading)
         names, run = _compiled(self.condition.expression)
-        return found.reserves, run(*(found.values[name] for name in names))
+        return found.reach_margins, run(*(found.values[name] for name in names))
 
     def at(self, p: Field, R: Field, leading: Leading = None) -> tuple[NDArray[np.bool_], Field]:
         """Whether all legs reach, (n,), and the value, (n,), at poses (n, 3), (n, 3, 3); NaN or no number where they
-        do not; ``leading`` as for :meth:`Chart.at`."""
+        do not; ``leading`` as for :meth:`LegForms.at`."""
         if self.signed:
-            reserves, value = self.raw(p, R, leading)
-            return np.asarray(above_zero(reserves).all(axis=1)), value
-        found = self.chart.at(p, R, leading)
-        reached = np.asarray(above_zero(found.reserves).all(axis=1))
+            reach_margins, value = self.raw(p, R, leading)
+            return np.asarray(above_zero(reach_margins).all(axis=1)), value
+        found = self.forms.at(p, R, leading)
+        reached = np.asarray(above_zero(found.reach_margins).all(axis=1))
         if p.dtype == object:
             return reached, np.array([_weakest({name: value[i : i + 1] for name, value in found.values.items()},
                                                self.condition) if reached[i] else 0.0 for i in range(len(p))])
@@ -62,7 +61,7 @@ class Reading:
         values[reached] = np.linalg.svd(blocks[reached], compute_uv=False)[:, -1]
         return reached, values
 
-    def bounds(self, way: Way, low: Array, high: Array) -> Array:
+    def bounds(self, way: PathSegment, low: Array, high: Array) -> Array:
         """Lower bounds of |value| on intervals of a way, (n,); 0 where reach or value is not proved. Where a value
         holds zero its mean value form is tried, which is sharper on short intervals."""
         boxes = balls(low, high)
@@ -103,7 +102,7 @@ class Proof:
     boxes: int
 
 
-def prove(reading: Reading, way: Way, budget: int) -> Proof:
+def prove(enclosure: ConditionEnclosure, way: PathSegment, budget: int) -> Proof:
     """Enclose reach and value along a way by bisection with at most ``budget`` intervals.
 
     Given up as soon as a midpoint is out of reach or lies on the other side, or an interval is too short.
@@ -113,13 +112,13 @@ def prove(reading: Reading, way: Way, budget: int) -> Proof:
     side, margin, boxes = 0.0, np.inf, 0
     while len(low):
         middle = (low + high) / 2
-        reached, values = reading.at(*way.at(middle))
+        reached, values = enclosure.at(*way.at(middle))
         sides = np.sign(values)
         side = side or float(sides[0])
         if not reached.all() or np.any(sides != side) or side == 0 or boxes + len(low) > budget:
             return Proof(False, 0.0, boxes)
         boxes += len(low)
-        bounds = reading.bounds(way, low, high)
+        bounds = enclosure.bounds(way, low, high)
         done = bounds > 0
         margin = min(margin, float(np.min(bounds[done], initial=np.inf)))
         low, high, middle = low[~done], high[~done], middle[~done]
@@ -129,12 +128,12 @@ def prove(reading: Reading, way: Way, budget: int) -> Proof:
     return Proof(True, margin, boxes)
 
 
-def enclosed(reading: Reading, p: Array, R: Array) -> tuple[bool, float]:
+def enclosed(enclosure: ConditionEnclosure, p: Array, R: Array) -> tuple[bool, float]:
     """Whether all poses within ``tolerances.FOLLOWED`` of one reach, and a bound of the value with its sign: the point
     of their values that is nearest to zero (0 where zero is among them)."""
-    here = Stretch(p, R, np.zeros(3), np.zeros(3))
-    reached, values = reading.at(*here.at(balls([0.0], [0.0])))
-    _, middle = reading.at(*here.at(np.zeros(1)))
+    here = StraightSegment(p, R, np.zeros(3), np.zeros(3))
+    reached, values = enclosure.at(*here.at(balls([0.0], [0.0])))
+    _, middle = enclosure.at(*here.at(np.zeros(1)))
     return bool(reached[0]), float(np.sign(middle[0]) * below(values)[0])
 
 

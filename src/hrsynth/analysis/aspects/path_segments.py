@@ -1,0 +1,197 @@
+"""The poses that a path runs through: which point of the platform, whether its turn counts; and its parts, straight
+segments and changes of working mode.
+
+Lengths in characteristic lengths, base axes. A *pose* is (p, R): the position of the point and the platform's rotation
+(the identity where the turn does not count). A leg changes its working mode on a way out to where its rod and its crank
+or rail are at their limit, and back to the same pose; there the leg leads and the platform follows without turning.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...geometry.balls import Field, widened
+from ...geometry.so3 import exponential, logarithm
+from ...geometry.vectors import Array, cross, hat, inverse
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.platform_motion import PlatformMotion
+from ...kinematics.relation import Measurement, relation
+from ...legs.closed_forms import ClosedFormLeg, OnCrank, OnRail
+from ...legs.platform_points import PlatformPoint
+from ...mechanism.legs import LegDecomposition
+from ...tolerances import FOLLOWED
+
+Place = tuple[Array, Array]
+"""A pose: the point (3,) and the platform's rotation (3, 3)."""
+
+
+@dataclass(frozen=True, eq=False)
+class PathCoordinates:
+    """What changes in a platform's pose: the position of a point, along ``motion.translations``, and its turn, by
+    ``motion.rotations``, where ``turning``; together as many as the robot has freedoms."""
+
+    motion: PlatformMotion
+    turning: bool
+    length: float
+
+    def of(self, configurations: Sequence[ClosedConfiguration]) -> tuple[Array, Array]:
+        """The poses (n, 3) and (n, 3, 3) at configurations."""
+        frames = np.array([at.pose(self.motion.link) for at in configurations])
+        p = frames[:, :3, :3] @ self.motion.point + frames[:, :3, 3]
+        R = frames[:, :3, :3] if self.turning else np.broadcast_to(np.eye(3), (len(p), 3, 3))
+        return p / self.length, R
+
+    def frame(self, p: Array, R: Array) -> Array:
+        """X_BP (4, 4), metres, of a pose whose turn counts."""
+        X = np.eye(4)
+        X[:3, :3], X[:3, 3] = R, self.length * p - R @ self.motion.point
+        return X
+
+
+def path_coordinates(anatomy: LegDecomposition, question: Measurement, dof: int,
+                     configurations: Sequence[ClosedConfiguration]) -> Iterator[PathCoordinates]:
+    """The whole pose of the platform where its parts are independent, then the positions of joint centres on it that
+    have all of the robot's freedoms."""
+    mechanism = anatomy.mechanism
+    X_PB = inverse(mechanism.links[mechanism.platform].pose)
+    centres = [(X_PB @ np.append(joint.point, 1.0))[:3] for joint in mechanism.joints_of(mechanism.platform)]
+    for point in (question.point, *centres):
+        asked = replace(question, point=point, observations=())
+        if any(relation(at, asked).dof.value != dof for at in configurations):
+            continue
+        motion = PlatformMotion.of(configurations, asked)
+        shifts, spins = motion.translations.shape[1], motion.rotations.shape[1]
+        if motion.twists.shape[1] == shifts + spins == dof and spins in (0, 1, 3):
+            yield PathCoordinates(motion, motion.body, configurations[0].twin.length)
+
+
+@dataclass(frozen=True, eq=False)
+class StraightSegment:
+    """A way between two poses: the point on a straight line, the platform about one axis; λ from 0 to 1."""
+
+    p: Array
+    R: Array
+    shift: Array
+    turn: Array
+
+    @classmethod
+    def between(cls, one: tuple[Array, Array], two: tuple[Array, Array]) -> StraightSegment:
+        """The way from a pose (3,), (3, 3) to another."""
+        return cls(*one, two[0] - one[0], logarithm(two[1] @ one[1].T))
+
+    def at(self, fractions: Field) -> tuple[Field, Field]:
+        """Poses (n, 3), (n, 3, 3) at fractions (n,); of balls, with all poses nearer than ``FOLLOWED``."""
+        p = self.p + fractions[:, None] * self.shift
+        angle = float(np.linalg.norm(self.turn))
+        R: Field = np.broadcast_to(self.R, (len(fractions), 3, 3))
+        if angle > 0:
+            K = hat(self.turn / angle)
+            sines, cosines = np.sin(fractions * angle), np.cos(fractions * angle)
+            R = self.R + sines[:, None, None] * (K @ self.R) + (1 - cosines)[:, None, None] * (K @ K @ self.R)
+        if p.dtype == object:
+            R = R.astype(object)
+        return widened(p, FOLLOWED), widened(R, FOLLOWED)
+
+    @property
+    def end(self) -> tuple[Array, Array]:
+        """The pose at λ = 1."""
+        return self.p + self.shift, exponential(self.turn) @ self.R
+
+
+def poses_between(p: Array, R: Array, q: Array, S: Array, fractions: Array) -> tuple[Array, Array, Array]:
+    """Poses (n, k, 3), (n, k, 3, 3) on the ways from poses (p, R) to (q, S), (n, 3) and (n, 3, 3), at fractions (k,);
+    and the ways' lengths (n,) (characteristic lengths, radians)."""
+    turns = logarithm(S @ R.transpose(0, 2, 1))
+    places = p[:, None] + fractions[:, None] * (q - p)[:, None]
+    turned = exponential(fractions[:, None] * turns[:, None]) @ R[:, None]
+    return places, turned, np.hypot(np.linalg.norm(q - p, axis=1), np.linalg.norm(turns, axis=1))
+
+
+@dataclass(frozen=True, eq=False)
+class TurningVector:
+    """A vector that turns about a unit ``axis`` from ``first`` by ``angle``."""
+
+    first: Array
+    axis: Array
+    angle: float
+
+    @classmethod
+    def between(cls, one: Array, two: Array, axis: Array) -> TurningVector:
+        """From a vector to another with the same part along the axis."""
+        flat = one - axis * float(axis @ one)
+        return cls(one, axis, float(np.arctan2(axis @ np.cross(flat, two), flat @ two - (axis @ two) * (axis @ flat))))
+
+    def at(self, fractions: Field) -> Field:
+        """The vectors (n, 3) at fractions (n,) of the turn."""
+        along = self.axis * float(self.axis @ self.first)
+        flat = self.first - along
+        angles = fractions * self.angle
+        aside = cross(self.axis, flat)
+        return np.asarray(along + np.cos(angles)[:, None] * flat + np.sin(angles)[:, None] * aside)
+
+
+@dataclass(frozen=True, eq=False)
+class WorkingModeChange:
+    """A limb's way through its limit at one pose: the foot of its rod turns about ``centre`` or moves straight from one
+    working mode's place to the other's, its rod turns, the platform keeps its turn ``R``; λ from 0 to 1."""
+
+    place: Place
+    limb: int
+    leg: str
+    tip: PlatformPoint
+    rod: TurningVector
+    foot: TurningVector | tuple[Array, Array]
+    centre: Array
+
+    @property
+    def p(self) -> Array:
+        """The point's position at both ends."""
+        return self.place[0]
+
+    @property
+    def R(self) -> Array:
+        """The platform's turn all along."""
+        return self.place[1]
+
+    @property
+    def end(self) -> Place:
+        """The pose at λ = 1, the same as at λ = 0."""
+        return self.place
+
+    def at(self, fractions: Field) -> tuple[Field, Field, tuple[int, Field]]:
+        """Poses (n, 3), (n, 3, 3) at fractions (n,), and the leading limb with the vector that it carries."""
+        if isinstance(self.foot, TurningVector):
+            carried = self.centre + self.foot.at(fractions)
+        else:
+            carried = self.foot[0] + fractions[:, None] * (self.foot[1] - self.foot[0])
+        carried = widened(carried, FOLLOWED)
+        p = carried + self.rod.at(fractions) - (self.tip.constant + self.R @ self.tip.turned)
+        R: Field = np.broadcast_to(self.R, (len(fractions), 3, 3))
+        return widened(p, FOLLOWED), widened(R.astype(p.dtype), FOLLOWED), (self.limb, carried)
+
+
+def mode_change(coordinates: PathCoordinates, limb: ClosedFormLeg, number: int, place: Place
+                ) -> WorkingModeChange | None:
+    """The way of limb ``number`` to its other working mode at a pose; None where it has none in the platform's motion.
+
+    Where the platform's point moves in a plane only, the crank turns and the rod swings in that plane.
+    """
+    if not isinstance(limb, OnCrank | OnRail) or not (limb.tip.follows and coordinates.turning):
+        return None
+    tip = limb.tip.value(place[0][None], place[1][None])
+    ends = [limb.solve(tip, sign * limb.mode)[1][0] for sign in (1.0, -1.0)]
+    rods = [tip[0] - end for end in ends]
+    axis = limb.axis if isinstance(limb, OnCrank) else np.cross(*rods)
+    axis = axis / max(float(np.linalg.norm(axis)), FOLLOWED)
+    shifts = coordinates.motion.translations
+    if shifts.shape[1] < 2 or (shifts.shape[1] == 2 and np.linalg.norm(axis @ shifts) > FOLLOWED):
+        return None
+    rod = TurningVector.between(rods[0], rods[1], axis)
+    if isinstance(limb, OnRail):
+        return WorkingModeChange(place, number, limb.label, limb.tip, rod, (ends[0], ends[1]), np.zeros(3))
+    spokes = [end - limb.centre for end in ends]
+    crank = TurningVector.between(spokes[0], spokes[1], axis)
+    return WorkingModeChange(place, number, limb.label, limb.tip, rod, crank, limb.centre)

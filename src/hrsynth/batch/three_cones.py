@@ -1,0 +1,113 @@
+"""Bounds of the largest error for three cones and more.
+
+E(w) = Σ √(wᵀ B_i w) is sought over unit w. Any w gives a lower bound; the ascent w ← Σ B_i w / √(wᵀ B_i w), normalised,
+never makes E smaller (E is convex). Any weights t give the upper bound (1) of ``cones``, √λmax(Σ B_i / t_i). The least
+of the upper bounds is the maximum of the concave
+
+    F(Z) = Σ √tr(B_i Z)   over Z ⪰ 0 of trace one,                                                               (2)
+
+of which E is the part Z = w wᵀ of rank one. So each round takes the weights t_i = √tr(B_i Z) / F(Z), at which (1) is
+the best that this Z tells, and goes from Z towards w wᵀ, w the eigenvector of (1), which is where F rises most (Frank
+and Wolfe), as far as F rises. It ends where the bounds meet; where the maximum of (2) has a higher rank than one they
+do not, and both are told: the truth lies between.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ..geometry.components import Components, dot, scaled, sqrt, times, where
+from ..tolerances import CONES_TIGHT
+from .cones import error_along, larger, largest_eigenvalue, positive, trace_root
+from .program import Program
+
+ASCENT = 10
+"""Steps of the ascent from each of its starts; four times as many follow from the best end."""
+ROUNDS = 30
+"""Rounds in which the upper bound is lowered."""
+BISECTIONS = 10
+"""Halvings with which the way of a round is found."""
+
+
+def trace_three(program: Program, forms: list[str], go: str, name: str) -> None:
+    """Add the upper and the lower bound ``name`` at poses where the flag ``go`` is positive."""
+    k = len(forms)
+    w, best, terms, upper, open_ = (f"{name}_{part}" for part in ("w", "best", "terms", "upper", "open"))
+
+    def start(*given: Components) -> dict[str, Components]:
+        B, (on,) = given[:k], given[k:]
+        return {w: largest_eigenvalue(weighted(B, [1.0 / positive(trace_root(each)) for each in B]))[1],
+                best: [1.0, 0.0, 0.0, -1.0], open_: on}
+
+    def compare(*given: Components) -> dict[str, Components]:
+        """Keep the better end with its E."""
+        B, here, before = given[:k], given[k], given[k + 1]
+        total = sum(error_along(each, here) for each in B)
+        return {best: [where(total > before[3], x, y) for x, y in zip([*here, total], before, strict=True)]}
+
+    def ascend(*given: Components) -> dict[str, Components]:
+        return {w: _ascent(given[:k], given[k]), open_: given[k + 1]}
+
+    def primal(*given: Components) -> dict[str, Components]:
+        B, here = given[:k], given[k]
+        return {terms: [error_along(each, here[:3]) for each in B], upper: [float("inf")]}
+
+    def round_(*given: Components) -> dict[str, Components]:
+        made = _round(given[:k], given[k][3], *given[k + 1 :])
+        return dict(zip((terms, upper, open_), made, strict=True))
+
+    with program.where(go):
+        program.apply(start, *forms, go, state=(w, best, open_))
+        for axis in (None, [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]):
+            if axis is not None:
+                program.apply(lambda axis=axis: {w: axis})
+            program.repeat(ascend, ASCENT, forms, (w, open_))
+            program.apply(compare, *forms, w, best)
+        program.apply(lambda best: {w: best[:3]}, best)
+        program.repeat(ascend, 4 * ASCENT, forms, (w, open_))
+        program.apply(compare, *forms, w, best)
+        program.apply(primal, *forms, w, state=(terms, upper))
+        program.repeat(round_, ROUNDS, (*forms, best), (terms, upper, open_))
+        program.apply(lambda upper, best: {name: [larger(upper[0], best[3]), best[3]]}, upper, best)
+
+
+def weighted(B: tuple[Components, ...], weights: Components) -> list[Any]:
+    """Σ weight_i B_i."""
+    return [sum(weight * form[j] for weight, form in zip(weights, B, strict=True)) for j in range(6)]
+
+
+def _ascent(B: tuple[Components, ...], w: Components) -> list[Any]:
+    """One step, w ← Σ B_i w / √(wᵀ B_i w), normalised."""
+    pull: Any = [0.0, 0.0, 0.0]
+    for form in B:
+        gain = error_along(form, w)
+        share = where(gain > 0.0, 1.0, 0.0) / positive(gain)
+        pull = [x + y for x, y in zip(pull, scaled(share, times(form, w)), strict=True)]
+    size = sqrt(dot(pull, pull))
+    return [where(size > 0.0, x / positive(size), y) for x, y in zip(pull, w, strict=True)]
+
+
+def _round(B: tuple[Components, ...], lower: Any, terms: Components, upper: Components, _: Components
+           ) -> tuple[Components, Components, Components]:
+    """One round: √tr(B_i Z) of the next Z, the least upper bound so far, 1 where it may become smaller yet."""
+    floor = 1e-12 * sum(terms) + 1e-300
+    roots = [larger(term, floor) for term in terms]
+    total = sum(roots)
+    square, w = largest_eigenvalue(weighted(B, [total / root for root in roots]))
+    bound = sqrt(larger(square, 0.0))
+    bound = where(bound < upper[0], bound, upper[0])
+    here = [root * root for root in roots]
+    rise = [dot(w, times(form, w)) - before for form, before in zip(B, here, strict=True)]
+    share = _way(here, rise)
+    return ([sqrt(larger(before + share * more, 0.0)) for before, more in zip(here, rise, strict=True)], [bound],
+            [where(bound > lower * (1 + CONES_TIGHT), 1.0, 0.0)])
+
+
+def _way(here: Components, rise: Components) -> Any:
+    """The γ of [0, 1] that makes Σ √(here + γ rise) largest, by halving: its slope falls."""
+    low: Any = 0.0
+    for halving in range(1, BISECTIONS + 1):
+        middle = low + 0.5**halving
+        slope = sum(more / sqrt(before + middle * more) for before, more in zip(here, rise, strict=True))
+        low = where(slope > 0.0, middle, low)
+    return low
