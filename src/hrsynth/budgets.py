@@ -145,3 +145,6 @@ PARTS_AHEAD = 3
 """Parts of a build that wait for each thread of a cluster."""
 LARGEST_WORD = 12
 """Legs of a word of the catalog."""
+
+REMEMBERED = 8
+"""Observed robots that are kept for further questions about them."""

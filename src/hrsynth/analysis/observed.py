@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..budgets import REMEMBERED
 from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled, PoseNotReached
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
@@ -65,8 +66,10 @@ class ObservedRobot:
                                  "nothing besides an observed robot")
             return robot
         tell("sampling")
+        listed = [name.strip() for name in observe.split(",")] if isinstance(observe, str) else observe
+        names = None if listed is None else tuple(listed)
         try:
-            return _observed_robot(robot if at is None else _started(robot, at, seed), observe, camera, samples, seed)
+            return _observed_robot(robot if at is None else _started(robot, at, seed), names, camera, samples, seed)
         except (BadMechanism, NotSampled) as error:
             error.file = robot.file
             raise
@@ -206,10 +209,10 @@ def _started(robot: Mechanism, at: Pose | str, seed: int) -> Mechanism:
     raise refused
 
 
-def _observed_robot(robot: Mechanism, observe: Sequence[str] | str | None, camera: str | None, samples: int, seed: int
+@lru_cache(maxsize=REMEMBERED)
+def _observed_robot(robot: Mechanism, observe: tuple[str, ...] | None, camera: str | None, samples: int, seed: int
                     ) -> ObservedRobot:
-    if isinstance(observe, str):
-        observe = [name.strip() for name in observe.split(",")]
+    """The answer to the same words for the same value of a robot is the same value: it is drawn once."""
     if camera is not None:
         if camera not in robot.links:
             raise BadRequest(f"{robot.name} has no link for the camera", camera, sorted(robot.links))
