@@ -59,17 +59,9 @@ NOT_IN_FILES = ["TO" "DO", "FIX" "ME", "/wo" "rk/", "pypi" ".org", "python" "hos
 STILL_TWICE = {
     "Body",
     "Chain",
-    "Joint",
-    "Leg",
     "Limb",
     "Line",
-    "Locus",
-    "Rod",
-    "Sight",
-    "Spread",
     "Stage",
-    "Step",
-    "Word",
 }
 STILL_OUTSIDE: set[str] = set()
 STILL_IN_CIRCLES: set[str] = set()

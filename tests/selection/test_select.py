@@ -24,7 +24,7 @@ from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.vectors import pose, rotation_from_rpy
 from hrsynth.mechanism.pose import Pose
 from hrsynth.selection.select import Candidate, Criteria, Selection, _Work, select
-from hrsynth.selection.sight import Sight, camera_at, hidden
+from hrsynth.selection.sight import CameraView, camera_at, hidden
 from hrsynth.simulation.camera import Camera, cylinders
 
 START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
@@ -171,13 +171,13 @@ def test_sight_sees_what_is_ahead_in_the_picture_and_not_hidden() -> None:
     at = setting.everything.start
     rods = dict(zip(setting.labels, cylinders(setting.mechanism, setting.observed), strict=True))
     below = rotation_from_rpy(0.0, 0.0, 0.0)
-    sight = Sight(Camera(pose([0, 0, -3.0], below)), "base", rods)
+    sight = CameraView(Camera(pose([0, 0, -3.0], below)), "base", rods)
     assert all(part == 1.0 for part in sight.seen(at).values())
-    away = Sight(Camera(pose([0, 0, -3.0], rotation_from_rpy(math.pi, 0, 0))), "base", rods)
+    away = CameraView(Camera(pose([0, 0, -3.0], rotation_from_rpy(math.pi, 0, 0))), "base", rods)
     assert all(part == 0.0 for part in away.seen(at).values())
     level = Camera(pose([-3.0, -3.0, -0.35], rotation_from_rpy(-math.pi / 2, 0, -math.pi / 4)))
-    assert all(part == 1.0 for part in Sight(level, "base", rods).seen(at).values())
-    fat = Sight(level, "base", {leg: replace(rod, radius=0.12) for leg, rod in rods.items()})
+    assert all(part == 1.0 for part in CameraView(level, "base", rods).seen(at).values())
+    fat = CameraView(level, "base", {leg: replace(rod, radius=0.12) for leg, rod in rods.items()})
     seen = fat.seen(at)
     assert seen["1"] > 0.9
     assert seen["3"] < 0.2

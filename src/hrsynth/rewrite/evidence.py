@@ -22,7 +22,7 @@ from ..tolerances import LOCUS, SOLVED
 
 
 @dataclass(frozen=True, eq=False)
-class Locus:
+class Flat:
     """The set a point or a direction moves on: its dimension as a flat (0 fixed, 1 line, 2 plane, 3 space), and
     orthonormal ``axes`` with the flat's directions first, the normals last (rows)."""
 
@@ -35,11 +35,11 @@ class Locus:
         return self.axes[2]
 
 
-def locus(points: Array, scale: float) -> Locus:
+def locus(points: Array, scale: float) -> Flat:
     """The smallest flat that holds all points, shape (n, 3); ``scale`` is what no extent is relative to."""
     centred = points - points.mean(axis=0)
     _, s, Vt = np.linalg.svd(centred / np.sqrt(len(points)), full_matrices=True)
-    return Locus(int(np.sum(s > LOCUS * scale)), Vt)
+    return Flat(int(np.sum(s > LOCUS * scale)), Vt)
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +60,7 @@ class ProximalChain:
     length: float
 
     @cached_property
-    def anchor_locus(self) -> Locus:
+    def anchor_locus(self) -> Flat:
         """The flat on which A moves."""
         return locus(self.anchors, self.length)
 

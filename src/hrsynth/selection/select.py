@@ -31,7 +31,7 @@ from ..results import Result, by_name
 from ..simulation.camera import cylinders, placed
 from ..simulation.ending import GOAL
 from ..simulation.servo import servo
-from .sight import Sight, camera_at, of_focal
+from .sight import CameraView, camera_at, of_focal
 
 BUDGET = 2_000
 """Intervals that a path's certificate may take."""
@@ -150,7 +150,7 @@ class Selection(Result, shown_as="select"):
     candidates: tuple[Candidate, ...]
     cones: Array
     """Half-angles (rad) of all legs' cones."""
-    sight: Sight | None
+    sight: CameraView | None
     left: str | None
     """Why sets were not examined, None where all were."""
 
@@ -220,14 +220,14 @@ def select(robot: Mechanism | ObservedRobot, camera: str | None = None, *, start
     return Selection(setting, poses[0], poses[1], tuple(found), half, work.sight, left)
 
 
-def _sight(setting: ObservedRobot, ends: Sequence[ClosedConfiguration], criteria: Criteria) -> Sight | None:
+def _sight(setting: ObservedRobot, ends: Sequence[ClosedConfiguration], criteria: Criteria) -> CameraView | None:
     if criteria.sight is None:
         return None
     rods = cylinders(setting.mechanism, setting.observed)
     reference = setting.mechanism.reference
     camera = (placed(rods, reference, [at.pose for at in ends], of_focal(criteria.focal)) if criteria.sight == AUTO
               else camera_at(criteria.sight, criteria.focal))
-    return Sight(camera, reference, {o.leg: rod for o, rod in zip(setting.observed, rods, strict=True)})
+    return CameraView(camera, reference, {o.leg: rod for o, rod in zip(setting.observed, rods, strict=True)})
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,7 +238,7 @@ class _Work:
     start: ClosedConfiguration
     goal: ClosedConfiguration
     cones: Array
-    sight: Sight | None
+    sight: CameraView | None
     criteria: Criteria
     until: float
     seed: int

@@ -20,7 +20,7 @@ PLACES = 101
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class CameraView:
     """A camera carried by ``reference``, and the rods of all legs by their labels: those of the default segments."""
 
     camera: Camera
