@@ -22,7 +22,7 @@ LINKS = {"docs/pictures/": "pictures/", "docs/pages/": "", "CONTRIBUTING.md": "c
 """Where what the README links to lies in the site."""
 QUICK = "HRSYNTH_DOCS_QUICK"
 """Environment variable: notebooks of which no executed copy is kept are shown without outputs."""
-FOLDERS = ("geometry", "mechanism", "description", "families", "kinematics", "batch", "rewrite", "constraints",
+FOLDERS = ("geometry", "mechanism", "description", "families", "kinematics", "legs", "batch", "rewrite", "constraints",
            "analysis", "simulation", "selection", "present", "catalog")
 
 
