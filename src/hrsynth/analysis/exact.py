@@ -1,28 +1,19 @@
-"""Exact verdicts of an architecture: ranks over the rationals at random instances of its geometry (theory.md 12).
+"""Exact verdicts of an architecture: ranks over the rationals at random instances (docs/pages/theory.md, section 12).
 
-Instantaneous kinematics depends on joint centres, joint axes and observed directions alone, and any choice of them *is*
-an assembled mechanism; link lengths do not matter. F is the irreducible family of geometries with all relations that
-persist in the robot's motion; an instance is one of its rational members. With A the constraints, X the platform's
-twist and Y the rates of the directions, the legs see rank X − rank [X; Y] + rank Y of the platform's freedoms, ranks
-on ker A.
+F is the irreducible family of geometries with all relations that persist in the robot's motion, an instance one of its
+rational members. With A the constraints, X the platform's twist and Y the rates of the directions, the legs see
+rank X − rank [X; Y] + rank Y of the platform's freedoms, ranks on ker A.
 
-*Proved*: almost all members of F are controllable, over-constrained mechanisms included (T_qC ⊂ ker A). Premises, and
-what each rests on:
+*Proved*: almost all members of F are controllable. Its premises, numbered as in section 12:
 
-1. every relation of F holds on the robot's branch: *carried* by links and joints, from the file
-   (:mod:`hrsynth.mechanism.carried`), or *kept* by all motions where all relations hold (:mod:`.kept`), which asks for
-   a regular zero configuration (4) and an identity that is tested at random instances, with a chance of error;
-2. rank [A; Y] = rank [A; Y; X] at one instance: exact;
-3. rank [A; Y; X] there is the largest on F: exact where only the spins of rods between two S joints are left out, which
-   every member has; else as likely as at several random instances it is the same and yet not the largest;
-4. the robot is a regular member of F: the conditions on each direction and on all centres have the rank of the
-   instance's (with 1: so has A). Numerical, at the zero configuration, else at a sample.
+1. every relation of F holds on the robot's branch, carried or kept (:attr:`ExactArchitecture.basis`; merely *observed*
+   ones are named, and the word is not *proved*);
+2. rank [A; Y] = rank [A; Y; X] at one instance: exact (:meth:`ExactArchitecture._rank`);
+3. rank [A; Y; X] there is the largest on F, but for a chance (:meth:`ExactArchitecture._chance`);
+4. the robot is a regular member of F: numerical (:meth:`ExactArchitecture._regular`).
 
-That the robot's own mobility, dof and dim ρ, at samples, are those of the instances is compared besides, and numerical:
-it says that F has all relations that matter. Relations that are neither carried nor kept are *observed*, at samples:
-then the word is not *proved*, and they are named. A *deficient* verdict holds the largest rank of several instances: it
-is probabilistic, wrong only if all of them are special by chance. What a single link's dimensions make special (three
-centres on a line) belongs to a robot, not to its architecture; it may see less than its architecture, never more.
+A *deficient* verdict holds the largest rank of several instances: it is probabilistic. What a single link's dimensions
+make special (three centres on a line) belongs to a robot, not to its architecture; it may see less, never more.
 """
 
 from __future__ import annotations

@@ -169,8 +169,11 @@ def cycle(f: Table, g: Table, h: Table) -> Eliminant:
     """
     a, b = _in_second(f), _in_second(g.T)
     c0, c1, c2 = _in_second(h.T)
+    # 1: Res_y(f, g), of degree four in z, by the formula above
     quartic = _resultant_in_third(a, b)
+    # 2: modulo h = c₂ z² + c₁ z + c₀ that is (R₁ z + R₀) / c₂³
     R0, R1, leading = _reduced(quartic, (c0, c1, c2))
+    # 3: c₂ (R₁ z₁ + R₀) (R₁ z₂ + R₀) at the roots of h, by z₁ + z₂ = −c₁/c₂ and z₁ z₂ = c₀/c₂; c₂³ is a factor
     norm = R1 * R1 * c0 - R1 * R0 * c1 + R0 * R0 * c2
     polynomial = norm if not norm else _exact(norm, leading)
 

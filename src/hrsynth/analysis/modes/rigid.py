@@ -156,12 +156,14 @@ def _third(conics: Sequence[Conic], tips: Sequence[Any], curve: Curve, frame: Wo
     scale = (gamma.T @ gamma)[0, 0]
     centre = numbers.vector(frame.point(curve.centre))
     if isinstance(curve, Line):
+        # n · (γ̄ γ tip₃) = |γ|² n · c, with n normal to the line through c
         d = direction(curve.direction, frame, numbers)
         normal = np.array([-d[1], d[0]])
         first, second = alpha.T @ gamma @ normal, beta.T @ gamma @ normal
         return (np.outer(one.N @ first, other.w) + np.outer(one.w, other.N @ second)
                 - scale * (normal @ centre) * np.outer(one.w, other.w))
     assert isinstance(curve, Circle)
+    # |α tip₁ + β tip₂ − γ c|² = |γ|² ρ²
     rho = numbers.vector(np.array([curve.radius / frame.size]))[0]
     first, second = alpha.T @ gamma @ centre, beta.T @ gamma @ centre
     return (np.outer((alpha.T @ alpha)[0, 0] * one.Q - 2 * (one.N @ first), other.w)
