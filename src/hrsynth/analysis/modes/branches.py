@@ -32,58 +32,37 @@ class Model:
 
 def model(confined: TipLoci) -> Model:
     """The system for the way in which the platform moves."""
-    made = {"translations": _translating, "planar": _planar, "spatial": _spatial,
-            "bodies": _articulated}[confined.motion](confined)
+    at = {body: confined.goal.pose(body) for body in confined.bodies}
+    curves = tuple(tip.curve for tip in confined.tips)
+    made = {"translations": _translating, "bodies": _articulated}.get(confined.motion, _rigid)(confined, at, curves)
     return replace(made, system=replace(made.system, error=confined.error, as_written=confined.as_written))
 
 
-def _translating(confined: TipLoci) -> Model:
+def _translating(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
     """q is the position of the first body's origin; tips are counted from there."""
-    at = _poses(confined)
     p = at[confined.bodies[0]][:3, 3]
     tips = np.array([_point(at[tip.body], tip.place) - p for tip in confined.tips])
-
-    def bodies(q: Array) -> dict[str, Array]:
-        return {body: _moved(X, q - p) for body, X in at.items()}
-
-    return Model(Translating(_curves(confined), tips), bodies, p)
+    return Model(Translating(curves, tips), lambda q: {body: _moved(X, q - p) for body, X in at.items()}, p)
 
 
-def _planar(confined: TipLoci) -> Model:
-    """q is counted from the goal: the plane's frame lies at the first body's origin there."""
-    assert confined.plane is not None
-    at = _poses(confined)
-    n = confined.plane
-    first = perpendicular(n)
-    X_plane = pose(at[confined.bodies[0]][:3, 3], np.column_stack([first, np.cross(n, first), n]))
-    back = inverse(X_plane)
-    tips = np.array([_point(back @ at[tip.body], tip.place)[:2] for tip in confined.tips])
-    system = Planar(_curves(confined), tips, X_plane)
-
-    def bodies(q: Array) -> dict[str, Array]:
-        return {body: system.pose(q) @ back @ X for body, X in at.items()}
-
-    return Model(system, bodies, np.zeros(3))
-
-
-def _spatial(confined: TipLoci) -> Model:
-    """q is counted from the goal: the system's frame is the base's, moved to the first body's origin there."""
-    at = _poses(confined)
-    origin = pose(at[confined.bodies[0]][:3, 3])
-    back = inverse(origin)
+def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
+    """q is counted from the goal: the frame of the plane of motion (in space: the base's) lies at the first body's
+    origin there."""
+    p, n = at[confined.bodies[0]][:3, 3], confined.plane if confined.motion == "planar" else None
+    X_goal = pose(p)
+    if n is not None:
+        first = perpendicular(n)
+        X_goal = pose(p, np.column_stack([first, np.cross(n, first), n]))
+    back = inverse(X_goal)
     tips = np.array([_point(back @ at[tip.body], tip.place) for tip in confined.tips])
-    system = Spatial(_curves(confined), tips)
-
-    def bodies(q: Array) -> dict[str, Array]:
-        return {body: system.pose(q) @ back @ X for body, X in at.items()}
-
-    return Model(system, bodies, np.array([*origin[:3, 3], 0.0, 0.0, 0.0]))
+    system = Spatial(curves, tips) if n is None else Planar(curves, tips[:, :2], X_goal)
+    home = np.array([*p, 0.0, 0.0, 0.0]) if n is None else np.zeros(3)
+    return Model(system, lambda q: {body: system.pose(q) @ back @ X for body, X in at.items()}, home)
 
 
-def _articulated(confined: TipLoci) -> Model:
+def _articulated(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
     """q is the first body's origin and the second's place on its circle about it."""
     assert confined.slide is not None
-    at = _poses(confined)
     one, other = confined.bodies
     p, slide = at[one][:3, 3], confined.slide
     tips = np.array([_point(at[tip.body], tip.place) - at[tip.body][:3, 3] for tip in confined.tips])
@@ -94,15 +73,7 @@ def _articulated(confined: TipLoci) -> Model:
         return {one: _moved(at[one], first), other: _moved(at[other], second)}
 
     sides = tuple(confined.bodies.index(tip.body) for tip in confined.tips)
-    return Model(Articulated(_curves(confined), tips, sides, slide), bodies, np.array([*p, 0.0]))
-
-
-def _poses(confined: TipLoci) -> dict[str, Array]:
-    return {body: confined.goal.pose(body) for body in confined.bodies}
-
-
-def _curves(confined: TipLoci) -> tuple[Reach, ...]:
-    return tuple(tip.curve for tip in confined.tips)
+    return Model(Articulated(curves, tips, sides, slide), bodies, np.array([*p, 0.0]))
 
 
 def _point(X: Array, place: Array) -> Array:

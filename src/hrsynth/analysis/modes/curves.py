@@ -19,15 +19,23 @@ from ...geometry.vectors import Array, cross, frozen, perpendicular
 from ...tolerances import EXACT
 
 
+class _Checked:
+    """Something through or about a ``centre``, whose vectors and radius are checked, directions of length one."""
+
+    def __post_init__(self) -> None:
+        for name, value in list(vars(self).items()):
+            if name == "radius":
+                object.__setattr__(self, name, _radius(type(self).__name__.lower(), value))
+            elif name != "start":
+                object.__setattr__(self, name, _vector(value) if name == "centre" else _unit(value))
+
+
 @dataclass(frozen=True, eq=False)
-class Point:
+class Point(_Checked):
     """The tip rests at ``centre``, shape (3,)."""
 
     centre: Array
     freedoms = 0
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "centre", _vector(self.centre))
 
     def at(self, parameter: float = 0.0) -> Array:
         """The tip; shape (3,)."""
@@ -39,16 +47,12 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
-class Line:
+class Line(_Checked):
     """The tip is centre + s d, with d the unit vector along ``direction`` and s in metres."""
 
     centre: Array
     direction: Array
     freedoms = 1
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "centre", _vector(self.centre))
-        object.__setattr__(self, "direction", _unit(self.direction))
 
     def at(self, parameter: float) -> Array:
         """The tip at s = ``parameter``; shape (3,)."""
@@ -61,7 +65,7 @@ class Line:
 
 
 @dataclass(frozen=True, eq=False)
-class Circle:
+class Circle(_Checked):
     """The tip is centre + ρ (cos θ e₁ + sin θ e₂), with e₁ the part of ``start`` normal to ``axis`` and e₂ = n × e₁."""
 
     centre: Array
@@ -71,11 +75,8 @@ class Circle:
     freedoms = 1
 
     def __post_init__(self) -> None:
-        axis = _unit(self.axis)
-        object.__setattr__(self, "centre", _vector(self.centre))
-        object.__setattr__(self, "axis", axis)
-        object.__setattr__(self, "radius", _radius("circle", self.radius))
-        object.__setattr__(self, "start", frozen(perpendicular(axis, self.start)))
+        super().__post_init__()
+        object.__setattr__(self, "start", frozen(perpendicular(self.axis, self.start)))
 
     def at(self, parameter: float) -> Array:
         """The tip at θ = ``parameter``; shape (3,)."""
@@ -101,16 +102,12 @@ class Circle:
 
 
 @dataclass(frozen=True, eq=False)
-class Sphere:
+class Sphere(_Checked):
     """The tip is at the distance ``radius`` from ``centre``."""
 
     centre: Array
     radius: float
     freedoms = 2
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "centre", _vector(self.centre))
-        object.__setattr__(self, "radius", _radius("sphere", self.radius))
 
     def miss(self, tip: Array) -> Array:
         """From the nearest point of the sphere to ``tip``; shape (3,), metres."""
@@ -120,16 +117,12 @@ class Sphere:
 
 
 @dataclass(frozen=True, eq=False)
-class Plane:
+class Plane(_Checked):
     """The tip is in the plane through ``centre`` that the unit vector along ``normal`` is normal to."""
 
     centre: Array
     normal: Array
     freedoms = 2
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "centre", _vector(self.centre))
-        object.__setattr__(self, "normal", _unit(self.normal))
 
     def miss(self, tip: Array) -> Array:
         """From the nearest point of the plane to ``tip``; shape (3,), metres."""
