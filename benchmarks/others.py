@@ -19,10 +19,10 @@ sys.path.insert(0, str(Path(__file__).resolve().parent.parent / "tests"))
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.exact import architecture
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.catalog.build import unmoved
 from hrsynth.catalog.entry import entry
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.groups import GROUPS
-from hrsynth.catalog.build import unmoved
 from hrsynth.catalog.words import parse
 from hrsynth.description import load, shipped
 from hrsynth.description.formats.mjcf.write import write

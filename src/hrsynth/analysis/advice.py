@@ -292,8 +292,3 @@ def _padded(block: Array) -> Array:
 def _ranks(matrices: Array) -> Array:
     """The rank of each matrix (k, rows, columns), zero relative to one or to its largest singular value; shape (k,)."""
     return np.asarray(np.sum(singular_values(matrices) > RANK_CUTOFF, axis=1))
-
-
-def advised(setting: ObservedRobot, *, most: int | None = None) -> Advice:
-    """As :func:`advise`."""
-    return advise(setting, most=most)

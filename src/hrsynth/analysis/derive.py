@@ -242,9 +242,3 @@ def _exchanged(anatomy: LegDecomposition, found: Certificate) -> tuple[tuple[Fre
         ours, theirs = real.unobserved_twists, hidden.unobserved_twists
         gains, loses = beyond(theirs, ours), beyond(ours, theirs)
     return gains, loses
-
-
-
-def derived(setting: ObservedRobot, *, form: str = "simplified", beside: bool = True) -> Derivation:
-    """As :func:`derive`."""
-    return derive(setting, form=form, paper=beside)

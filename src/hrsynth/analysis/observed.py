@@ -303,10 +303,3 @@ def selected(relation: Relation, places: Sequence[int]) -> Relation:
     basis, rank = range_basis(np.vstack(blocks), 1.0)
     sizes = tuple(relation.sizes[i] for i in places)
     return Relation(basis, relation.twist_rows, sizes, relation.mobility, min(relation.gap, rank.gap))
-
-
-prepare = observe
-
-
-def silent(text: str) -> None:
-    """The progress of a question that nobody follows."""

@@ -9,13 +9,13 @@ from functools import lru_cache
 from itertools import combinations, groupby
 from typing import Any
 
-from ..analysis.advice import Advice, advised
+from ..analysis.advice import Advice, advise
 from ..analysis.controllability import CONTROLLABLE, Verdict, verdict_of
-from ..analysis.derive import derived
+from ..analysis.derive import derive
 from ..analysis.exact import ExactArchitecture, architecture
 from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.modes import counted
-from ..analysis.observed import ObservedRobot, prepare, restricted, selected
+from ..analysis.observed import ObservedRobot, observe, restricted, selected
 from ..errors import BadRequest, HrsynthError, NotConfined, NotConfirmed, Unsolved
 from ..geometry.ranks import range_basis
 from ..kinematics.relation import Relation
@@ -102,10 +102,10 @@ def _studied(text: str) -> _Study | str:
 
 
 def _study(word: RobotWord, attempt: int) -> _Study:
-    setting = prepare(mechanism(word, attempt), samples=SAMPLES)
+    setting = observe(mechanism(word, attempt), samples=SAMPLES)
     if not setting.dof:
         raise NotConfirmed(setting.robot.name, "its platform does not move")
-    derivation = derived(setting, beside=False)
+    derivation = derive(setting, paper=False)
     exact = architecture(setting)
     _agree(exact, setting.samples, derivation.verdict)
     fewest = _smallest(setting, exact, _kinds(word), derivation.verdict)
@@ -121,7 +121,7 @@ def _study(word: RobotWord, attempt: int) -> _Study:
     if derivation.verdict.verdict == CONTROLLABLE:
         facts.update(_singular(setting), **_modes(setting, fewest[0]))
     else:
-        facts["cure"] = _cure(advised(setting, most=1))
+        facts["cure"] = _cure(advise(setting, most=1))
     return _Study(facts, attempt, *_encoders(setting))
 
 

@@ -15,7 +15,7 @@ from ..analysis.accuracy.cones import Cones, half_angles
 from ..analysis.accuracy.pose_errors import PoseErrors
 from ..analysis.aspects.path import SEPARATED, Aspects
 from ..analysis.controllability import CONTROLLABLE, verdict_of
-from ..analysis.modes.modes import AssemblyModes, modes_at
+from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.observed import ObservedRobot
 from ..analysis.posture import ConfigurationAnalysis, Posture
 from ..batch.reach import reach
@@ -286,7 +286,7 @@ class _Work:
         start_modes, goal_modes = self._modes(setting, self.start), self._modes(setting, self.goal)
         tell("aspects")
         try:
-            answer = Aspects.about(setting).join(self.start, self.goal, seed=self.seed, budget=BUDGET)
+            answer = Aspects.of(setting).join(self.start, self.goal, seed=self.seed, budget=BUDGET)
             aspect = Decision(answer.verdict, answer.reason)
         except HrsynthError as error:
             aspect = Decision("undecided", str(error))
@@ -296,7 +296,7 @@ class _Work:
     @staticmethod
     def _modes(setting: ObservedRobot, at: ClosedConfiguration) -> ModeCount:
         try:
-            return ModeCount.of(modes_at(setting, at))
+            return ModeCount.of(modes(setting, at=at))
         except HrsynthError as error:
             return ModeCount(None, None, False, str(error))
 

@@ -16,6 +16,7 @@ from PIL import Image
 
 from hrsynth.analysis.modes.curves import Circle, Line, Point
 from hrsynth.analysis.modes.modes import AssemblyModes, modes
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.cli import execute
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest
@@ -234,7 +235,7 @@ def test_scales_are_equal(name: str, observe: str | None):
 def test_bad_files_are_refused_before_any_work(path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                                capsys: pytest.CaptureFixture[str]):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.setattr("hrsynth.analysis.modes.modes.prepare", lambda *a, **k: pytest.fail("work was begun"))
+    monkeypatch.setattr(ObservedRobot, "of", lambda *a, **k: pytest.fail("work was begun"))
     assert execute(["modes", "rrrrr_m1", "-o", path]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
     assert list(tmp_path.iterdir()) == []

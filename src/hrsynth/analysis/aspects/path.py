@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -160,8 +159,6 @@ class Aspects:
         return cls(setting, setting.motion, seen.pattern, seen.condition,
                    tuple(freedom.name for freedom in seen.verdict.lost))
 
-    about = of
-
     @property
     def members(self) -> list[ClosedConfiguration]:
         """The zero configuration and the samples."""
@@ -191,8 +188,8 @@ class Aspects:
             raise NoLegForm(str(self.pattern))
         return ConditionEnclosure(self.condition, self.pattern.forms(at))
 
-    def join(self, start: ClosedConfiguration, goal: ClosedConfiguration, *, seed: int = 0, budget: int = BUDGET,
-             progress: Any = None) -> PathAnswer:
+    def join(self, start: ClosedConfiguration, goal: ClosedConfiguration, *, seed: int = 0, budget: int = BUDGET
+             ) -> PathAnswer:
         """Whether a path without Type 2 singularity joins two configurations."""
         found, scene = self.condition, self.structure.values_at([start, goal])
         values = found.expressed(scene) if found.signed else smallest_of(found.rows(scene))

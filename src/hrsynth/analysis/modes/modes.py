@@ -292,8 +292,3 @@ def _lever(goal: ClosedConfiguration, link: str) -> float:
     origin = mechanism.links[link].pose[:3, 3]
     return max([LEVER, *(float(np.linalg.norm(joint.point - origin)) / goal.twin.length
                          for joint in mechanism.joints.values() if link in joint.links)])
-
-
-def modes_at(setting: ObservedRobot, goal: ClosedConfiguration) -> AssemblyModes:
-    """As :func:`modes`."""
-    return modes(setting, at=goal)

@@ -8,8 +8,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
-from ...analysis.derive import Derivation, derived
-from ...analysis.observed import prepare
+from ...analysis.derive import Derivation, derive
+from ...analysis.observed import observe
 from ...description import native
 from ...description.files import replacement
 from ...errors import HrsynthError
@@ -126,8 +126,8 @@ def study(record: Record) -> Study:
     if "refused" in record:
         return Study(attempt)
     try:
-        setting = prepare(mechanism(model(parse(record["word"])), attempt), samples=SAMPLES)
-        found = derived(setting, beside=False)
+        setting = observe(mechanism(model(parse(record["word"])), attempt), samples=SAMPLES)
+        found = derive(setting, paper=False)
     except HrsynthError as error:
         return Study(attempt, differs=str(error).splitlines()[0])
     return Study(attempt, found, _difference(found, record))
