@@ -23,7 +23,7 @@ from .plots import MapPlane, along, cell_edges, entry, heading, missing_entry, p
 
 if TYPE_CHECKING:
     from ..analysis.accuracy.accuracy import Accuracy
-    from ..analysis.accuracy.field import Field as ErrorField
+    from ..analysis.accuracy.error_map import ErrorMap as ErrorField
     from ..analysis.check import Check, GridCheck
     from ..analysis.singularity.locus import Locus, SingularityMap
     from ..analysis.singularity.singular import Singularity

@@ -11,7 +11,7 @@ from hypothesis import HealthCheck, assume, given, settings
 
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy, errors_at, sees_all
 from hrsynth.analysis.accuracy.cones import half_angles
-from hrsynth.analysis.accuracy.field import Mapper
+from hrsynth.analysis.accuracy.error_map import Mapper
 from hrsynth.analysis.accuracy.pose_errors import _descended, _width, reading
 from hrsynth.analysis.accuracy.sampled import sampled
 from hrsynth.analysis.accuracy.singular_search import singular_poses
@@ -183,7 +183,7 @@ def test_a_grid_in_parts_is_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     grid = "x=-0.9:0.9:23,y=-0.9:0.9:23,z=-0.7"
     found = []
     for part in (10_000, 50):
-        monkeypatch.setattr("hrsynth.analysis.accuracy.field.PART", part)
+        monkeypatch.setattr("hrsynth.analysis.accuracy.error_map.PART", part)
         found.append(accuracy(load("quattro_rigid"), "1,2,3", cones=0.002, grid=grid).field)
     whole, parts = found
     assert 0 < whole.reached.sum() < whole.reached.size

@@ -20,7 +20,7 @@ from ...results import Result
 from ..controllability import verdict_of
 from ..observed import ObservedRobot
 from .cones import Cones, half_angles
-from .field import Field, Mapper
+from .error_map import ErrorMap, Mapper
 from .pose_errors import PoseErrors, measured
 from .sampled import Sampled, sampled
 
@@ -40,7 +40,7 @@ class Accuracy(Result, shown_as="accuracy"):
     """Half-angles (k,) of the observed directions (rad)."""
     poses: tuple[PoseErrors, ...]
     sampled: tuple[Sampled | None, ...]
-    field: Field | None
+    field: ErrorMap | None
 
     def headline(self) -> str:
         """The robot, and the largest errors at each pose or of the grid."""

@@ -23,7 +23,7 @@ DESCENTS = 60
 
 
 @dataclass(frozen=True, eq=False)
-class Extent:
+class ErrorEllipsoid:
     """The largest error in each direction of space, its extremes: ``largest`` with its unit direction (3,), ``least``
     with its own, among the directions in which there are errors at all.
 
@@ -60,8 +60,8 @@ class PoseErrors:
     """The error maxima at a pose: position (m) and orientation (rad)."""
 
     pose: Pose
-    position: Extent
-    orientation: Extent
+    position: ErrorEllipsoid
+    orientation: ErrorEllipsoid
 
 
 def reading(at: ClosedConfiguration, question: Measurement) -> tuple[Array, Array]:
@@ -92,22 +92,22 @@ def measured(at: ClosedConfiguration, question: Measurement, cones: Array, pose:
     return PoseErrors(pose, position, orientation)
 
 
-def _extent(J: Array, cones: Array, largest: float, lower: float) -> Extent:
+def _extent(J: Array, cones: Array, largest: float, lower: float) -> ErrorEllipsoid:
     """The extremes of Σ ψ_i ‖J_iᵀ w‖ over unit w in the range of J (3, 3 k)."""
     if not np.isfinite(largest):
-        return Extent(np.inf, None, 0.0, None, None)
+        return ErrorEllipsoid(np.inf, None, 0.0, None, None)
     blocks = (J.reshape(3, -1, 3) * cones[:, None]).transpose(1, 2, 0)
     left, values, _ = np.linalg.svd(J)
     span = left[:, : int(np.sum(values > INVERTED * values[0]))] if values[0] > INVERTED else np.zeros((3, 0))
     if not span.shape[1]:
-        return Extent(0.0, None, 0.0, None, None)
+        return ErrorEllipsoid(0.0, None, 0.0, None, None)
     inside = blocks @ span
     w = span @ _ascended(inside)
     low = span @ _descended(inside)
     pulls = blocks @ w
     sizes = np.linalg.norm(pulls, axis=1)
     errors = cones[:, None] * pulls / np.where(sizes > 0, sizes, 1.0)[:, None]
-    return Extent(largest, w, float(_width(blocks, low[:, None])[0]), low, errors,
+    return ErrorEllipsoid(largest, w, float(_width(blocks, low[:, None])[0]), low, errors,
                   (largest - lower) / largest if largest else 0.0, span.shape[1] == 1)
 
 

@@ -10,13 +10,13 @@ from numpy.typing import NDArray
 from ...budgets import VALLEY_NARROWING, VALLEYS_ON_LINES, VALLEYS_ON_PLANE
 from ...geometry.vectors import Array
 from ...tolerances import VALLEY_DEPTH, VALLEY_ZERO
-from .field import Field
+from .error_map import ErrorMap
 
 ROUNDS = 28
 """Times the search is narrowed."""
 
 
-def singular_poses(field: Field) -> Array:
+def singular_poses(field: ErrorMap) -> Array:
     """Singular poses (n, 2) of a plane, as values of its two parts: along the lines of its cells, and isolated ones."""
     if field.smallest_at is None or field.grid.ndim != 2:
         return np.zeros((0, 2))

@@ -11,7 +11,7 @@ from typing import TypeVar
 
 from ...analysis.accuracy.accuracy import Accuracy, sees_all
 from ...analysis.accuracy.cones import half_angles
-from ...analysis.accuracy.field import Mapper
+from ...analysis.accuracy.error_map import Mapper
 from ...analysis.controllability import Legs, legs
 from ...analysis.derive import Derivation
 from ...analysis.modes.modes import AssemblyModes, modes

@@ -13,8 +13,8 @@ from .tables import GAP, Rows, camera, head, known, listing, table
 
 if TYPE_CHECKING:
     from ...analysis.accuracy.accuracy import Accuracy
-    from ...analysis.accuracy.field import Field
-    from ...analysis.accuracy.pose_errors import Extent, PoseErrors
+    from ...analysis.accuracy.error_map import ErrorMap
+    from ...analysis.accuracy.pose_errors import ErrorEllipsoid, PoseErrors
     from ...analysis.accuracy.sampled import Sampled
     from ...selection.select import Candidate, ModeCount, Selection
     from ...simulation.result import Servo
@@ -85,7 +85,7 @@ def accuracy(found: Accuracy, file: str | None = None) -> str:
     return listing([*rows, *(() if file is None else [*GAP, ("written", file)])])
 
 
-def field_rows(field: Field) -> list[tuple[str, str]]:
+def field_rows(field: ErrorMap) -> list[tuple[str, str]]:
     """What a grid holds: its size, what is reached of it, the range of the errors, how they were checked."""
     grid = field.grid
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
@@ -129,7 +129,7 @@ def _samples(errors: PoseErrors, true: Sampled) -> Rows:
     return [("samples", lines)]
 
 
-def _extent(name: str, extent: Extent, unit: float, word: str) -> Rows:
+def _extent(name: str, extent: ErrorEllipsoid, unit: float, word: str) -> Rows:
     if not np.isfinite(extent.largest):
         return [(name, "infinite: a freedom is lost here")]
     if extent.direction is None:
@@ -141,7 +141,7 @@ def _extent(name: str, extent: Extent, unit: float, word: str) -> Rows:
     return [(name, lines)]
 
 
-def _apart(true: float, linear: Extent) -> bool:
+def _apart(true: float, linear: ErrorEllipsoid) -> bool:
     return np.isfinite(linear.largest) and abs(true - linear.largest) > PARTS_FROM_LINEAR * max(linear.largest, 1e-12)
 
 

@@ -63,7 +63,7 @@ class Spots:
 
 
 @dataclass(frozen=True, eq=False)
-class Field:
+class ErrorMap:
     """The error maxima over a grid, in its shape: position (m) and orientation (rad), NaN where no pose is reached,
     infinite where a freedom is lost. ``smallest_at`` gives the smallest singular value of Mᵀ (n,) at other poses of the
     same grid (values of its axes (n, ndim)); None where poses are found one by one."""
@@ -147,7 +147,7 @@ class Mapper:
         count = steps or (FINE if self.batch is not None else COARSE)
         return framed(everything.start, everything.question, motion, plane, count, met)
 
-    def over(self, grid: Grid, seed: int) -> Field:
+    def over(self, grid: Grid, seed: int) -> ErrorMap:
         """The error maxima over a grid; raises ``PlaneNotMet`` where no pose of it is reached, ``BadRequest`` where
         poses have to be found one by one and are too many for that."""
         name = self.setting.robot.name
@@ -161,8 +161,8 @@ class Mapper:
         if self.batch is not None:
             spots, smallest_at = self._spots(grid, seen, seed), partial(self._smallest, grid)
         shape = grid.shape
-        return Field(grid, seen.reached.reshape(shape), seen.position.reshape(shape), seen.orientation.reshape(shape),
-                     seen.gap, seen, spots, smallest_at)
+        position, orientation = seen.position.reshape(shape), seen.orientation.reshape(shape)
+        return ErrorMap(grid, seen.reached.reshape(shape), position, orientation, seen.gap, seen, spots, smallest_at)
 
     def _together(self, grid: Grid, places: Array) -> Seen:
         """Poses by the batch; of a part of them no more is kept than their errors."""
