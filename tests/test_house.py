@@ -26,7 +26,7 @@ FOLDERS = [
     {"description"},
     {"families"},
     {"kinematics"},
-    {"legs"},
+    {"closed_forms"},
     {"batch"},
     {"rewrite"},
     {"constraints"},
@@ -39,7 +39,7 @@ FOLDERS = [
 ]
 LEVEL = {name: level for level, names in enumerate(FOLDERS) for name in names}
 
-ENGINE = {"geometry", "mechanism", "description", "kinematics", "legs", "batch", "rewrite", "constraints"} | {
+ENGINE = {"geometry", "mechanism", "description", "kinematics", "closed_forms", "batch", "rewrite", "constraints"} | {
     "analysis", "simulation", "selection", "present"}
 ROBOTS = re.compile(
     r"(?<![a-z])(quattro|delta|orthoglide|gough|stewart|hexaglide|uranesx|i4l|tsai)(?![a-z])", re.IGNORECASE

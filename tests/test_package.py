@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
@@ -17,6 +18,12 @@ def test_public_names_are_those_of_their_modules():
     assert (hrsynth.load, hrsynth.save, hrsynth.shipped) == (load, save, shipped)
     assert (hrsynth.derive, hrsynth.legs) == (derivation.derive, controllability.legs)
     assert set(hrsynth.__all__) <= set(dir(hrsynth))
+
+
+def test_no_folder_hides_a_public_function():
+    """A folder that is imported becomes an attribute of the package, whatever the function of its name."""
+    below = {path.stem for path in Path(hrsynth.__file__).parent.iterdir() if path.suffix == ".py" or path.is_dir()}
+    assert below & set(hrsynth.__all__) == {"catalog"}
 
 
 def test_an_unknown_name_is_an_attribute_error():

@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
+from ..closed_forms.legs import ClosedFormLeg, FixedDirection, Number, OnCrank, OnRod, PlatformDirection
 from ..geometry.components import Components, cross, dot, minus, plus, scaled, sqrt, transformed
-from ..legs.closed_forms import ClosedFormLeg, FixedDirection, Number, OnCrank, OnRod, PlatformDirection
 
 
 def direction_rows(leg: ClosedFormLeg, p: Components, R: Components, twists: Components, number: Number

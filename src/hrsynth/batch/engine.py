@@ -15,12 +15,12 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..budgets import LARGEST_BATCH, POSES_FOR_COMPILING, POSES_FOR_NUMBA
+from ..closed_forms.legs import ClosedFormLeg
 from ..errors import BadRequest
 from ..geometry.components import Components, plus, tangents, transformed, where
 from ..geometry.vectors import Array, frozen
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
-from ..legs.closed_forms import ClosedFormLeg
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.observation import Direction, Observation
 from ..tolerances import RANK_CUTOFF

@@ -13,12 +13,12 @@ from itertools import takewhile
 import numpy as np
 
 from ..budgets import FAST_DIRECTIONS
+from ..closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, PlatformDirection
 from ..errors import NotSampled
 from ..geometry.so3 import between, exponential, quaternions
 from ..geometry.vectors import Array, frozen, inverse
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
-from ..legs.closed_forms import ClosedFormLeg, OnCrank, OnRail, PlatformDirection
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.observation import Direction

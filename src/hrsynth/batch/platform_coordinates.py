@@ -12,10 +12,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..closed_forms.platform_points import PlatformPoint
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
-from ..legs.platform_points import PlatformPoint
 from ..tolerances import SAME_DIRECTION, SAME_GEOMETRY
 
 Frames = Mapping[str, Array]

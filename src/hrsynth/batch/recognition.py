@@ -14,10 +14,10 @@ from functools import partial
 
 import numpy as np
 
+from ..closed_forms.legs import ClosedFormLeg, FixedDirection, OnCrank, OnRail, PlatformDirection, SlidingRod
+from ..closed_forms.platform_points import PlatformPoint
 from ..geometry.lines import foot
 from ..geometry.vectors import Array, inverse
-from ..legs.closed_forms import ClosedFormLeg, FixedDirection, OnCrank, OnRail, PlatformDirection, SlidingRod
-from ..legs.platform_points import PlatformPoint
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.normal import centre_pair

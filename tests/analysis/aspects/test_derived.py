@@ -11,10 +11,10 @@ import pytest
 
 from hrsynth.analysis.aspects.leg_forms import LegPattern
 from hrsynth.analysis.aspects.path import SAME, SEPARATED, Aspects, leads
+from hrsynth.closed_forms.legs import ClosedFormLeg
 from hrsynth.description import load
 from hrsynth.geometry.balls import balls
 from hrsynth.kinematics.sampling import random_walk
-from hrsynth.legs.closed_forms import ClosedFormLeg
 from strategies import deltas, planar, pods
 
 SHIPPED = ("3rrr_m1", "3rpr_m1", "3prr_m1", "rrrrr_m1", "rprpr_m1", "prrrp_m1", "gough_stewart", "quattro",

@@ -11,12 +11,12 @@ from typing import cast
 
 import numpy as np
 
+from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
+from ...closed_forms.platform_points import ORIGIN, PlatformPoint, platform_point
 from ...constraints.named_vectors import BodyPoint, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at
 from ...geometry.balls import Field
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...legs.closed_forms import ClosedFormLeg, OnCrank, OnRail, SlidingRod
-from ...legs.platform_points import ORIGIN, PlatformPoint, platform_point
 from ...mechanism import Joint, JointType, Mechanism
 from ...mechanism.legs import Leg, LegDecomposition
 from ...tolerances import EXACT, FOLLOWED, SAME_RELATION

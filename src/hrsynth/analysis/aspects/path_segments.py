@@ -13,14 +13,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail
+from ...closed_forms.platform_points import PlatformPoint
 from ...geometry.balls import Field, widened
 from ...geometry.so3 import exponential, logarithm
 from ...geometry.vectors import Array, cross, hat, inverse
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement, relation
-from ...legs.closed_forms import ClosedFormLeg, OnCrank, OnRail
-from ...legs.platform_points import PlatformPoint
 from ...mechanism.legs import LegDecomposition
 from ...tolerances import FOLLOWED
 

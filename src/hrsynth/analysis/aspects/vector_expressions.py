@@ -12,12 +12,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...closed_forms.platform_points import ORIGIN, PlatformPoint
 from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector
 from ...geometry.balls import Field, normed
 from ...geometry.lines import distance
 from ...geometry.vectors import Array, cross
 from ...kinematics.configuration import ClosedConfiguration
-from ...legs.platform_points import ORIGIN, PlatformPoint
 from ...mechanism import Joint, JointType, Mechanism
 from ...mechanism.legs import LegDecomposition
 from ...tolerances import EXACT, FOLLOWED
