@@ -73,7 +73,7 @@ for name in ("uranesx", "hexaglide", "i4l", "linear_delta", "orthoglide"):
 # is compared.)
 
 # %%
-print(hrsynth.derive(hrsynth.load("i4l")).verdict.graph)
+print(hrsynth.derive(hrsynth.load("i4l")).verdict.has_interaction_matrix)
 
 # %% [markdown]
 # ## What must be measured besides?

@@ -41,7 +41,7 @@ class Verdict(Result, shown_as="verdict"):
     rank: int
     lost: tuple[Freedom, ...]
     gap: float
-    graph: bool = True
+    has_interaction_matrix: bool = True
     """Whether Mᵀ exists: no observed direction moves while the platform rests."""
     counted: float = 1.0
     """The smallest singular value of the measured rates on ρ that counts as seen, at the sample where it is largest:
@@ -61,8 +61,9 @@ class Verdict(Result, shown_as="verdict"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"legs": list(self.legs), "verdict": self.verdict, "rank": self.rank,
-                "lost": [freedom.to_dict() for freedom in self.lost], "gap": self.gap, "interaction_matrix": self.graph,
-                "margin": self.margin}
+                "lost": [freedom.to_dict() for freedom in self.lost], "gap": self.gap,
+                "has_interaction_matrix": self.has_interaction_matrix,
+                "interaction_matrix": self.has_interaction_matrix, "margin": self.margin}
 
     @property
     def margin(self) -> dict[str, float]:

@@ -171,7 +171,7 @@ QUESTIONS = (
               Option("steps", "Poses along each side of the plane.", None, int, 51, low=5, high=300))),
     Question("advise", "What is missing: the smallest sets of further measurements that make a robot controllable.",
              WATCHED),
-    Question("modes", "All assembly modes: every pose of the platform with the same directions, each proved.",
+    Question("modes", "All assembly modes: every pose of the platform with the same directions.",
              (Option("at", "Pose whose directions are held, as x=0.02,y=0.1,z=-0.7 (default: the zero "
                      "configuration's).", "POSE"),
               *WATCHED, flag("real", "The real robot with its own motors held instead."),

@@ -30,7 +30,7 @@ class XmlReader:
         """Record what is wrong in a line of the file (or of one that it includes)."""
         if value is not None and len(value) > 80:
             value = value[:77] + "..."
-        file = line.file if isinstance(line, xml.Line) else self.file
+        file = line.file if isinstance(line, xml.SourceLine) else self.file
         self.defects.append(Defect(file, line, what, value, allowed))
 
     def require_sound(self) -> None:

@@ -79,7 +79,7 @@ def document(text: bytes | str, file: str) -> Element:
         raise refusal(file, "malformed XML", value=str(error), line=1) from None
 
 
-class Line(int):
+class SourceLine(int):
     """A line of a file that a document includes."""
 
     file: str
@@ -90,7 +90,7 @@ def line(element: Element) -> int | None:
     number: object = element.sourceline
     if not isinstance(number, int) or element.base is None:
         return number if isinstance(number, int) else None
-    found = Line(number)
+    found = SourceLine(number)
     found.file = element.base
     return found
 

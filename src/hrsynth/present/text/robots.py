@@ -62,7 +62,7 @@ def derivation(found: Derivation, hidden_file: str | None = None, report: str | 
         ("mode", _modes(observed)),
         ("architecture", exact_words(found.exact, found.verdict.rank)),
         ("lost at zero", [freedom.name for freedom in found.verdict.lost]),
-        ("", [] if found.verdict.graph else NO_MATRIX),
+        ("", [] if found.verdict.has_interaction_matrix else NO_MATRIX),
         ("certificate", certificate(found.certificate)),
     ]
     if paper is not None:
