@@ -39,11 +39,11 @@ def bounds_of(M: Array, twists: Array, cones: Array, reached: NDArray[np.bool_] 
     there = np.ones(n, dtype=bool) if reached is None else reached
     if twists.ndim == 2 and n > 1:
         program = _constant_program(rows // 3, d, twists.tobytes(), cones.tobytes())
-        given = np.vstack([M.reshape(-1, n), there])
+        given = np.vstack([M.reshape(rows * d, n), there])
     else:
         program = _program(rows // 3, d)
         turns = np.broadcast_to(twists.reshape(-1, 6 * d), (n, 6 * d)).T
-        given = np.vstack([M.reshape(-1, n), there, turns, np.broadcast_to(cones[:, None], (len(cones), n))])
+        given = np.vstack([M.reshape(rows * d, n), there, turns, np.broadcast_to(cones[:, None], (len(cones), n))])
     found = program.run(given.T, OUTPUTS, compiled=compiled)
     found[:4, ~there] = np.nan
     lost = np.flatnonzero(there & ~(found[4] > 0))
