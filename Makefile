@@ -23,8 +23,9 @@ help:  ## this list
 demo: setup  ## derive the hidden robot of a Quattro of which legs 1 and 4 are observed
 	@$(BIN)/hrsynth derive robots/quattro.urdf --observe 1,4
 
+# a file's tests go to one process: what they share is derived once
 test: setup-dev  ## the tests, without the slow ones
-	@$(PYTEST) -m "not slow and not long and not browser" tests
+	@$(PYTEST) --dist loadfile -m "not slow and not long and not browser" tests
 
 test-all: setup-all setup-browser  ## all tests but the longest (AFTER_TEST=1: those that `make test` left out)
 	@$(PYTEST) -m "$(if $(AFTER_TEST),(slow or browser) and )not long" tests

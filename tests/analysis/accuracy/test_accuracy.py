@@ -154,6 +154,7 @@ def test_samples_approach_the_linear_maxima_as_cones_shrink(robot: str) -> None:
     assert away[1] < 0.75 * away[0] or away[1] < 1e-4
 
 
+@pytest.mark.slow
 def test_near_a_singularity_samples_do_not_follow_the_linear_law() -> None:
     found = accuracy(load("quattro"), "1,4", cones="0.5deg", at=["x=-0.17,y=0,z=-0.7,phi=0"], samples=12)
     (true,), (linear,) = found.sampled, found.poses

@@ -82,9 +82,10 @@ def furthest(path: list[ClosedConfiguration], joints: list[str]) -> tuple[str, f
     return joint, float(low[joint] - room), float(high[joint] + room)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("robot", [
     pytest.param(load("3rrr_m1"), id="3rrr_m1"),
-    pytest.param(planar(["RRR"] * 3, np.random.default_rng(3), [{0}] * 3), id="random", marks=pytest.mark.slow)])
+    pytest.param(planar(["RRR"] * 3, np.random.default_rng(3), [{0}] * 3), id="random")])
 def test_paths_are_led_around_the_limits_that_others_pass(robot: Mechanism):
     """Limits that a path without them leaves: another path keeps to them, or none is found."""
     free = Aspects.of(robot)
