@@ -48,6 +48,7 @@ lint: setup-dev  ## style and import order
 
 types: setup-dev  ## type check
 	@$(BIN)/mypy
+	@$(BIN)/mypy --config-file tests/mypy.ini
 
 robots: setup  ## regenerate robots/*.urdf from the families
 	@$(BIN)/python -m hrsynth.families

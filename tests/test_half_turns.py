@@ -29,6 +29,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.steps import track
 from hrsynth.kinematics.tasks import Target
 from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.observation import AngleEncoder
 from hrsynth.mechanism.pose import Grid, Pose
 from hrsynth.selection import select as selections
 from hrsynth.simulation.law import whole
@@ -239,6 +240,7 @@ def test_a_motor_at_half_a_turn_is_held_from_either_side() -> None:
     case = case_of("3rrr_m1")
     setting, twin = case.setting, case.setting.everything.twin
     (encoder, *_) = motors(setting).observations
+    assert isinstance(encoder, AngleEncoder)
     bare = Target(setting.motion.link, np.eye(4), np.zeros(3), setting.mechanism.reference, ())
     (crank,) = twin.coordinates[encoder.joint]
     for angle in (np.pi, -np.pi):

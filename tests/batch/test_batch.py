@@ -19,6 +19,7 @@ from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.relation import relation
 from hrsynth.kinematics.sampling import random_walk
+from hrsynth.mechanism.observation import Direction
 from kinematics.robots import ROBOTS
 from strategies import parallel_robots
 
@@ -57,7 +58,8 @@ def check_law(setting: ObservedRobot, legs: Sequence[str], count: int, seed: int
     batch = setting.batch
     assert batch is not None
     everything = setting.everything
-    watched = tuple(o for o in everything.question.observations[: setting.defaults] if o.leg in legs)
+    watched = tuple(o for o in everything.question.observations[: setting.defaults]
+                    if isinstance(o, Direction) and o.leg in legs)
     question = replace(everything.question, observations=watched)
     walk = list(random_walk(everything.start, count, seed=seed, steps=4))
     found = batch.evaluate([at.pose(question.platform) for at in walk], [o.leg for o in watched])

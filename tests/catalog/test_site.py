@@ -22,7 +22,7 @@ from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.jsonl import line, record
 from hrsynth.catalog.site import Site, build, folder, site
 from hrsynth.catalog.site.index import LISTS, NUMBERS, TEXTS, columns, notation, rendered
-from hrsynth.catalog.site.pages import study, trace
+from hrsynth.catalog.site.pages import study, trace, written
 from hrsynth.catalog.site.structures import Structure, named, structures
 from hrsynth.catalog.words import parse
 from hrsynth.cli import execute
@@ -272,7 +272,7 @@ def test_a_site_replaces_an_older_one_and_nothing_else(few, tmp_path):
 def test_a_build_that_was_broken_off_goes_on_and_gives_the_same_bytes(few, tmp_path, monkeypatch):
     done = site(few, tmp_path / "whole")
     assert (done.now, done.pages) == (3, 3)
-    write, count = build.written, []
+    write, count = written, []
 
     def breaks(folder, parts):
         count.append(1)

@@ -99,8 +99,8 @@ def test_a_written_file_is_assembled_at_zero(mechanism: Mechanism):
         axes = [np.array([float(word) for word in loop.find(tag).get("xyz").split()])
                 for tag in ("axis", "axis2") if loop.find(tag) is not None]
         kind = LOOP_TYPES[loop.get("type")]
-        joint = JointSpec(loop.get("name"), kind, (FrameSpec("a"), FrameSpec("b")), tuple(axes))
-        assert residual(joint, *ends, mechanism.length) <= ASSEMBLED
+        spec = JointSpec(loop.get("name"), kind, (FrameSpec("a"), FrameSpec("b")), tuple(axes))
+        assert residual(spec, ends[0], ends[1], mechanism.length) <= ASSEMBLED
         if kind is JointType.UNIVERSAL:
             assert abs((ends[0][:3, :3] @ axes[0]) @ (ends[1][:3, :3] @ axes[1])) <= ASSEMBLED
     assert loops
@@ -336,5 +336,6 @@ def test_an_observed_direction_is_read_in_its_links_frame():
     robot = with_rods()
     read = native.parse(native.write(robot))
     for mine, theirs in zip(robot.observations, read.observations, strict=True):
+        assert isinstance(mine, Direction)
         assert isinstance(theirs, Direction)
         assert np.allclose(mine.direction, theirs.direction, atol=1e-13)

@@ -14,6 +14,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism.model import JointType, Mechanism, Motor
+from hrsynth.mechanism.observation import Direction
 from hrsynth.tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
 from kinematics.robots import derived
 
@@ -67,6 +68,7 @@ def test_a_longer_rod_is_caught(robot: str, legs: tuple[str, ...]) -> None:
     hidden = hidden_of(robot, *legs)
     derivation = derived(robot, legs or None)
     observation = derivation.setting.observed[0]
+    assert isinstance(observation, Direction)
     last = next(j for j in hidden.joints_of(derivation.setting.anatomy.leg(observation.leg).attach)
                 if j.name in derivation.setting.anatomy.leg(observation.leg).joints)
     u = hidden.links[observation.link].pose[:3, :3] @ observation.direction

@@ -25,7 +25,7 @@ EXPECTED = {
 }
 
 
-def made(name: str) -> tuple[Coordinates, object]:
+def made(name: str) -> tuple[Coordinates, ObservedRobot]:
     setting = ObservedRobot.of(load(name))
     start = setting.everything.start
     return Coordinates.of(start, setting.everything.question, setting.motion), setting

@@ -10,11 +10,12 @@ import numpy as np
 import pytest
 
 from hrsynth.description import load, shipped
+from hrsynth.geometry.incidences import Incidence
 from hrsynth.geometry.vectors import Array, inverse, unit
 from hrsynth.mechanism import Direction, Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.relations import Incidence, Relations
+from hrsynth.mechanism.relations import Relations
 from hrsynth.mechanism.screws import constraints
 from mechanism.relating import observed, recognised, segments, walked
 from oracle import Oracle

@@ -56,7 +56,7 @@ def push(tab: Tab, number: int, key: str, times: int = 4) -> None:
 @pytest.mark.parametrize("name", FIVE)
 def test_the_page_of_a_robot_shows_it_and_its_sliders_move_it(name: str, tab: Tab, tmp_path: Path):
     file = tmp_path / "view.html"
-    page.write(seen(name), str(file))
+    file.write_bytes(page.static(seen(name)))
     tab.page.set_viewport_size(SIZE)
     tab.open(file, READY)
     home = drawn(tab)
@@ -79,7 +79,7 @@ def test_the_page_of_a_robot_shows_it_and_its_sliders_move_it(name: str, tab: Ta
 @pytest.mark.browser
 def test_what_is_switched_off_is_gone(tab: Tab, tmp_path: Path):
     file = tmp_path / "view.html"
-    page.write(seen("quattro"), str(file))
+    file.write_bytes(page.static(seen("quattro")))
     tab.page.set_viewport_size(SIZE)
     tab.open(file, READY)
     before = drawn(tab)
@@ -96,7 +96,7 @@ def test_what_is_switched_off_is_gone(tab: Tab, tmp_path: Path):
 @pytest.mark.browser
 def test_the_panel_says_what_is_shown_and_fits_a_narrow_window(tab: Tab, tmp_path: Path):
     file = tmp_path / "view.html"
-    page.write(seen("uranesx"), str(file))
+    file.write_bytes(page.static(seen("uranesx")))
     tab.page.set_viewport_size(SIZE)
     tab.open(file, READY)
     text = tab.page.locator("aside").inner_text()

@@ -90,7 +90,7 @@ def test_a_result_is_one_line_at_a_prompt_and_marked_up_in_a_notebook(command: s
     assert marked == hrsynth.html(found)
     inside = re.sub("<u>(.)</u>", "\\1\u0332", marked.removesuffix("</pre>").split(">", 1)[1])
     assert html.unescape(inside) == str(found)
-    assert isinstance(found.to_dict(), dict)
+    assert isinstance(found.to_dict(), dict)  # type: ignore[attr-defined]
 
 
 def test_parts_of_results_and_robots_are_shown_too():

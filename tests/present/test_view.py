@@ -11,6 +11,7 @@ from hrsynth import check, load, modes, view
 from hrsynth.description import shipped
 from hrsynth.geometry.vectors import unit
 from hrsynth.mechanism import JointType
+from hrsynth.mechanism.observation import Direction
 from hrsynth.present.view.view import View
 from present.views import mechanism_of, miss, moved, seen, states, turned
 
@@ -73,7 +74,7 @@ def test_the_hidden_robot_shows_the_same_directions_and_platform(name: str):
     real, hidden = (list(machine.links) for machine in found.machines)
     for state in states(found):
         for seen_by in found.setting.observed:
-            if seen_by.link not in hidden:
+            if not isinstance(seen_by, Direction) or seen_by.link not in hidden:
                 continue
             d = found.setting.mechanism.links[seen_by.link].pose[:3, :3] @ seen_by.direction
             u, v = (turned(state.places[key][links.index(seen_by.link)], d)
@@ -118,6 +119,7 @@ def test_every_observed_leg_has_its_arrow_along_what_is_observed(name: str):
     found = seen(name)
     assert [arrow.leg for arrow in found.arrows] == list(found.setting.labels)
     for arrow, observed in zip(found.arrows, found.setting.observed, strict=True):
+        assert isinstance(observed, Direction)
         d = found.setting.mechanism.links[observed.link].pose[:3, :3] @ observed.direction
         assert unit(arrow.ends[1] - arrow.ends[0]) == pytest.approx(d, abs=DRAWN)
         assert arrow.link == observed.link
@@ -134,6 +136,7 @@ def test_there_is_a_ghost_for_each_mode_but_the_pose_itself(name: str):
     assert len(found.mode_outlines) == len(listed.modes) - 1
     for outline in found.mode_outlines:
         for observed in found.setting.observed if outline.reachable else ():
+            assert isinstance(observed, Direction)
             place = outline.places[list(found.setting.mechanism.links).index(observed.link)]
             d = found.setting.mechanism.links[observed.link].pose[:3, :3] @ observed.direction
             assert turned(place, d) == pytest.approx(d, abs=1e-5)

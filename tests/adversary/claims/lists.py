@@ -72,7 +72,7 @@ def asked_of(case: Case, claim: str, asked: str, told: Any) -> None:
     wrong = max(abs(float(fields[n]) - v) for n, v in zip("xyz", x, strict=True)) / case.robot.length
     if "rpy" in fields and R is not None:
         angles = [float(a) for a in fields["rpy"].split("/")]
-        wrong = max(wrong, float(np.max(np.abs(R - matrix_of(_Told(*x, tuple(angles)))[1]))))  # type: ignore[arg-type]
+        wrong = max(wrong, float(np.max(np.abs(R - matrix_of(_Told(x[0], x[1], x[2], tuple(angles)))[1]))))
     case.say(claim, HELD if wrong < 2e-5 else WRONG, "" if wrong < 2e-5 else f"asked {asked}, told {told}")
 
 

@@ -20,6 +20,7 @@ from hrsynth.analysis.aspects.path import BUDGET, SAME, SEPARATED, UNDECIDED, As
 from hrsynth.analysis.aspects.path_segments import StraightSegment, mode_change
 from hrsynth.analysis.aspects.road_map import PoseRegion, plan
 from hrsynth.analysis.singularity.agreement import smallest_of
+from hrsynth.closed_forms.legs import OnCrank
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.balls import balls, below, centred, jets
@@ -236,6 +237,7 @@ def test_a_crossing_leads_from_one_working_mode_to_the_other():
     for at in walk("3rrr_m1", None)[:5]:
         chart, (p, R) = aspects.enclosure(at).forms, carriage.of([at])
         for number, limb in enumerate(chart.limbs):
+            assert isinstance(limb, OnCrank)
             found = mode_change(carriage, limb, number, (p[0], R[0]))
             assert found is not None
             places, turns, (_, ends) = found.at(fractions)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hrsynth.analysis.modes.curves import Circle, Line, Plane, Point, Reach, Sphere
 from hrsynth.analysis.modes.rigid import Planar, Spatial
-from hrsynth.analysis.modes.systems import System
 from hrsynth.analysis.modes.translating import Articulated, Translating
 from hrsynth.geometry.vectors import Array, pose, rotation_about, unit
 from strategies import random_rotation
@@ -20,7 +19,8 @@ Rng = np.random.Generator
 class Draw(NamedTuple):
     """A system, and the pose (4, 4) through which its curves were laid."""
 
-    system: System
+    system: Any
+    """A system of equations, of the kind that its maker names."""
     goal: Array
 
 

@@ -9,6 +9,7 @@ import shlex
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -146,12 +147,13 @@ def test_near_modes_have_their_own_mark():
 @pytest.mark.parametrize("kinds", ["CC", "LL", "LC", "CL", "PC", "CP", "PL"])
 def test_a_bar_keeps_its_length_and_its_ends_their_curves(kinds: str, seed: int):
     rng = rng_of(seed)
-    curves = [{"C": lambda: Circle(rng.normal(size=3), rng.normal(size=3), rng.uniform(0.3, 1.5)),
-               "L": lambda: Line(rng.normal(size=3), rng.normal(size=3)), "P": lambda: Point(rng.normal(size=3))}[k]()
-              for k in kinds]
+    made: dict[str, Any] = {
+        "C": lambda: Circle(rng.normal(size=3), rng.normal(size=3), rng.uniform(0.3, 1.5)),
+        "L": lambda: Line(rng.normal(size=3), rng.normal(size=3)), "P": lambda: Point(rng.normal(size=3))}
+    curves = [made[kind]() for kind in kinds]
     ends = [curve.at(rng.uniform(-2, 2)) for curve in curves]
     length = float(np.linalg.norm(ends[1] - ends[0]))
-    found = chains(*curves, length, 181)
+    found = chains(curves[0], curves[1], length, 181)
     for one, other in found:
         assert np.allclose(np.linalg.norm(other - one, axis=1), length, atol=1e-6)
         assert max(np.linalg.norm(curves[0].miss(tip)) for tip in one) < 1e-9
@@ -262,7 +264,7 @@ def test_the_command_draws_and_the_file_says_what_it_holds(tmp_path: Path, capsy
 
 def held(file: Path) -> dict:
     with Image.open(file) as image:
-        return json.loads(image.text["Description"])
+        return json.loads(image.info["Description"])
 
 
 def test_two_pictures_of_the_same_are_the_same():

@@ -15,7 +15,8 @@ from analysis.modes.draws import FAMILIES, MEETING, SURFACES, on_two_bodies, spa
 from analysis.modes.laws import among, check_agreement, check_member, draw, installed
 from hrsynth.analysis.modes.curves import Circle, Plane, Reach, Sphere
 from hrsynth.analysis.modes.msolve import parametrised, read, wholes, written
-from hrsynth.analysis.modes.quadrics import Balls, Quadric
+from hrsynth.analysis.modes.polynomials import Quadric
+from hrsynth.analysis.modes.quadrics import Balls
 from hrsynth.analysis.modes.rigid import Planar
 from hrsynth.analysis.modes.solve import solve, solve_by_msolve
 from hrsynth.analysis.modes.systems import System

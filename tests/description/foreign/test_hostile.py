@@ -179,9 +179,7 @@ def _folder(path: Path) -> Path:
 
 
 def test_a_xacro_file_without_the_package_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    from hrsynth.description.formats.urdf import xacro
-
-    monkeypatch.setattr(xacro.importlib.util, "find_spec", lambda name: None)
+    monkeypatch.setattr("hrsynth.description.formats.urdf.xacro.importlib.util.find_spec", lambda name: None)
     text = ONE["urdf"].replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"', 1).replace(
         "</robot>", '<xacro:property name="x" value="1"/></robot>')
     assert_refused(made(tmp_path, text), "the package xacro is not installed")

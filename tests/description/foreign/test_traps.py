@@ -15,6 +15,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.observation import Direction
 
 CHAIN = '<link name="{1}"/><joint name="{0}" type="{3}"><parent link="{2}"/><child link="{1}"/>{4}</joint>'
 
@@ -295,6 +296,7 @@ def test_motors_platform_freeze_and_observed_links_may_be_given(tmp_path: Path):
     robot = read(tmp_path, text, platform="bar", motors="c", observe=["crank"])
     assert {name for name, joint in robot.joints.items() if joint.actuated} == {"c"}
     (seen,) = robot.observations
+    assert isinstance(seen, Direction)
     assert seen.link == "crank"
     direction = robot.links["crank"].pose[:3, :3] @ seen.direction
     assert np.allclose(direction, (B - A) / np.linalg.norm(B - A))
