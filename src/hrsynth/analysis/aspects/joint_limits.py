@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import combinations, product
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,10 +14,8 @@ from ...geometry.so3 import wrap_angle
 from ...geometry.vectors import Array, cross, dot
 from ...mechanism import Joint, JointType
 from ...tolerances import FOLLOWED, SAME_RELATION, TURNING_ARM
+from .sampled_mechanism import SampledMechanism
 from .vector_expressions import NoLegForm, VectorExpression
-
-if TYPE_CHECKING:
-    from .leg_forms import SampledMechanism
 
 Value = Callable[[VectorExpression], Field]
 
