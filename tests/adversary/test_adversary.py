@@ -227,6 +227,8 @@ FOUND = (
     ("translational", 3020, "paths"),  # a held leg whose tip may move anywhere
     ("rods", 20261164, "hidden modes"),  # the pose itself, whose solution is known to 1e-8 only
     ("translational", 20261429, "errors"),  # a platform that turns by 1e-10 rad, taken for one that does not
+    ("pods", 20270025, "hidden modes"),  # the pose itself, where all choices of legs depend on each other
+    ("pods", 20270044, "hidden modes"),
     ("pods words", 20261184, "real modes"),  # the pose itself, where msolve finds nothing
     ("tripods", 20261176, "real modes"),  # legs R-R-S with skew axes, told not to reach a mode
     ("slides", 20261175, "hidden robot"),  # zero as a dead point, where the certificate says nothing

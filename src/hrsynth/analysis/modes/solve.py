@@ -123,7 +123,7 @@ def _solved(system: System, near: bool, goal: Array | None) -> SystemModes:
                            ((each, solve_square(each)) for each in islice(others, CHOICES)), goal)
     if system.surfaces and not isinstance(system, Translating):
         return _proposed(system, near, goal)
-    return _undecided(system, square is not None)
+    return _undecided(system, square is not None, goal)
 
 
 def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:
@@ -144,21 +144,23 @@ def _proposed(system: System, near: bool, goal: Array | None) -> SystemModes:
         roots = solve_whole(part, system.balls(part.chart.frame), system.farthest)
         if not roots.continuum:
             return _judged(system, part, roots, () if near else None, goal)
-    return _undecided(system, part is not None)
+    return _undecided(system, part is not None, goal)
 
 
 def _too_few(system: System) -> SystemModes:
     return continuum(f"too few legs: a continuum of dimension {system.missing}", system.missing)
 
 
-def _undecided(system: System, tried: bool) -> SystemModes:
-    """What is said where no choice of legs has finitely many solutions."""
+def _undecided(system: System, tried: bool, goal: Array | None) -> SystemModes:
+    """What is said where no choice of legs has finitely many solutions: the goal, where it is given, is one."""
+    known = () if goal is None else (_by_construction(system, goal, ()),)
     if not tried:
-        return SystemModes(0, (), False, "nothing proved", degenerate="no choice of legs decides the pose: tips on one "
-                           "line, in one point, or at rest")
+        return SystemModes(len(known), known, False, "nothing proved", degenerate="no choice of legs decides the pose: "
+                           "tips on one line, in one point, or at rest")
     size = dimension(system)
     if size is None:
-        return continuum("the equations depend on each other, but no real pose was found", None)
+        return SystemModes(len(known), known, False, "nothing proved",
+                           degenerate="the equations depend on each other, but no continuum of poses was found")
     return continuum(f"the tips can move together: a continuum of dimension {size}", size)
 
 
@@ -188,9 +190,7 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
     open_ = [mode for mode in left if mode is not at_goal and mode.residual > VANISHES]
     lost = goal is not None and not any(_same(system, mode.q, goal) for mode in left)
     if goal is not None and not any(_same(system, mode.q, goal) for mode in modes):
-        # a mode by construction, whose solution is known too roughly to fit
-        at_goal = SystemMode((), np.inf, np.inf, np.pi, system.residual(system.reached(goal)),
-                             frozen(system.pose(goal)), frozen(goal), square.legs)
+        at_goal = _by_construction(system, goal, square.legs)  # its solution is known too roughly to fit
         modes, open_ = (*modes, at_goal), [mode for mode in open_ if not _same(system, mode.q, goal)]
         enclosed = False
     near = () if others is None else _near(system, found, modes, others)
@@ -200,6 +200,12 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
              + words(at_goal is not None, lost, fitting, len(found) - len(left), len(open_)))
     return SystemModes(len(modes), modes, enclosed and bound != "none", proof, near, _special(roots), None, bound,
                        enclosed)
+
+
+def _by_construction(system: System, goal: Array, legs: tuple[int, ...]) -> SystemMode:
+    """The goal as a mode whose place no solution proves."""
+    return SystemMode((), np.inf, np.inf, np.pi, system.residual(system.reached(goal)), frozen(system.pose(goal)),
+                      frozen(goal), legs)
 
 
 def _goal(system: System, roots: Roots, found: Sequence[SystemMode], goal: Array | None) -> SystemMode | None:
