@@ -130,6 +130,8 @@ class Program:
     numbers: list[float] = field(default_factory=list)
     tape: Tape | None = None
     """The formula that is being traced."""
+    texts: dict[tuple[Any, ...], str] = field(default_factory=dict)
+    """The module of each choice of outputs, until more is traced."""
 
     @classmethod
     def of(cls, **inputs: int) -> Program:
@@ -168,6 +170,7 @@ class Program:
 
     def _traced(self, formula: Formula, reads: Sequence[str], state: Sequence[str]) -> Kernel:
         self.tape = tape = Tape(self.numbers)
+        self.texts.clear()
         made = formula(*([tape.load(each) if isinstance(each, int) else each for each in self.places[name]]
                          for name in reads))
         stores: list[Store] = []
@@ -249,6 +252,12 @@ class Program:
 
     def text(self, outputs: Sequence[Any]) -> str:
         """The module that numba compiles: the same for all robots of one structure, whose numbers it is given."""
+        key = tuple(outputs)
+        if key not in self.texts:
+            self.texts[key] = self._written(outputs)
+        return self.texts[key]
+
+    def _written(self, outputs: Sequence[Any]) -> str:
         kernels: list[str] = []
         body: list[str] = []
         for section in self.sections:
