@@ -206,7 +206,7 @@ def test_class_names_are_unique():
     homes: dict[str, list[str]] = {}
     for path in MODULES:
         for node in ast.walk(tree_of(path)):
-            if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
+            if isinstance(node, ast.ClassDef):
                 homes.setdefault(node.name, []).append(where(path, node.lineno))
     twice = {name: places for name, places in homes.items() if len(places) > 1}
     assert_none([f"{name}: {', '.join(places)}" for name, places in twice.items()],

@@ -48,11 +48,11 @@ class TangentChart:
         image = question.rows(centre) @ kernel
         return cls(centre, kernel @ range_basis(image.T, 1.0)[0])
 
-    def at(self, y: Array, near: Array) -> ClosedConfiguration:
+    def at(self, y: Array, near: Array, *, iterations: int = 15) -> ClosedConfiguration:
         """The configuration with the coordinates y that lies next to the configuration ``near`` (nq,); raises
         ``LoopsNotClosed``."""
         twin = self.centre.twin
-        q, residual = solve(twin, near, _Coordinates(self, y), tolerance=SOLVED, iterations=15)
+        q, residual = solve(twin, near, _Coordinates(self, y), tolerance=SOLVED, iterations=iterations)
         if not residual <= CLOSED:
             raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, twin.worst_loop(q)[0])
         return ClosedConfiguration.of(twin, q)

@@ -82,7 +82,7 @@ def measure(twin: PinocchioModel, q: Array, reference: str, observations: Sequen
 
 
 @dataclass(frozen=True, eq=False)
-class _Group:
+class _AlikeObservations:
     """Observations of one kind, seen from one link: their places among all, the places of the links."""
 
     kind: type[Observation]
@@ -94,7 +94,7 @@ class _Group:
 
 @lru_cache(maxsize=512)
 def _grouped(reference: str, observations: tuple[Observation, ...], links: tuple[str, ...]
-             ) -> tuple[tuple[str, ...], list[_Group]]:
+             ) -> tuple[tuple[str, ...], list[_AlikeObservations]]:
     """All links that matter, ``links`` first, and the observations that are evaluated together."""
     seen = [o.seen_from or reference for o in observations]
     names = (*links, *dict.fromkeys(name for name in (*seen, *(o.link for o in observations)) if name not in links))
@@ -103,5 +103,5 @@ def _grouped(reference: str, observations: tuple[Observation, ...], links: tuple
     for kind, view in dict.fromkeys((type(o), name) for o, name in zip(observations, seen, strict=True)):
         members = [i for i, o in enumerate(observations) if (type(o), seen[i]) == (kind, view)]
         chosen = [observations[i] for i in members]
-        groups.append(_Group(kind, place[view], members, chosen, [place[o.link] for o in chosen]))
+        groups.append(_AlikeObservations(kind, place[view], members, chosen, [place[o.link] for o in chosen]))
     return names, groups

@@ -16,13 +16,12 @@ from ..analysis.observed import ObservedRobot, motors
 from ..errors import BadRequest, LoopsNotClosed, MissingExtra
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
+from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezero
-from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.relation import relation
-from ..kinematics.tasks import solve
 from ..mechanism import Mechanism
-from ..tolerances import BENCH_SETTLED, BENCH_STEADY, CLOSED, SOLVED
+from ..tolerances import BENCH_SETTLED, BENCH_STEADY
 from .law import Command, Poses
 from .mockup import STEP, coordinates, mockup
 from .run import OPEN, SERVED_AT, TIME, Loop, Run
@@ -81,14 +80,13 @@ class Bench:
         mujoco.mj_kinematics(model, data)
         twin = self.start.twin
         driven = twin.actuated()
-        first = twin.difference(twin.q0, self.start.q)[driven]
         scale = np.array([twin.length if model.joint(name).type[0] == mujoco.mjtJoint.mjJNT_SLIDE else 1.0
                           for name in self._names])
         at, time, stopped = self.start, 0.0, TIME
         times: list[float] = []
         states: list[tuple[ClosedConfiguration, Command]] = []
         while time < horizon:
-            at_now = encoded(at, driven, first + data.qpos[places] / scale)
+            at_now = encoded(self.start, at, driven, data.qpos[places] / scale)
             if at_now is None:
                 stopped = OPEN
                 break
@@ -131,30 +129,14 @@ class Bench:
         return replace(command, error=np.cross(seen, loop.desired(time)[0]), directions=seen)
 
 
-@dataclass(frozen=True, eq=False)
-class _Coordinates:
-    """Coordinates of motors that are wanted."""
-
-    places: list[int]
-    values: Array
-    free: Array
-    """How the motors can move together, (motors, n), orthonormal: what more motors say than that is left out."""
-
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        """Error (reached − wanted) and its Jacobian."""
-        return self.free.T @ (twin.difference(twin.q0, q)[self.places] - self.values), self.free.T @ np.eye(
-            twin.nv)[self.places]
-
-
-def encoded(at: ClosedConfiguration, places: list[int], values: Array) -> ClosedConfiguration | None:
-    """The configuration next to another with these coordinates of the motors; None where there is none."""
-    twin = at.twin
+def encoded(start: ClosedConfiguration, at: ClosedConfiguration, places: list[int], moved: Array
+            ) -> ClosedConfiguration | None:
+    """The configuration next to ``at`` to which these motors have moved since the start; None where there is none. What
+    more motors say than how they can move together is left out."""
     free, _ = range_basis(at.kernel()[0][places], 1.0)
-    found, residual = solve(twin, at.q, _Coordinates(places, values, free), tolerance=SOLVED)
-    if residual > CLOSED:
-        return None
+    chart = TangentChart(start, np.eye(at.twin.nv)[:, places] @ free)
     try:
-        return ClosedConfiguration.of(twin, found)
+        return chart.at(free.T @ moved, at.q, iterations=30)
     except LoopsNotClosed:
         return None
 

@@ -164,8 +164,8 @@ def _undecided(system: System, tried: bool, goal: Array | None) -> SystemModes:
     return continuum(f"the tips can move together: a continuum of dimension {size}", size)
 
 
-def continuum(text: str, size: int | None) -> SystemModes:
-    """Modes that form a continuum of this dimension, None where it is not known."""
+def continuum(text: str, size: int) -> SystemModes:
+    """Modes that form a continuum of this dimension."""
     return SystemModes(0, (), False, "a continuum is not counted", degenerate=text, continuum=size)
 
 

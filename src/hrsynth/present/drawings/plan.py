@@ -78,7 +78,7 @@ class Layout:
 
 
 @dataclass(frozen=True)
-class _Group:
+class _LegBoxes:
     label: str | None
     ears: tuple[Ear, ...]
 
@@ -99,7 +99,7 @@ def plan(mechanism: Mechanism | LegDecomposition, *, observed: Collection[str] |
     if leg is not None:
         chosen = (anatomy or decompose(whole)).leg(leg)
         own = [box for box in boxes if set(box.joints) <= set(chosen.joints)]
-        groups, platform = [_Group(leg, tuple(ears(own, (whole.base, chosen.attach))))], (chosen.attach,)
+        groups, platform = [_LegBoxes(leg, tuple(ears(own, (whole.base, chosen.attach))))], (chosen.attach,)
     columns = _columns(groups, whole.base)
     ends = {group.ears[0].links[-1] for group in groups if group.ears}
     spots, ways, rows = _placed(groups, columns)
@@ -114,10 +114,10 @@ def _anatomy(mechanism: Mechanism) -> LegDecomposition | None:
 
 
 def _groups(mechanism: Mechanism, anatomy: LegDecomposition | None,
-            boxes: list[Box]) -> tuple[list[_Group], tuple[str, ...]]:
+            boxes: list[Box]) -> tuple[list[_LegBoxes], tuple[str, ...]]:
     """The legs in the order of what they end on, the platform's own joints after those of the first end."""
     ends = (mechanism.base, mechanism.platform)
-    everything = [_Group(None, tuple(ears(boxes, ends)))]
+    everything = [_LegBoxes(None, tuple(ears(boxes, ends)))]
     if anatomy is None:
         return everything, (mechanism.platform,)
     of_leg = {name: leg.label for leg in anatomy.legs for name in leg.joints}
@@ -129,16 +129,16 @@ def _groups(mechanism: Mechanism, anatomy: LegDecomposition | None,
     if any(not {box.tail, box.head, *box.inside} <= platform for box in inner):
         return everything, (mechanism.platform,)
     attached = tuple(dict.fromkeys(leg.attach for leg in anatomy.legs))
-    groups: list[_Group] = []
+    groups: list[_LegBoxes] = []
     for attach in attached:
-        groups += [_Group(leg.label, tuple(ears(members.get(leg.label, ()), (mechanism.base, attach))))
+        groups += [_LegBoxes(leg.label, tuple(ears(members.get(leg.label, ()), (mechanism.base, attach))))
                    for leg in anatomy.legs if leg.attach == attach]
         if attach == attached[0] and inner:
-            groups.append(_Group(None, tuple(ears(inner, attached))))
+            groups.append(_LegBoxes(None, tuple(ears(inner, attached))))
     return groups, anatomy.platform
 
 
-def _columns(groups: Sequence[_Group], base: str) -> dict[str, int]:
+def _columns(groups: Sequence[_LegBoxes], base: str) -> dict[str, int]:
     """A column for each link, such that every box has its two links in different ones: longest ways from the left."""
     import networkx as nx
 
@@ -158,7 +158,7 @@ _Way = tuple[str, tuple[Point, ...], int]
 """A link, the points of its line within a lane, the group."""
 
 
-def _placed(groups: Sequence[_Group], columns: dict[str, int]) -> tuple[list[PlacedBox], list[_Way], list[Row]]:
+def _placed(groups: Sequence[_LegBoxes], columns: dict[str, int]) -> tuple[list[PlacedBox], list[_Way], list[Row]]:
     spots: list[PlacedBox] = []
     ways: list[_Way] = []
     rows: list[Row] = []
