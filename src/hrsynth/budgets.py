@@ -107,6 +107,10 @@ FINEST_INTERVAL = 2.0**-16
 """Length of an interval (of its way) below which such a proof is given up."""
 REGION_WIDER = 1.5
 """How much wider than the known poses the region is from which poses of a road map are drawn."""
+SEARCH_STARTS = 300
+"""Random starts of the whole robot from which modes are looked for where no system of equations is known for them."""
+SEARCH_ITERATIONS = 100
+"""Iterations in which each of them is closed, at most."""
 BRANCH_CHOICES = 256
 """Choices of branches of held legs that are solved; where there are more the list of modes is not complete."""
 FINEST_BOX = 2.0 ** -100

@@ -64,6 +64,10 @@ class BadRequest(HrsynthError):
         super().__init__(text)
 
 
+class NoSegment(BadRequest):
+    """A leg without a segment whose direction could be observed: it is one joint, or its links have no length."""
+
+
 class BadMechanism(BadRequest):
     """A mechanism whose parts contradict each other (a joint of an unknown link, a zero axis)."""
 

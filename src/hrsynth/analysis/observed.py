@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..budgets import REMEMBERED
-from ..errors import BadMechanism, BadRequest, HrsynthError, NotSampled, PoseNotReached
+from ..errors import BadMechanism, BadRequest, HrsynthError, NoSegment, NotSampled, PoseNotReached
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezero
@@ -250,8 +250,12 @@ def _observed(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str,
         raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
     if observe is None or list(observe) == ["all"]:
         for leg in anatomy.legs:
-            if leg.label not in defaults and (leg.links or not defaults):
-                default_observation(anatomy, leg)
+            if leg.label not in defaults:
+                try:
+                    default_observation(anatomy, leg)
+                except NoSegment:
+                    if not defaults:
+                        raise
         return tuple(defaults.values())
     chosen: dict[tuple[str, ...], Observation] = {}
     for name in observe:

@@ -202,7 +202,7 @@ def _modes(setting: ObservedRobot, legs: Sequence[str]) -> dict[str, Any]:
     try:
         for at in setting.configurations[:INSTANCES]:
             found = counted(measured, at)
-            if found.complete and not found.continuum:
+            if found.complete and found.complex is not None and not found.continuum:
                 bounds.append(found.complex)
                 seen.append(sum(mode.multiplicity for mode in found.modes))
     except (NotConfined, Unsolved, BadRequest):

@@ -111,7 +111,7 @@ def plucker(pattern: ConstraintPattern, values: Values) -> Array:
 
 def condition(pattern: ConstraintPattern, question: Measurement) -> Condition:
     """The condition of a pattern: by name where it is a known one, else by the screws of all joints."""
-    if pattern.motion == "other":
+    if pattern.motion in ("other", "oriented"):
         return _general(question)
     if any(leg.fixed for leg in pattern.legs) and pattern.motion == "translations":
         return Named("never: a held leg leaves the platform no motion", _number(1), never=True, pattern=pattern)

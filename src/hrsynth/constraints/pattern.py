@@ -58,8 +58,9 @@ class LockedLeg:
 class ConstraintPattern:
     """How the platform can move and what the held legs leave of it.
 
-    ``motion`` is ``translations`` (held legs leave translations alone), ``planar``, ``spatial``, ``bodies`` (an
-    articulated platform whose bodies translate, one along ``slide`` relative to the other) or ``other``.
+    ``motion`` is ``translations`` (held legs leave translations alone), ``planar``, ``spatial``, ``oriented`` (spatial,
+    and some legs forbid a part of the turns), ``bodies`` (an articulated platform whose bodies translate, one along
+    ``slide`` relative to the other) or ``other``.
     """
 
     motion: str
@@ -162,7 +163,8 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
     else:
         found = _two_bodies(anatomy, legs, motions, samples)
     # where the turns of all legs are alike, a leg whose tip may move anywhere holds nothing
-    binding = () if found is None else tuple(leg for leg in found.legs if not leg.free)
+    binding = () if found is None else tuple(leg for leg in found.legs if not leg.free or (
+        found.motion == "oriented" and leg.turns < 3))
     return replace(found, legs=binding) if found is not None and binding else other
 
 
@@ -182,8 +184,9 @@ def _one_body(anatomy: LegDecomposition, held: dict[str, LockedLeg | None], legs
         return None if plane is None else ConstraintPattern("planar", base, bodies, every, plane=plane)
     if motions.shape[2] == 6 and all(leg.turns == 3 for leg in legs):
         return ConstraintPattern("spatial", base, bodies, legs)
-    if len(every) == len(held) and all(leg.turns == 3 for leg in every):
-        return ConstraintPattern("spatial", base, bodies, every)
+    if len(every) == len(held) and all(leg.turns >= 2 for leg in every):
+        motion = "spatial" if all(leg.turns == 3 for leg in every) else "oriented"
+        return ConstraintPattern(motion, base, bodies, every)
     return None
 
 

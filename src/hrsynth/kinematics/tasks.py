@@ -5,6 +5,7 @@ Lengths are in characteristic lengths, so that errors of positions and of turns 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -35,6 +36,28 @@ class GuidedTask(Task, Protocol):
 
     def towards(self, X: Array, fraction: float) -> GuidedTask:
         """What lies ``fraction`` of the way from the pose X (4, 4) to it."""
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Measured values that are to stay as they are, seen from ``reference`` where an observation names no link."""
+
+    reference: str
+    measured: tuple[tuple[Observation, Array], ...]
+
+    @classmethod
+    def at(cls, twin: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation]) -> Held:
+        """As they are at a configuration."""
+        values = measure(twin, q, reference, observations)[2]
+        return cls(reference, tuple(zip(observations, values, strict=True)))
+
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+        """Error (reached − wanted) and its Jacobian."""
+        if not self.measured:
+            return np.zeros(0), np.zeros((0, twin.nv))
+        _, _, values, rates = measure(twin, q, self.reference, [o for o, _ in self.measured])
+        errors = [o.apart(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True)]
+        return np.concatenate(errors), np.vstack(rates)
 
 
 @dataclass(frozen=True, eq=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import BadRequest
+from ..errors import BadRequest, NoSegment
 from ..geometry import lines
 from ..geometry.vectors import Array, frozen, perpendicular, unit
 from ..tolerances import SAME_POINT
@@ -33,7 +33,7 @@ def default_observation(anatomy: LegDecomposition, leg: Leg) -> Direction:
     if path[-1].inside:
         return segments.binary(path[-1].inside[0])
     if len(nodes) < 3:
-        raise BadRequest(f"leg {leg.label} has no segment to observe: it is one joint", path[-1].joints[0])
+        raise NoSegment(f"leg {leg.label} has no segment to observe: it is one joint", path[-1].joints[0])
     return segments.at(len(nodes) - 2)
 
 
@@ -102,8 +102,8 @@ class _Segments:
 
     def _direction(self, link: str, vector: Array) -> Direction:
         if np.linalg.norm(vector) <= SAME_POINT * self.mechanism.length:
-            raise BadRequest(f"the observed segment {link!r} of leg {self.leg.label} has no length",
-                             float(np.linalg.norm(vector)), "two joint centres apart from each other")
+            raise NoSegment(f"the observed segment {link!r} of leg {self.leg.label} has no length",
+                            float(np.linalg.norm(vector)), "two joint centres apart from each other")
         return Direction(self.leg.label, link, self.mechanism.links[link].pose[:3, :3].T @ unit(vector))
 
 

@@ -51,7 +51,7 @@ def picture(found: AssemblyModes) -> bytes:
 
 def why_undrawn(found: AssemblyModes) -> str | None:
     """Why there is nothing to draw: a continuum of modes, or none at all."""
-    if found.confined is None or found.found.continuum is not None or not (found.modes or found.near):
+    if found.found.continuum is not None or not (found.modes or found.near):
         return found.found.degenerate or "there is no mode"
     return None
 
@@ -155,7 +155,7 @@ def _robot(sketch: Sketch, place: Any, drawn: ModesScene, each: Placed, k: int) 
 def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> None:
     setting, count = found.setting, found.found
     held = f"directions of legs {', '.join(setting.labels)}" if found.kind == "hidden" else "motor coordinates"
-    many = f"{len(found.modes)} real of {count.complex} complex" + ("" if count.complete else ", not proved to be all")
+    many = found.count + ("" if count.complete else ", not proved to be all")
     many += f"; {len(found.near)} near" if found.near else ""
     many += f"; the first {MOST} drawn as robots" if len(drawn.placed) > MOST else ""
     if drawn.rest:

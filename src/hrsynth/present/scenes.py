@@ -87,8 +87,8 @@ class _Plot:
 
 def scene(found: AssemblyModes) -> ModesScene:
     """What a picture of the modes shows; they must not be a continuum."""
-    assert found.confined is not None
-    plot = _PLOTS[found.confined.motion](found, found.confined)
+    confined = found.confined
+    plot = _platform(found) if confined is None else _PLOTS[confined.motion](found, confined)
     listed = [(str(k), mode) for k, mode in enumerate(found.modes, 1)]
     listed += [(f"near {k}", mode) for k, mode in enumerate(found.near, 1)]
     placed = tuple(_placed(found, plot, label, mode) for label, mode in listed)
@@ -96,7 +96,7 @@ def scene(found: AssemblyModes) -> ModesScene:
     drawn = tuple(Trace(_drawn(reach, about, found.goal.twin.length), words) for reach, words in plot.reaches)
     mechanism = found.goal.twin.mechanism
     ground = np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
-    rest = tuple(tip.leg for tip in found.confined.tips if plot.legs and tip.leg not in plot.legs)
+    rest = tuple(leg for leg in found.labels if plot.legs and leg not in plot.legs)
     return ModesScene(_normal(found), (*plot.traces, *drawn), placed, ground, rest)
 
 
@@ -118,11 +118,11 @@ def _placed(found: AssemblyModes, plot: _Plot, label: str, mode: AssemblyMode) -
 
 def _normal(found: AssemblyModes) -> Array | None:
     """The normal of the plane in which the platform moves, where there is one."""
-    assert found.confined is not None
-    if found.confined.plane is not None:
+    if found.confined is not None and found.confined.plane is not None:
         return found.confined.plane
     shifts = found.setting.motion.translations
-    return np.cross(*shifts.T) if shifts.shape[1] == 2 and found.confined.motion == "translations" else None
+    flat = found.confined is None or found.confined.motion == "translations"
+    return np.cross(*shifts.T) if shifts.shape[1] == 2 and flat else None
 
 
 def _at_goal(found: AssemblyModes, tip: Tip) -> Array:
@@ -131,9 +131,10 @@ def _at_goal(found: AssemblyModes, tip: Tip) -> Array:
     return transform(X, tip.place)
 
 
-def _platform(found: AssemblyModes, confined: TipLoci) -> _Plot:
+def _platform(found: AssemblyModes) -> _Plot:
     """The platform's own position, and no curves."""
-    body = confined.bodies[0]
+    bodies = (each.bodies for each in (*found.modes, *found.near))
+    body = next(iter(next(each for each in bodies if each)))
     p = found.pose
     place = inverse(found.goal.pose(body)) @ np.array([p.x, p.y, p.z, 1.0])
     return _Plot(body, place[:3])
@@ -141,7 +142,7 @@ def _platform(found: AssemblyModes, confined: TipLoci) -> _Plot:
 
 def _translating(found: AssemblyModes, confined: TipLoci) -> _Plot:
     """What the platform's position can be by each leg alone: they meet in the modes (MMT Fig. 5)."""
-    plot = _platform(found, confined)
+    plot = _platform(found)
     X = found.goal.pose(plot.body)
     p = transform(X, plot.place)
     curves = [(tip, curve) for tip in confined.tips for curve in (tip.curve, *(each for each, _ in tip.others))]
@@ -155,7 +156,7 @@ def _planar(found: AssemblyModes, confined: TipLoci) -> _Plot:
     n = confined.plane
     legs = _deciding(found, confined, 3) or _deciding(found, confined, 2)
     if n is None or not legs:
-        return _platform(found, confined)
+        return _platform(found)
     tips = [confined.tips[k] for k in legs]
     at = np.array([_at_goal(found, tip) for tip in tips])
     level = at - np.outer(at @ n, n)
@@ -175,7 +176,7 @@ def _spatial(found: AssemblyModes, confined: TipLoci) -> _Plot:
     """The surface of the third tip while two tips slide on their curves, and the third leg's curve (MMT Fig. 11)."""
     legs = _deciding(found, confined, 3)
     if not legs:
-        return _platform(found, confined)
+        return _platform(found)
     tips = [confined.tips[k] for k in legs]
     at = np.array([_at_goal(found, tip) for tip in tips])
     last = tips[-1]
@@ -190,7 +191,7 @@ def _bodies(found: AssemblyModes, confined: TipLoci) -> _Plot:
     """The surface of translation of one body's curve and the slide, and the other body's curve (MMT Fig. 15)."""
     legs = _deciding(found, confined, 2)
     if not legs or confined.slide is None or len({confined.tips[k].body for k in legs}) < 2:
-        return _platform(found, confined)
+        return _platform(found)
     first, last = (confined.tips[k] for k in legs)
     sign = 1.0 if first.body == confined.bodies[0] else -1.0
     arms = [_at_goal(found, tip) - found.goal.pose(tip.body)[:3, 3] for tip in (first, last)]
@@ -202,7 +203,7 @@ def _bodies(found: AssemblyModes, confined: TipLoci) -> _Plot:
 
 
 _PLOTS: dict[str, Callable[[AssemblyModes, TipLoci], _Plot]] = {
-    "translations": _translating, "planar": _planar, "spatial": _spatial, "bodies": _bodies}
+    "translations": _translating, "planar": _planar, "spatial": _spatial, "oriented": _spatial, "bodies": _bodies}
 
 
 def _on(tip: Tip, legs: Sequence[Tip]) -> str:

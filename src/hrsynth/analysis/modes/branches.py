@@ -12,7 +12,7 @@ import numpy as np
 from ...budgets import BRANCH_CHOICES
 from ...geometry.vectors import Array, inverse, perpendicular, pose, transform
 from ...tolerances import RANK_GAP, SAME_POINT
-from .curves import Reach
+from .curves import Plane, Reach
 from .rigid import Planar, Spatial
 from .solve import SystemMode, SystemModes, solve
 from .systems import System
@@ -54,8 +54,15 @@ def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -
         first = perpendicular(n)
         X_goal = pose(p, np.column_stack([first, np.cross(n, first), n]))
     back = inverse(X_goal)
-    tips = np.array([_point(back @ at[tip.body], tip.place) for tip in confined.tips])
-    system = Spatial(curves, tips) if n is None else Planar(curves, tips[:, :2], X_goal)
+    tips = np.array([_point(back @ at[tip.body], tip.place) for tip in confined.tips]).reshape(-1, 3)
+    if n is None:
+        size = confined.goal.twin.length
+        arrows = np.array([size * (at[each.body][:3, :3] @ each.direction) for each in confined.angles]).reshape(-1, 3)
+        planes = tuple(Plane(p + each.axis * float(each.axis @ arrow), each.axis)
+                       for each, arrow in zip(confined.angles, arrows, strict=True))
+        system: Spatial | Planar = Spatial((*curves, *planes), np.vstack([tips, arrows]), len(arrows), p)
+    else:
+        system = Planar(curves, tips[:, :2], X_goal)
     home = np.array([*p, 0.0, 0.0, 0.0]) if n is None else np.zeros(3)
     return Model(system, lambda q: {body: system.pose(q) @ back @ X for body, X in at.items()}, home)
 
@@ -145,7 +152,7 @@ def _together(found: Sequence[SystemModes], tips: Sequence[Tip], size: float) ->
     special = found[0].degenerate or next((f"on other branches of the legs: {each.degenerate}" for each in found
                                            if each.degenerate is not None), None)
     complete = not unclear and all(each.complete for each in found)
-    return SystemModes(sum(each.complex for each in found) - twice, modes, complete, proof, near, special, None,
+    return SystemModes(sum(each.complex or 0 for each in found) - twice, modes, complete, proof, near, special, None,
                  next((each.bound for each in found if each.bound != "resultant"), "resultant"),
                  all(each.enclosed for each in found), found[0].meant)
 

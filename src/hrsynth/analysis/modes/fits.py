@@ -167,7 +167,7 @@ def as_meant(system: System) -> tuple[System, tuple[Meant, ...]]:
     if system.as_written or not isinstance(system, Spatial):
         return system, ()
     spheres = [k for k, curve in enumerate(system.curves) if isinstance(curve, Sphere)]
-    points = {"platform": dict(enumerate(system.tips)), "base": {k: system.curves[k].centre for k in spheres}}
+    points = {"platform": dict(enumerate(system.points)), "base": {k: system.curves[k].centre for k in spheres}}
     apart = [(float(np.linalg.norm(at[i] - at[j])), where, i, j)
              for where, at in points.items() for i, j in combinations(at, 2)]
     accepted = [each for each in apart if each[0] <= MEANT * system.size]

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...batch.reach import reach
-from ...errors import BadRequest
+from ...constraints.pattern import attached
+from ...errors import BadRequest, MissingExtra, NotConfined, Unsolved
 from ...geometry.ranks import range_basis
 from ...geometry.vectors import Array
 from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly
@@ -27,11 +28,12 @@ from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
 from ..singularity.agreement import weakest
 from .branches import Model, solve_all
+from .search import FoundMode, search
 from .solve import SystemMode, SystemModes, continuum
 from .tips import TipLoci, tip_loci
 
 WITHIN = {"translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
-          "planar": "poses in the plane of motion", "spatial": "poses in space"}
+          "planar": "poses in the plane of motion", "spatial": "poses in space", "oriented": "poses in space"}
 """Among which poses the modes are listed, for each way in which the platform moves."""
 
 
@@ -104,7 +106,7 @@ class AssemblyModes(Result, shown_as="modes"):
 
     ``complex``, ``complete``, ``proof``, ``degenerate`` and ``continuum`` as for :class:`SystemModes`; ``kind`` is
     ``hidden`` or ``real``; ``confined`` holds the curves of the tips (None where the measurements never decide the
-    pose).
+    pose, or where the modes were searched for because no such curves are known).
     """
 
     setting: ObservedRobot
@@ -129,8 +131,14 @@ class AssemblyModes(Result, shown_as="modes"):
 
     def headline(self) -> str:
         """The robot and how many modes there are."""
-        count = "a continuum" if self.found.continuum is not None else f"{len(self.modes)} real of {self.found.complex}"
-        return f"{self.setting.headline()}: {count} ({self.kind} robot) at {self.pose}"
+        return f"{self.setting.headline()}: {self.count} ({self.kind} robot) at {self.pose}"
+
+    @property
+    def count(self) -> str:
+        """How many there are, in words."""
+        if self.found.continuum is not None:
+            return "a continuum"
+        return f"{len(self.modes)} real" + ("" if self.found.complex is None else f" of {self.found.complex} complex")
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
@@ -155,9 +163,12 @@ def modes(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
     ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide, and
     solutions nearly at infinity, are taken to be so where that is clearly meant, unless ``as_written`` is true.
 
-    Raises ``BadRequest`` for names that there are not, ``PoseNotReached`` for a pose out of reach, ``NotConfined``
-    where the tips' paths are none of those known, ``MeaningUndecided`` where special geometry may be meant or not,
-    ``MissingExtra`` where only an external solver could list the modes.
+    Where the tips' paths are none of those known, or the solver that they need gives up or is not installed, the whole
+    robot is closed from random starts (:mod:`.search`): modes that are found, of any kind of closing, and nothing says
+    that they are all.
+
+    Raises ``BadRequest`` for names that there are not, ``PoseNotReached`` for a pose out of reach, ``MeaningUndecided``
+    where special geometry may be meant or not.
     """
     if real and observe not in (None, "all", ["all"]):
         raise BadRequest("the motors are held instead of directions", f"real with observe {observe}", "one of the two")
@@ -177,6 +188,35 @@ def modes(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
         return AssemblyModes(setting, kind, goal, pose, continuum(f"{text}: a continuum of dimension {free}", free),
                              (), ())
     tell("modes")
+    try:
+        return _listed(setting, measured, goal, wanted, pose, kind, as_written)
+    except (NotConfined, Unsolved, MissingExtra) as error:
+        reason = str(error) if isinstance(error, MissingExtra) else error.reason
+        return _searched(setting, measured.question, goal, pose, kind, reason)
+
+
+def _searched(setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, pose: Pose, kind: str,
+              reason: str) -> AssemblyModes:
+    """The modes that a search finds, and why there is no list that could be complete."""
+    done = search(goal, question, attached(setting.anatomy))
+    found = SystemModes(None, (), False, f"{done.words}; not counted: {reason}", degenerate=done.degenerate)
+    return AssemblyModes(setting, kind, goal, pose, found,
+                         tuple(_closed(setting, question, mode, k == 0) for k, mode in enumerate(done.modes)), ())
+
+
+def _closed(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal: bool) -> AssemblyMode:
+    """A closing that was found, as a mode of which nothing is proved."""
+    at, motion = mode.configuration, setting.motion
+    beyond = tuple(outside(at.twin, at.q, [*at.twin.mechanism.joints]))
+    found = Assembly(at, (), beyond)
+    return AssemblyMode(motion.pose(at.pose(motion.link)), np.inf, np.pi, mode.residual, goal, found.reachable,
+                        weakest(at, question), found.verdict, (), beyond, (), at, length=at.twin.length,
+                        bodies=mode.bodies)
+
+
+def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfiguration, wanted: Task | None,
+            pose: Pose, kind: str, as_written: bool) -> AssemblyModes:
+    """The modes as the solutions of the system that the tips' curves and surfaces give."""
     confined = tip_loci(setting.anatomy, measured.question, measured.pattern, goal)
     # a curve that was fitted to a leg's moves is not known to hold its exact tip
     fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)

@@ -7,7 +7,7 @@ import math
 import random
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import combinations
 from typing import Any
@@ -185,9 +185,21 @@ def _complex(v: Any) -> Any:
 
 @dataclass(frozen=True, eq=False)
 class Spatial(System):
-    """A rigid platform in space: q = (p, rotation vector); ``tips`` has shape (n, 3), no three used on one line."""
+    """A rigid platform in space: q = (p, rotation vector); ``tips`` has shape (n, 3), no three used on one line.
+
+    The last ``arrows`` of the tips are none of its points but vectors that turn with it; they start at ``hub`` (3,) in
+    the base frame, and their curves are planes: what keeps an angle.
+    """
+
+    arrows: int = 0
+    hub: Array = field(default_factory=lambda: np.zeros(3))
 
     freedoms = 6
+
+    @property
+    def points(self) -> Array:
+        """The tips that are points of the platform, shape (n - arrows, 3)."""
+        return self.tips[:len(self.tips) - self.arrows]
 
     def pose(self, q: Array) -> Array:
         """The platform's frame in the base frame; shape (4, 4)."""
@@ -196,21 +208,26 @@ class Spatial(System):
     def reached(self, q: Array) -> Array:
         """Where the tips are at a pose; shape (legs, 3), metres."""
         X = self.pose(q)
-        return np.asarray(X[:3, 3] + self.tips @ X[:3, :3].T)
+        at = self.tips @ X[:3, :3].T
+        return np.vstack([X[:3, 3] + at[:len(self.points)], self.hub + at[len(self.points):]])
 
     def spread(self, q: Array, apart: Mapping[int, float]) -> tuple[float, float]:
         """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
-        return registered(self.tips, apart)
+        return registered(self.tips, apart, self.arrows)
 
     def bound(self, legs: Sequence[int]) -> tuple[int, str] | None:
         """Six conditions *on a sphere or plane* are linear in (1, R, p, Rᵀp, |p|²), in which poses are of degree 40
         (M. Gallet, G. Nawratil, J. Schicho, J. Geom. 106, 2015; F. Ronga, T. Vust 1995): at most 40, and no curve
         besides 40. With a tip at rest, or six planes that leave p to R, three quadrics of the quaternion are left: 8;
-        three rods in one ball let it be in two places.
+        three rods in one ball let it be in two places. With a tip at rest and one on a curve, that one is in two places
+        at most, and one more condition on the turn about the line through both, of degree two in its half angle's
+        tangent, leaves two turns for each: 4.
         """
         curves = [self.curves[k] for k in legs]
         if sum(self.forbids[k] for k in legs) != self.freedoms:
             return None
+        if sorted(self.forbids[k] for k in legs) == [1, 2, 3]:
+            return 4, "two places of a tip on its curve, two turns about the line to the tip at rest for each"
         if any(isinstance(curve, Point) for curve in curves):
             return 8, "three quadrics of the quaternion (Bézout)"
         if all(isinstance(curve, Line | Plane) for curve in curves):
@@ -223,7 +240,7 @@ class Spatial(System):
 
     def chart(self, number: int) -> PoseParametrization:
         """Study's coordinates, with a linear form of the quaternion that depends on the number made 1."""
-        return study(self.curves, self.tips, self.size, number)
+        return study(self.curves, self.tips, self.size, number, self.arrows, self.hub)
 
     def squares(self) -> Iterator[SquareSystem]:
         """Three tips at rest; two, one or none and as many curves as make three, with tips not on one line."""
@@ -280,8 +297,9 @@ COUNT = 7
 """Unknowns: three of the quaternion, four of g."""
 
 
-def study(reaches: tuple[Reach, ...], b: Array, size: float, number: int) -> PoseParametrization:
-    """The chart of a number for tips b (n, 3)."""
+def study(reaches: tuple[Reach, ...], b: Array, size: float, number: int, arrows: int, hub: Array
+          ) -> PoseParametrization:
+    """The chart of a number for tips b (n, 3), the last of them arrows from a hub (3,)."""
     frame = spatial_frame(reaches, size)
     E = _quaternions(number)
     e, g = E, np.eye(8, dtype=int).astype(object)[4:]
@@ -292,10 +310,15 @@ def study(reaches: tuple[Reach, ...], b: Array, size: float, number: int) -> Pos
 
     def tips(numbers: Numbers) -> list[Moving]:
         found = []
-        for tip in b:
+        for k, tip in enumerate(b):
             v = numbers.vector(tip / frame.size)
-            Q = 4 * UNIT * UNIT * gg + 2 * UNIT * (back @ v) + (v @ v) * w
-            found.append(Moving(UNIT * shift + R @ v, Q, w))
+            if k < len(b) - arrows:
+                Q = 4 * UNIT * UNIT * gg + 2 * UNIT * (back @ v) + (v @ v) * w
+                found.append(Moving(UNIT * shift + R @ v, Q, w))
+            else:
+                o = numbers.vector(frame.point(hub))
+                N = R @ v + np.multiply.outer(w, o)
+                found.append(Moving(N, (v @ v - o @ o) * w + 2 * (N @ o), w))
         return found
 
     def place(x: Sequence[float]) -> Array:

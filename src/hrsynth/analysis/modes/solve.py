@@ -66,7 +66,8 @@ class SystemMode:
 
 @dataclass(frozen=True, eq=False)
 class SystemModes:
-    """All modes: ``complex`` solutions counted with multiplicity, the real ones as ``modes``, and in words the proof.
+    """All modes: ``complex`` solutions counted with multiplicity (None where they are not known), the real ones as
+    ``modes``, and in words the proof.
 
     Where more is observed than needed, ``complex`` counts only the modes. ``complete`` holds only if every complex
     solution is isolated and every real one enclosed. ``near`` are poses that match almost (none unless more is observed
@@ -76,7 +77,7 @@ class SystemModes:
     singular pose, tips on one line.
     """
 
-    complex: int
+    complex: int | None
     modes: tuple[SystemMode, ...]
     complete: bool
     proof: str

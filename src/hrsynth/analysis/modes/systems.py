@@ -151,28 +151,32 @@ class System:
         raise NotImplementedError
 
 
-def registered(tips: Array, apart: Mapping[int, float]) -> tuple[float, float]:
+def registered(tips: Array, apart: Mapping[int, float], arrows: int = 0) -> tuple[float, float]:
     """How far the origin of a rigid body (m) can be moved and how far the body turned (rad), at most, where its points
-    ``tips`` (n, d) are moved by at most the distances ``apart`` (m).
+    ``tips`` (n, d) are moved by at most the distances ``apart`` (m); the last ``arrows`` only turn with it.
 
-    With the tips' mean c, a turn φ about a unit n moves b − c by 2 sin(φ/2) |n × (b − c)| against the mean, and the sum
-    of |n × (b − c)|² is at least that of |b − c|² less the largest eigenvalue of Σ (b − c)(b − c)ᵀ (in the plane: all).
+    With the points' mean c, a turn φ about a unit n moves b − c by 2 sin(φ/2) |n × (b − c)| against the mean, and an
+    arrow as if it were b − c; the sum of |n × (b − c)|² is at least that of |b − c|² less the largest eigenvalue of
+    Σ (b − c)(b − c)ᵀ (in the plane: all).
     """
-    b, e = tips[list(apart)], list(apart.values())
-    mean, seen = _spread(tuple(map(tuple, b.tolist())))
-    moved = math.hypot(*e) / math.sqrt(seen) if seen > 0 else math.inf
+    points = [k for k in apart if k < len(tips) - arrows]
+    turned = [k for k in apart if k not in points]
+    if not points:
+        return math.inf, math.pi
+    mean, seen = _spread(tuple(map(tuple, tips[points].tolist())), tuple(map(tuple, tips[turned].tolist())))
+    moved = math.hypot(*apart.values()) / math.sqrt(seen) if seen > 0 else math.inf
     if not moved < 2.0:
         return math.inf, math.pi
-    return sum(e) / len(e) + moved * mean, 2.0 * math.asin(moved / 2.0)
+    return sum(apart[k] for k in points) / len(points) + moved * mean, 2.0 * math.asin(moved / 2.0)
 
 
 @lru_cache(maxsize=64)
-def _spread(points: tuple[tuple[float, ...], ...]) -> tuple[float, float]:
-    """How far the mean of points is from the origin, and the least sum of squared distances to an axis through it (a
-    point of the plane)."""
+def _spread(points: tuple[tuple[float, ...], ...], arrows: tuple[tuple[float, ...], ...]) -> tuple[float, float]:
+    """How far the mean of points is from the origin, and the least sum of squared distances of the points to an axis
+    through it (a point of the plane), and of arrows that start there."""
     b = np.array(points)
     mean = b.mean(axis=0)
-    C = b - mean
+    C = np.vstack([b - mean, np.reshape(arrows, (-1, b.shape[1]))])
     seen = float(np.sum(C * C)) - (float(np.linalg.eigvalsh(C.T @ C)[-1]) if C.shape[1] == 3 else 0.0)
     return length(mean), seen
 

@@ -19,12 +19,12 @@ from ...constraints.pattern import ConstraintPattern, LockedLeg
 from ...errors import NotConfined
 from ...geometry.ranks import kernel_basis
 from ...geometry.vectors import Array, transform
-from ...kinematics.configuration import ClosedConfiguration, measure
+from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.leg_reach import alone
 from ...kinematics.locked import joint_at, rezero
 from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.relation import Measurement
-from ...kinematics.tasks import solve
+from ...kinematics.tasks import Held, solve
 from ...mechanism import Observation
 from ...mechanism.composites import WordGraph
 from ...mechanism.legs import LegDecomposition, decompose
@@ -32,6 +32,7 @@ from ...tolerances import CLOSED, FOLLOWED, SAME_POINT, SAME_RELATION, SOLVED
 from .chain import Underived, chain
 from .curves import Circle, Line, Plane, Point, Reach, Sphere
 from .reaches import reaches
+from .turns import kept_angle
 
 MOVES = (-0.4, -0.15, 0.15, 0.4)
 """How far a leg is moved along a freedom to check where its tip can be (characteristic lengths, radians)."""
@@ -58,8 +59,19 @@ class Tip:
 
 
 @dataclass(frozen=True, eq=False)
+class KeptAngle:
+    """A direction (3,), in the frame of the body that carries it, whose angle with ``axis`` (3,) in the base frame a
+    held leg keeps as it is at the goal."""
+
+    leg: str
+    body: str
+    direction: Array
+    axis: Array
+
+
+@dataclass(frozen=True, eq=False)
 class TipLoci:
-    """The platform at one configuration with its directions held: tips on curves and surfaces.
+    """The platform at one configuration with its directions held: tips on curves and surfaces, and kept ``angles``.
 
     ``motion`` is that of :class:`ConstraintPattern`; ``plane`` the normal of planar motion; ``slide`` the circle on
     which the second body's origin moves relative to the first's, ``doubt`` why it may have other ways;
@@ -72,6 +84,7 @@ class TipLoci:
     bodies: tuple[str, ...]
     plane: Array | None = None
     slide: Circle | None = None
+    angles: tuple[KeptAngle, ...] = ()
     error: float = 0.0
     """How far a point of the robot can be from where it is at the exact goal (m)."""
     doubt: str | None = None
@@ -91,10 +104,24 @@ def tip_loci(anatomy: LegDecomposition, question: Measurement, pattern: Constrai
         raise NotConfined(name, "the pattern of its legs is not a known one")
     plane = None if pattern.plane is None else _value(pattern.plane, goal)
     end = (plane if plane is not None and pattern.motion == "planar" else
-           "free" if pattern.motion == "spatial" or anatomy.point is not None else "kept")
-    tips = tuple(_tip(anatomy, question, leg, goal, end) for leg in pattern.legs)
+           "free" if pattern.motion in ("spatial", "oriented") or anatomy.point is not None else "kept")
+    tips = tuple(_tip(anatomy, question, leg, goal, end) for leg in pattern.legs if not leg.free)
+    angles = tuple(_angle(anatomy, question, leg, goal) for leg in pattern.legs
+                   if pattern.motion == "oriented" and leg.turns < 3)
     slide, doubt = (None, None) if pattern.slide is None else _slide(anatomy, pattern, goal)
-    return TipLoci(goal, pattern.motion, tips, pattern.bodies, plane, slide, doubt=doubt)
+    return TipLoci(goal, pattern.motion, tips, pattern.bodies, plane, slide, angles, doubt=doubt)
+
+
+def _angle(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration) -> KeptAngle:
+    """The angle that a leg keeps; raises ``NotConfined`` where its joints do not show one."""
+    own = [o for o in question.observations if o.leg == leg.label]
+    tip = _value(leg.tip, goal) * goal.twin.length
+    try:
+        axis, direction = kept_angle(chain(anatomy, anatomy.leg(leg.label), own, goal, tip, "free"))
+    except Underived as error:
+        raise NotConfined(anatomy.mechanism.name, f"how leg {leg.label} turns the platform is not known: {error}"
+                          ) from None
+    return KeptAngle(leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis)
 
 
 def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration,
@@ -214,29 +241,13 @@ def _apart(pattern: ConstraintPattern, goal: ClosedConfiguration, q: Array) -> t
     return X[1, :3, 3] - X[0, :3, 3], V[1, :3] - V[0, :3]
 
 
-@dataclass(frozen=True, eq=False)
-class _Held:
-    """Measured values that are to stay as they are."""
-
-    reference: str
-    measured: Sequence[tuple[Observation, Array]]
-
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        if not self.measured:
-            return np.zeros(0), np.zeros((0, twin.nv))
-        _, _, values, rates = measure(twin, q, self.reference, [o for o, _ in self.measured])
-        errors = [o.apart(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True)]
-        return np.concatenate(errors), np.vstack(rates)
-
-
 def _held_paths(anatomy: LegDecomposition, own: Sequence[Observation], reference: str, leg: LockedLeg,
                 goal: ClosedConfiguration, place: Array) -> list[Array]:
     """Positions of a tip when its leg alone, with what is measured held, is moved along each of its freedoms, and along
     some random combinations of them."""
     rest = decompose(rezero(goal))
     twin = PinocchioModel(alone(rest, rest.leg(leg.label)), goal.twin.length)
-    values = measure(twin, twin.q0, reference, own)[2] if own else []
-    held = _Held(reference, tuple(zip(own, values, strict=True)))
+    held = Held.at(twin, twin.q0, reference, own)
     start = ClosedConfiguration.of(twin, twin.q0, SAME_RELATION)
     free, _ = kernel_basis(np.vstack([twin.jacobian(start.q), held.rows(twin, start.q)[1]]))
     found = []

@@ -100,6 +100,38 @@ def _held(chain: Chain, known: Known) -> Iterator[tuple[Array, list[Way], Array]
                 yield from ((Q, groups([*way, (-1, crank.axis)]), d) for d in crank.watched)
 
 
+def kept_angle(chain: Chain) -> tuple[Array, Array]:
+    """Unit vectors a, fixed in the base, and c, of the chain's last body at the goal, whose angle the chain keeps:
+    a · Q c = a · c, where all that turns the last body is axes along a, then axes along c.
+
+    Raises :class:`Underived` where other axes turn it too, or where a differs between branches.
+    """
+    found = [_two_axes(chain, known) for known, _ in orientations(chain)]
+    first = found[0]
+    if any(not _same(a, first[0]) for a, _ in found):
+        raise Underived("the axis with which its end keeps an angle differs between branches")
+    return first
+
+
+def _two_axes(chain: Chain, known: Known) -> tuple[Array, Array]:
+    """The two directions about which the last body turns against what is known, or against a direction that is held in
+    a body that spins about it."""
+    axes, base = list[Array](), np.eye(3)
+    for body, Q in zip(chain.bodies[::-1], known[::-1], strict=True):
+        if Q is not None:
+            base = Q
+            break
+        if body.axis is None and not body.watched:
+            raise Underived("its end turns freely")
+        axes.append(body.watched[0] if body.axis is None else body.axis)
+        if body.axis is None:
+            break
+    parts = groups([(0, axis) for axis in axes[::-1]])
+    if len(parts) != 2:
+        raise Underived(f"{len(parts)} axes turn its end")
+    return base @ parts[0][0][1], parts[1][0][1]
+
+
 def _driven(chain: Chain, known: Known) -> Iterator[_Found]:
     """A body that a drive turns, on one of known orientation: as many solutions as the drive leaves angles."""
     for k, body in enumerate(chain.bodies):

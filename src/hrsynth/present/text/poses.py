@@ -114,7 +114,7 @@ def modes(found: AssemblyModes, file: str | None = None) -> str:
     name, seen = head(found.setting)
     rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_SINCE[found.kind]} at {found.pose}")]
     if count.continuum is None:
-        rows += [("modes", f"{len(found.modes)} real of {count.complex} complex, {all_of(found)}"),
+        rows += [("modes", f"{found.count}, {all_of(found)}"),
                  ("proof", count.proof)]
     for each in count.meant:
         legs = ", ".join(found.labels[k] for k in each.legs)

@@ -1,0 +1,103 @@
+"""Modes of any closed loop by search: the whole robot is closed from random starts with its measurements held.
+
+Nothing is assumed of the legs, so every robot has an answer; and nothing is proved: what is listed was found, and there
+may be more. How often each mode was met tells how well the search has covered them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...budgets import SEARCH_ITERATIONS, SEARCH_STARTS
+from ...geometry.vectors import Array
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.limits import outside
+from ...kinematics.pinocchio_model import PinocchioModel
+from ...kinematics.relation import Measurement, relation
+from ...kinematics.tasks import Held, solve
+from ...progress import tell
+from ...tolerances import CLOSED, SAME_RELATION, SOLVED
+
+
+@dataclass(frozen=True, eq=False)
+class FoundMode:
+    """A closing of the whole robot with the measurements of the goal: the configuration, the poses (4, 4) of the
+    platform's bodies, what is left of loops and measurements, and from how many starts that pose was met."""
+
+    configuration: ClosedConfiguration
+    bodies: dict[str, Array]
+    residual: float
+    met: int
+
+
+@dataclass(frozen=True, eq=False)
+class ModeSearch:
+    """What random starts found: modes at which the measurements decide the pose, the goal first; how many of the
+    ``starts`` ``closed``, and how many of those ended where the measurements leave the platform a freedom
+    (``loose``)."""
+
+    modes: tuple[FoundMode, ...]
+    starts: int
+    closed: int
+    loose: int
+
+    @property
+    def words(self) -> str:
+        """What was done, and how well it covers."""
+        once = sum(mode.met == 1 for mode in self.modes[1:])
+        rare = "" if not once else f"; {once} of the modes {'was' if once == 1 else 'were'} met only once"
+        return f"found from {self.starts} random starts of the whole robot, of which {self.closed} closed{rare}"
+
+    @property
+    def degenerate(self) -> str | None:
+        """What is special: closings at which the platform is free to move."""
+        if not self.loose:
+            return None
+        return (f"{self.loose} starts ended at poses, not listed, at which the measurements leave the platform a "
+                "freedom: singular poses or a continuum")
+
+
+def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[str]) -> ModeSearch:
+    """All closings with the measurements at the goal that random starts lead to, each pose of the bodies once; of the
+    closings at one pose the first within the joints' limits, where there is one."""
+    twin, rng = goal.twin, np.random.default_rng(0)
+    held = Held.at(twin, goal.q, question.reference, question.observations)
+    found = [FoundMode(goal, _poses(goal, bodies), goal.residual, 1)]
+    closed = loose = 0
+    for number in range(SEARCH_STARTS):
+        tell("starts")
+        far = np.pi if number % 2 else rng.uniform(0.0, np.pi)
+        start = twin.moved(twin.q0, rng.uniform(-far, far, twin.nv))
+        q, residual = solve(twin, start, held, tolerance=SOLVED, iterations=SEARCH_ITERATIONS)
+        if residual > CLOSED:
+            continue
+        closed += 1
+        at = ClosedConfiguration.of(twin, q)
+        poses = _poses(at, bodies)
+        known = next((k for k, mode in enumerate(found) if _same(mode.bodies, poses, twin.length)), None)
+        if known is not None:
+            mode = found[known]
+            better = known > 0 and _beyond(twin, mode.configuration.q) and not _beyond(twin, q)
+            found[known] = FoundMode(at if better else mode.configuration, mode.bodies, mode.residual, mode.met + 1)
+        elif (there := relation(at, question)).rank < there.dof.value:
+            loose += 1
+        else:
+            found.append(FoundMode(at, poses, residual, 1))
+    return ModeSearch(tuple(found), SEARCH_STARTS, closed, loose)
+
+
+def _poses(at: ClosedConfiguration, bodies: Sequence[str]) -> dict[str, Array]:
+    return {body: at.pose(body) for body in bodies}
+
+
+def _same(one: dict[str, Array], other: dict[str, Array], length: float) -> bool:
+    """Whether all bodies are at the same poses, to ``SAME_RELATION``."""
+    unit = np.array([1.0, 1.0, 1.0, length])
+    return all(np.abs((one[body] - other[body])[:3] / unit).max() <= SAME_RELATION for body in one)
+
+
+def _beyond(twin: PinocchioModel, q: Array) -> list[str]:
+    return outside(twin, q, [*twin.mechanism.joints])

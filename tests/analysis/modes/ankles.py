@@ -1,0 +1,88 @@
+"""Humanoid ankles: a foot on a U joint and two legs with motors; and their modes counted with NumPy alone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hrsynth.geometry.vectors import Array, perpendicular, rotation_about, unit
+from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.builder import Builder
+
+LEGS = ("SPU", "RSU", "RUS")
+Rod = tuple[Array, Array]
+"""Where a leg with its motor held turns on the shank, and where on the foot, at zero (3,)."""
+
+
+def ankle(kind: str, seed: int, *, two_turns: bool = True) -> tuple[Mechanism, tuple[Array, Array, Array], list[Rod]]:
+    """A random ankle in a tilted base; the U joint's centre and two axes, and both rods.
+
+    ``two_turns``: the U joint is written as two R with a connector that has no length.
+    """
+    rng = np.random.default_rng(seed)
+    tilt = rotation_about(rng.normal(size=3), rng.uniform(0, 3))
+
+    def near(*at: float, by: float = 0.05) -> Array:
+        return np.asarray(tilt @ (np.array(at) + by * rng.normal(size=3)))
+
+    centre = near(0, 0, 0)
+    first, second = unit(near(0, 1, 0, by=0.2)), unit(near(1, 0, 0, by=0.2))
+    b, rods = Builder("ankle"), list[Rod]()
+    b.link("shank")
+    b.link("foot", at=near(0, 0, -0.05))
+    if two_turns:
+        b.link("cross", at=centre)
+        b.joint("pitch", "R", "shank", "cross", at=centre, axis=first)
+        b.joint("roll", "R", "cross", "foot", at=centre, axis=second)
+    else:
+        b.joint("ankle", "U", "shank", "foot", at=centre, axis=first, axis2=unit(np.cross(np.cross(first, second),
+                                                                                         first)))
+        second = unit(np.cross(np.cross(first, second), first))
+    for leg, side in (("1", 0.06), ("2", -0.06)):
+        motor, end = near(-0.05, side, 0.3), near(-0.06, side, -0.04)
+        ball = motor if kind == "SPU" else motor + near(-0.06, 0, 0)
+        along = unit(end - ball)
+        axes = {"axis": perpendicular(along), "axis2": unit(np.cross(along, perpendicular(along)))}
+        b.link(f"crank_{leg}", at=motor)
+        b.link(f"rod_{leg}", at=ball)
+        if kind == "SPU":
+            b.joint(f"ball_{leg}", "S", "shank", f"crank_{leg}", at=ball)
+            b.joint(f"slide_{leg}", "P", f"crank_{leg}", f"rod_{leg}", at=ball, axis=along, motor=True)
+            b.joint(f"end_{leg}", "U", f"rod_{leg}", "foot", at=end, loop=True, **axes)
+        else:
+            b.joint(f"crank_{leg}", "R", "shank", f"crank_{leg}", at=motor, axis=unit(near(0, 1, 0, by=0.2)),
+                    motor=True)
+            up, down = ({}, axes) if kind == "RSU" else (axes, {})
+            b.joint(f"ball_{leg}", kind[1], f"crank_{leg}", f"rod_{leg}", at=ball, **up)
+            b.joint(f"end_{leg}", kind[2], f"rod_{leg}", "foot", at=end, loop=True, **down)
+        b.observe(leg, f"rod_{leg}", along)
+        rods.append((ball, end))
+    return b.build(platform="foot"), (centre, first, second), rods
+
+
+def counted(joint: tuple[Array, Array, Array], rods: list[Rod]) -> tuple[int, int]:
+    """Complex and real poses of the foot with both rods' lengths kept.
+
+    With x = exp(iα), y = exp(iβ) of both turns, each length is x y times a polynomial of degree two in each; their
+    resultant in y, by values at roots of unity, has the solutions' x as roots.
+    """
+    centre, a, c = joint
+    tables = []
+    for ball, end in rods:
+        angles = 2 * np.pi * np.arange(3) / 3
+        values = [[np.sum((centre + rotation_about(a, alpha) @ rotation_about(c, beta) @ (end - centre) - ball) ** 2)
+                   - np.sum((end - ball) ** 2) for beta in angles] for alpha in angles]
+        tables.append(np.roll(np.fft.fft2(values), (1, 1), (0, 1)))  # powers -1, 0, 1 of x and of y
+    nodes = np.exp(2j * np.pi * np.arange(16) / 16)
+    powers = nodes[:, None] ** np.arange(3)
+    f, g = (powers @ table for table in tables)
+    zero = np.zeros_like(f[:, :1])
+    sylvester = np.stack([np.hstack(row) for row in ((f, zero), (zero, f), (g, zero), (zero, g))], axis=1)
+    resultant = np.fft.fft(np.linalg.det(sylvester)) / 16
+    size = np.abs(resultant).max()
+    assert np.abs(resultant[9:]).max() < 1e-10 * size
+    x = np.roots(resultant[8::-1])
+    there = [np.roots((each ** np.arange(3) @ tables[0])[::-1]) for each in x]
+    y = [ys[np.argmin([abs(v ** np.arange(3) @ (each ** np.arange(3) @ tables[1])) for v in ys])]
+         for each, ys in zip(x, there, strict=True)]
+    real = sum(abs(abs(each) - 1) < 1e-6 and abs(abs(v) - 1) < 1e-6 for each, v in zip(x, y, strict=True))
+    return int(np.sum((np.abs(x) > 1e-9) & np.isfinite(x))), int(real)

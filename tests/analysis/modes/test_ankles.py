@@ -1,0 +1,65 @@
+"""A platform that legs keep from some turns: ankles, whose modes are counted independently, and passive legs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hrsynth
+from analysis.modes.ankles import LEGS, ankle, counted
+from analysis.modes.test_robots import check_completeness, check_modes
+from analysis.modes.test_surfaces import needs_msolve
+
+
+def check_motors_held(kind: str, seed: int) -> int:
+    """Eight complex modes, proved to be all, and as many real ones as the independent count has."""
+    mechanism, joint, rods = ankle(kind, seed, two_turns=bool(seed % 2))
+    found = hrsynth.modes(mechanism, real=True)
+    assert (found.found.complex, found.found.bound) == (8, "class")
+    assert (8, len(found.modes)) == counted(joint, rods)
+    check_modes(found)
+    check_completeness(found, 20)
+    return len(found.modes)
+
+
+def check_one_leg_watched(kind: str, seed: int) -> None:
+    """One rod decides the foot: four complex modes, proved to be all."""
+    mechanism, _, _ = ankle(kind, seed, two_turns=bool(seed % 2))
+    found = hrsynth.modes(mechanism, "1")
+    assert (found.found.complex, found.found.bound) == (4, "class")
+    check_modes(found)
+    check_completeness(found, 20)
+
+
+@needs_msolve
+@pytest.mark.parametrize("kind", LEGS)
+def test_an_ankle_has_eight_modes_with_its_motors_held_and_four_with_one_rod_watched(kind: str):
+    check_motors_held(kind, 1)
+    check_one_leg_watched(kind, 2)
+
+
+@needs_msolve
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", LEGS)
+def test_twenty_ankles(kind: str):
+    real = [check_motors_held(kind, seed) for seed in range(20)]
+    assert len(set(real)) > 1
+    for seed in range(20):
+        check_one_leg_watched(kind, seed)
+
+
+def test_a_leg_without_a_segment_is_not_watched():
+    mechanism, _, _ = ankle("SPU", 1)
+    assert hrsynth.observe(mechanism).labels == ("1", "2")
+    verdict = hrsynth.derive(mechanism).verdict
+    assert (verdict.verdict, verdict.dof) == ("controllable", 2)
+
+
+@needs_msolve
+@pytest.mark.parametrize("both", [False, True])
+def test_both_rods_watched_leave_the_pose_itself(both: bool):
+    mechanism, _, _ = ankle("RSU", 3)
+    found = hrsynth.modes(mechanism, "1,2" if both else "2")
+    assert sum(mode.goal for mode in found.modes) == 1
+    assert not both or len(found.modes) == 1
+    assert np.isfinite(found.modes[0].radius)

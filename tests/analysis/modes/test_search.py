@@ -1,0 +1,104 @@
+"""Modes that are searched for: each is one, and where a list is complete the search finds nothing else."""
+
+from __future__ import annotations
+
+import shutil
+from functools import cache
+
+import numpy as np
+import pytest
+
+import hrsynth
+from analysis.modes.closings import other_branch
+from analysis.modes.test_robots import check_modes, robot_of
+from hrsynth.analysis.measured import MeasuredRobot
+from hrsynth.analysis.modes.modes import AssemblyModes
+from hrsynth.analysis.modes.msolve import PACKAGE
+from hrsynth.analysis.modes.search import search
+from hrsynth.catalog.entry import mechanism
+from hrsynth.catalog.words import parse
+from hrsynth.constraints.pattern import attached
+from hrsynth.description import load, shipped
+from hrsynth.mechanism import Mechanism
+
+LISTED = [("3rrr_m1", None, False), ("3rps", None, False), ("gough_stewart", "1,3,5", False), ("quattro", "1,4", False),
+          ("delta", None, True)]
+WORDS = ["(Pk*-Rt-S)+(Rt*-Rt-S)+(S-Rt*-Rt)", "3(Ro-Ra*!-Ro-Ro)", "(Rz*-Pl-Rz)+(Rz*-Rz-Rz)+(Rz!-Rz*-Ph)"]
+"""Robots of which no system of equations is known."""
+
+
+@cache
+def robot(name: str) -> Mechanism:
+    return load(shipped()[name]) if name in shipped() else mechanism(parse(name), 0)
+
+
+def check_agreement(listed: AssemblyModes) -> None:
+    """What is searched for is in the complete list, but for closings on another branch (crossed parallelograms, turns
+    of a platform that only translates)."""
+    assert listed.found.complete
+    measured = (MeasuredRobot.driven if listed.kind == "real" else MeasuredRobot.watched)(listed.setting)
+    found = search(listed.goal, measured.question, attached(listed.setting.anatomy))
+    assert found.loose == 0
+    for mode in found.modes:
+        if not other_branch(listed, mode.configuration):
+            assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
+                       for each in listed.modes if each.bodies) < 1e-6
+    assert sum(mode.met for mode in found.modes) == found.closed + 1
+
+
+@pytest.mark.parametrize(("name", "observe", "real"), LISTED)
+def test_a_search_finds_only_what_a_complete_list_has(name: str, observe: str | None, real: bool):
+    check_agreement(hrsynth.modes(robot(name), observe, real=real))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("kind", ["planar", "pod", "delta"])
+@pytest.mark.parametrize("seed", range(200, 206))
+def test_a_search_finds_only_what_a_complete_list_of_a_random_robot_has(kind: str, seed: int):
+    mechanism, real = robot_of(kind, seed)
+    listed = hrsynth.modes(mechanism, real=real)
+    if listed.found.complete and listed.found.continuum is None:
+        check_agreement(listed)
+
+
+@pytest.mark.parametrize("word", WORDS)
+def test_a_robot_without_a_list_has_modes_that_are_found(word: str):
+    observed = hrsynth.observe(robot(word))
+    at = observed.configurations[3]
+    found = hrsynth.modes(observed, at=at)
+    assert (found.found.complex, found.found.complete, found.found.bound) == (None, False, "none")
+    assert found.found.proof.startswith("found from 300 random starts")
+    assert found.to_dict()["complex"] is None
+    assert all(np.isinf(mode.radius) and not mode.proved for mode in found.modes)
+    check_modes(found)
+
+
+def test_poses_that_the_measurements_leave_free_are_told_and_not_listed():
+    """Watched legs that see all freedoms at a generic pose, at a zero pose where they do not."""
+    found = hrsynth.modes(robot("3(Ra-Rb*-Ph-Rb-Pj)"))
+    assert found.found.degenerate is not None
+    assert "leave the platform a freedom" in found.found.degenerate
+    assert [mode.goal for mode in found.modes] == [True]
+
+
+def test_without_the_solver_the_modes_are_found_and_the_extra_is_named(monkeypatch: pytest.MonkeyPatch):
+    import importlib.metadata
+
+    def absent(name: str) -> None:
+        raise importlib.metadata.PackageNotFoundError(name)
+
+    monkeypatch.setattr(importlib.metadata, "files", absent)
+    monkeypatch.setattr(shutil, "which", lambda name: None)
+    found = hrsynth.modes(robot("gough_stewart"), real=True)
+    assert not found.found.complete
+    assert len(found.modes) > 1
+    assert 'pip install "hrsynth[solve]"' in found.found.proof
+    assert PACKAGE not in found.found.proof
+
+
+def test_what_was_found_is_drawn(tmp_path):
+    from hrsynth.present.modes import drawable, picture
+
+    found = hrsynth.modes(robot(WORDS[2]))
+    assert len(drawable(found).placed) == len(found.modes) > 1
+    assert picture(found).startswith(b"\x89PNG")
