@@ -131,6 +131,9 @@ NEARLY_DOUBLE = 1e-6
 """Distance between two solutions, in their parameters, below which the pose counts as singular."""
 CHAIN_ROUNDING = 16 * 2.0 ** -52
 """What thirty-two roundings, those of a chain of joints from the file's decimals on, make of lengths and angles."""
+MOVED = 4.0
+"""What an axis that is moved does to points within the robot's extent, at most, as a multiple: a turn carries it to
+both sides, and a tilted one has a lever."""
 TIP_ROUNDING = 2.0 ** -46
 """What sixty-four roundings make of a length, relative to the size: poses and tips computed in floats."""
 SHARP_ROOT = 2.0 ** -60

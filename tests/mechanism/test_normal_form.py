@@ -53,6 +53,19 @@ def test_merging_goes_by_geometry(joints: list, expected: str) -> None:
     assert sorted(found) == sorted(expected)
 
 
+@pytest.mark.parametrize(("joints", "moved"), [
+    ([("R", AT, X), ("R", AT, Y)], 0.0),
+    ([("R", AT, X), ("R", (0, 0, 1e-9), Y)], 1e-9),
+    ([("R", AT, X), ("R", (0.5, 3e-9, 0), X)], 3e-9),
+    ([("R", AT, X), ("R", AT, Y), ("R", (0, 0, 2e-9), Z)], 0.0),
+    ([("R", AT, X), ("R", AT, Y), ("R", (2e-9, 0, 0), Z)], 2e-9),
+])
+def test_what_merging_moves_is_told(joints: list, moved: float) -> None:
+    """Of a chain about the origin: the sum of how far each axis is from the joint that takes its place."""
+    found = normal_form(chain(*joints)).moved
+    assert moved - 1e-15 <= found <= 2 * moved + 1e-15
+
+
 def test_a_driven_and_a_passive_joint_stay_two() -> None:
     assert types(chain(("R", AT, X), ("R", AT, Y), motors=(0,))) == "RR"
     assert types(chain(("R", AT, X), ("R", AT, Y), motors=(0, 1))) == "U"

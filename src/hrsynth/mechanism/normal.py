@@ -27,20 +27,35 @@ from .wrist import Interval, Wrist, chained
 
 @dataclass(frozen=True, eq=False)
 class NormalForm:
-    """The mechanism in normal form, and where its links went: ``into[old]`` is the link that took ``old`` in."""
+    """The mechanism in normal form, and where its links went: ``into[old]`` is the link that took ``old`` in; how far
+    axes and centres were moved, all together, to make one joint of several (m)."""
 
     mechanism: Mechanism
     into: dict[str, str]
+    moved: float = 0.0
 
 
 def normal_form(mechanism: Mechanism) -> NormalForm:
     """Merge until nothing merges; names, frames and order of what stays are kept."""
     into = {name: name for name in mechanism.links}
     current = _without_fixed(mechanism, into)
+    moved = 0.0
     while (merge := _next_merge(current)) is not None:
         between, gone, joint = merge
+        moved += sum(_moved(each, joint, mechanism.length) for each in gone)
         current = _replaced(current, between, gone, joint)
-    return NormalForm(current, into)
+    return NormalForm(current, into, moved)
+
+
+def _moved(old: Joint, new: Joint, length: float) -> float:
+    """How far the axes of a joint are from those of the joint that takes its place, within a length (m)."""
+    found = 0.0
+    for axis in old.axes:
+        if old.type in (JointType.REVOLUTE, JointType.UNIVERSAL):
+            found += lines.distance(new.point, old.point, axis)
+        if new.axes:
+            found += length * min(float(np.linalg.norm(np.cross(axis, other))) for other in new.axes)
+    return found
 
 
 def _protected(mechanism: Mechanism) -> set[str]:

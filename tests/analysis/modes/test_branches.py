@@ -123,9 +123,9 @@ def offset_u(offset: float) -> Chain:
 
 def test_an_offset_parts_the_two_lines_of_a_u():
     """None: one line; a millimetre: two, which the other solution of the direction parts; between: no answer."""
-    assert len(reaches(offset_u(0.0))) == 1
+    assert len(reaches(offset_u(0.0))[0]) == 1
     for offset in (1e-3, 0.1):
-        (one, gain), (other, more) = reaches(offset_u(offset))
+        (one, gain), (other, more) = reaches(offset_u(offset))[0]
         assert isinstance(one, Line)
         assert isinstance(other, Line)
         assert gain == 1.0 < more

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 
@@ -24,7 +24,7 @@ from ...mechanism.composites import WordEdge
 from ...mechanism.legs import Leg, LegDecomposition
 from ...mechanism.notation import Rods
 from ...mechanism.observation import Direction, Encoder
-from ...tolerances import RANK_GAP, SAME_DIRECTION, SAME_POINT
+from ...tolerances import CHAIN_ROUNDING, RANK_GAP, SAME_DIRECTION, SAME_POINT
 
 
 class Underived(Exception):
@@ -75,13 +75,15 @@ class Chain:
     bodies: tuple[ChainBody, ...]
     kept: bool
     length: float
+    moved: float = 0.0
+    """How far axes and centres were moved so that they meet, coincide or are parallel, all together (m)."""
 
 
 def chain(anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal: ClosedConfiguration, tip: Array,
           end: Array | str) -> Chain:
     """The chain of a leg to its ``tip`` (3,); ``end`` is ``free``, ``kept`` (its body's orientation) or the normal of
     the plane in which that turns. Raises :class:`Underived`."""
-    bodies = _Walk(anatomy, leg, held, goal).bodies(tip)
+    bodies, moved = _Walk(anatomy, leg, held, goal).bodies(tip)
     if not isinstance(end, str):
         bodies = (*bodies, ChainBody(end, tip))
     for one, other in pairwise(bodies):
@@ -89,7 +91,18 @@ def chain(anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal
             sine = float(np.linalg.norm(np.cross(one.axis, other.axis)))
             if SAME_DIRECTION / RANK_GAP < sine < SAME_DIRECTION:
                 raise Underived(f"two of its axes are only {sine:.1e} from parallel")
-    return Chain(bodies, end != "free" if isinstance(end, str) else True, goal.twin.length)
+    far = goal.twin.length + sum(float(np.linalg.norm(body.shift)) for body in bodies)
+    kept = end != "free" if isinstance(end, str) else True
+    return Chain(bodies, kept, goal.twin.length, moved + far * _tilted(bodies))
+
+
+def _tilted(bodies: Sequence[ChainBody]) -> float:
+    """The angles (rad) of all pairs of directions of a chain that count as parallel, and are not but for rounding."""
+    found = [d for body in bodies for d in (*([] if body.axis is None else [body.axis]), *body.slides, *body.watched,
+                                            *(d for crank in body.cranks for d in (crank.axis, *crank.watched)))]
+    angles = [float(np.linalg.norm(np.cross(one, other))) for one, other in combinations(found, 2)
+              if lines.parallel(one, other)]
+    return sum(angle for angle in angles if angle > CHAIN_ROUNDING)
 
 
 class _Walk:
@@ -110,8 +123,9 @@ class _Walk:
             else:
                 raise Underived("what is measured is not a direction seen from the base")
 
-    def bodies(self, tip: Array) -> tuple[ChainBody, ...]:
-        """The bodies, shifts included; every measurement must be met on the way."""
+    def bodies(self, tip: Array) -> tuple[tuple[ChainBody, ...], float]:
+        """The bodies, shifts included, and how far their points were moved to meet (m); every measurement must be met
+        on the way."""
         at = self.anatomy.mechanism.base
         found = [ChainBody(None, np.zeros(3), watched=self._seen(at))]
         path = self.anatomy.path(self.leg)
@@ -226,32 +240,38 @@ _TURNS = {JointType.REVOLUTE: True, JointType.UNIVERSAL: True, JointType.CYLINDR
 """Joints that are read axis by axis, and whether those are axes of turns."""
 
 
-def _shifted(bodies: Sequence[ChainBody], tip: Array, small: float) -> tuple[ChainBody, ...]:
-    """Bodies with their shifts, counted from points of their axes that neighbours share where axes meet."""
-    points = [bodies[0].point]
+def _shifted(bodies: Sequence[ChainBody], tip: Array, small: float) -> tuple[tuple[ChainBody, ...], float]:
+    """Bodies with their shifts, counted from points of their axes that neighbours share where axes meet; and how far
+    they are from meeting (m)."""
+    points, moved = [bodies[0].point], 0.0
     for k, body in enumerate(bodies[1:], 1):
         before = bodies[k - 1] if bodies[k - 1].rigid and k > 1 else None
         after = bodies[k + 1] if k + 1 < len(bodies) and body.rigid else None
-        points.append(body.point if body.axis is None else
-                      _meeting(body, before, after, tip if k + 1 == len(bodies) and body.rigid else None, small))
+        point, off = (body.point, 0.0) if body.axis is None else _meeting(
+            body, before, after, tip if k + 1 == len(bodies) and body.rigid else None, small)
+        points.append(point)
+        moved += off if off > CHAIN_ROUNDING * (small / SAME_POINT) else 0.0
     found = []
     for body, start, end in zip(bodies, points, [*points[1:], tip], strict=True):
         cranks = sum((crank.vector for crank in body.cranks), np.zeros(3))
         found.append(replace(body, point=start, shift=end - start - cranks))
-    return tuple(found)
+    return tuple(found), moved
 
 
 def _meeting(body: ChainBody, before: ChainBody | None, after: ChainBody | None, tip: Array | None, small: float
-             ) -> Array:
-    """The point of a body's axis at which a ball, the tip or a neighbour's axis is, else its own."""
+             ) -> tuple[Array, float]:
+    """The point of a body's axis at which a ball, the tip or a neighbour's axis is, else its own; and how far from the
+    axis that is (m)."""
     assert body.axis is not None
     balls = [each.point for each in (before, after) if each is not None and each.axis is None]
     for point in [*balls, *([] if tip is None else [tip])]:
-        if lines.distance(point, body.point, body.axis) <= small:
-            return lines.foot(point, body.point, body.axis)
+        off = lines.distance(point, body.point, body.axis)
+        if off <= small:
+            return lines.foot(point, body.point, body.axis), off
     for other in (before, after):
         if other is not None and other.axis is not None:
             near, far = lines.common_perpendicular(body.point, body.axis, other.point, other.axis)
-            if not lines.parallel(body.axis, other.axis) and np.linalg.norm(near - far) <= small:
-                return near
-    return body.point
+            off = float(np.linalg.norm(near - far))
+            if not lines.parallel(body.axis, other.axis) and off <= small:
+                return near, off
+    return body.point, 0.0

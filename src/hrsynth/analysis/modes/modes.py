@@ -23,7 +23,7 @@ from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...progress import tell
 from ...results import Result
-from ...tolerances import CHAIN_ROUNDING, SAME_RELATION
+from ...tolerances import CHAIN_ROUNDING, MOVED, SAME_RELATION
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
 from ..singularity.agreement import weakest
@@ -220,7 +220,8 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     confined = tip_loci(setting.anatomy, measured.question, measured.pattern, goal)
     # a curve that was fitted to a leg's moves is not known to hold its exact tip
     fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
-    confined = replace(confined, error=np.inf if fitted else drift(goal, wanted), as_written=as_written)
+    confined = replace(confined, error=np.inf if fitted else drift(goal, wanted, setting.normal.moved)
+                       + max(tip.moved for tip in confined.tips), as_written=as_written)
     made, found = solve_all(confined)
     reader = _ModeReader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
@@ -232,7 +233,10 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
 
 def counted(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
     """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
-    as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
+    as :func:`modes`, for many configurations of one robot that sees all its freedoms; ``NotConfined`` also where legs
+    keep the platform from some turns, which only an external solver counts."""
+    if measured.pattern.motion == "oriented":
+        raise NotConfined(measured.setting.robot.name, "its legs keep the platform from some turns")
     confined = tip_loci(measured.setting.anatomy, measured.question, measured.pattern, at)
     return solve_all(confined, near=False)[1]
 
@@ -299,9 +303,9 @@ LEVER = 2.0
 """Least lever (characteristic lengths) of a turn: directions are compared with the size of the tips' curves."""
 
 
-def drift(goal: ClosedConfiguration, pose: Task | None = None) -> float:
+def drift(goal: ClosedConfiguration, pose: Task | None = None, moved: float = 0.0) -> float:
     """How far a point of a link can be from where it is at the exact goal (m), within the robot's extent; infinite
-    where that is not proved.
+    where that is not proved. ``moved``: how far axes and centres are from those of the file (m), all together.
 
     Newton and Kantorovich: with σ the smallest singular value of the rows J that count and L a Lipschitz constant of J,
     L ‖F‖ ≤ σ²/2 gives an exact goal within 2 ‖J⁺ F‖. Rows that depend on the others are taken as consistent.
@@ -312,7 +316,7 @@ def drift(goal: ClosedConfiguration, pose: Task | None = None) -> float:
     mechanism, V = twin.mechanism, twin.frames(goal.q, links)[1]
     points = [*(mechanism.links[link].pose[:3, 3] for link in links), *(j.point for j in mechanism.joints.values())]
     extent = 1.0 + float(np.ptp(np.array(points), axis=0).max()) / twin.length
-    miss = float(np.linalg.norm(F)) + CHAIN_ROUNDING * extent
+    miss = float(np.linalg.norm(F)) + CHAIN_ROUNDING * extent + MOVED * moved / twin.length
     if not len(J):
         return twin.length * miss
     rank = range_basis(J, 1.0)[1].value
@@ -321,7 +325,7 @@ def drift(goal: ClosedConfiguration, pose: Task | None = None) -> float:
     if bends * miss > sigma ** 2 / 2:
         return float("inf")
     inverse: Array = right[:rank].T / values[:rank] @ left[:, :rank].T
-    return 2.0 * twin.length * miss * max(
+    return MOVED * moved + 2.0 * twin.length * miss * max(
         float(np.linalg.norm(moved[:3], 2) + _lever(goal, link) * np.linalg.norm(moved[3:], 2))
         for link, moved in zip(links, V @ inverse, strict=True))
 

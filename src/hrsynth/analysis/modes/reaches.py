@@ -14,28 +14,34 @@ import numpy as np
 
 from ...geometry import lines
 from ...geometry.vectors import Array
-from ...tolerances import RANK_GAP, SAME_POINT
+from ...tolerances import CHAIN_ROUNDING, MOVED, RANK_GAP, SAME_POINT
 from .chain import Chain, ChainBody, Underived
 from .curves import Circle, Line, Plane, Point, Reach, Sphere
 from .turns import Known, groups, orientations, ways
 
 
-def reaches(chain: Chain) -> list[tuple[Reach, float]]:
-    """All components of the places of the tip, each once, the goal's own first; and by what an error of the goal grows
-    in each (1 in the goal's own).
+def reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
+    """All components of the places of the tip, each once, the goal's own first, and by what an error of the goal grows
+    in each (1 in the goal's own); and how far the leg's geometry was moved (m): what nearly meets, is parallel or at
+    one point is taken to be so.
 
     Raises :class:`Underived`, also where two branches are nearly one: neither the same to 1e-10 nor 1e-7 apart.
     """
     found: list[tuple[Reach, float]] = []
     far = sum(float(np.linalg.norm(body.shift)) for body in chain.bodies) / chain.length
+    moved = 0.0
     for known, gain in orientations(chain):
-        reach = _sum(chain, known)
+        reach, radii = _sum(chain, known)
+        moved = max(moved, radii)
         gap = min((apart(reach, other, chain.length) for other, _ in found), default=np.inf)
         if gap > SAME_POINT:
             found.append((reach, gain * (1.0 + far) if found else 1.0))
         elif gap > SAME_POINT / RANK_GAP:
             raise Underived(f"two of its branches lie only {gap:.1e} characteristic lengths apart")
-    return found
+        else:
+            moved = max(moved, gap * chain.length)
+    moved = moved if moved > CHAIN_ROUNDING * (chain.length + far) else 0.0
+    return found, MOVED * (chain.moved + moved)
 
 
 @dataclass(eq=False)
@@ -47,6 +53,10 @@ class _Sum:
     circles: list[tuple[Array, Array]] = field(default_factory=list)
     lines: list[Array] = field(default_factory=list)
     spheres: list[float] = field(default_factory=list)
+    moved: float = 0.0
+    """Radii of circles and spheres that count as points, all together (m)."""
+    tilt: float = 0.0
+    """Angles of directions that count as perpendicular, and are not, all together (rad)."""
 
     def turn(self, axis: Array, vector: Array) -> None:
         """A vector that turns about a fixed direction."""
@@ -57,6 +67,7 @@ class _Sum:
             self.circles.append((axis, spoke))
         else:
             self.centre = self.centre + vector
+            self.moved += float(np.linalg.norm(spoke))
 
     def ball(self, vector: Array) -> None:
         """A vector that turns freely."""
@@ -65,6 +76,7 @@ class _Sum:
             self.spheres.append(radius)
         else:
             self.centre = self.centre + vector
+            self.moved += radius
 
     def reach(self) -> Reach:
         """Its name. Raises :class:`Underived` where it has none."""
@@ -83,6 +95,7 @@ class _Sum:
         normal = first[0]
         if (all(lines.parallel(axis, normal) for axis in first)
                 and all(lines.perpendicular(d, normal) for d in self.lines)):
+            self.tilt += sum(abs(float(d @ normal)) for d in self.lines)
             return Plane(self.centre, normal)
         raise Underived("circles and lines that lie in no common plane")
 
@@ -92,8 +105,8 @@ def _normal(directions: Sequence[Array]) -> Array:
     return np.asarray(crossed / np.linalg.norm(crossed))
 
 
-def _sum(chain: Chain, known: Known) -> Reach:
-    """The reach in one branch of orientations."""
+def _sum(chain: Chain, known: Known) -> tuple[Reach, float]:
+    """The reach in one branch of orientations, and how far radii were moved (m)."""
     total = _Sum(SAME_POINT * chain.length, chain.bodies[0].point)
     for k, body in enumerate(chain.bodies):
         Q = known[k]
@@ -109,7 +122,8 @@ def _sum(chain: Chain, known: Known) -> Reach:
             raise Underived("a body that turns freely and carries a slide or a parallelogram")
         else:
             total.ball(body.shift)
-    return total.reach()
+    reach, far = total.reach(), sum(float(np.linalg.norm(body.shift)) for body in chain.bodies) + chain.length
+    return reach, total.moved + total.tilt * far
 
 
 def _rests(total: _Sum, body: ChainBody, Q: Array) -> None:
@@ -147,6 +161,7 @@ def _turns(total: _Sum, body: ChainBody, Q: Array, a: Array) -> None:
         elif lines.perpendicular(slide, a):
             first = Q @ slide
             total.lines += [first, np.cross(axis, first)]
+            total.tilt += abs(float(slide @ a))
         else:
             raise Underived("a slide that turns about an axis oblique to it")
     for crank in body.cranks:

@@ -56,6 +56,8 @@ class Tip:
     curve: Reach
     others: tuple[tuple[Reach, float], ...] = ()
     doubt: str | None = None
+    moved: float = 0.0
+    """How far what the leg's geometry was taken to be is from it (m)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -130,15 +132,21 @@ def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal:
     X = goal.pose(leg.body)
     place = X[:3, :3].T @ (B - X[:3, 3])
     own = [o for o in question.observations if o.leg == leg.label]
+
+    def branches(at: ClosedConfiguration) -> tuple[list[tuple[Reach, float]], float]:
+        return reaches(chain(anatomy, anatomy.leg(leg.label), own, at, _value(leg.tip, at) * at.twin.length, end))
+
     try:
-        found = reaches(chain(anatomy, anatomy.leg(leg.label), own, goal, B, end))
+        found, moved = branches(goal)
+        if moved:  # at the zero configuration the file's own decimals show it, without the goal's residual
+            moved = branches(ClosedConfiguration(goal.twin, goal.twin.q0, 0.0))[1]
     except Underived as error:
         return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=str(error)),
                        leg, goal)
     freedoms = 0 if leg.fixed else 1 if leg.line is not None else 2 if leg.normal is not None else 3
     here = found[0][0]
     if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= FOLLOWED * goal.twin.length:
-        return Tip(leg.label, leg.body, place, here, tuple(found[1:]))
+        return Tip(leg.label, leg.body, place, here, tuple(found[1:]), moved=moved)
     doubt = (f"its joints taken one by one leave {here.freedoms} freedoms, together {freedoms}"
              if here.freedoms != freedoms else "its joints put its end elsewhere")
     return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=doubt), leg, goal)
