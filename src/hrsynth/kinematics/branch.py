@@ -16,9 +16,9 @@ from itertools import combinations
 
 import numpy as np
 
-from ..geometry.ranks import largest_angle, range_basis, singular_values
+from ..geometry.ranks import largest_angle, singular_values
 from ..geometry.vectors import Array
-from ..tolerances import NUDGE, SURELY_SOMETHING, SURELY_ZERO
+from ..tolerances import NUDGE, RANK_CUTOFF, SURELY_SOMETHING, SURELY_ZERO
 from .configuration import ClosedConfiguration
 from .relation import Relation
 
@@ -84,25 +84,31 @@ def _alike(one: Array, other: Array) -> bool:
     return not np.any((other > CHANGED * one) | (one > CHANGED * other))
 
 
+def turns_of(found: Relation, zero: float = RANK_CUTOFF) -> int:
+    """The rank of the platform's angular velocities, counting singular values above a zero."""
+    return int(np.sum(singular_values(found.twists[None, 3:]) > zero)) if found.twist_rows == 6 else 0
+
+
 @dataclass(frozen=True)
 class Signature:
     """What is the same at all generic configurations of one operation mode.
 
-    ``turns`` is the rank of the platform's angular velocities. ``seen`` holds, for each of :func:`sets_of` the
-    observations, the least and the most freedoms that they may be said to see, between singular values that surely
-    count and those that surely do not.
+    ``turns`` is the rank of the platform's angular velocities, ``turning`` the least and the most that may be said to
+    be, between singular values that surely count and those that surely do not. ``seen`` holds, for each of
+    :func:`sets_of` the observations, the least and the most freedoms that they may be said to see in that sense.
     """
 
     mobility: int
     dimension: int
     dof: int
     turns: int
+    turning: tuple[int, int]
     seen: tuple[tuple[int, int], ...]
 
     @classmethod
     def of(cls, found: Relation) -> Signature:
         """The signature that ρ shows at one configuration."""
-        turns = range_basis(found.twists[3:], 1.0)[1].value if found.twist_rows == 6 else 0
+        turning = turns_of(found, SURELY_SOMETHING), turns_of(found, SURELY_ZERO)
         chosen = _chosen(found.sizes)
         rates = found.rates * chosen[:, :, None]
         twists = np.broadcast_to(found.twist_part, (len(chosen), *found.twist_part.shape))
@@ -112,14 +118,14 @@ class Signature:
                            for values in lost)
         dof = found.dof.value
         least, most = dof - (together[1] - alone[0]), dof - (together[0] - alone[1])
-        return cls(found.mobility, found.dimension, dof, turns,
+        return cls(found.mobility, found.dimension, dof, turns_of(found), turning,
                    tuple(zip(least.tolist(), most.tolist(), strict=True)))
 
     def agrees(self, other: Signature) -> bool:
         """Whether both can be of one operation mode."""
-        same = ((self.mobility, self.dimension, self.dof, self.turns)
-                == (other.mobility, other.dimension, other.dof, other.turns))
-        return same and all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(self.seen, other.seen, strict=True))
+        same = (self.mobility, self.dimension, self.dof) == (other.mobility, other.dimension, other.dof)
+        return same and all(a[0] <= b[1] and b[0] <= a[1] for a, b in zip(
+            (self.turning, *self.seen), (other.turning, *other.seen), strict=True))
 
     @property
     def motion(self) -> str:

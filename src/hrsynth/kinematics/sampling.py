@@ -19,7 +19,7 @@ from ..geometry.ranks import kernel_basis, largest_angle, range_basis
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
 from ..tolerances import CLOSED, EXACT, FOLLOWED, INVERTED, NUDGE, PASSED_BY, RANK_GAP, SHARP, SOLVED, STEADY_TANGENT
-from .branch import CORRECTED, OperationMode, Signature, follows, group_modes
+from .branch import CORRECTED, OperationMode, Signature, follows, group_modes, turns_of
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation
@@ -75,8 +75,8 @@ class Samples:
 
     @cached_property
     def signature(self) -> Signature:
-        """What tells the samples' operation mode from others."""
-        return Signature.of(self.members[0].relation)
+        """What tells the samples' operation mode from others, at one with the most turns."""
+        return Signature.of(max((member.relation for member in self.members), key=turns_of))
 
 
 def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 0, *,
