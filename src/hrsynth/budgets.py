@@ -108,7 +108,10 @@ FINEST_INTERVAL = 2.0**-16
 REGION_WIDER = 1.5
 """How much wider than the known poses the region is from which poses of a road map are drawn."""
 SEARCH_STARTS = 300
-"""Random starts of the whole robot from which modes are looked for where no system of equations is known for them."""
+"""Random starts of the whole robot, at most, from which modes are looked for where no system of equations is known for
+them."""
+SEARCH_QUIET = 100
+"""Starts in a row that close without a new mode after which the search ends."""
 SEARCH_ITERATIONS = 100
 """Iterations in which each of them is closed, at most."""
 BRANCH_CHOICES = 256

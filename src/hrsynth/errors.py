@@ -129,14 +129,18 @@ class MeaningUndecided(Unanswered):
 class PoseNotReached(Unanswered):
     """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much
     (mm, degrees), or None where each leg alone reaches it; how far the robot came (0 to 1), and to which pose; the
-    ``wrist``, a joint that stands for several R, that is near the end of its turns there."""
+    ``wrist``, a joint that stands for several R, that is near the end of its turns there; another ``reason`` instead
+    of these."""
 
     def __init__(self, robot: str, pose: str, came: float, last: str, leg: str | None = None,
                  millimetres: float = 0.0, degrees: float = 0.0, origin: str = "its zero configuration",
-                 wrist: str | None = None) -> None:
+                 wrist: str | None = None, reason: str | None = None) -> None:
         self.robot, self.pose, self.came, self.last = robot, pose, came, last
         self.leg, self.millimetres, self.degrees = leg, millimetres, degrees
         self.wrist = wrist
+        if reason is not None:
+            super().__init__(f"{robot}: the pose {pose} is not reached: {reason}")
+            return
         if wrist is not None:
             reason = f"joint {wrist}, which stands for several R through one point, is near the end of its turns"
         elif leg is None:

@@ -8,11 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from ..batch.reach import reach, sweep
+from ..batch.reach import sweep
 from ..mechanism import Mechanism
-from ..mechanism.pose import SCALARS, Grid, Pose
+from ..mechanism.pose import SCALARS, Grid, Pose, asked_pose
 from ..progress import tell
 from ..results import Result
+from .asked import configurations_at
 from .classes import Redundancy, listed
 from .observed import ObservedRobot
 from .posture import ConfigurationAnalysis, Posture
@@ -88,12 +89,12 @@ def check(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
     Raises ``BadRequest`` for names that there are not and for parts of a pose that the platform cannot change,
     ``PoseNotReached`` for poses out of reach.
     """
-    poses = [Pose.parse(each) if isinstance(each, str) else each for each in at]
+    poses = [asked_pose(each) for each in at]
     cells = Grid.parse(grid) if isinstance(grid, str) else grid
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     examiner = ConfigurationAnalysis(setting)
     start, question, motion = setting.everything.start, setting.everything.question, setting.motion
-    configurations = [reach(start, question, pose, motion) for pose in poses] or [start]
+    configurations = configurations_at(setting, poses) or [start]
     tell("poses")
     postures = tuple(map(examiner.examine, configurations))
     swept = None

@@ -146,9 +146,10 @@ def _goal(help: str) -> Option:
     return Option("goal", help, "POSE", default=NEEDED, flags=("--to",))
 
 
-POSES = "again for more (default: the zero configuration)."
+POSES = "or mode:2, of the list that modes gives; again for more (default: the zero configuration)."
 BEGIN = Option("at", "Start there instead of at the zero configuration, in another operation mode if need be.", "POSE")
-START = Option("start", "Start pose, such as x=0.02,y=0.1,z=-0.7.", "POSE", default=NEEDED, flags=("--from",))
+START = Option("start", "Start pose, such as x=0.02,y=0.1,z=-0.7, or mode:2 of the other pose.", "POSE",
+               default=NEEDED, flags=("--from",))
 QUESTIONS = (
     Question("derive", "The hidden robot of a robot, how it is derived, its certificate, and what the controller can "
              "see.",
@@ -180,7 +181,7 @@ QUESTIONS = (
               _file("modes"))),
     Question("path", "Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, "
              "undecided.",
-             (START, _goal("Where it ends."), *WATCHED)),
+             (START, _goal("Where it ends; mode:2 is a mode with the directions at the start."), *WATCHED)),
     Question("servo", "A servo run on the directions of legs, simulated: where it ends, and what it passes on the way.",
              (START, _goal("Pose whose directions are desired."), *WATCHED,
               Option("gain", "λ of the control law (1/s).", None, float, 0.8),

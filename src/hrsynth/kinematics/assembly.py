@@ -165,6 +165,20 @@ class Assembler:
         return q if residual <= CLOSED and turned else None
 
 
+def of_links(twin: PinocchioModel, at: ClosedConfiguration) -> ClosedConfiguration:
+    """The configuration of a twin at which its links are where they are at a configuration of another twin of the same
+    links; raises ``LoopsNotClosed`` where none was found."""
+    if at.twin is twin:
+        return at
+    links = {link: at.pose(link) for link in twin.mechanism.links}
+    target, residual = _Poses(tuple(links.items())), np.inf
+    for start in _starts(twin):
+        q, residual = solve(twin, start, target, tolerance=SOLVED, iterations=LEG_ITERATIONS)
+        if residual <= CLOSED and all(_turned_as(twin.pose(q, link), X) for link, X in links.items()):
+            return ClosedConfiguration.of(twin, q)
+    raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, "in coordinates of the zero configuration")
+
+
 @dataclass(frozen=True, eq=False)
 class _Closing:
     """A leg at a pose: its closed configuration (twin, q), or what proves that there is none, or neither; whether all

@@ -79,6 +79,28 @@ class Pose:
         return ",".join(f"{name}={'/'.join(map(_written, values))}" for name, values in self.given.items())
 
 
+@dataclass(frozen=True)
+class ModeNumber:
+    """A pose by its number in a list of assembly modes, written ``mode:3``."""
+
+    number: int
+
+    def __str__(self) -> str:
+        return f"mode:{self.number}"
+
+
+def asked_pose(given: Pose | str) -> Pose | ModeNumber:
+    """The pose that a text says, by its parts or as ``mode:3``; raises ``BadRequest``."""
+    if not isinstance(given, str):
+        return given
+    name, colon, number = given.strip().partition(":")
+    if not colon or name != "mode":
+        return Pose.parse(given)
+    if not number.isdecimal() or int(number) < 1:
+        raise BadRequest("number of a mode", given, "mode:1, mode:2, … as modes lists them")
+    return ModeNumber(int(number))
+
+
 @dataclass(frozen=True, eq=False)
 class Grid:
     """A line, plane or box of poses: the parts that vary with their values, over a pose that holds the rest."""

@@ -13,19 +13,19 @@ import numpy as np
 from ..analysis.accuracy.accuracy import errors_at
 from ..analysis.accuracy.cones import Cones, half_angles
 from ..analysis.accuracy.pose_errors import PoseErrors
+from ..analysis.asked import configurations_at
 from ..analysis.aspects.path import SEPARATED, Aspects
 from ..analysis.controllability import CONTROLLABLE, verdict_of
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.observed import ObservedRobot
 from ..analysis.posture import ConfigurationAnalysis, Posture
-from ..batch.reach import reach
 from ..budgets import AXIS_SEEN
 from ..errors import BadRequest, HrsynthError, PoseNotReached
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Mechanism
 from ..mechanism.observation import Direction
-from ..mechanism.pose import Pose
+from ..mechanism.pose import Pose, asked_pose
 from ..progress import tell
 from ..results import Result, by_name
 from ..simulation.camera import cylinders, placed
@@ -198,14 +198,13 @@ def select(robot: Mechanism | ObservedRobot, camera: str | None = None, *, start
 
     Raises ``BadRequest``, ``PoseNotReached`` (exit status 2).
     """
-    wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
+    wanted = [asked_pose(each) for each in (start, goal)]
     setting = ObservedRobot.of(robot, None, camera, seed=seed)
     directions = tuple(o for o in setting.segments if isinstance(o, Direction))
     setting = replace(setting, observed=directions)
     half = half_angles(cones, directions)
-    everything = setting.everything
     try:
-        ends = [reach(everything.start, everything.question, pose, setting.motion) for pose in wanted]
+        ends = configurations_at(setting, wanted)
     except PoseNotReached as error:
         error.exit_status = 2
         raise

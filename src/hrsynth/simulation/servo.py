@@ -8,17 +8,17 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..analysis.asked import configurations_at
 from ..analysis.controllability import verdict_of
 from ..analysis.observed import ObservedRobot
 from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
-from ..batch.reach import reach
 from ..budgets import LONGEST_RUN, RUN_EVALUATIONS
 from ..errors import BadRequest, PoseNotReached, RankUndecided
 from ..geometry.so3 import angle_of
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Mechanism
-from ..mechanism.pose import Pose
+from ..mechanism.pose import Pose, asked_pose
 from ..progress import tell
 from ..results import by_name
 from ..tolerances import RANK_GAP
@@ -140,12 +140,12 @@ class ServoTask:
     def of(cls, setting: ObservedRobot, *, start: Pose | str, goal: Pose | str, conditions: Conditions = Conditions(),
            seed: int = 0) -> ServoTask:
         """The task of a request; raises what :func:`servo` raises."""
-        wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
+        wanted = [asked_pose(each) for each in (start, goal)]
         _require_seen(setting)
-        question, motion = setting.everything.question, setting.motion
+        motion = setting.motion
         law = Law(setting.samples.question, setting.dof, conditions.gain)
         try:
-            ends = [reach(setting.everything.start, question, pose, motion) for pose in wanted]
+            ends = configurations_at(setting, wanted)
             desired: FixedDirections | Trajectory = FixedDirections(directions(ends[1], law.question)[0])
             if conditions.duration is not None:
                 goal_pose = whole(motion, ends[1].pose(motion.link))

@@ -8,15 +8,15 @@ from typing import Any
 
 import numpy as np
 
-from ...batch.reach import reach
 from ...errors import BadRequest
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
-from ...mechanism.pose import Grid, Pose
+from ...mechanism.pose import Grid, ModeNumber, Pose, asked_pose
 from ...progress import tell
 from ...results import Result
+from ..asked import configurations_at
 from ..controllability import verdict_of
 from ..observed import ObservedRobot
 from .cones import Cones, half_angles
@@ -73,7 +73,7 @@ def accuracy(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | No
     Raises ``BadRequest`` for names that there are not, cones that are none, legs that do not see every freedom (their
     error is infinite everywhere), ``PoseNotReached``, ``PlaneNotMet``.
     """
-    wanted = [Pose.parse(each) if isinstance(each, str) else each for each in at]
+    wanted: list[Pose | ModeNumber] = [asked_pose(each) for each in at]
     if plane is not None and grid is not None:
         raise BadRequest("both a plane and a grid are given", f"{plane} and {grid}", "one of them")
     if steps is not None and plane is None:
@@ -94,9 +94,9 @@ def accuracy(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | No
     if cells is not None:
         field = mapper.over(cells, seed)
     if field is not None and samples and not wanted:
-        wanted = field.worst(WORST)
-    start, question, motion = setting.everything.start, setting.everything.question, setting.motion
-    configurations = [reach(start, question, pose, motion) for pose in wanted]
+        wanted = [*field.worst(WORST)]
+    start, motion = setting.everything.start, setting.motion
+    configurations = configurations_at(setting, wanted)
     if not configurations and field is None:
         configurations = [start]
     tell("errors")

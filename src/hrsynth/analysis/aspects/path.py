@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from ...batch.reach import reach
 from ...constraints.condition import Condition, Named
 from ...constraints.pattern import ConstraintPattern
 from ...geometry.vectors import Array
@@ -17,10 +16,11 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.steps import track
 from ...mechanism import Mechanism
-from ...mechanism.pose import Pose
+from ...mechanism.pose import Pose, asked_pose
 from ...progress import tell
 from ...results import Result
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
+from ..asked import configurations_at
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
 from ..singularity.agreement import smallest_of
@@ -265,12 +265,11 @@ def path(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None =
 
     Raises ``BadRequest`` for names and parts of a pose that there are not, ``PoseNotReached``.
     """
-    wanted = [Pose.parse(each) if isinstance(each, str) else each for each in (start, goal)]
+    wanted = [asked_pose(each) for each in (start, goal)]
     aspects = Aspects.of(robot, observe, camera, seed=seed)
-    samples = aspects.setting.samples
     tell("poses")
-    ends = [reach(samples.start, samples.question, pose, aspects.motion) for pose in wanted]
-    return aspects.join(*ends, seed=seed, budget=budget)
+    first, last = configurations_at(aspects.setting, wanted)
+    return aspects.join(first, last, seed=seed, budget=budget)
 
 
 def leads(ways: Sequence[PathSegment], start: Place, goal: Place, enclosures: Sequence[ConditionEnclosure]) -> bool:

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...budgets import SEARCH_ITERATIONS, SEARCH_STARTS
+from ...budgets import SEARCH_ITERATIONS, SEARCH_QUIET, SEARCH_STARTS
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
@@ -66,15 +66,16 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
     twin, rng = goal.twin, np.random.default_rng(0)
     held = Held.at(twin, goal.q, question.reference, question.observations)
     found = [FoundMode(goal, _poses(goal, bodies), goal.residual, 1)]
-    closed = loose = 0
-    for number in range(SEARCH_STARTS):
+    starts = closed = loose = quiet = 0
+    while starts < SEARCH_STARTS and quiet < SEARCH_QUIET:
+        number, starts = starts, starts + 1
         tell("starts")
         far = np.pi if number % 2 else rng.uniform(0.0, np.pi)
         start = twin.moved(twin.q0, rng.uniform(-far, far, twin.nv))
         q, residual = solve(twin, start, held, tolerance=SOLVED, iterations=SEARCH_ITERATIONS)
         if residual > CLOSED:
             continue
-        closed += 1
+        closed, quiet = closed + 1, quiet + 1
         at = ClosedConfiguration.of(twin, q)
         poses = _poses(at, bodies)
         known = next((k for k, mode in enumerate(found) if _same(mode.bodies, poses, twin.length)), None)
@@ -86,7 +87,8 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
             loose += 1
         else:
             found.append(FoundMode(at, poses, residual, 1))
-    return ModeSearch(tuple(found), SEARCH_STARTS, closed, loose)
+            quiet = 0
+    return ModeSearch(tuple(found), starts, closed, loose)
 
 
 def _poses(at: ClosedConfiguration, bodies: Sequence[str]) -> dict[str, Array]:

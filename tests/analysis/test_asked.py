@@ -1,0 +1,70 @@
+"""Poses by the number of a mode: the robot is there, assembled, with the directions of the pose that was asked for."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hrsynth
+from hrsynth.analysis.asked import configurations_at
+from hrsynth.description import load, shipped
+from hrsynth.errors import BadRequest, PoseNotReached
+from hrsynth.kinematics.configuration import measure
+from hrsynth.mechanism.pose import ModeNumber, Pose, asked_pose
+
+ROBOTS = [("3rrr_m1", None, "x=0.01,y=0.01,phi=5deg"), ("gough_stewart", "1,3,5", "x=0.02,y=0,z=0.31,rpy=0/0.1/0"),
+          ("quattro", "1,4", "x=0.05,y=0.02,z=-0.7"), ("3rps", None, "z=0.65")]
+
+
+@pytest.mark.parametrize(("name", "legs", "about"), ROBOTS)
+def test_a_mode_by_its_number_is_the_robot_assembled_there(name: str, legs: str | None, about: str):
+    setting = hrsynth.observe(load(shipped()[name]), legs)
+    listed = hrsynth.modes(setting, at=about)
+    numbers = [k for k, mode in enumerate(listed.modes, 1) if mode.configuration is not None]
+    assert len(numbers) > 1
+    first, *found = configurations_at(setting, [Pose.parse(about), *(ModeNumber(k) for k in numbers)])
+    question = setting.samples.question
+    wanted = np.concatenate(measure(first.twin, first.q, question.reference, question.observations)[2])
+    for k, at in zip(numbers, found, strict=True):
+        assert at.twin is first.twin
+        assert str(setting.motion.pose(at.pose(setting.motion.link))) == str(listed.modes[k - 1].pose)
+        got = np.concatenate(measure(at.twin, at.q, question.reference, question.observations)[2])
+        assert np.abs(got - wanted).max() < 1e-9
+
+
+def test_every_command_takes_a_mode():
+    robot = load(shipped()["gough_stewart"])
+    listed = hrsynth.modes(robot, "1,3,5")
+    (posture,) = hrsynth.check(robot, "1,3,5", at=["mode:2"]).postures
+    assert str(posture.pose) == str(listed.modes[1].pose)
+    assert posture.distances.type2 == pytest.approx(listed.modes[1].type2_distance, rel=1e-9)
+    found = hrsynth.accuracy(robot, "1,3,5", cones="0.1deg", at=["mode:2"])
+    assert str(found.poses[0].pose) == str(listed.modes[1].pose)
+    answer = hrsynth.path(robot, "1,3,5", start="mode:1", goal="mode:2")
+    assert [str(end.pose) for end in (answer.start, answer.goal)] == [str(mode.pose) for mode in listed.modes]
+    run = hrsynth.servo(robot, "1,3,5", start="mode:2", goal=str(listed.pose))
+    assert (run.ending.name, run.ending.matched) == ("mode", 2)
+
+
+@pytest.mark.parametrize(("text", "match"), [("mode:0", "mode:1, mode:2"), ("mode:", "mode:1, mode:2"),
+                                             ("mode:two", "mode:1, mode:2"), ("mode:9", "mode:1 to mode:2")])
+def test_a_mode_that_there_is_not_is_refused(text: str, match: str):
+    with pytest.raises(BadRequest, match=match):
+        hrsynth.check(load(shipped()["gough_stewart"]), "1,3,5", at=[text])
+
+
+def test_a_mode_that_is_not_assembled_is_not_reached():
+    setting = hrsynth.observe(load(shipped()["quattro"]), "1,4")
+    listed = hrsynth.modes(setting)
+    lost = next((k for k, mode in enumerate(listed.modes, 1) if mode.configuration is None), None)
+    if lost is not None:
+        with pytest.raises(PoseNotReached, match="was not found assembled"):
+            configurations_at(setting, [ModeNumber(lost)])
+
+
+def test_texts_without_a_number_are_poses():
+    assert asked_pose("x=0.1") == Pose(x=0.1)
+    assert asked_pose(" mode:12 ") == ModeNumber(12)
+    assert str(ModeNumber(3)) == "mode:3"
+    with pytest.raises(BadRequest):
+        asked_pose("modes:1")
