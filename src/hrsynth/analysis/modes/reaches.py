@@ -40,7 +40,7 @@ def reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
             raise Underived(f"two of its branches lie only {gap:.1e} characteristic lengths apart")
         else:
             moved = max(moved, gap * chain.length)
-    moved = moved if moved > CHAIN_ROUNDING * (chain.length + far) else 0.0
+    moved = moved if moved > CHAIN_ROUNDING * chain.length * (1.0 + far) else 0.0
     return found, MOVED * (chain.moved + moved)
 
 

@@ -28,7 +28,7 @@ from ...kinematics.tasks import Held, solve
 from ...mechanism import Observation
 from ...mechanism.composites import WordGraph
 from ...mechanism.legs import LegDecomposition, decompose
-from ...tolerances import CLOSED, FOLLOWED, SAME_POINT, SAME_RELATION, SOLVED
+from ...tolerances import CLOSED, FOLLOWED, MOVED, SAME_POINT, SAME_RELATION, SOLVED
 from .chain import Underived, chain
 from .curves import Circle, Line, Plane, Point, Reach, Sphere
 from .reaches import reaches
@@ -69,6 +69,8 @@ class KeptAngle:
     body: str
     direction: Array
     axis: Array
+    moved: float
+    """How far what the leg's geometry was taken to be is from it (m)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -119,11 +121,12 @@ def _angle(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goa
     own = [o for o in question.observations if o.leg == leg.label]
     tip = _value(leg.tip, goal) * goal.twin.length
     try:
-        axis, direction = kept_angle(chain(anatomy, anatomy.leg(leg.label), own, goal, tip, "free"))
+        found = chain(anatomy, anatomy.leg(leg.label), own, goal, tip, "free")
+        axis, direction = kept_angle(found)
     except Underived as error:
         raise NotConfined(anatomy.mechanism.name, f"how leg {leg.label} turns the platform is not known: {error}"
                           ) from None
-    return KeptAngle(leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis)
+    return KeptAngle(leg.label, leg.body, goal.pose(leg.body)[:3, :3].T @ direction, axis, MOVED * found.moved)
 
 
 def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal: ClosedConfiguration,
