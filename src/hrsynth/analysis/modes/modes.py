@@ -221,7 +221,8 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     # a curve that was fitted to a leg's moves is not known to hold its exact tip
     fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
     confined = replace(confined, error=np.inf if fitted else drift(goal, wanted, setting.normal.moved)
-                       + max(each.moved for each in (*confined.tips, *confined.angles)), as_written=as_written)
+                       + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
+                       as_written=as_written)
     made, found = solve_all(confined)
     reader = _ModeReader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
