@@ -48,7 +48,7 @@ class Held:
     @classmethod
     def at(cls, twin: PinocchioModel, q: Array, reference: str, observations: Sequence[Observation]) -> Held:
         """As they are at a configuration."""
-        values = measure(twin, q, reference, observations)[2]
+        values = measure(twin, q, reference, observations)[2] if observations else []
         return cls(reference, tuple(zip(observations, values, strict=True)))
 
     def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
