@@ -225,6 +225,7 @@ FOUND = (
     ("pods", 3004, "paths"),
     ("offset_u", 3036, "enclosures"),  # a fitted curve, where two branches are nearly one
     ("offset_u", 90000000, "enclosures"),  # axes that miss each other by 1e-9 m, made one U without telling the radius
+    ("quattros", 20500032, "singularities"),  # a lost freedom where idle motions turn the watched rods
     ("translational", 3020, "paths"),  # a held leg whose tip may move anywhere
     ("rods", 20261164, "hidden modes"),  # the pose itself, whose solution is known to 1e-8 only
     ("translational", 20261429, "errors"),  # a platform that turns by 1e-10 rad, taken for one that does not

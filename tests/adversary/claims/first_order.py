@@ -25,12 +25,18 @@ def inverse_law(case: Case, items: Items, at: State) -> Array | None:
 
 
 def sees_least(case: Case, items: Items, at: State) -> Array:
-    """The smallest singular value of Mᵀ on the feasible twists at each configuration, (N,); M A = U N (T N)⁺."""
-    U = case.study.rates(items, at)
+    """The smallest singular value of Mᵀ on the feasible twists at each configuration, (N,); M A = U N (T N)⁺. Zero
+    where the platform moves with all directions held: such a motion can differ by idle ones that turn a direction."""
     found = []
-    for local, rates in zip(case.study.locals(at), U, strict=True):
+    for local, rates in zip(case.study.locals(at), case.study.rates(items, at), strict=True):
         _, s, V = np.linalg.svd(local.T, full_matrices=False)
         dof = int(np.sum(s > 1e-7))
-        M = np.asarray(rates, dtype=float) @ local.N @ V[:dof].T / s[:dof]
+        U = np.asarray(rates, dtype=float) @ local.N
+        _, shown, held = np.linalg.svd(U)
+        still = local.T @ held[int(np.sum(shown > 1e-7)):].T
+        if still.size and float(np.linalg.norm(still, 2)) > 1e-6:
+            found.append(0.0)
+            continue
+        M = U @ V[:dof].T / s[:dof]
         found.append(float(np.linalg.svd(M, compute_uv=False)[dof - 1]) if dof and len(M) >= dof else 0.0)
     return np.array(found)
