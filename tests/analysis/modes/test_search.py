@@ -73,6 +73,17 @@ def test_a_robot_without_a_list_has_modes_that_are_found(word: str):
     check_modes(found)
 
 
+def test_a_platform_that_is_a_point_has_modes_at_points():
+    """However its body, of which only the point counts, is turned."""
+    mechanism, real = robot_of("planar, a point", 6)
+    listed = hrsynth.modes(mechanism, real=real)
+    measured = (MeasuredRobot.driven if real else MeasuredRobot.watched)(listed.setting)
+    bodies = attached(listed.setting.anatomy)
+    found = search(listed.goal, measured.question, bodies)
+    assert listed.found.complete
+    assert len(found.modes) == len(listed.modes) == 2
+
+
 def test_poses_that_the_measurements_leave_free_are_told_and_not_listed():
     """Watched legs that see all freedoms at a generic pose, at a zero pose where they do not."""
     found = hrsynth.modes(robot("3(Ra-Rb*-Ph-Rb-Pj)"))

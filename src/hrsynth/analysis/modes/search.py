@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...budgets import SEARCH_ITERATIONS, SEARCH_QUIET, SEARCH_STARTS
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, transform
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
 from ...kinematics.pinocchio_model import PinocchioModel
@@ -78,7 +78,7 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
         closed, quiet = closed + 1, quiet + 1
         at = ClosedConfiguration.of(twin, q)
         poses = _poses(at, bodies)
-        known = next((k for k, mode in enumerate(found) if _same(mode.bodies, poses, twin.length)), None)
+        known = next((k for k, mode in enumerate(found) if _same(mode.bodies, poses, question, twin.length)), None)
         if known is not None:
             mode = found[known]
             better = known > 0 and _beyond(twin, mode.configuration.q) and not _beyond(twin, q)
@@ -95,8 +95,11 @@ def _poses(at: ClosedConfiguration, bodies: Sequence[str]) -> dict[str, Array]:
     return {body: at.pose(body) for body in bodies}
 
 
-def _same(one: dict[str, Array], other: dict[str, Array], length: float) -> bool:
-    """Whether all bodies are at the same poses, to ``SAME_RELATION``."""
+def _same(one: dict[str, Array], other: dict[str, Array], question: Measurement, length: float) -> bool:
+    """Whether all bodies are at the same poses, to ``SAME_RELATION``; of a platform that is a point, the point."""
+    if question.point is not None and question.platform in one:
+        shift = transform(one[question.platform], question.point) - transform(other[question.platform], question.point)
+        return float(np.abs(shift).max()) <= SAME_RELATION * length
     unit = np.array([1.0, 1.0, 1.0, length])
     return all(np.abs((one[body] - other[body])[:3] / unit).max() <= SAME_RELATION for body in one)
 
