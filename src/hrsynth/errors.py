@@ -201,7 +201,8 @@ class MissingExtra(Unanswered):
 
     def __init__(self, what: str, extra: str) -> None:
         self.what, self.extra = what, extra
-        super().__init__(f'{what} needs an optional package: pip install "hrsynth[{extra}]"')
+        self.reason = f'{what} needs an optional package: pip install "hrsynth[{extra}]"'
+        super().__init__(self.reason)
 
 
 class Unsolved(Unanswered):

@@ -9,7 +9,7 @@ from ..errors import BadRequest, PoseNotReached
 from ..kinematics.assembly import of_links
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import ModeNumber, Pose
-from .modes.modes import modes
+from .modes.modes import AssemblyModes, modes
 from .observed import ObservedRobot
 
 
@@ -21,25 +21,25 @@ def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber]
     ``PoseNotReached`` for poses out of reach and for modes at which the robot was not found assembled.
     """
     everything, motion = setting.everything, setting.motion
-    found = [None if isinstance(each, ModeNumber) else reach(everything.start, everything.question, each, motion)
-             for each in poses]
-    about = next((each for each in found if each is not None), everything.start)
-    return [_mode(setting, each, about) if at is None and isinstance(each, ModeNumber) else at or about
-            for each, at in zip(poses, found, strict=True)]
+    reached = {each: reach(everything.start, everything.question, each, motion)
+               for each in poses if isinstance(each, Pose)}
+    about = next(iter(reached.values()), everything.start)
+    listed = modes(setting, at=about) if any(isinstance(each, ModeNumber) for each in poses) else None
+    return [reached[each] if isinstance(each, Pose) else _assembled(listed, each, about) for each in poses]
 
 
-def _mode(setting: ObservedRobot, asked: ModeNumber, about: ClosedConfiguration) -> ClosedConfiguration:
-    """The robot assembled at a mode, its coordinates counted from the zero configuration."""
-    listed = modes(setting, at=about)
-    name = setting.robot.name
-    if not 1 <= asked.number <= len(listed.modes):
-        count = len(listed.modes)
+def _assembled(listed: AssemblyModes | None, asked: ModeNumber, about: ClosedConfiguration) -> ClosedConfiguration:
+    """The robot assembled at a mode of those at a configuration, its coordinates counted from the zero configuration.
+    """
+    assert listed is not None
+    name, count = listed.setting.robot.name, len(listed.modes)
+    if not 1 <= asked.number <= count:
         raise BadRequest(f"{name}: a mode at {listed.pose}", str(asked),
                          "poses that are no continuum" if listed.found.continuum is not None else
                          f"mode:1 to mode:{count}" if count else "no mode")
     mode = listed.modes[asked.number - 1]
     at = about if mode.goal else mode.configuration
     if at is None:
-        raise PoseNotReached(name, f"{asked} ({mode.pose})", 0.0, str(listed.pose), origin="the pose whose mode it is",
-                             reason=f"the robot was not found assembled there without leg {', '.join(mode.open)}")
+        raise PoseNotReached(name, f"{asked} ({mode.pose})", 0.0, str(listed.pose), reason="the robot was not found "
+                             f"assembled there without leg {', '.join(mode.open)}")
     return of_links(about.twin, at)

@@ -94,6 +94,15 @@ def inverse(X_AB: Array) -> Array:
     return pose(-rotation @ X_AB[:3, 3], rotation)
 
 
+def pose_difference(X: Array, other: Array, length: float, point: Array | None = None) -> float:
+    """How far two poses (4, 4) are apart: the larger of the shift (in lengths) and the difference of the rotations,
+    each by its largest entry; of a ``point`` (3,) of the body, where it is given, the shift alone."""
+    if point is not None:
+        return float(np.max(np.abs(transform(X, point) - transform(other, point)))) / length
+    gap = np.abs(X - other)
+    return float(max(np.max(gap[:3, 3]) / length, np.max(gap[:3, :3])))
+
+
 def rotation_about(axis: ArrayLike, angle: float) -> Array:
     """Rodrigues: the rotation by ``angle`` about the unit vector along ``axis``; shape (3, 3)."""
     K = hat(unit(axis))

@@ -84,18 +84,21 @@ def _alike(one: Array, other: Array) -> bool:
     return not np.any((other > CHANGED * one) | (one > CHANGED * other))
 
 
-def turns_of(found: Relation, zero: float = RANK_CUTOFF) -> int:
-    """The rank of the platform's angular velocities, counting singular values above a zero."""
-    return int(np.sum(singular_values(found.twists[None, 3:]) > zero)) if found.twist_rows == 6 else 0
+def turns_of(found: Relation) -> tuple[int, int, int]:
+    """The rank of the platform's angular velocities, and the least and the most that may be said to be: singular values
+    above the cutoff, those that surely count, and all but those that surely do not."""
+    values = singular_values(found.twists[None, 3:]) if found.twist_rows == 6 else np.zeros(0)
+    rank, least, most = (int(np.sum(values > zero)) for zero in (RANK_CUTOFF, SURELY_SOMETHING, SURELY_ZERO))
+    return rank, least, most
 
 
 @dataclass(frozen=True)
 class Signature:
     """What is the same at all generic configurations of one operation mode.
 
-    ``turns`` is the rank of the platform's angular velocities, ``turning`` the least and the most that may be said to
-    be, between singular values that surely count and those that surely do not. ``seen`` holds, for each of
-    :func:`sets_of` the observations, the least and the most freedoms that they may be said to see in that sense.
+    ``turns`` is the rank of the platform's angular velocities, ``turning`` the least and the most, as of
+    :func:`turns_of`. ``seen`` holds, for each of :func:`sets_of` the observations, the least and the most freedoms that
+    they may be said to see, between singular values that surely count and those that surely do not.
     """
 
     mobility: int
@@ -108,7 +111,7 @@ class Signature:
     @classmethod
     def of(cls, found: Relation) -> Signature:
         """The signature that ρ shows at one configuration."""
-        turning = turns_of(found, SURELY_SOMETHING), turns_of(found, SURELY_ZERO)
+        turns, *turning = turns_of(found)
         chosen = _chosen(found.sizes)
         rates = found.rates * chosen[:, :, None]
         twists = np.broadcast_to(found.twist_part, (len(chosen), *found.twist_part.shape))
@@ -118,7 +121,7 @@ class Signature:
                            for values in lost)
         dof = found.dof.value
         least, most = dof - (together[1] - alone[0]), dof - (together[0] - alone[1])
-        return cls(found.mobility, found.dimension, dof, turns_of(found), turning,
+        return cls(found.mobility, found.dimension, dof, turns, (turning[0], turning[1]),
                    tuple(zip(least.tolist(), most.tolist(), strict=True)))
 
     def agrees(self, other: Signature) -> bool:

@@ -54,10 +54,11 @@ def wrists_beyond(twin: PinocchioModel, q: Array) -> list[str]:
     return [name for name, margin in wrist_margins(twin, q).items() if margin < -SAME_POINT]
 
 
-def outside(twin: PinocchioModel, q: Array, joints: Sequence[str]) -> list[str]:
-    """Those joints, turning or sliding about one axis, whose coordinates are outside their limits (turns count
-    modulo 2π), and the wrists beyond their intervals."""
+def outside(twin: PinocchioModel, q: Array, joints: Sequence[str] | None = None) -> list[str]:
+    """Those joints (default: of all), turning or sliding about one axis, whose coordinates are outside their limits
+    (turns count modulo 2π), and the wrists beyond their intervals."""
     values = coordinates(twin, q)
+    joints = [*twin.mechanism.joints] if joints is None else joints
     return ([name for name in wrists_beyond(twin, q) if name in joints]
             + [name for name in joints
                if name in values and excluded(twin.mechanism, name, values[name], values[name])])

@@ -12,7 +12,7 @@ from ..analysis.observed import ObservedRobot
 from ..analysis.posture import ConfigurationAnalysis
 from ..budgets import RUN_EVALUATIONS
 from ..errors import HrsynthError
-from ..geometry.vectors import Array
+from ..geometry.vectors import Array, pose_difference
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.limits import margins
 from ..tolerances import DAMPED, SAME_RELATION
@@ -109,9 +109,5 @@ class EndingClassifier:
         return self._alike(at.pose(self.setting.motion.link), X, self.setting.anatomy.point)
 
     def _alike(self, X: Array, other: Array, point: Array | None) -> bool:
-        near = SAME_RELATION * self.goal.twin.length
-        if point is not None:
-            return bool(np.max(np.abs((X - other)[:3] @ np.append(point, 1.0))) <= near)
-        return bool(np.max(np.abs(X[:3, 3] - other[:3, 3])) <= near
-                    and np.max(np.abs(X[:3, :3] - other[:3, :3])) <= SAME_RELATION)
+        return pose_difference(X, other, self.goal.twin.length, point) <= SAME_RELATION
 

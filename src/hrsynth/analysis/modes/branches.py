@@ -10,7 +10,7 @@ from itertools import combinations, islice, product
 import numpy as np
 
 from ...budgets import BRANCH_CHOICES
-from ...geometry.vectors import Array, inverse, perpendicular, pose, transform
+from ...geometry.vectors import Array, inverse, perpendicular, pose, pose_difference, transform
 from ...tolerances import RANK_GAP, SAME_POINT
 from .curves import Plane, Reach
 from .rigid import Planar, Spatial
@@ -168,5 +168,4 @@ def _once(modes: Sequence[SystemMode], size: float) -> tuple[SystemMode, ...]:
 
 def _apart(one: SystemMode, other: SystemMode, size: float) -> float:
     """How far two poses are apart (sizes, entries of the rotations)."""
-    gap = np.abs(one.pose - other.pose)
-    return float(max(np.max(gap[:3, 3]) / size, np.max(gap[:3, :3])))
+    return pose_difference(one.pose, other.pose, size)

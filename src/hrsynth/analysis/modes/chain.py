@@ -75,15 +75,25 @@ class Chain:
     bodies: tuple[ChainBody, ...]
     kept: bool
     length: float
-    moved: float = 0.0
-    """How far axes and centres were moved so that they meet, coincide or are parallel, all together (m)."""
+    off: float = 0.0
+    """How far axes and centres were moved so that they meet, all together (m)."""
+
+    @property
+    def extent(self) -> float:
+        """The robot's length and those of all shifts: a lever for the leg's turns (m)."""
+        return self.length + sum(float(np.linalg.norm(body.shift)) for body in self.bodies)
+
+    @property
+    def moved(self) -> float:
+        """How far axes and centres were moved so that they meet, coincide or are parallel, all together (m)."""
+        return self.off + self.extent * _tilted(self.bodies)
 
 
 def chain(anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal: ClosedConfiguration, tip: Array,
           end: Array | str) -> Chain:
     """The chain of a leg to its ``tip`` (3,); ``end`` is ``free``, ``kept`` (its body's orientation) or the normal of
     the plane in which that turns. Raises :class:`Underived`."""
-    bodies, moved = _Walk(anatomy, leg, held, goal).bodies(tip)
+    bodies, off = _Walk(anatomy, leg, held, goal).bodies(tip)
     if not isinstance(end, str):
         bodies = (*bodies, ChainBody(end, tip))
     for one, other in pairwise(bodies):
@@ -91,9 +101,7 @@ def chain(anatomy: LegDecomposition, leg: Leg, held: Sequence[Observation], goal
             sine = float(np.linalg.norm(np.cross(one.axis, other.axis)))
             if SAME_DIRECTION / RANK_GAP < sine < SAME_DIRECTION:
                 raise Underived(f"two of its axes are only {sine:.1e} from parallel")
-    far = goal.twin.length + sum(float(np.linalg.norm(body.shift)) for body in bodies)
-    kept = end != "free" if isinstance(end, str) else True
-    return Chain(bodies, kept, goal.twin.length, moved + far * _tilted(bodies))
+    return Chain(bodies, end != "free" if isinstance(end, str) else True, goal.twin.length, off)
 
 
 def _tilted(bodies: Sequence[ChainBody]) -> float:

@@ -12,7 +12,7 @@ from ...batch.reach import reach
 from ...constraints.pattern import attached
 from ...errors import BadRequest, MissingExtra, NotConfined, Unsolved
 from ...geometry.ranks import range_basis
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, pose_difference
 from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly
 from ...kinematics.closures import Miss
 from ...kinematics.configuration import ClosedConfiguration, measure
@@ -191,8 +191,7 @@ def modes(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
     try:
         return _listed(setting, measured, goal, wanted, pose, kind, as_written)
     except (NotConfined, Unsolved, MissingExtra) as error:
-        reason = str(error) if isinstance(error, MissingExtra) else error.reason
-        return _searched(setting, measured.question, goal, pose, kind, reason)
+        return _searched(setting, measured.question, goal, pose, kind, error.reason)
 
 
 def _searched(setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, pose: Pose, kind: str,
@@ -207,7 +206,7 @@ def _searched(setting: ObservedRobot, question: Measurement, goal: ClosedConfigu
 def _closed(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal: bool) -> AssemblyMode:
     """A closing that was found, as a mode of which nothing is proved."""
     at, motion = mode.configuration, setting.motion
-    beyond = tuple(outside(at.twin, at.q, [*at.twin.mechanism.joints]))
+    beyond = tuple(outside(at.twin, at.q))
     found = Assembly(at, (), beyond)
     return AssemblyMode(motion.pose(at.pose(motion.link)), np.inf, np.pi, mode.residual, goal, found.reachable,
                         weakest(at, question), found.verdict, (), beyond, (), at, length=at.twin.length,
@@ -253,7 +252,7 @@ class _ModeReader:
 
     def away(self, mode: SystemMode) -> float:
         """How far a mode is from the goal (characteristic lengths, differences of rotation matrices)."""
-        return max(_difference(X, self.goal.pose(body), self.goal.twin.length)
+        return max(pose_difference(X, self.goal.pose(body), self.goal.twin.length)
                    for body, X in self.made.bodies(mode.q).items())
 
     def read(self, mode: SystemMode, nearest: bool) -> AssemblyMode:
@@ -264,7 +263,7 @@ class _ModeReader:
         held = () if near else self.measured
         scale = self.made.system.size / size
         found = Assembly(self.goal)
-        if not at_goal or near or outside(self.goal.twin, self.goal.q, [*self.goal.twin.mechanism.joints]):
+        if not at_goal or near or outside(self.goal.twin, self.goal.q):
             found = self.assembler.at(bodies, held, 0.0 if near else self.known(mode))
         X = self.goal.pose(self.motion.link) if found.platform is None else found.platform[self.motion.link]
         shift, turn = self.radius(mode, bodies, X)
@@ -293,11 +292,6 @@ class _ModeReader:
         lever = float(np.linalg.norm(told[:3, 3] - first[:3, 3]))
         return (shift + turn * lever + float(np.linalg.norm(X[:3, 3] - told[:3, 3])),
                 turn + float(np.linalg.norm(X[:3, :3] - told[:3, :3])))
-
-
-def _difference(X: Array, other: Array, length: float) -> float:
-    """The largest difference of two poses."""
-    return float(max(np.max(np.abs(X[:3, 3] - other[:3, 3])) / length, np.max(np.abs(X[:3, :3] - other[:3, :3]))))
 
 
 LEVER = 2.0

@@ -28,19 +28,18 @@ def reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
     Raises :class:`Underived`, also where two branches are nearly one: neither the same to 1e-10 nor 1e-7 apart.
     """
     found: list[tuple[Reach, float]] = []
-    far = sum(float(np.linalg.norm(body.shift)) for body in chain.bodies) / chain.length
     moved = 0.0
     for known, gain in orientations(chain):
         reach, radii = _sum(chain, known)
         moved = max(moved, radii)
         gap = min((apart(reach, other, chain.length) for other, _ in found), default=np.inf)
         if gap > SAME_POINT:
-            found.append((reach, gain * (1.0 + far) if found else 1.0))
+            found.append((reach, gain * chain.extent / chain.length if found else 1.0))
         elif gap > SAME_POINT / RANK_GAP:
             raise Underived(f"two of its branches lie only {gap:.1e} characteristic lengths apart")
         else:
             moved = max(moved, gap * chain.length)
-    moved = moved if moved > CHAIN_ROUNDING * chain.length * (1.0 + far) else 0.0
+    moved = moved if moved > CHAIN_ROUNDING * chain.extent else 0.0
     return found, MOVED * (chain.moved + moved)
 
 
@@ -122,8 +121,8 @@ def _sum(chain: Chain, known: Known) -> tuple[Reach, float]:
             raise Underived("a body that turns freely and carries a slide or a parallelogram")
         else:
             total.ball(body.shift)
-    reach, far = total.reach(), sum(float(np.linalg.norm(body.shift)) for body in chain.bodies) + chain.length
-    return reach, total.moved + total.tilt * far
+    reach = total.reach()
+    return reach, total.moved + total.tilt * chain.extent
 
 
 def _rests(total: _Sum, body: ChainBody, Q: Array) -> None:

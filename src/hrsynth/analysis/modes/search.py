@@ -12,10 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...budgets import SEARCH_ITERATIONS, SEARCH_QUIET, SEARCH_STARTS
-from ...geometry.vectors import Array, transform
+from ...geometry.vectors import Array, pose_difference
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
-from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.relation import Measurement, relation
 from ...kinematics.tasks import Held, solve
 from ...progress import tell
@@ -81,7 +80,7 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
         known = next((k for k, mode in enumerate(found) if _same(mode.bodies, poses, question, twin.length)), None)
         if known is not None:
             mode = found[known]
-            better = known > 0 and _beyond(twin, mode.configuration.q) and not _beyond(twin, q)
+            better = known > 0 and outside(twin, mode.configuration.q) and not outside(twin, q)
             found[known] = FoundMode(at if better else mode.configuration, mode.bodies, mode.residual, mode.met + 1)
         elif (there := relation(at, question)).rank < there.dof.value:
             loose += 1
@@ -97,12 +96,5 @@ def _poses(at: ClosedConfiguration, bodies: Sequence[str]) -> dict[str, Array]:
 
 def _same(one: dict[str, Array], other: dict[str, Array], question: Measurement, length: float) -> bool:
     """Whether all bodies are at the same poses, to ``SAME_RELATION``; of a platform that is a point, the point."""
-    if question.point is not None and question.platform in one:
-        shift = transform(one[question.platform], question.point) - transform(other[question.platform], question.point)
-        return float(np.abs(shift).max()) <= SAME_RELATION * length
-    unit = np.array([1.0, 1.0, 1.0, length])
-    return all(np.abs((one[body] - other[body])[:3] / unit).max() <= SAME_RELATION for body in one)
-
-
-def _beyond(twin: PinocchioModel, q: Array) -> list[str]:
-    return outside(twin, q, [*twin.mechanism.joints])
+    return all(pose_difference(X, other[body], length, question.point if body == question.platform else None)
+               <= SAME_RELATION for body, X in one.items())
