@@ -9,6 +9,7 @@ known to be all.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from itertools import combinations
 
@@ -141,11 +142,12 @@ def _tip(anatomy: LegDecomposition, question: Measurement, leg: LockedLeg, goal:
 
     try:
         found, moved = branches(goal)
-        if moved:  # at the zero configuration the file's own decimals show it, without the goal's residual
-            moved = branches(ClosedConfiguration(goal.twin, goal.twin.q0, 0.0))[1]
     except Underived as error:
         return _fitted(anatomy, own, question.reference, Tip(leg.label, leg.body, place, Point(B), doubt=str(error)),
                        leg, goal)
+    if moved:  # at the zero configuration, unless that is special, the file's own decimals show it
+        with suppress(Underived):
+            moved = branches(ClosedConfiguration(goal.twin, goal.twin.q0, 0.0))[1]
     freedoms = 0 if leg.fixed else 1 if leg.line is not None else 2 if leg.normal is not None else 3
     here = found[0][0]
     if here.freedoms == freedoms and np.linalg.norm(here.miss(B)) <= FOLLOWED * goal.twin.length:
