@@ -8,12 +8,12 @@ if TYPE_CHECKING:
     from . import catalog
     from .analysis.accuracy.accuracy import accuracy
     from .analysis.advice import advise
+    from .analysis.asked import observe
     from .analysis.aspects.path import path
     from .analysis.check import check
     from .analysis.controllability import legs
     from .analysis.derive import derive
     from .analysis.modes.modes import modes
-    from .analysis.observed import observe
     from .analysis.singularity.singular import singular
     from .description import load, save, shipped
     from .present.show import draw, html, text
@@ -37,7 +37,7 @@ _HOME = {
     "legs": ".analysis.controllability",
     "load": ".description",
     "modes": ".analysis.modes.modes",
-    "observe": ".analysis.observed",
+    "observe": ".analysis.asked",
     "path": ".analysis.aspects.path",
     "save": ".description",
     "select": ".selection.select",

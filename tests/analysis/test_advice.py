@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 import hrsynth
 from hrsynth.analysis import advice as module
 from hrsynth.analysis.advice import Advice, advise, candidates
-from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.geometry.vectors import Array, unit

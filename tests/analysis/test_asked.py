@@ -46,6 +46,28 @@ def test_every_command_takes_a_mode():
     assert (run.ending.name, run.ending.matched) == ("mode", 2)
 
 
+@pytest.mark.parametrize(("name", "watched"), [("3rrr_m1", None), ("gough_stewart", "1,3,5"), ("quattro", "1,4")])
+def test_a_robot_is_observed_from_a_mode_on(name: str, watched: str | None):
+    """The mode is its zero configuration: what ``derive`` and ``legs`` say holds about there, in the file's numbers."""
+    robot = load(shipped()[name])
+    setting = hrsynth.observe(robot, watched)
+    number = next(k for k, mode in enumerate(hrsynth.modes(setting).modes, 1) if mode.configuration and not mode.goal)
+    begun = hrsynth.observe(robot, watched, at=f"mode:{number}")
+    start, (there,) = begun.everything.start, configurations_at(setting, [ModeNumber(number)])
+    assert all(np.abs(start.pose(link) - there.pose(link)).max() < 1e-9 for link in setting.mechanism.links)
+    assert hrsynth.derive(robot, watched, at=f"mode:{number}").to_dict() == hrsynth.derive(begun).to_dict()
+    assert begun.robot.file == robot.file
+
+
+def test_legs_are_counted_from_a_mode_on():
+    robot = load(shipped()["3rrr_m1"])
+    assert hrsynth.legs(robot, at="mode:2").to_dict() == hrsynth.legs(hrsynth.observe(robot, at="mode:2")).to_dict()
+    with pytest.raises(BadRequest, match="mode:1 to mode:2"):
+        hrsynth.legs(robot, at="mode:3")
+    with pytest.raises(BadRequest, match="mode:1, mode:2, …"):
+        hrsynth.derive(robot, at="mode:0")
+
+
 @pytest.mark.parametrize(("text", "match"), [("mode:0", "mode:1, mode:2"), ("mode:", "mode:1, mode:2"),
                                              ("mode:two", "mode:1, mode:2"), ("mode:9", "mode:1 to mode:2")])
 def test_a_mode_that_there_is_not_is_refused(text: str, match: str):

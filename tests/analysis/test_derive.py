@@ -12,9 +12,9 @@ import pytest
 import yourdfpy
 
 import hrsynth
-from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.analysis.observed import SAMPLES
+from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.catalog.geometry import mechanism as catalog_mechanism
 from hrsynth.catalog.words import parse
 from hrsynth.description import load, native

@@ -14,11 +14,12 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hrsynth.analysis import instances
-from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL, legs
+from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.exact import INSTANCES, TESTS, ExactArchitecture, ExactVerdict, architecture, architecture_of
 from hrsynth.analysis.instances import Geometry, Instance, NotRecognised, draw, kernel, rank, seen
 from hrsynth.analysis.observed import ObservedRobot, selected
+from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from hrsynth.errors import HrsynthError
 from hrsynth.geometry.vectors import Array, frozen, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration

@@ -12,11 +12,11 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from hrsynth.analysis import instances
-from hrsynth.analysis.controllability import CONTROLLABLE, PARTIAL
 from hrsynth.analysis.exact import TESTS, ExactArchitecture, architecture, architecture_of
 from hrsynth.analysis.instances import Instance, draw, instance, ranks_at
 from hrsynth.analysis.kept import degree, kept
 from hrsynth.analysis.observed import ObservedRobot, selected
+from hrsynth.analysis.verdict import CONTROLLABLE, PARTIAL
 from hrsynth.catalog.geometry import mechanism as built
 from hrsynth.catalog.words import parse
 from hrsynth.description import load

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 
 import hrsynth
-from hrsynth.analysis.controllability import BLIND, CONTROLLABLE, PARTIAL, Legs, Verdict, legs
+from hrsynth.analysis.controllability import Legs, legs
+from hrsynth.analysis.verdict import BLIND, CONTROLLABLE, PARTIAL, Verdict
 from hrsynth.description import load
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array

@@ -47,7 +47,7 @@ def test_one_observed_robot_is_sampled_once() -> None:
     assert {"certificate", "modes"} <= set(told)
 
 
-@pytest.mark.parametrize("more", [{"observe": "1"}, {"camera": "platform"}])
+@pytest.mark.parametrize("more", [{"observe": "1"}, {"camera": "platform"}, {"at": "mode:1"}])
 def test_what_is_watched_is_asked_once(more: dict[str, str]) -> None:
     observed = hrsynth.observe(load("delta"), "1,2")
     assert ObservedRobot.of(observed) is observed

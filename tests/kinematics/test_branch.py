@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.advice import advise
-from hrsynth.analysis.controllability import legs, verdict_of
+from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import derive
 from hrsynth.analysis.observed import ObservedRobot, restricted
+from hrsynth.analysis.verdict import verdict_of
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
 from hrsynth.description import load

@@ -20,8 +20,8 @@ from ..mechanism.sensors import encoders, line_position, observation_of
 from ..progress import tell
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
-from .controllability import CONTROLLABLE, Verdict, verdict_of
 from .observed import ObservedRobot, restricted
+from .verdict import CONTROLLABLE, Verdict, verdict_of
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
 """The names of the coordinates of joints that have two."""

@@ -3,14 +3,58 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
+from typing import TYPE_CHECKING
 
 from ..batch.reach import reach
-from ..errors import BadRequest, PoseNotReached
+from ..errors import BadRequest, HrsynthError, PoseNotReached
 from ..kinematics.assembly import of_links
 from ..kinematics.configuration import ClosedConfiguration
-from ..mechanism.pose import ModeNumber, Pose
-from .modes.modes import AssemblyModes, modes
-from .observed import ObservedRobot
+from ..kinematics.locked import rezero
+from ..mechanism import Mechanism
+from ..mechanism.pose import ModeNumber, Pose, asked_pose
+from .observed import SAMPLES, ObservedRobot
+
+if TYPE_CHECKING:
+    from .modes.modes import AssemblyModes
+
+
+def observe(robot: Mechanism | ObservedRobot, legs: Sequence[str] | str | None = None, camera: str | None = None, *,
+            at: Pose | str | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
+    """A robot with what is watched of it, its normal form and samples of its motion: what every question takes.
+
+    ``legs`` holds leg labels or link names (a string sets them apart by commas); None or ``["all"]`` means all legs at
+    their default segments. ``camera`` names the link that carries the camera. ``at`` is a pose that takes the place of
+    the zero configuration: on the branch of that where it reaches the pose, else in another operation mode that was
+    met; or a mode of the zero configuration with what is watched, ``mode:2``, at which ``modes`` found the robot
+    assembled.
+
+    Raises ``BadRequest`` for labels, links, parts of a pose and modes that there are not, ``PoseNotReached``.
+    """
+    if at is None:
+        return ObservedRobot.of(robot, legs, camera, samples=samples, seed=seed)
+    if isinstance(robot, ObservedRobot):
+        raise BadRequest(f"{robot.headline()}: what is watched is asked twice", str(at),
+                         "nothing besides an observed robot")
+    asked = asked_pose(at)
+    if isinstance(asked, Pose):
+        start = _started(ObservedRobot.of(robot, seed=seed), asked)
+    else:
+        (start,) = configurations_at(ObservedRobot.of(robot, legs, camera, seed=seed), [asked])
+    return ObservedRobot.of(replace(rezero(start), file=robot.file), legs, camera, samples=samples, seed=seed)
+
+
+def _started(setting: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
+    """The configuration at a pose, on the branch of the zero configuration or in another operation mode."""
+    drawn = setting.everything
+    refused: HrsynthError | None = None
+    for start in (drawn.start, *(mode.at for mode in drawn.met)):
+        try:
+            return reach(start, drawn.question, wanted)
+        except (BadRequest, PoseNotReached) as error:
+            refused = refused or error
+    assert refused is not None
+    raise refused
 
 
 def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber]) -> list[ClosedConfiguration]:
@@ -20,6 +64,8 @@ def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber]
     Raises ``BadRequest`` for parts of a pose that the platform cannot change and for modes that there are not,
     ``PoseNotReached`` for poses out of reach and for modes at which the robot was not found assembled.
     """
+    from .modes.modes import modes
+
     everything, motion = setting.everything, setting.motion
     reached = {each: reach(everything.start, everything.question, each, motion)
                for each in poses if isinstance(each, Pose)}

@@ -23,11 +23,12 @@ from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
 from ..rewrite.strategy import FORMS, GENERAL, Check, Rewriting, Step, Strategy, trusting
 from ..tolerances import SAME_RELATION
-from .controllability import Verdict, verdict_of
+from .asked import observe as observed_robot
 from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
 from .observed import Mobility, ObservedRobot
+from .verdict import Verdict, verdict_of
 
 if TYPE_CHECKING:
     from ..mechanism.pose import Pose
@@ -129,12 +130,13 @@ def derive(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None
 
     ``observe`` holds leg labels or link names (default: all legs); ``camera`` names the link that carries the camera
     (default: the base); ``at`` is a pose that takes the place of the zero configuration, in another operation mode if
-    need be; an observed robot says all of that itself. ``form`` is ``simplified`` or ``general``; ``paper``: with the
-    paper's own form beside it. Raises ``BadRequest`` for unknown names, ``NotCertified`` if even the exact lift fails.
+    need be, or one of its modes (``mode:2``); an observed robot says all of that itself. ``form`` is ``simplified`` or
+    ``general``; ``paper``: with the paper's own form beside it. Raises ``BadRequest`` for unknown names,
+    ``NotCertified`` if even the exact lift fails.
     """
     if form not in FORMS:
         raise BadRequest("unknown form", form, tuple(FORMS))
-    setting = ObservedRobot.of(robot, observe, camera, at=at, seed=seed)
+    setting = observed_robot(robot, observe, camera, at=at, seed=seed)
     anatomy, samples = setting.anatomy, setting.samples
     verdict = verdict_of(setting, setting.labels, samples)
     exact = exact_architecture(setting).verdict(setting.observed)

@@ -10,8 +10,8 @@ from ..constraints.pattern import ConstraintPattern, recognise
 from ..kinematics.relation import Measurement
 from ..kinematics.sampling import Samples
 from ..mechanism.observation import labels_of
-from .controllability import Verdict, verdict_of
 from .observed import ObservedRobot, motors
+from .verdict import Verdict, verdict_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..budgets import REMEMBERED
-from ..errors import BadMechanism, BadRequest, HrsynthError, NoSegment, NotSampled, PoseNotReached
+from ..errors import BadMechanism, BadRequest, HrsynthError, NoSegment, NotSampled
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
-from ..kinematics.locked import rezero
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..kinematics.platform_motion import PlatformMotion
 from ..kinematics.relation import Measurement, Relation, relation
@@ -57,19 +56,19 @@ class ObservedRobot:
 
     @classmethod
     def of(cls, robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None,
-           *, at: Pose | str | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
+           *, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
         """What a question is asked of: an observed robot itself, or a robot with what is watched of it, as
-        :func:`observe`."""
+        :func:`.asked.observe`."""
         if isinstance(robot, ObservedRobot):
-            if (observe, camera, at) != (None, None, None):
-                raise BadRequest(f"{robot.headline()}: what is watched is asked twice", observe or camera or str(at),
+            if (observe, camera) != (None, None):
+                raise BadRequest(f"{robot.headline()}: what is watched is asked twice", observe or camera,
                                  "nothing besides an observed robot")
             return robot
         tell("sampling")
         listed = [name.strip() for name in observe.split(",")] if isinstance(observe, str) else observe
         names = None if listed is None else tuple(listed)
         try:
-            return _observed_robot(robot if at is None else _started(robot, at, seed), names, camera, samples, seed)
+            return _observed_robot(robot, names, camera, samples, seed)
         except (BadMechanism, NotSampled) as error:
             error.file = robot.file
             raise
@@ -177,36 +176,6 @@ class ObservedRobot:
                     {"dof": mode.signature.dof, "motion": mode.signature.motion, "mobility": mode.signature.mobility,
                      "words": mode.beside(own, labels),
                      "pose": Pose.of(mode.at.pose(drawn.question.platform)).to_dict()} for mode in drawn.met]}
-
-
-def observe(robot: Mechanism, legs: Sequence[str] | str | None = None, camera: str | None = None, *,
-            at: Pose | str | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
-    """A robot with what is watched of it, its normal form and samples of its motion: what every question takes.
-
-    ``legs`` holds leg labels or link names (a string sets them apart by commas); None or ``["all"]`` means all legs at
-    their default segments. ``camera`` names the link that carries the camera. ``at`` is a pose that takes the place of
-    the zero configuration: on the branch of that where it reaches the pose, else in another operation mode that was
-    met.
-
-    Raises ``BadRequest`` for labels, links and parts of a pose that there are not, ``PoseNotReached``.
-    """
-    return ObservedRobot.of(robot, legs, camera, at=at, samples=samples, seed=seed)
-
-
-def _started(robot: Mechanism, at: Pose | str, seed: int) -> Mechanism:
-    """The robot in normal form whose zero configuration is the one at a pose; see :func:`observe`."""
-    from ..batch.reach import reach
-
-    setting = ObservedRobot.of(robot, seed=seed)
-    drawn, wanted = setting.everything, Pose.parse(at) if isinstance(at, str) else at
-    refused: HrsynthError | None = None
-    for start in (drawn.start, *(mode.at for mode in drawn.met)):
-        try:
-            return replace(rezero(reach(start, drawn.question, wanted)), file=robot.file)
-        except (BadRequest, PoseNotReached) as error:
-            refused = refused or error
-    assert refused is not None
-    raise refused
 
 
 @lru_cache(maxsize=REMEMBERED)

@@ -1,6 +1,19 @@
-"""The words of a verdict (docs/pages/theory.md, section 6)."""
+"""What one set of observed legs sees of the platform (docs/pages/theory.md, section 6)."""
 
 from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+from ..errors import RankUndecided
+from ..geometry.ranks import Rank
+from ..kinematics.relation import relation
+from ..kinematics.sampling import Samples
+from ..results import Result
+from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
+from .freedoms import Freedom, name_freedoms, point_text
+from .observed import ObservedRobot
 
 CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncontrollable"
 
@@ -8,3 +21,80 @@ CONTROLLABLE, PARTIAL, BLIND = "controllable", "partially controllable", "uncont
 def word(rank: int, dof: int) -> str:
     """The verdict where ``rank`` of the platform's ``dof`` freedoms are seen."""
     return CONTROLLABLE if rank == dof else PARTIAL if rank else BLIND
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Verdict(Result, shown_as="verdict"):
+    """What one set of observed legs sees of the platform, at generic configurations."""
+
+    legs: tuple[str, ...]
+    verdict: str
+    dof: int
+    rank: int
+    lost: tuple[Freedom, ...]
+    gap: float
+    has_interaction_matrix: bool = True
+    """Whether Mᵀ exists: no observed direction moves while the platform rests."""
+    counted: float = 1.0
+    """The smallest singular value of the measured rates on ρ that counts as seen, at the sample where it is largest:
+    single samples may lie near a singularity, whatever the dimensions."""
+    dropped: float = 0.0
+    """The largest that does not, at the sample where it is least."""
+
+    @property
+    def near(self) -> bool:
+        """Whether a singular value lies so near to the cutoff that slightly other geometry has another verdict."""
+        return (self.rank > 0 and self.counted < SURELY_SOMETHING) or self.dropped > SURELY_ZERO
+
+    def headline(self) -> str:
+        """The legs, the verdict and the rank."""
+        return f"legs {', '.join(self.legs)}: {self.verdict}, rank {self.rank} of {self.dof}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"legs": list(self.legs), "verdict": self.verdict, "rank": self.rank,
+                "lost": [freedom.to_dict() for freedom in self.lost], "gap": self.gap,
+                "has_interaction_matrix": self.has_interaction_matrix,
+                "interaction_matrix": self.has_interaction_matrix, "margin": self.margin}
+
+    @property
+    def margin(self) -> dict[str, float]:
+        """How far the verdict is from another, as the record of the command line has it."""
+        return {"counted": self.counted, "dropped": self.dropped, "cutoff": RANK_CUTOFF}
+
+
+def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) -> Verdict:
+    """The verdict for ``samples``, whose observations are those of ``legs``.
+
+    All samples are of one operation mode and must show one rank. Raises ``RankUndecided`` where its gap is too small at
+    a sample, or between what counts at one sample and what does not at another.
+    """
+    found = [member.relation for member in samples.members]
+    rank = max(each.rank for each in found)
+    what = f"what legs {', '.join(legs)} see"
+    if any(each.rank != rank for each in found):
+        between = min(each.seen.weakest for each in found) / max(each.seen.dropped for each in found)
+        raise RankUndecided(f"{what} is not the same at all configurations", between, RANK_GAP)
+    gap = min(min(each.gap, each.RO.gap) for each in found)
+    Rank(rank, gap).decided(what)
+    dof = setting.dof
+    lost: tuple[Freedom, ...] = ()
+    if rank < dof:
+        lost = _lost(setting, samples, tuple(legs), dof - rank)
+    graph = not any(each.RI for each in found)
+    return Verdict(tuple(legs), word(rank, dof), dof, rank, lost, gap, graph,
+                   max(each.seen.weakest for each in found), min(each.seen.dropped for each in found))
+
+
+def _lost(setting: ObservedRobot, samples: Samples, legs: tuple[str, ...], count: int) -> tuple[Freedom, ...]:
+    """The lost freedoms at the zero configuration where it is generic, else at a sample."""
+    start = relation(samples.start, samples.question)
+    position = None
+    found = start.unobserved_twists
+    if found.shape[1] != count or start.gap < RANK_GAP:
+        member = next(member for member in samples.members if member.relation.unobserved_twists.shape[1] == count)
+        found, position = member.relation.unobserved_twists, member.configuration.pose(samples.question.platform)[:3, 3]
+    named = name_freedoms(found, setting.anatomy, legs, position)
+    if position is None:
+        return named
+    return tuple(replace(each, name=f"{each.name} (with the platform at {point_text(position)})") for each in named)

@@ -10,12 +10,13 @@ from itertools import combinations, groupby
 from typing import Any
 
 from ..analysis.advice import Advice, advise
-from ..analysis.controllability import CONTROLLABLE, Verdict, verdict_of
+from ..analysis.asked import observe
 from ..analysis.derive import derive
 from ..analysis.exact import ExactArchitecture, architecture
 from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.modes import counted
-from ..analysis.observed import ObservedRobot, observe, restricted, selected
+from ..analysis.observed import ObservedRobot, restricted, selected
+from ..analysis.verdict import CONTROLLABLE, Verdict, verdict_of
 from ..errors import BadRequest, HrsynthError, NotConfined, NotConfirmed, Unsolved
 from ..geometry.ranks import range_basis
 from ..kinematics.relation import Relation

@@ -147,7 +147,8 @@ def _goal(help: str) -> Option:
 
 
 POSES = "or mode:2, of the list that modes gives; again for more (default: the zero configuration)."
-BEGIN = Option("at", "Start there instead of at the zero configuration, in another operation mode if need be.", "POSE")
+BEGIN = Option("at", "Start there instead of at the zero configuration, in another operation mode if need be; or "
+               "mode:2.", "POSE")
 START = Option("start", "Start pose, such as x=0.02,y=0.1,z=-0.7, or mode:2 of the other pose.", "POSE",
                default=NEEDED, flags=("--from",))
 QUESTIONS = (

@@ -15,10 +15,10 @@ from ..analysis.accuracy.cones import Cones, half_angles
 from ..analysis.accuracy.pose_errors import PoseErrors
 from ..analysis.asked import configurations_at
 from ..analysis.aspects.path import SEPARATED, Aspects
-from ..analysis.controllability import CONTROLLABLE, verdict_of
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.observed import ObservedRobot
 from ..analysis.posture import ConfigurationAnalysis, Posture
+from ..analysis.verdict import CONTROLLABLE, verdict_of
 from ..budgets import AXIS_SEEN
 from ..errors import BadRequest, HrsynthError, PoseNotReached
 from ..geometry.vectors import Array

@@ -9,9 +9,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..analysis.asked import configurations_at
-from ..analysis.controllability import verdict_of
 from ..analysis.observed import ObservedRobot
 from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
+from ..analysis.verdict import verdict_of
 from ..budgets import LONGEST_RUN, RUN_EVALUATIONS
 from ..errors import BadRequest, PoseNotReached, RankUndecided
 from ..geometry.so3 import angle_of

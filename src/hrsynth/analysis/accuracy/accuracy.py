@@ -17,8 +17,8 @@ from ...mechanism.pose import Grid, ModeNumber, Pose, asked_pose
 from ...progress import tell
 from ...results import Result
 from ..asked import configurations_at
-from ..controllability import verdict_of
 from ..observed import ObservedRobot
+from ..verdict import verdict_of
 from .cones import Cones, half_angles
 from .error_map import ErrorMap, Mapper
 from .pose_errors import PoseErrors, measured

@@ -17,10 +17,10 @@ from ...mechanism.pose import Pose
 from ...progress import tell
 from ...results import Result
 from ...tolerances import SOLVED
-from ..controllability import Verdict
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
+from ..verdict import Verdict
 from .agreement import Agreement, agreement, weakest
 
 POINTS = 10_000

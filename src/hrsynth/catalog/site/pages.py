@@ -8,8 +8,8 @@ from itertools import groupby
 from pathlib import Path
 from typing import Any
 
+from ...analysis.asked import observe
 from ...analysis.derive import Derivation, derive
-from ...analysis.observed import observe
 from ...description import native
 from ...description.files import replacement
 from ...errors import HrsynthError

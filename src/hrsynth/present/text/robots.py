@@ -13,9 +13,10 @@ from .tables import Rows, camera, head, known, listing, sets, table
 
 if TYPE_CHECKING:
     from ...analysis.advice import Advice, FurtherMeasurement
-    from ...analysis.controllability import Legs, Verdict
+    from ...analysis.controllability import Legs
     from ...analysis.derive import Derivation
     from ...analysis.observed import ObservedRobot
+    from ...analysis.verdict import Verdict
     from ...kinematics.certificate import Certificate
     from ...mechanism import Mechanism
     from ..view.view import View
