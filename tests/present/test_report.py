@@ -13,12 +13,14 @@ from typing import Any
 import pytest
 from lxml import etree
 
+from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.cli import execute
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet
 from hrsynth.present.drawings import svg
 from hrsynth.present.report import figures, parts
+from hrsynth.present.report.answer import set_rows
 from hrsynth.present.report.formulas import barred, collected, formula, indexed
 from hrsynth.present.report.pages import report
 
@@ -114,6 +116,27 @@ def test_what_the_program_says_is_on_the_page(name: str, legs: str | None):
         assert found.hidden_architecture.unicode.replace("\u0332", "") in words
     for freedom in found.verdict.lost:
         assert freedom.name in words
+
+
+@PAGES
+def test_picture_and_plain_answer_come_first_and_the_derivation_is_folded(name: str, legs: str | None):
+    found, page = made(name, legs)
+    root = read(page)
+    first = root.xpath("//header//*[@class='hero']")[0]
+    assert [each.get("aria-label") for each in first.iter("svg")] == [f"Drawing of {name}"]
+    said = text_of(first.xpath(".//ul")[0])
+    assert f"shows {found.verdict.rank} of the platform's {found.dof} freedoms" in said
+    folded = root.xpath("//details//*[@data-steps or @data-step]")
+    assert folded == root.xpath("//*[@data-steps or @data-step]") != []
+    assert all(each[0].tag == "summary" and each.get("open") is None for each in root.iter("details"))
+
+
+def test_sets_that_show_all_alike_are_one_row():
+    found = derive(load("gough_stewart"))
+    rows = list(set_rows(legs(found.setting), 63))
+    assert sum(len(sets) for sets, *_ in rows) == 63
+    assert [len(sets) for sets, each, _, _ in rows if not each.lost] == [20, 15, 6, 1]
+    assert all(len(sets) == 1 for sets, each, _, _ in rows if each.lost)
 
 
 def test_what_is_refused_is_one_sentence():
@@ -227,6 +250,16 @@ def test_names_are_set_as_in_print():
 def test_symbols_that_differ_in_their_index_are_told_once():
     where = {"B1": "centre of wrist_1", "B2": "centre of wrist_2", "e": "tangent", "u3": "seen in leg 3"}
     assert collected(where) == [("Bi", "centre of wrist_i (i = 1, 2)"), ("e", "tangent"), ("u3", "seen in leg 3")]
+
+
+def test_an_index_is_not_read_as_a_letter_of_a_name():
+    """``tip1, tip2`` are not ``tipi``, nor are the symbols of a formula names."""
+    where = {"B1": "centre of tip1", "B2": "centre of tip2", "N1": "I - u1 u1^T", "N2": "I - u2 u2^T",
+             "u1": "direction watched in leg 1 (knee1a)", "u2": "direction watched in leg 2 (knee2a)"}
+    told = [(indexed(symbol), indexed(meaning)) for symbol, meaning in collected(where)]
+    assert told == [("B<sub>i</sub>", "centre of tip<sub>i</sub> (i = 1, 2)"),
+                    ("N<sub>i</sub>", "I - u<sub>i</sub> u<sub>i</sub><sup>T</sup> (i = 1, 2)"),
+                    ("u<sub>i</sub>", "direction watched in leg i (knee<sub>i</sub>a) (i = 1, 2)")]
 
 
 # ---- the command

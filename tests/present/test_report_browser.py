@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -40,3 +41,23 @@ def test_a_report_is_read_on_a_small_screen_and_on_paper(tab: Tab, tmp_path: Pat
     tab.page.emulate_media(media="print")
     assert tab.page.evaluate("getComputedStyle(document.querySelector('nav')).display") == "none"
     assert tab.page.pdf(format="A4")[:5] == b"%PDF-"
+
+
+PRINTED = {"width": 695, "height": 1024}
+"""What an A4 page has inside its margins of 13 mm (CSS pixels)."""
+
+
+@pytest.mark.parametrize(("name", "legs"), FIVE, ids=[name for name, _ in FIVE])
+def test_a_report_prints_on_eight_full_pages(tab: Tab, tmp_path: Path, name: str, legs: str):
+    """All of it is printed, the folded parts too; so pages that the height of what is printed fills are full."""
+    page = tmp_path / "report.html"
+    assert execute(["derive", name, "--observe", legs, "--report", str(page)]) == 0
+    tab.page.set_viewport_size(PRINTED)
+    tab.open(page, "document.readyState == 'complete'")
+    tab.page.emulate_media(media="print")
+    shown = "[...document.querySelectorAll('details table')].every(t => t.getBoundingClientRect().height > 50)"
+    assert tab.page.evaluate(shown)
+    tall = tab.page.evaluate("document.body.getBoundingClientRect().height")
+    count = len(re.findall(rb"/Type\s*/Page\b", tab.page.pdf(format="A4")))
+    assert 2 <= count <= 8
+    assert tall > 0.8 * (count - 0.5) * PRINTED["height"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+from collections.abc import Collection, Mapping
 from functools import cache
 from typing import Any
 from xml.sax.saxutils import escape
@@ -11,6 +11,11 @@ from xml.sax.saxutils import escape
 _INDEXED = re.compile(r"\b(tau|[BJNnpu]|τ)(\d+|i)\b")
 _NUMBERED = re.compile(r"(.*?\D)(\d+)")
 _BARRED = re.compile("(.)\u0332")
+_LOW = "\u1d62"
+"""Stands for the index of names in which an i would be read as a letter: tip1, tip2."""
+
+_FORMULA = ("I", "T", "x", "e")
+"""Letters in formulas that have no meaning listed: the identity, transposed, the cross product's matrix."""
 
 
 @cache
@@ -59,7 +64,7 @@ def formula(expression: Any, said: str, zero: bool = True) -> str:
 def indexed(text: str) -> str:
     """Words with the indices of points and directions set low, as HTML."""
     found = _INDEXED.sub(lambda m: f"{'τ' if m[1] == 'tau' else m[1]}<sub>{m[2]}</sub>", escape(text))
-    return found.replace("]x", "]<sub>×</sub>").replace("^T", "<sup>T</sup>")
+    return found.replace(_LOW, "<sub>i</sub>").replace("]x", "]<sub>×</sub>").replace("^T", "<sup>T</sup>")
 
 
 def collected(where: Mapping[str, str]) -> list[tuple[str, str]]:
@@ -68,11 +73,18 @@ def collected(where: Mapping[str, str]) -> list[tuple[str, str]]:
     for symbol, meaning in where.items():
         match = _NUMBERED.fullmatch(symbol)
         head, number = (match[1], match[2]) if match else (symbol, "")
-        pattern = re.sub(rf"(?<!\d){number}(?!\d)", "i", meaning) if number else meaning
+        pattern = _indices(meaning, number, set(where)) if number else meaning
         kinds.setdefault((head, pattern), []).append(number)
     return [(f"{head}i", f"{pattern} (i = {', '.join(numbers)})") if len(numbers) > 1
             else (head + numbers[0], pattern if not numbers[0] else where[head + numbers[0]])
             for (head, pattern), numbers in kinds.items()]
+
+
+def _indices(meaning: str, number: str, symbols: Collection[str]) -> str:
+    """A meaning with the index instead of its number: a letter where it stands alone or in a formula, else low."""
+    formula = set(re.findall(r"[^\W\d_]\w*", meaning)) <= {*symbols, *_FORMULA}
+    return re.sub(rf"(?<!\d){number}(?!\d)",
+                  lambda m: "i" if formula or meaning[m.start() - 1] in " _" else _LOW, meaning)
 
 
 def barred(text: str) -> str:

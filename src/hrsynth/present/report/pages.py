@@ -12,15 +12,19 @@ from ...tolerances import RANK_GAP, SAME_RELATION
 from ..drawings.schematic import graph_svg
 from ..maps import error_map
 from ..modes import picture, why_undrawn
+from ..portrait import Portrait
 from ..text.poses import all_of, at_mode, proved
-from ..text.robots import exact_cell, exact_words
+from ..text.robots import exact_words
 from ..text.runs import field_rows
+from .answer import answer, set_rows
 from .figures import SOURCES, actuators, pairs, step_figures
 from .formulas import barred, collected, formula, indexed
 from .parts import CONE, Parts, Refused, asked, parts
 
 LARGEST_LIST = 63
 """Sets of legs in the table at most: all of six legs; of more, the smallest sets."""
+PORTRAIT = (420.0, 330.0)
+"""Width and height of the robot's picture (pixels)."""
 
 
 def report(found: Derivation, *, seed: int = 0) -> str:
@@ -38,7 +42,8 @@ def page(found: Derivation, told: Parts) -> bytes:
         graphs.append(graph_svg(found.hidden, observed=observed, virtual=actuators(found),
                                 title=f"Joint graph of the hidden robot of {name}"))
     return str(_template().render(
-        found=found, setting=found.setting, told=told, name=name, graphs=graphs, real=str(found.architecture),
+        found=found, setting=found.setting, told=told, answer=list(answer(found, told)),
+        portrait=Portrait.of(found.setting).svg(*PORTRAIT), name=name, graphs=graphs, real=str(found.architecture),
         hidden=found.hidden_architecture and str(found.hidden_architecture), pairs=pairs(found),
         cone=CONE.replace("deg", "°"),
         watched=[f"leg {o.leg} ({o.link})" for o in found.setting.observed],
@@ -61,9 +66,9 @@ def _template() -> Any:
         "angle": lambda value: "" if value is None else f"{value:.1e}"}
     environment.tests["refused"] = lambda part: isinstance(part, Refused)
     environment.globals.update(
-        all_of=all_of, at_mode=at_mode, collected=collected, exact_cell=exact_cell, exact_words=exact_words,
+        all_of=all_of, at_mode=at_mode, collected=collected, exact_words=exact_words,
         field_rows=field_rows, formula=formula, most=LARGEST_LIST, proved=proved, rank_gap=RANK_GAP,
-        same_relation=SAME_RELATION, sources=SOURCES, version=__version__, zip=zip)
+        same_relation=SAME_RELATION, sources=SOURCES, version=__version__, set_rows=set_rows)
     return environment.get_template("page.html.j2")
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from ...analysis.derive import Derivation, derive
 from ...analysis.observed import ObservedRobot
 from ...geometry.vectors import Array
+from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
 from ...progress import tell
@@ -134,7 +135,7 @@ def view(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None =
     elif hidden:
         notes = (*notes, "every leg is blind: there is no hidden robot")
     return View(setting, derivation, mover, tuple(machines), home, sliders, tuple(_arrows(setting)), found,
-                _normal(setting), (*notes, *missing))
+                plane_normal(setting.motion), (*notes, *missing))
 
 
 def _machine(key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, states: Sequence[ViewState],
@@ -180,9 +181,8 @@ def _arrows(setting: ObservedRobot) -> Iterator[Arrow]:
         yield Arrow(seen.leg, seen.link, np.array([middle - half * direction, middle + half * direction]))
 
 
-def _normal(setting: ObservedRobot) -> Array | None:
+def plane_normal(motion: PlatformMotion) -> Array | None:
     """The normal of the plane in which the platform moves, None where it leaves every plane."""
-    motion = setting.motion
     if motion.translations.shape[1] != 2:
         return None
     normal = np.cross(*motion.translations.T)

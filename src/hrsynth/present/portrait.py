@@ -1,0 +1,134 @@
+"""A robot in space as a drawing: rods, plates and joints at the zero configuration, seen from one side (SVG)."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ..analysis.observed import ObservedRobot
+from ..geometry.vectors import Array
+from ..mechanism import Mechanism
+from .drawings import svg
+from .sketch import Sketch
+from .view.shapes import BASE, LEG, MOTOR, PLATFORM, RADIUS, Drawer
+from .view.view import plane_normal
+
+TRAVEL = 0.3
+"""Half of a rail that is drawn (characteristic lengths)."""
+SEEN = "seen"
+"""A link whose direction is watched."""
+STROKES = {BASE: ("#7a828b", 2.0), LEG: ("#4a4f55", 3.0), PLATFORM: ("#1f4e8c", 3.4), SEEN: (svg.VIRTUAL, 4.6)}
+"""Colour and width of what a link is (pixels at the full size of a drawing)."""
+FILLS = {BASE: "#eceff2", PLATFORM: "#c9dcf2"}
+DIGITS = 4
+"""Significant decimals of a drawing's size in what a page is given."""
+
+
+@dataclass(frozen=True, eq=False)
+class Mark:
+    """A stroke, an area or a joint: ``kind`` line, area, dot or sleeve (a slider), its ``role``, its points (n, 3)."""
+
+    kind: str
+    role: str
+    points: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Portrait:
+    """What is drawn of a robot, about the middle of it; ``normal`` (3,) is that of the plane of motion, if any."""
+
+    name: str
+    marks: tuple[Mark, ...]
+    normal: Array | None
+
+    @classmethod
+    def of(cls, setting: ObservedRobot) -> Portrait:
+        """An observed robot."""
+        return cls.drawn(setting.mechanism, setting.anatomy.platform, {each.link for each in setting.observed},
+                         plane_normal(setting.motion))
+
+    @classmethod
+    def drawn(cls, mechanism: Mechanism, platform: Collection[str], observed: Collection[str],
+              normal: Array | None) -> Portrait:
+        """A mechanism at its zero configuration."""
+        drawer = Drawer(mechanism, mechanism, platform, RADIUS * mechanism.length)
+        way = TRAVEL * mechanism.length
+        marks = []
+        for shape in drawer.shapes({joint.name: (-way, way) for joint in drawer.sliders()}):
+            role = SEEN if shape.link in observed and shape.joint is None else shape.role
+            if shape.kind in ("rod", "rail"):
+                marks.append(Mark("line", BASE if shape.kind == "rail" else role, shape.points))
+            elif shape.kind == "plate":
+                marks.append(Mark("area", role, shape.points))
+            elif shape.joint is not None:
+                at = shape.points if shape.kind == "slider" else shape.points.mean(axis=0)[None]
+                marks.append(Mark("sleeve" if shape.kind == "slider" else "dot", role, at))
+        return cls(mechanism.name, tuple(marks), normal)
+
+    @cached_property
+    def axes(self) -> Array:
+        """Right, up and towards the eye, (3, 3) by rows, as :class:`~hrsynth.present.sketch.Sketch` sees it."""
+        areas = [mark.points for mark in self.marks if mark.kind == "area"]
+        spots = np.vstack([mark.points for mark in self.marks if mark.kind == "dot"] or areas)
+        seen = Sketch.of(self.normal, spots, areas)
+        if seen.flat:
+            return np.vstack([seen.axes, np.cross(*seen.axes)])
+        up, turn = np.radians(seen.view)
+        eye = np.array([np.cos(up) * np.cos(turn), np.cos(up) * np.sin(turn), np.sin(up)])
+        right = np.array([-np.sin(turn), np.cos(turn), 0.0])
+        return np.array([right, np.cross(eye, right), eye])
+
+    def svg(self, width: float, height: float, title: str | None = None) -> str:
+        """The drawing, as large as fits; small ones (thumbnails) have thinner strokes."""
+        seen = [mark.points @ self.axes.T for mark in self.marks]
+        every = np.vstack(seen)
+        low, high = every[:, :2].min(axis=0), every[:, :2].max(axis=0)
+        thin = min(1.0, max(0.4, height / 320.0))
+        room = np.array([width, height]) - 22.0 * thin
+        scale = float(np.min(room / np.maximum(high - low, 1e-9)))
+        middle = (low + high) / 2
+        order = sorted(range(len(seen)), key=lambda i: (self.marks[i].kind != "area", float(np.mean(seen[i][:, 2]))
+                                                        + (0.02 if self.marks[i].kind in ("dot", "sleeve") else 0.0)))
+        parts = []
+        for i in order:
+            at = (seen[i][:, :2] - middle) * [scale, -scale] + [width / 2, height / 2]
+            parts.append(_drawn(self.marks[i], [(float(x), float(y)) for x, y in at], thin))
+        return svg.picture(width, height, title or f"Drawing of {self.name}", self.words(), *parts)
+
+    def words(self) -> str:
+        """The drawing in a sentence."""
+        legs = sum(mark.role == SEEN for mark in self.marks)
+        motors = sum(mark.role == MOTOR for mark in self.marks)
+        return (f"{self.name} at its zero configuration, the platform blue, {motors} motors dark"
+                + (", the watched segments orange" if legs else "") + ".")
+
+    def scene(self) -> dict[str, Any]:
+        """What a page is given that turns it: marks about the middle, scaled to a size of one."""
+        every = np.vstack([mark.points for mark in self.marks])
+        middle, size = (every.min(axis=0) + every.max(axis=0)) / 2, float(np.max(np.ptp(every, axis=0))) or 1.0
+        return {"axes": np.round(self.axes, DIGITS).tolist(), "marks": [
+            [mark.kind, mark.role, np.round((mark.points - middle) / size, DIGITS).tolist()] for mark in self.marks]}
+
+
+def _drawn(mark: Mark, at: list[svg.Place], thin: float) -> str:
+    """A mark on the page, a pale line about strokes so that what is nearer stands out."""
+    if mark.kind == "area":
+        colour, wide = STROKES[mark.role]
+        return svg.element("path", d=svg.lines([at]) + "Z", fill=FILLS.get(mark.role, "#fff"), stroke=colour,
+                           stroke_width=wide * thin, stroke_linejoin="round", fill_opacity="0.75")
+    if mark.kind == "line":
+        colour, wide = STROKES[mark.role]
+        way = svg.lines([at])
+        return (svg.element("path", d=way, stroke="#fff", stroke_width=(wide + 3) * thin)
+                + svg.element("path", d=way, stroke=colour, stroke_width=wide * thin, stroke_linecap="round"))
+    fill = svg.INK if mark.role == MOTOR else "#fff"
+    if mark.kind == "sleeve":
+        way = svg.lines([at])
+        return (svg.element("path", d=way, stroke=svg.INK, stroke_width=13 * thin)
+                + svg.element("path", d=way, stroke=fill, stroke_width=10 * thin))
+    (x, y), radius = at[0], (5.5 if mark.role == MOTOR else 3.6) * thin
+    return svg.element("circle", cx=x, cy=y, r=radius, fill=fill, stroke=svg.INK, stroke_width=1.4 * thin)
