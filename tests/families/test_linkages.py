@@ -2,19 +2,41 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 import hrsynth
-from families.linkages import LINKAGES, Linkage
+from hrsynth.errors import BadRequest
+from hrsynth.families.__main__ import main
+from hrsynth.families.linkages import LINKAGES, Linkage
 from hrsynth.geometry.vectors import Array, rotation_about
 
 
 def drawn(name: str, seed: int) -> tuple[Linkage, Array, Array]:
-    """A linkage, closed angles, and how its base is turned."""
+    """A linkage of random dimensions, closed angles, and how its base is turned."""
     rng = np.random.default_rng(seed)
-    linkage = LINKAGES[name](rng)
+    twists, lengths, offsets = rng.uniform(0.5, 1.2, 3), rng.uniform(0.5, 1.2, 4), rng.uniform(-0.3, 0.3, 3)
+    dimensions = {"bennett": (*twists[:2], 1.0), "goldberg": (*twists, 1.0), "myard": (twists[0], 1.0),
+                  "sarrus": (lengths, twists[0] + 0.3, 0.5), "line_symmetric_bricard": (lengths[:3], twists, offsets),
+                  "plane_symmetric_bricard": (lengths[:3], twists), "schatz": (1.0, 0.2 + abs(offsets[0]))}
+    linkage = LINKAGES[name](*dimensions[name])
     return linkage, linkage.regular(rng), rotation_about(rng.normal(size=3), rng.uniform(0, 3))
+
+
+def closings(linkage: Linkage, seed: int, starts: int, second: float) -> list[Array]:
+    """Closed angles (n,) with the second angle held, one for each random start that ends there."""
+    found = (linkage.closed(start, second)
+             for start in np.random.default_rng(seed).uniform(-np.pi, np.pi, (starts, len(linkage.lengths))))
+    return [angles for angles in found if angles is not None]
+
+
+def moved(linkage: Linkage, angles: Array, zero: Array) -> Array:
+    """The displacement (4, 4) of the middle link since ``zero``, in the frame of the second axis there."""
+    link = len(linkage.lengths) // 2 + 1
+    now, then = (np.linalg.inv(frames[1]) @ frames[link] for frames in (linkage.frames(angles), linkage.frames(zero)))
+    return now @ np.linalg.inv(then)
 
 
 def check_mobility(name: str, seed: int) -> None:
@@ -43,11 +65,11 @@ def check_modes(name: str, seed: int, starts: int) -> int:
     platform = mechanism.platform
     back = np.linalg.inv(mechanism.links[platform].pose)
     told = [np.linalg.inv(frame) @ mode.bodies[platform] @ back @ frame for mode in found.modes if mode.bodies]
-    ends = linkage.closed(np.random.default_rng(seed + 100), starts, zero[1])
+    ends = closings(linkage, seed + 100, starts, zero[1])
     assert ends
     for end in ends:
         if np.linalg.svd(np.delete(linkage.axes(end), 1, 1), compute_uv=False)[-1] > 1e-4:  # no singular closure
-            assert min(np.abs(linkage.moved(end, zero) - each).max() for each in told) < 1e-6
+            assert min(np.abs(moved(linkage, end, zero) - each).max() for each in told) < 1e-6
     return len(told)
 
 
@@ -59,6 +81,15 @@ def test_a_paradoxical_linkage_has_one_freedom(name: str):
 @pytest.mark.parametrize("name", ["bennett", "myard", "schatz"])
 def test_the_modes_of_a_driven_linkage_are_found(name: str):
     assert check_modes(name, 1, 10) >= 1
+
+
+def test_a_linkage_is_written_by_its_name(tmp_path: Path):
+    main(str(tmp_path), "schatz", "3rps")
+    assert sorted(path.stem for path in tmp_path.iterdir()) == ["3rps", "schatz"]
+    posture = hrsynth.check(hrsynth.load(tmp_path / "schatz.urdf")).postures[0]
+    assert posture.mobility.total == 1
+    with pytest.raises(BadRequest, match="'robot'"):
+        main(str(tmp_path), "robot")
 
 
 @pytest.mark.slow
