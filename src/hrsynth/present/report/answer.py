@@ -7,8 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from ...analysis.accuracy.accuracy import Accuracy
-from ...analysis.controllability import Legs, Verdict
+from ...analysis.controllability import Legs
 from ...analysis.derive import Derivation
+from ...analysis.verdict import Verdict
 from ...geometry.vectors import Array
 from ..text.poses import all_of
 from ..text.robots import exact_cell
