@@ -11,7 +11,7 @@ import pytest
 
 import hrsynth
 from hrsynth.errors import BadRequest
-from hrsynth.present.animations import FRAMES, animation
+from hrsynth.present.animations import AFTER, FRAMES, animation, captions
 from hrsynth.present.outputs import OUTPUTS
 
 
@@ -41,5 +41,19 @@ def test_a_film_ends_with_the_watched_leg_over_its_wanted_place():
         colours = np.asarray(image.convert("RGB"), dtype=float)
         return int(np.sum((np.ptp(colours, axis=2) > 60) & (colours.min(axis=2) > 100)))
 
+    assert image.size == (1280, 720)
     assert 10 < image.n_frames <= FRAMES + 12
     assert pale(image.n_frames - 1) < 0.5 * pale(0)
+
+
+def test_the_words_of_a_film_tell_start_crossings_and_end():
+    found = hrsynth.servo(hrsynth.load("3rpr_m1"), start="x=-0.08,y=-0.06,phi=-10deg", goal="x=0.034,y=0.23,phi=23deg")
+    moments = list(range(0, len(found.run.times), 2))
+    words = list(captions(found, moments))
+    assert len(words) == len(moments)
+    assert words[0].startswith("The start")
+    assert words[-1].startswith("The end: the goal. The platform is")
+    crossed = {place for place, each in zip(moments, words, strict=True) if "crossed" in each or "limit" in each}
+    assert bool(crossed) == bool(found.track.passages)
+    for each in found.track.passages or ():
+        assert any(0 <= place - each.place <= 2 * AFTER for place in crossed)

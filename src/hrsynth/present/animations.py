@@ -1,49 +1,123 @@
-"""A servo run → an animation (GIF): what a camera sees that watches the legs, over what it is to see."""
+"""A servo run → an animation (GIF, 1280 × 720): what a camera sees that watches the legs, over what it is to see, and
+what is happening, in words and as a curve."""
 
 from __future__ import annotations
 
 import io
+import textwrap
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from ..geometry.vectors import Array, inverse
 from ..simulation.camera import Camera, Cylinder, cylinders, facing, seen
 from ..simulation.mockup import rods as rods_of
-from ..simulation.pictures import GREY, LegRenderer
+from ..simulation.pictures import COLOURS, GREY, LegRenderer
 from ..simulation.result import Servo
+from ..simulation.track import TYPE_2
+from ..tolerances import REST_OF_RUN
+from .plots import empty_figure, pose_words, styled
+from .runs import ENDS, LEAST_TURN, until
 
 FRAMES, PAUSE = 50, 12
 """Pictures of the run, and how often the last one is shown on."""
 MILLISECONDS = 80
 """How long each picture is shown."""
-SCALE = 2
-"""The picture is this much smaller than the camera's."""
+WIDTH, HEIGHT, SIDE, DOTS = 1280, 720, 440, 100
+"""Pixels of the animation, of the words beside the camera's picture, and an inch."""
+FOCAL = 1.25
+"""Focal length of the camera over its picture's width."""
 ELEVATION = 0.3
 """How far down the camera looks (rad)."""
 WANTED = 0.45
 """How bright what the camera is to see is beneath what it sees."""
+AFTER = 3
+"""Pictures during which a crossing is told."""
+SHADES = 32
+"""Colours of the file."""
+LINE = 38
+"""Letters of a line of words."""
 
 
+@styled
 def animation(found: Servo) -> bytes:
     """The run as GIF, at equal parts of its way; raises ``MissingExtra``, ``NotRendered``."""
     from PIL import Image
 
     setting, configurations = found.setting, found.run.configurations
     question = setting.samples.question
-    rods = cylinders(setting.mechanism, question.observations)
-    stage = LegRenderer(setting.mechanism, _camera(found), question.reference, rods)
+    stage = LegRenderer(setting.mechanism, _camera(found), question.reference,
+                        cylinders(setting.mechanism, question.observations))
     wanted = _lit(stage.picture(found.target.pose))
+    sheet = Sheet(found)
     frames = []
-    for number in _moments(np.array([at.pose(setting.motion.link)[:3, 3] for at in configurations]), found.errors):
+    moments = _moments(np.array([at.pose(setting.motion.link)[:3, 3] for at in configurations]), found.errors)
+    for number, words in zip(moments, captions(found, moments), strict=True):
         seen = _lit(stage.picture(configurations[number].pose))
         paper = np.where(_bare(wanted)[..., None], 1.0, 1.0 - WANTED * (1.0 - wanted))
-        frame = np.where(_bare(seen)[..., None], paper, seen)
-        image = Image.fromarray((255 * frame).astype(np.uint8))
-        frames.append(image.resize((image.width // SCALE, image.height // SCALE)).quantize(64))
+        frame = sheet.at(number, words)
+        frame[:, : seen.shape[1]] = 255 * np.where(_bare(seen)[..., None], paper, seen)
+        frames.append(Image.fromarray(frame).quantize(SHADES, dither=Image.Dither.NONE))
     stream = io.BytesIO()
     frames[0].save(stream, "GIF", save_all=True, append_images=[*frames[1:], *[frames[-1]] * PAUSE], loop=0,
                    duration=MILLISECONDS, optimize=True)
     return stream.getvalue()
+
+
+def captions(found: Servo, moments: list[int]) -> Iterator[str]:
+    """What happens at each of the moments (numbers of configurations, the last one the end)."""
+    sizes = found.errors.max(axis=1)
+    metres, radians = found.from_goal
+    passages = found.track.passages or ()
+    for k, number in enumerate(moments):
+        since = moments[max(0, k - AFTER)]
+        passed = [each for each in passages if since < each.place <= number]
+        if k == 0:
+            yield "The start. Pale: where the watched legs are to lie. Bright: where they lie."
+        elif k == len(moments) - 1:
+            turned = f" and {np.degrees(radians):.2g}°" if np.degrees(radians) > LEAST_TURN else ""
+            yield f"The end: {ENDS[found.ended]}. The platform is {1e3 * metres:.3g} mm{turned} from the goal."
+        elif passed:
+            yield ("A singularity is crossed: for a moment the legs do not show how the platform moves."
+                   if passed[-1].kind == TYPE_2 else "A leg passes its limit.")
+        elif sizes[number] > REST_OF_RUN * sizes.max():
+            yield "The controller turns the watched legs towards the directions that they are to have."
+        else:
+            yield "The watched legs have their directions; the platform comes to rest."
+
+
+class Sheet:
+    """The right part of each picture: title, words, time, and curves with a mark where the run is."""
+
+    def __init__(self, found: Servo) -> None:
+        self.times = found.run.times
+        figure = self.figure = empty_figure(WIDTH / DOTS, HEIGHT / DOTS, dpi=DOTS)
+        left, wide = (WIDTH - SIDE + 30) / WIDTH, (SIDE - 60) / WIDTH
+        figure.text(left, 0.945, found.setting.robot.name, fontsize=17, fontweight="bold", va="center")
+        figure.text(left, 0.895, f"from {pose_words(found.start)}\nto {pose_words(found.goal)}", fontsize=9, va="top")
+        self.words = figure.text(left, 0.79, "", fontsize=14, va="top", linespacing=1.35)
+        for k, leg in enumerate(found.setting.labels):
+            figure.text(left + 0.075 * (k % 4) + 0.016, 0.53 - 0.035 * (k // 4), f"leg {leg}", fontsize=10, va="center")
+            figure.text(left + 0.075 * (k % 4), 0.53 - 0.035 * (k // 4), "■", fontsize=11, va="center",
+                        color=COLOURS[k % len(COLOURS)])
+        self.marks: list[Any] = []
+        for bottom, values, label in ((0.29, found.errors.max(axis=1), "largest error of a direction"),
+                                      (0.075, found.track.smallest, "distance to the singularity")):
+            place = figure.add_axes((left + 0.025, bottom, wide - 0.025, 0.135))
+            place.plot(self.times, values, color="0.35")
+            place.set(xlim=(0, until(found) or 1.0), ylim=(0, None))
+            place.set_title(label, loc="left", fontsize=10)
+            self.marks.append((place.plot([], [], "o", color="black")[0], values))
+        place.set_xlabel("time (s)")
+
+    def at(self, number: int, words: str) -> Array:
+        """The picture (height, width, 3), bytes, without what the camera sees."""
+        self.words.set_text(textwrap.fill(words, LINE))
+        for mark, values in self.marks:
+            mark.set_data([self.times[number]], [values[number]])
+        self.figure.canvas.draw()
+        return np.array(self.figure.canvas.buffer_rgba())[..., :3]
 
 
 def _camera(found: Servo) -> Camera:
@@ -56,7 +130,9 @@ def _camera(found: Servo) -> Camera:
     configurations = (*found.run.configurations[:: max(1, len(found.run.configurations) // 5)], found.target)
     points = np.array([seen(links, reference, at.pose) for at in configurations])
     ahead = np.array([np.cos(ELEVATION), 0.0, -np.sin(ELEVATION)])
-    return facing(points, ahead, np.array([0.0, -1.0, 0.0]))
+    wide = WIDTH - SIDE
+    blank = Camera(np.eye(4), FOCAL * wide, wide, HEIGHT)
+    return facing(points, ahead, np.array([0.0, -1.0, 0.0]), blank)
 
 
 def _moments(places: Array, errors: Array) -> list[int]:

@@ -19,7 +19,20 @@ from ..geometry.vectors import Array
 from ..mechanism.pose import PARTS
 from ..tolerances import DARKEST_DISTANCE, DISTANCE_FLOOR
 from . import plots
-from .plots import MapPlane, along, cell_edges, entry, heading, missing_entry, panels, png, tick_values
+from .plots import (
+    MapPlane,
+    along,
+    cell_edges,
+    entry,
+    heading,
+    missing_entry,
+    panels,
+    png,
+    round_ticks,
+    styled,
+    tick_values,
+    tick_words,
+)
 
 if TYPE_CHECKING:
     from ..analysis.accuracy.accuracy import Accuracy
@@ -27,6 +40,7 @@ if TYPE_CHECKING:
     from ..analysis.check import Check, GridCheck
     from ..analysis.singularity.locus import Locus, SingularityMap
     from ..analysis.singularity.singular import Singularity
+    from ..kinematics.platform_motion import PlatformMotion
     from ..mechanism.pose import Pose
 
 MARKS = {"type1": ("^", "Type 1"), "type2": ("o", "Type 2"), "type3": ("D", "Type 3"),
@@ -42,6 +56,7 @@ HIGHEST = 30.0
 """Multiple of the median error at which the scale ends."""
 
 
+@styled
 def distance_map(found: Check) -> bytes:
     """The distance to Type 2 singularities over a grid: a curve for a line of poses, a colour map for a plane, one map
     for each value of the third part for a box. Raises ``BadRequest`` where Mᵀ exists nowhere."""
@@ -53,17 +68,18 @@ def distance_map(found: Check) -> bytes:
                          "another grid, or a table (.csv)")
     numbers = np.array([np.nan if value is None else value for value in grid.values("type2")]).reshape(grid.grid.shape)
     states = np.array(grid.states).reshape(grid.grid.shape)
-    figure = (_distance_curve if grid.grid.ndim == 1 else _distance_maps)(grid, numbers, states)
+    figure = (_distance_curve(grid, numbers, states) if grid.grid.ndim == 1
+              else _distance_maps(grid, numbers, states, found.setting.motion))
     entries = [missing_entry()] if UNREACHABLE in grid.states else []
     entries += [entry(label, linestyle="", marker=mark, color="red", markeredgecolor="white")
                 for state, (mark, label) in MARKS.items() if state in grid.states]
-    plots.legend(figure, entries, len(entries))
+    plots.legend(figure, entries)
     heading(figure, f"{found.setting.robot.name}: distance to Type 2 singularities, legs "
             f"{', '.join(found.setting.labels)} observed", grid.grid.fixed)
     return png(figure)
 
 
-def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_]) -> Any:
+def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion) -> Any:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
 
@@ -73,7 +89,7 @@ def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_]) ->
     columns = min(len(ps), 4)
     rows = -(-len(ps) // columns)
     size = 3.6 if columns > 1 else 5.6
-    plane = MapPlane.of(grid.grid.axes, 0.3, 2.0)
+    plane = MapPlane.of(grid.grid.axes, motion, 0.3, 2.0)
     figure, axes = panels(rows, columns, size * columns + 1.4, (size * plane.tall + 0.7) * rows + 0.8)
     low, high, ticks = _scale(numbers)
     norm = LogNorm(low, high)
@@ -86,7 +102,7 @@ def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_]) ->
         place.set_visible(False)
     below = "min" if np.nanmin(numbers) < low else "neither"
     bar = figure.colorbar(ScalarMappable(norm, "viridis"), ax=list(axes), label=f"{VALUE} (logarithmic)", extend=below)
-    bar.set_ticks(list(ticks), labels=[f"{value:.2g}" for value in ticks])
+    bar.set_ticks(list(ticks), labels=tick_words(ticks))
     bar.minorticks_off()
     return figure
 
@@ -95,11 +111,11 @@ def _distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray[np.s
     """One plane: colours, white where there is no Mᵀ, marks on singular cells."""
     plane.cells(place, numbers, norm=norm, cmap="viridis")
     blank = (states != UNREACHABLE) & ~np.isfinite(numbers)
-    place.pcolormesh(cell_edges(plane.x), cell_edges(plane.y), np.ma.masked_where(~blank.T, blank.T), cmap="gray",
-                     vmin=0, vmax=1)
+    plane.cells(place, np.where(blank, 1.0, np.nan), cmap="gray", vmin=0, vmax=1)
     for state, (mark, _) in MARKS.items():
         i, j = np.nonzero(states == state)
-        place.scatter(plane.x[i], plane.y[j], marker=mark, s=26, color="red", edgecolor="white", linewidth=0.6)
+        place.scatter(*plane.at(plane.x[i], plane.y[j]), marker=mark, s=26, color="red", edgecolor="white",
+                      linewidth=0.6)
 
 
 def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_]) -> Any:
@@ -110,7 +126,7 @@ def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_]) -
     floor = low / (high / low) ** 0.1 if np.nanmin(numbers) < low else low
     place.semilogy(x, np.where(numbers < low, np.nan, numbers), ".-", color="C0")
     place.minorticks_off()
-    place.set_yticks(list(ticks), labels=[f"{value:.2g}" for value in ticks])
+    place.set_yticks(list(ticks), labels=tick_words(ticks))
     for state, (mark, _) in MARKS.items():
         hit = states == state
         place.scatter(x[hit], np.fmax(numbers[hit], floor), marker=mark, s=36, color="red",
@@ -125,7 +141,7 @@ def _scale(numbers: Array) -> tuple[float, float, Array]:
     regular = numbers[numbers > DISTANCE_FLOOR * high]
     low = float(regular.min()) if regular.size else DISTANCE_FLOOR * high
     low = low if low < 0.9 * high else 0.5 * high
-    return low, high, np.geomspace(low, high, 6)
+    return low, high, round_ticks(low, high)
 
 
 def check_table(found: Check) -> bytes:
@@ -149,9 +165,10 @@ def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -
     return locus(found.setting, plane=plane, steps=steps, seed=seed)
 
 
+@styled
 def locus_map(found: Singularity, drawn: Locus) -> bytes:
     """Type 2 loci of the hidden and the real robot over a plane, the Type 1 boundary and what is not reached (PNG)."""
-    plane = MapPlane.of(drawn.grid.axes, 0.4, 1.6)
+    plane = MapPlane.of(drawn.grid.axes, found.setting.motion, 0.4, 1.6)
     figure, (place,) = panels(1, 1, 7.2, 6.0 * plane.tall + 1.6)
     shade = np.log10(np.maximum(drawn.hidden.type2, DARKEST_DISTANCE))
     plane.cells(place, np.where(np.isfinite(drawn.hidden.type2), shade, np.nan), cmap="Greys_r",
@@ -161,10 +178,10 @@ def locus_map(found: Singularity, drawn: Locus) -> bytes:
     for name, field in (("real robot", drawn.real), ("hidden robot", drawn.hidden)):
         if field is not None:
             entries.insert(0, _drawn_locus(place, plane, field, name))
-    plane.finish(place, xlim=plane.x[[0, -1]], ylim=plane.y[[0, -1]])
+    plane.finish(place, plane.x, plane.y)
     entries += [entry("Type 1 boundary", linestyle="", marker="o", markersize=4, color="darkorange"),
                 entry("other limit of reach", linestyle="", marker="o", markersize=4, color="black"), missing_entry()]
-    plots.legend(figure, entries, 3, fontsize=9)
+    plots.legend(figure, entries)
     heading(figure, f"{found.setting.robot.name}: Type 2 singularities, legs {', '.join(found.setting.labels)} "
             "observed", drawn.grid.fixed)
     return png(figure)
@@ -174,9 +191,8 @@ def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) 
     """Draw where a freedom is lost, as a curve or as points; its entry in the legend."""
     colour, style, mark = LOCI[name]
     met = field.signed and plane.sign_change(place, field.value, colour, 2.0, style)
-    for x, y in field.spots:
-        place.plot(*(tick_values(part, np.array([v])) for part, v in zip(plane.names, (x, y), strict=True)), mark,
-                   color=colour, markeredgecolor="white", markersize=9)
+    if len(field.spots):
+        place.plot(*plane.spots(field.spots), mark, color=colour, markeredgecolor="white", markersize=9)
     shape = {"linestyle": style} if field.signed else {"linestyle": "", "marker": mark}
     return entry(f"{name}: Type 2{'' if met or len(field.spots) else ' (none here)'}", color=colour, linewidth=2.0,
                  **shape)
@@ -196,9 +212,10 @@ def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> None:
             near |= np.min(around, axis=0) < NEAR_TYPE_1 * np.nanmedian(field.type1)
     for cells, colour in ((border & near, "darkorange"), (border & ~near, "black")):
         i, j = np.nonzero(cells)
-        place.scatter(plane.x[i], plane.y[j], s=9, color=colour, marker="o", linewidth=0)
+        place.scatter(*plane.at(plane.x[i], plane.y[j]), s=9, color=colour, marker="o", linewidth=0)
 
 
+@styled
 def error_map(found: Accuracy) -> bytes:
     """Position and orientation errors (the latter where there are any): maps with the singular locus and the border of
     what is reached drawn over for a plane, a row of maps for a box, curves for a line (PNG)."""
@@ -209,22 +226,23 @@ def error_map(found: Accuracy) -> bytes:
     shown = [(values, label) for values, label in shown if np.nanmax(values, initial=0.0) > 0]
     if not shown:
         raise BadRequest("there is nothing to draw", str(field.grid.fixed), "a robot whose platform has errors")
-    figure, locus = _error_curves(field, shown) if field.grid.ndim == 1 else _error_maps(field, shown)
-    plots.legend(figure, _error_entries(field, locus), 3 if figure.get_figwidth() > 8 else 1, fontsize=9)
+    figure, locus = (_error_curves(field, shown) if field.grid.ndim == 1
+                     else _error_maps(field, shown, found.setting.motion))
+    plots.legend(figure, _error_entries(field, locus))
     legs = ", ".join(f"{o.leg} within {np.degrees(cone):.3g}°"
                      for o, cone in zip(found.setting.observed, found.cones, strict=True))
     heading(figure, f"{found.setting.robot.name}: largest errors\nobserved legs: {legs}", field.grid.fixed, "; ")
     return png(figure)
 
 
-def _error_maps(field: ErrorField, shown: list[tuple[Array, str]]) -> tuple[Any, bool]:
+def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: PlatformMotion) -> tuple[Any, bool]:
     """The figure, and whether a place where a freedom is lost is in it."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
 
     pname, ps = (*field.grid.axes, ("", np.zeros(1)))[2]
     flat = field.grid.ndim == 2
-    plane = MapPlane.of(field.grid.axes, 0.4, 1.6)
+    plane = MapPlane.of(field.grid.axes, motion, 0.4, 1.6)
     rows, columns = (1, len(shown)) if flat else (len(shown), len(ps))
     size = 5.0 if flat else 3.0
     figure, axes = panels(rows, columns, size * columns + (1.4 * len(shown) if flat else 1.4),
@@ -239,18 +257,16 @@ def _error_maps(field: ErrorField, shown: list[tuple[Array, str]]) -> tuple[Any,
             plane.cells(place, np.where(np.isinf(layer), high, layer), norm=norm, cmap=ERRORS)
             missing = np.isnan(layer)
             if missing.any() and not missing.all():
-                place.contour(plane.x, plane.y, missing.T.astype(float), levels=[0.5], colors=["black"],
-                              linewidths=1.6)
+                plane.contour(place, missing.astype(float), 0.5, "black", 1.6)
             if not flat and field.determinant is not None:
                 locus |= _lost(place, plane, field.determinant[..., k])
-            plane.finish(place, xlim=cell_edges(plane.x)[[0, -1]], ylim=cell_edges(plane.y)[[0, -1]])
+            plane.finish(place, cell_edges(plane.x), cell_edges(plane.y))
             if pname:
                 plots.layer_title(place, pname, tick_values(pname, ps)[k])
         bar = figure.colorbar(ScalarMappable(norm, ERRORS), ax=list(places), label=f"{label}, logarithmic",
                               extend="max" if np.nanmax(values) > high else "neither", shrink=0.9)
-        ticks = np.geomspace(low, high, 6) if high > 1.3 * low else np.array([np.nanmin(values)])
-        bar.set_ticks(list(ticks), labels=[np.format_float_positional(value, 2, fractional=False, trim="-")
-                                         for value in ticks])
+        ticks = round_ticks(low, high) if high > 1.3 * low else np.array([np.nanmin(values)])
+        bar.set_ticks(list(ticks), labels=tick_words(ticks))
         bar.minorticks_off()
     return figure, (flat and _locus(field, axes[: len(shown)], plane)) or locus
 
@@ -270,8 +286,8 @@ def _locus(field: ErrorField, places: Any, plane: MapPlane) -> bool:
         return all([_lost(place, plane, field.determinant) for place in places])
     spots = singular_poses(field)
     for place in places if len(spots) else ():
-        columns = [tick_values(name, spots[:, k]) for k, name in enumerate(field.grid.names)]
-        place.plot(*columns, "o", color="white", markeredgecolor="black", markersize=3.2, markeredgewidth=0.7)
+        place.plot(*plane.spots(spots), "o", color="white", markeredgecolor="black", markersize=3.2,
+                   markeredgewidth=0.7)
     return len(spots) > 0
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..analysis.modes.modes import AssemblyModes
 from ..errors import BadRequest
 from ..geometry.vectors import Array
-from .plots import empty_figure, entry
+from .plots import empty_figure, entry, styled
 from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, ModesScene, Placed, scene
 from .sketch import Box, Sketch
 
@@ -70,6 +70,7 @@ def description(found: AssemblyModes, drawn: ModesScene) -> dict[str, Any]:
             "at": str(found.pose), "complex": found.found.complex, **drawn.to_dict()}
 
 
+@styled
 def figure(found: AssemblyModes, drawn: ModesScene) -> Any:
     """The picture as a matplotlib figure."""
     placed = drawn.placed[:MOST]
@@ -186,4 +187,4 @@ def _legend(whole: Any, drawn: ModesScene) -> None:
                                markeredgecolor="black")
     long = sum(len(words) + SIGN for words in entries) > WIDEST
     columns = -(-len(entries) // 2) if long else len(entries)
-    whole.legend(list(entries.values()), list(entries), loc="lower center", ncols=columns, frameon=False, fontsize=9)
+    whole.legend(list(entries.values()), list(entries), loc="lower center", ncols=columns)

@@ -3,17 +3,45 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import wraps
+from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
 from ..geometry.vectors import Array
+from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.pose import Pose
+from .sketch import Sketch, axis_label
+from .view.view import plane_normal
+
+STYLE = "hrsynth.present.style"
+"""The one style of all plots, ``style.mplstyle`` of this folder."""
+COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
+"""Its colours, which colour-blind readers tell apart."""
+BESIDE = 2.3
+"""Room for a legend beside the axes (inches)."""
+FEWEST_TICKS = 3
+PLACES = 6
+"""Decimals of metres and degrees in words."""
+Asked = ParamSpec("Asked")
+Given = TypeVar("Given")
 
 MISSING: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "0.6", "hatch": "///"}
 """How what is not reached is drawn."""
+
+
+def styled(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
+    """A function that draws, in the style of all plots."""
+    @wraps(draw)
+    def drawn(*given: Asked.args, **named: Asked.kwargs) -> Given:
+        import matplotlib.style
+
+        with matplotlib.style.context(STYLE):
+            return draw(*given, **named)
+
+    return drawn
 
 
 def png(figure: Any) -> bytes:
@@ -40,11 +68,6 @@ def panels(rows: int, columns: int, width: float, height: float) -> tuple[Any, A
     return figure, figure.subplots(rows, columns, squeeze=False).ravel()
 
 
-def axis_label(name: str) -> str:
-    """What stands at the axis of a part of a pose."""
-    return "φ (degrees)" if name == "phi" else f"{name} (m)"
-
-
 def tick_values(name: str, values: Array) -> Array:
     """The values of a part of a pose as they are drawn: angles in degrees."""
     return np.degrees(values) if name == "phi" else values
@@ -56,42 +79,106 @@ def cell_edges(values: Array) -> Array:
     return np.append(values - half, values[-1] + half)
 
 
+def round_ticks(low: float, high: float) -> Array:
+    """Round numbers (1, 2, 5 times a power of ten) between the ends of a logarithmic scale; where these are too few,
+    those of an even one."""
+    from matplotlib.ticker import MaxNLocator
+
+    powers = 10.0 ** np.arange(np.floor(np.log10(low)), np.ceil(np.log10(high)) + 1)
+    slack = 1e-9 * high
+    for steps in ((1.0,), (1.0, 2.0, 5.0)):
+        found = np.sort(np.outer(powers, steps).ravel())
+        found = found[(found >= low - slack) & (found <= high + slack)]
+        if len(found) >= FEWEST_TICKS:
+            return np.asarray(found[:: -(-len(found) // 8)])
+    even = np.array(MaxNLocator(5, steps=[1, 2, 5, 10]).tick_values(low, high))
+    return np.asarray(even[(even >= low - slack) & (even <= high + slack)])
+
+
+def tick_words(ticks: Array) -> list[str]:
+    """Round numbers as they are written."""
+    return [np.format_float_positional(value, 3, fractional=False, trim="-") if 1e-4 <= abs(value) < 1e5 or value == 0
+            else f"{value:.3g}" for value in ticks]
+
+
 @dataclass(frozen=True, eq=False)
 class MapPlane:
-    """Two parts of a pose as the axes of a map: their names, and their values as they are drawn."""
+    """Two parts of a pose as the axes of a map: their names, and their values as they are drawn. In a plane of motion
+    that is tilted in the base, a pose is drawn at ``shear`` (2, 2) times its two values and ``offset`` (2,), along axes
+    of the plane itself."""
 
     names: tuple[str, str]
     x: Array
     y: Array
     tall: float
     """Height over width, 0.8 unless both parts are lengths."""
+    labels: tuple[str, str]
+    shear: Array
+    offset: Array
 
     @classmethod
-    def of(cls, axes: Sequence[tuple[str, Array]], least: float, most: float) -> MapPlane:
+    def of(cls, axes: Sequence[tuple[str, Array]], motion: PlatformMotion, least: float, most: float) -> MapPlane:
         """The first two axes of a grid; height over width between ``least`` and ``most``."""
         (xname, xs), (yname, ys) = axes[:2]
-        tall = min(max(float(np.ptp(ys) / np.ptp(xs)), least), most) if {xname, yname} <= set("xyz") else 0.8
-        return cls((xname, yname), tick_values(xname, xs), tick_values(yname, ys), tall)
+        made = cls((xname, yname), tick_values(xname, xs), tick_values(yname, ys), 0.8,
+                   *_own_axes((xname, yname), motion))
+        if not {xname, yname} <= set("xyz"):
+            return made
+        u, v = made.at(*np.meshgrid(made.x, made.y, indexing="ij"))
+        return replace(made, tall=min(max(float(np.ptp(v) / np.ptp(u)), least), most))
+
+    def spots(self, values: Array) -> tuple[Array, Array]:
+        """Where poses are drawn whose two parts have ``values`` (n, 2) (m, rad)."""
+        return self.at(*(tick_values(name, column) for name, column in zip(self.names, values.T, strict=True)))
+
+    def at(self, x: Array, y: Array) -> tuple[Array, Array]:
+        """Where values of the two parts (of one shape, angles in degrees) are drawn."""
+        u, v = (row[0] * x + row[1] * y + start for row, start in zip(self.shear, self.offset, strict=True))
+        return u, v
 
     def cells(self, place: Any, values: Array, **style: Any) -> None:
         """Colours, one a cell; hatched grey where a value is not finite."""
         place.set_facecolor(MISSING["facecolor"])
         place.patch.set(hatch=MISSING["hatch"], edgecolor=MISSING["edgecolor"])
-        place.pcolormesh(cell_edges(self.x), cell_edges(self.y), np.ma.masked_invalid(values.T), **style)
+        place.grid(False)
+        corners = np.meshgrid(cell_edges(self.x), cell_edges(self.y), indexing="ij")
+        place.pcolormesh(*self.at(*corners), np.ma.masked_invalid(values), **style)
+
+    def contour(self, place: Any, values: Array, level: float, colour: str, width: float, style: str = "solid") -> None:
+        """Draw where values are at a level."""
+        place.contour(*self.at(*np.meshgrid(self.x, self.y, indexing="ij")), np.ma.masked_invalid(values),
+                      levels=[level], colors=[colour], linestyles=[style], linewidths=[width])
 
     def sign_change(self, place: Any, values: Array, colour: str, width: float, style: str = "solid") -> bool:
         """Draw where values change their sign; whether they do."""
         if not np.nanmin(values) < 0 < np.nanmax(values):
             return False
-        place.contour(self.x, self.y, np.ma.masked_invalid(values).T, levels=[0.0], colors=[colour], linestyles=[style],
-                      linewidths=[width])
+        self.contour(place, values, 0.0, colour, width, style)
         return True
 
-    def finish(self, place: Any, **limits: Any) -> None:
-        """Name the axes; equal scales of two lengths."""
-        place.set(xlabel=axis_label(self.names[0]), ylabel=axis_label(self.names[1]), **limits)
-        if set(self.names) <= set("xyz"):
+    def finish(self, place: Any, x: Array | None = None, y: Array | None = None) -> None:
+        """Name the axes, show the values from the first to the last of ``x`` and ``y``; equal scales of two lengths."""
+        place.set(xlabel=axis_label(self.labels[0]), ylabel=axis_label(self.labels[1]))
+        if x is not None and y is not None:
+            u, v = self.at(*np.meshgrid(x[[0, -1]], y[[0, -1]], indexing="ij"))
+            place.set(xlim=(u.min(), u.max()), ylim=(v.min(), v.max()))
+        if "phi" not in self.names:
             place.set_aspect("equal")
+
+
+def _own_axes(names: tuple[str, str], motion: PlatformMotion) -> tuple[tuple[str, str], Array, Array]:
+    """The names of the axes along which a pose is drawn, and how it lies along them: the parts themselves, but for a
+    plane of motion that is no coordinate plane."""
+    normal = plane_normal(motion) if set(names) <= set("xyz") else None
+    sketch = None if normal is None else Sketch.of(normal, np.zeros((1, 3)), ())
+    if sketch is None or set(sketch.names) <= set("xyz"):
+        return names, np.eye(2), np.zeros(2)
+    chosen = np.eye(3)["xyz".index(names[0])], np.eye(3)["xyz".index(names[1])]
+    home = motion.position(motion.home)
+    moved = motion.translations @ np.linalg.inv(np.array(chosen) @ motion.translations)
+    shear = sketch.axes @ moved
+    first, second = sketch.names
+    return (first, second), shear, sketch.axes @ (home - moved @ np.array(chosen) @ home)
 
 
 def layer_title(place: Any, name: str, value: float) -> None:
@@ -105,13 +192,25 @@ def along(place: Any, name: str, x: Array, missing: Array, label: str, which: st
     for k in np.flatnonzero(missing):
         place.axvspan(edges[k], edges[k + 1], linewidth=0, **MISSING)
     place.set(xlabel=axis_label(name), ylabel=label, xlim=(edges[0], edges[-1]))
-    place.grid(alpha=0.3, which=which)
+    place.grid(which=which)
 
 
 def heading(figure: Any, text: str, fixed: Pose, before: str = "\n") -> None:
-    """The title, and after it what the plot holds fixed."""
-    words = str(fixed).replace(",", ", ").replace("=", " = ")
-    figure.suptitle(text + (f"{before}{words} (m, rad)" if words else ""), fontsize=11)
+    """The title, and after it what the plot holds fixed, angles in degrees."""
+    words = pose_words(fixed)
+    figure.suptitle(text + (f"{before}{words}" if words else ""))
+
+
+def pose_words(pose: Pose) -> str:
+    """A pose with its units, angles in degrees."""
+    return ", ".join(_held(name, values) for name, values in pose.given.items())
+
+
+def _held(name: str, values: Sequence[float]) -> str:
+    if name in "xyz":
+        return f"{name} = {round(values[0], PLACES) + 0.0:.4g} m"
+    turned = "/".join(f"{value:.4g}" for value in np.round(np.degrees(values), PLACES) + 0.0)
+    return f"{'φ' if name == 'phi' else name} = {turned}°"
 
 
 def entry(label: str, **style: Any) -> Any:
@@ -128,7 +227,8 @@ def missing_entry() -> Any:
     return Patch(label="not reached", **MISSING)
 
 
-def legend(figure: Any, entries: Sequence[Any], columns: int, **style: Any) -> None:
-    """The legend below, where there is something to explain."""
+def legend(figure: Any, entries: Sequence[Any]) -> None:
+    """The legend beside the axes, where there is something to explain."""
     if entries:
-        figure.legend(handles=entries, loc="outside lower center", ncols=columns, frameon=False, **style)
+        figure.set_figwidth(figure.get_figwidth() + BESIDE)
+        figure.legend(handles=entries, loc="outside right upper", labelspacing=0.8)

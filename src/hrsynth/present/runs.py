@@ -1,79 +1,134 @@
-"""A servo run → a picture: errors, position and turn against time, and the way (MMT Figs. 22-29)."""
+"""A servo run → a picture: the robot at start, end and goal, and against time the errors, the platform's place, and how
+far a singularity is (MMT Figs. 22-29)."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 
 from ..geometry.vectors import Array
+from ..kinematics.configuration import ClosedConfiguration
 from ..simulation.result import Servo
+from ..simulation.track import TYPE_2
 from ..tolerances import REST_OF_RUN, UNMOVED
-from .plots import panels, png
+from .plots import COLOURS, empty_figure, entry, png, pose_words, styled
+from .skeleton import legs_of, outline
+from .sketch import Sketch
+from .view.view import plane_normal
 
-COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
-"""Colours that colour-blind readers tell apart."""
 STYLES = ("solid", "dashed", "dashdot", "dotted", "solid", "dashed")
+SIZE = (12.0, 7.4)
+ROBOT = (0.055, 0.13, 0.43, 0.72)
+CURVES = {"left": 0.575, "right": 0.895, "top": 0.87, "bottom": 0.08, "hspace": 0.18}
+"""Where the robot and the curves are (parts of the picture)."""
+START, END, GOAL = ("0.72", "solid"), (COLOURS[1], "solid"), (COLOURS[2], (0, (4, 2)))
+"""Colour and stroke of the robot at these."""
+LEAST_TURN = 0.01
+"""Turns below this (degrees) are not drawn."""
+ENDS = {"goal": "the goal", "mode": "another assembly mode", "antipodal": "an antipodal pose",
+        "local minimum": "a local minimum", "boundary": "a boundary of the workspace", "time": "the end of its time",
+        "undecided": "a place that is not decided"}
+"""Endings in words."""
 
 
+@styled
 def picture(found: Servo) -> bytes:
     """The run as PNG."""
-    figure, (errors, places, turns, way) = panels(2, 2, 10.0, 7.6)
+    figure = empty_figure(*SIZE)
+    _robots(figure, found)
+    panels = list(_panels(found))
+    places = figure.add_gridspec(len(panels), 1, **CURVES).subplots(sharex=True)
     times = found.run.times
-    for i, observation in enumerate(found.setting.observed):
-        errors.plot(times, found.errors[:, i], color=COLOURS[i % 6], linestyle=STYLES[i % 6],
-                    label=f"leg {observation.leg}")
-    errors.set(ylabel=r"error of the direction $\|e_i\|$", ylim=(0, None))
-    errors.legend(frameon=False)
-    path, goal = found.way, found.goal_position
-    moved = [i for i in range(3) if np.ptp(path[:, i]) > UNMOVED or abs(path[-1, i] - goal[i]) > UNMOVED] or [0]
-    for i in moved:
-        places.plot(times, path[:, i] - goal[i], color=COLOURS[i], linestyle=STYLES[i], label="xyz"[i])
-    places.set(ylabel="position minus that of the goal (m)")
-    places.legend(frameon=False)
-    if found.turns.max() > UNMOVED:
-        turns.plot(times, np.degrees(found.turns), color=COLOURS[0])
-        turns.set(ylabel="turn away from the goal (degrees)", ylim=(0, max(1.0, 1.1 * np.degrees(found.turns.max()))))
-    else:
-        turns.plot(times, found.track.smallest, color=COLOURS[0])
-        turns.set(ylabel="smallest singular value of $M^T$", ylim=(0, None))
-    for place in (errors, places, turns):
+    for place, (label, curves, bottom) in zip(np.atleast_1d(places), panels, strict=True):
+        for name, values, colour, style in curves:
+            place.plot(times, values, color=colour, linestyle=style, label=name)
         place.axhline(0, color="0.6", linewidth=0.8)
-        place.set(xlabel="time (s)", xlim=(0, _until(found) or 1.0))
-    _draw_way(way, found, path, goal)
+        for passage in found.track.passages or ():
+            place.axvline(times[passage.place], color="crimson", linewidth=0.8, linestyle="dotted")
+        place.set_ylabel(label, fontsize=9)
+        place.set(xlim=(0, until(found) or 1.0), **({} if bottom is None else {"ylim": (bottom, None)}))
+        if len(curves) > 1 or curves[0][0]:
+            place.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+    np.atleast_1d(places)[-1].set_xlabel("time (s)")
+    figure.align_ylabels()
     legs = ", ".join(found.setting.labels)
-    figure.suptitle(f"{found.setting.robot.name}, legs {legs} observed: ended at {_ENDS[found.ended]}\n"
-                    f"from {found.start} to {found.goal}", fontsize=10)
+    figure.suptitle(f"{found.setting.robot.name}, legs {legs} observed: ended at {ENDS[found.ended]}\n"
+                    f"from {pose_words(found.start)} to {pose_words(found.goal)}")
     return png(figure)
 
 
-_ENDS = {"goal": "the goal", "mode": "another assembly mode", "antipodal": "an antipodal pose",
-         "local minimum": "a local minimum", "boundary": "a boundary of the workspace", "time": "the end of its time",
-         "undecided": "a place that is not decided"}
+Curve = tuple[str, Array, str, str]
+"""A curve's name, its values, colour and stroke."""
 
 
-def _until(found: Servo) -> float:
+def _panels(found: Servo) -> Iterator[tuple[str, list[Curve], float | None]]:
+    """What is drawn against time: its name, its curves, the lower end of its scale."""
+    yield r"error $\|e_i\|$", [(f"leg {observation.leg}", found.errors[:, i], COLOURS[i % 6], STYLES[i % 6])
+                               for i, observation in enumerate(found.setting.observed)], 0.0
+    path, goal = found.way, found.goal_position
+    moved = [i for i in range(3) if np.ptp(path[:, i]) > UNMOVED or abs(path[-1, i] - goal[i]) > UNMOVED] or [0]
+    yield "position − goal (m)", [("xyz"[i], path[:, i] - goal[i], COLOURS[i], STYLES[i]) for i in moved], None
+    if np.degrees(found.turns.max()) > LEAST_TURN:
+        yield "turn from goal\n(degrees)", [("", np.degrees(found.turns), COLOURS[0], "solid")], 0.0
+    if np.isfinite(found.track.smallest).any():
+        yield "distance to the\nsingularity ($M^T$)", [("", found.track.smallest, COLOURS[3], "solid")], 0.0
+
+
+def until(found: Servo) -> float:
     """The time (s) after which nothing is left to be seen."""
     sizes = found.errors.max(axis=1)
     late = np.nonzero(sizes > REST_OF_RUN * sizes.max())[0]
     return float(found.run.times[min(late[-1] + 1, len(sizes) - 1)]) if len(late) else float(found.run.times[-1])
 
 
-def _draw_way(way: Any, found: Servo, path: Array, goal: Array) -> None:
-    """The way in the plane of the two coordinates that change most, with start, goal, end, and the other modes."""
+def _robots(figure: Any, found: Servo) -> None:
+    """The robot at start, end and goal, the way of its platform, and where the other modes are."""
+    states = [(found.run.configurations[0], START), (found.settled, END), (found.target, GOAL)]
+    drawn = [(list(strokes(found, at)), style) for at, style in states]
+    ground = ground_of(found)
     modes = [] if found.ending.modes is None else [mode for mode in found.ending.modes.modes if not mode.goal]
-    ends = np.array([[getattr(mode.pose, name) for name in "xyz"] for mode in modes]).reshape(-1, 3)
-    spread = np.ptp(np.vstack([path, goal, ends]), axis=0)
-    i, j = sorted(np.argsort(spread)[-2:])
-    way.plot(path[:, i], path[:, j], color=COLOURS[0])
-    way.plot(*path[0, [i, j]], "s", color="black", label="start")
-    way.plot(*goal[[i, j]], "*", markersize=15, color=COLOURS[2], label="goal")
-    if len(ends):
-        way.plot(ends[:, i], ends[:, j], "D", markerfacecolor="none", color=COLOURS[3], label="other modes")
-    way.plot(*path[-1, [i, j]], "o", markersize=7, markerfacecolor="none", markeredgewidth=2, color=COLOURS[1],
-             label="end")
-    for passage in found.track.passages or ():
-        way.plot(*path[passage.place, [i, j]], "x", markersize=10, color="crimson", label="crossing")
-    way.set(xlabel=f"{'xyz'[i]} (m)", ylabel=f"{'xyz'[j]} (m)")
-    way.set_aspect("equal", adjustable="datalim")
-    way.legend(frameon=False)
+    others = np.array([[getattr(mode.pose, name) for name in "xyz"] for mode in modes]).reshape(-1, 3)
+    path = found.way
+    every = np.vstack([ground, path, *(stroke for each, _ in drawn for stroke, _ in each)])
+    sketch = sketch_of(found, every)
+    place = sketch.place(figure, ROBOT, every)
+    for number, (each, (colour, style)) in enumerate(drawn):
+        for stroke, platform in each:
+            sketch.stroke(place, stroke, color=colour, linestyle=style, linewidth=2.4 if platform else 1.2,
+                          zorder=2 + number)
+    sketch.stroke(place, ground, color="black", marker="s", markersize=4, linestyle="", zorder=6)
+    sketch.stroke(place, path, color=COLOURS[0], linewidth=1.6, zorder=7)
+    entries = [entry("robot at the start", color=START[0]), entry("robot where it ended", color=END[0]),
+               entry("robot at the goal", color=GOAL[0], linestyle="dashed"),
+               entry("way of the platform", color=COLOURS[0])]
+    inside = others[np.all((others >= every.min(axis=0) - 1e-9) & (others <= every.max(axis=0) + 1e-9), axis=1)]
+    marks = [(inside, "D", COLOURS[3], "other modes"), (path[-1:], "o", COLOURS[1], "")]
+    marks += [(path[each.place][None], "x", "crimson", "crossing a singularity" if each.kind == TYPE_2 else
+               "crossing a limit") for each in found.track.passages or ()]
+    for points, mark, colour, words in marks:
+        if len(points):
+            look: dict[str, Any] = {"marker": mark, "color": colour, "markerfacecolor": "none", "linestyle": ""}
+            sketch.stroke(place, points, markersize=7, markeredgewidth=1.8, zorder=8, **look)
+            if words and words not in [each.get_label() for each in entries]:
+                entries.append(entry(words, **look))
+    figure.legend(handles=entries, loc="lower left", bbox_to_anchor=(0.03, 0.0), ncols=3)
+
+
+def strokes(found: Servo, at: ClosedConfiguration) -> Iterator[tuple[Array, bool]]:
+    """The robot at a configuration as polylines (n, 3), and whether each is of the platform."""
+    platform = found.setting.anatomy.platform
+    yield from ((stroke, False) for stroke in legs_of(at, platform))
+    yield from ((outline(at.twin.mechanism, link, at.pose(link)), True) for link in platform)
+
+
+def ground_of(found: Servo) -> Array:
+    """The centres of the base's joints, (n, 3)."""
+    mechanism = found.target.twin.mechanism
+    return np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
+
+
+def sketch_of(found: Servo, every: Array) -> Sketch:
+    """How the run is seen."""
+    return Sketch.of(plane_normal(found.setting.motion), ground_of(found), [])

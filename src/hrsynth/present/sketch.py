@@ -12,7 +12,12 @@ import numpy as np
 from ..analysis.freedoms import point_text
 from ..geometry.vectors import Array, perpendicular
 from ..tolerances import SAME_DIRECTION
-from .plots import axis_label
+
+
+def axis_label(name: str) -> str:
+    """What stands at the axis of a part of a pose."""
+    return "φ (degrees)" if name == "phi" else f"{name} (m)"
+
 
 MARGIN = 0.06
 """Space about what is drawn, over its extent."""
