@@ -2,16 +2,67 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import replace
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass, replace
 from functools import wraps
 from inspect import Parameter, signature
 from typing import Any, ClassVar
 
 
-class Result:
+class Value:
+    """A frozen dataclass that is pickled and copied by its fields: what was computed from them is computed again where
+    it is asked for, and arrays stay read-only."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        for name, value in state.items():
+            for array in value if isinstance(value, tuple) else (value,):
+                if hasattr(array, "setflags"):
+                    array.setflags(write=False)
+            object.__setattr__(self, name, value)
+
+
+def content(value: Any) -> Any:
+    """What a value holds, to be compared and hashed: arrays as tuples, of dataclasses the fields that are compared."""
+    if isinstance(value, Mapping):
+        return tuple((key, content(each)) for key, each in value.items())
+    if isinstance(value, tuple | list):
+        return tuple(map(content, value))
+    if is_dataclass(value):
+        return type(value), *(content(getattr(value, field.name)) for field in fields(value) if field.compare)
+    return content(value.tolist()) if hasattr(value, "tolist") else value
+
+
+class Compared(Value):
+    """A value (a dataclass with ``eq=False``) that is equal to those that say the same, and where it is a verdict to
+    its word: ``found.verdict == "controllable"``."""
+
+    @property
+    def word(self) -> str | None:
+        """A verdict's one word, None for what is no verdict."""
+        return getattr(self, "verdict", None) if isinstance(getattr(self, "verdict", None), str) else None
+
+    def said(self) -> Any:
+        """What is compared."""
+        return content(self)
+
+    def __eq__(self, other: object) -> bool:
+        if isinstance(other, str):
+            return self.word == other
+        if type(self) is not type(other):
+            return NotImplemented
+        return self is other or self.said() == other.said()
+
+    def __hash__(self) -> int:
+        return hash(type(self).__name__ if self.word is None else self.word)
+
+
+class Result(Compared):
     """An answer: its ``repr`` is one line, its ``str`` the text of the command line, in a notebook the same as HTML.
 
+    Two are equal where they say the same of the same robot.
     ``shown_as`` names its outputs in the table of ``present/outputs.py``. What shows them stands above all questions:
     the package sets ``public``, which gives its public functions ``text`` and ``html`` and loads them when something is
     shown.
@@ -28,6 +79,17 @@ class Result:
     def headline(self) -> str:
         """What is said in one line."""
         raise NotImplementedError
+
+    def said(self) -> tuple[Any, ...]:
+        """What is compared: the robot with what is watched of it, and the record."""
+        return getattr(self, "setting", None), self.to_dict()
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        raise NotImplementedError
+
+    def __hash__(self) -> int:
+        return hash(self.headline() if self.word is None else self.word)
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.headline()}>"

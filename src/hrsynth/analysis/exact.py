@@ -34,6 +34,7 @@ from ..mechanism.carried import Tie, carried_by_joints, ties
 from ..mechanism.model import JointType
 from ..mechanism.observation import Direction, labels_of
 from ..mechanism.relations import Relations, recognise
+from ..results import Compared
 from ..tolerances import CLOSED
 from .instances import Instance, NotRecognised, draw, instance, ranks_at
 from .kept import degree, kept
@@ -71,8 +72,8 @@ class Basis:
                 "largest_defect_held": self.held, "smallest_defect_not_held": self.missed}
 
 
-@dataclass(frozen=True)
-class ExactVerdict:
+@dataclass(frozen=True, eq=False)
+class ExactVerdict(Compared):
     """What an architecture's generic geometry sees with some legs observed.
 
     ``verdict`` and ``rank`` are None where it is not ``exact``; ``reason`` says why. ``instances`` counts the random

@@ -24,6 +24,7 @@ from ..mechanism.observation import Direction, labels_of
 from ..mechanism.pose import Pose
 from ..mechanism.sensors import default_observation, encoders, observation_of
 from ..progress import tell
+from ..results import Value, content
 
 if TYPE_CHECKING:
     from ..batch.engine import Batch
@@ -42,7 +43,7 @@ class Mobility:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ObservedRobot:
+class ObservedRobot(Value):
     """A robot as read, its normal form and legs, the observations asked for, and samples in which all legs count."""
 
     robot: Mechanism
@@ -72,6 +73,19 @@ class ObservedRobot:
         except (BadMechanism, NotSampled) as error:
             error.file = robot.file
             raise
+
+    def __eq__(self, other: object) -> bool:
+        """The same robot, watched in the same way, at the same samples."""
+        if not isinstance(other, ObservedRobot):
+            return NotImplemented
+        return self is other or self._said() == other._said()
+
+    def __hash__(self) -> int:
+        return hash((self.robot, self.labels))
+
+    def _said(self) -> tuple[Any, ...]:
+        at = [each.q for each in (self.everything.start, *self.configurations)]
+        return self.robot, content(self.observed), content(at)
 
     def headline(self) -> str:
         """The robot and the observed legs."""

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ..geometry.components import Components
 from ..geometry.vectors import Array
+from ..results import Value
 from .tape import LANES, UFUNCS, Store, Symbol, Tape
 
 CHUNK = 4096
@@ -35,7 +36,7 @@ Formula = Callable[..., Mapping[str, Components]]
 
 
 @dataclass(frozen=True, eq=False)
-class Kernel:
+class Kernel(Value):
     """Straight-line code and what it stores."""
 
     tape: Tape

@@ -50,7 +50,16 @@ def products() -> Products:
             ordered = cls(*(vectors[i] for i in order))
             return ordered if order in ([1, 2, 0], [2, 0, 1]) else -ordered
 
+    for each in (dot, cross, det):
+        each.__qualname__ = each.__name__
     return Products(dot, cross, det)
+
+
+def __getattr__(name: str) -> Any:
+    """Where a pickled expression finds the products."""
+    if name not in Products._fields:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(products(), name)
 
 
 def vector(name: str) -> Any:

@@ -15,12 +15,13 @@ from ..errors import LoopsNotClosed
 from ..geometry.ranks import Rank, Spectrum, spectrum
 from ..geometry.vectors import Array, frozen
 from ..mechanism.observation import Observation
+from ..results import Value
 from ..tolerances import CLOSED
 from .pinocchio_model import PinocchioModel
 
 
 @dataclass(frozen=True, eq=False)
-class ClosedConfiguration:
+class ClosedConfiguration(Value):
     """A configuration of a twin whose loops are closed to ``tolerances.CLOSED``; ``q`` is read-only."""
 
     twin: PinocchioModel

@@ -56,6 +56,10 @@ class PinocchioModel:
         self._several: dict[tuple[str, ...], tuple[list[int], Array, Array]] = {}
         self._q: Array | None = None
 
+    def __reduce__(self) -> tuple[type[PinocchioModel], tuple[Mechanism, float]]:
+        """Pickled and copied by its recipe: Pinocchio's own objects are built again."""
+        return type(self), (self.mechanism, self.length)
+
     def _seen_from_body(self, link: str) -> Array:
         X = self.mechanism.links[link].pose.copy()
         X[:3, 3] -= self._centre[self._body[link]] * self.length

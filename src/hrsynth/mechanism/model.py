@@ -10,13 +10,13 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..errors import BadMechanism
 from ..geometry.vectors import Array, frozen, unit
-from ..results import Result
+from ..results import Result, Value, content
 from ..tolerances import SAME_GEOMETRY
 from .graphs import Adjacency, adjacency
 from .observation import Observation
@@ -73,20 +73,20 @@ class Motor:
 
 
 @dataclass(frozen=True, eq=False)
-class Link:
+class Link(Value):
     """A rigid body: its frame's pose X_BL at the zero configuration (4, 4); ``xml`` keeps unknown child elements."""
 
     name: str
     pose: Array = field(default_factory=lambda: frozen(np.eye(4)))
     xml: tuple[str, ...] = ()
-    line: int | None = None
+    line: int | None = field(default=None, compare=False)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen(self.pose))
 
 
 @dataclass(frozen=True, eq=False)
-class Joint:
+class Joint(Value):
     """A joint: ``point`` its centre (3,), ``axes`` unit vectors (R, P, C: one; planar: the normal; U: the first fixed
     in the predecessor, the second in the successor); its coordinate is the successor's motion seen from the
     predecessor.
@@ -103,7 +103,7 @@ class Joint:
     in_tree: bool = True
     """Whether a file writes it as a tree joint (else as a loop)."""
     xml: tuple[str, ...] = ()
-    line: int | None = None
+    line: int | None = field(default=None, compare=False)
     wrist: Wrist | None = None
     """What limits a spherical joint that stands for several R (normal form)."""
 
@@ -187,14 +187,29 @@ class Mechanism(Result, shown_as="robot"):
     camera: str | None = None
     """The reference link, the one that carries the camera; None means the base."""
     xml: tuple[str, ...] = ()
-    file: str | None = None
-    notes: tuple[Note, ...] = ()
+    file: str | None = field(default=None, compare=False)
+    notes: tuple[Note, ...] = field(default=(), compare=False)
     """What reading the file had to settle."""
 
     def headline(self) -> str:
         """The name, and how much there is of it."""
         motors = sum(joint.actuated for joint in self.joints.values())
         return f"{self.name}, {len(self.links)} links, {len(self.joints)} joints, {motors} motors"
+
+    def said(self) -> tuple[Any, ...]:
+        """All but where it was read from: two mechanisms with the same links, joints and observations are equal."""
+        return self._content
+
+    @cached_property
+    def _content(self) -> tuple[Any, ...]:
+        return tuple(content(self))
+
+    @cached_property
+    def _hash(self) -> int:
+        return hash(self._content)
+
+    def __hash__(self) -> int:
+        return self._hash
 
     def __post_init__(self) -> None:
         for key, joint in self.joints.items():

@@ -13,10 +13,11 @@ from ..errors import BadMechanism
 from ..geometry.screws import point_velocity
 from ..geometry.so3 import wrap_angle
 from ..geometry.vectors import Array, cross, frozen, hat, transform, unit
+from ..results import Value
 
 
 @dataclass(frozen=True, eq=False)
-class Observation:
+class Observation(Value):
     """A measurement of one link of a leg, seen from the reference link.
 
     A subclass gives the measured value and its rate; nothing else in the project knows what is measured. Poses are
@@ -32,7 +33,7 @@ class Observation:
 
     leg: str
     link: str
-    line: int | None = field(default=None, kw_only=True)
+    line: int | None = field(default=None, kw_only=True, compare=False)
     seen_from: str | None = field(default=None, kw_only=True)
     """The link from which it is measured; None means the mechanism's reference link."""
 

@@ -12,13 +12,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.vectors import Array, angle_between
+from ..results import Value
 from ..tolerances import SAME_DIRECTION
 
 Interval = tuple[float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Wrist:
+class Wrist(Value):
     """A spherical joint that stands for turns about axes through its centre: the ``first``, fixed in the predecessor,
     and the ``last``, fixed in the successor, unit vectors at the zero configuration, are ``low`` to ``high`` (rad)
     apart. At an end of the interval the axes lie in a plane, and the turns lose a freedom."""

@@ -27,7 +27,7 @@ from ..mechanism import Mechanism
 from ..mechanism.observation import Direction
 from ..mechanism.pose import Pose, asked_pose
 from ..progress import tell
-from ..results import Result, by_name
+from ..results import Compared, Result, by_name
 from ..simulation.camera import cylinders, placed
 from ..simulation.ending import GOAL
 from ..simulation.servo import servo
@@ -90,8 +90,8 @@ class ModeCount:
         return {"count": self.count, "reachable": self.reachable, "complete": self.complete, "reason": self.why or None}
 
 
-@dataclass(frozen=True)
-class Decision:
+@dataclass(frozen=True, eq=False)
+class Decision(Compared):
     """A verdict in a word, and its reason."""
 
     verdict: str

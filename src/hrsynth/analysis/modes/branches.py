@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, islice, product
 
 import numpy as np
@@ -12,7 +13,7 @@ import numpy as np
 from ...budgets import BRANCH_CHOICES
 from ...geometry.vectors import Array, inverse, perpendicular, pose, pose_difference, transform
 from ...tolerances import RANK_GAP, SAME_POINT
-from .curves import Plane, Reach
+from .curves import Circle, Plane, Reach
 from .rigid import Planar, Spatial
 from .solve import SystemMode, SystemModes, solve
 from .systems import System
@@ -42,7 +43,7 @@ def _translating(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, .
     """q is the position of the first body's origin; tips are counted from there."""
     p = at[confined.bodies[0]][:3, 3]
     tips = np.array([_point(at[tip.body], tip.place) - p for tip in confined.tips])
-    return Model(Translating(curves, tips), lambda q: {body: _moved(X, q - p) for body, X in at.items()}, p)
+    return Model(Translating(curves, tips), partial(_shifted, at, p), p)
 
 
 def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
@@ -64,23 +65,35 @@ def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -
     else:
         system = Planar(curves, tips[:, :2], X_goal)
     home = np.array([*p, 0.0, 0.0, 0.0]) if n is None else np.zeros(3)
-    return Model(system, lambda q: {body: system.pose(q) @ back @ X for body, X in at.items()}, home)
+    return Model(system, partial(_carried, system, {body: back @ X for body, X in at.items()}), home)
 
 
 def _articulated(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
     """q is the first body's origin and the second's place on its circle about it."""
     assert confined.slide is not None
     one, other = confined.bodies
-    p, slide = at[one][:3, 3], confined.slide
+    p = at[one][:3, 3]
     tips = np.array([_point(at[tip.body], tip.place) - at[tip.body][:3, 3] for tip in confined.tips])
-
-    def bodies(q: Array) -> dict[str, Array]:
-        first = q[:3] - p
-        second = q[:3] + slide.at(float(q[3])) - at[other][:3, 3]
-        return {one: _moved(at[one], first), other: _moved(at[other], second)}
-
     sides = tuple(confined.bodies.index(tip.body) for tip in confined.tips)
-    return Model(Articulated(curves, tips, sides, slide), bodies, np.array([*p, 0.0]))
+    return Model(Articulated(curves, tips, sides, confined.slide),
+                 partial(_on_circle, at[one], at[other], one, other, confined.slide), np.array([*p, 0.0]))
+
+
+def _shifted(at: dict[str, Array], p: Array, q: Array) -> dict[str, Array]:
+    """Bodies that move with one point from ``p`` to ``q``."""
+    return {body: _moved(X, q - p) for body, X in at.items()}
+
+
+def _carried(system: Spatial | Planar, at: dict[str, Array], q: Array) -> dict[str, Array]:
+    """Bodies in the frame that the system's coordinates place."""
+    return {body: system.pose(q) @ X for body, X in at.items()}
+
+
+def _on_circle(X_one: Array, X_other: Array, one: str, other: str, slide: Circle, q: Array) -> dict[str, Array]:
+    """Two bodies, the second at a place of its curve about the first."""
+    first = q[:3] - X_one[:3, 3]
+    second = q[:3] + slide.at(float(q[3])) - X_other[:3, 3]
+    return {one: _moved(X_one, first), other: _moved(X_other, second)}
 
 
 def _point(X: Array, place: Array) -> Array:
