@@ -97,7 +97,7 @@ print("printed minus computed:", round(1e3 * (-0.909 - second.pose.z), 1), "mm")
 # over the plane z = −0.7 m with φ = 0, as in MMT Figs. 19 and 20:
 
 # %%
-maps = {legs: hrsynth.accuracy(robot, list(legs), cones="0.1deg", grid="x=-0.5:0.5:81,y=-0.5:0.5:81,z=-0.7,phi=0")
+maps = {legs: hrsynth.accuracy(robot, list(legs), cone="0.1deg", grid="x=-0.5:0.5:81,y=-0.5:0.5:81,z=-0.7,phi=0")
         for legs in ("23", "24")}
 for legs, found in maps.items():
     errors = 1e3 * found.field.position[np.isfinite(found.field.position)]
@@ -220,7 +220,7 @@ for pair in (["1", "2"], ["1", "3"]):
 # %% jupyter={"source_hidden": true} tags=["solution"]
 # 2. the loop averages the noise: it strays less than a single wrong picture could move it
 noisy = hrsynth.servo(robot, ["2", "3"], start=START, goal=GOAL, noise="0.1deg")
-bound = hrsynth.accuracy(robot, ["2", "3"], cones="0.1deg", at=[GOAL]).poses[0].position.largest
+bound = hrsynth.accuracy(robot, ["2", "3"], cone="0.1deg", at=[GOAL]).poses[0].position.largest
 print(f"strays by {1e3 * noisy.spread.rms_metres:.2f} mm (root mean square)")
 print(f"largest first-order error {1e3 * bound:.2f} mm")
 

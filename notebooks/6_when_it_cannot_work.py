@@ -114,7 +114,7 @@ errors, smallest = [], []
 for angle in angles:
     tilted = prrrp(rails=(np.pi / 2 - angle / 2, np.pi / 2 + angle / 2))
     smallest.append(hrsynth.check(tilted).postures[0].distances.type2)
-    errors.append(1e3 * hrsynth.accuracy(tilted, cones="0.1deg").poses[0].position.largest)
+    errors.append(1e3 * hrsynth.accuracy(tilted, cone="0.1deg").poses[0].position.largest)
 figure, place = plt.subplots(figsize=(6, 4))
 place.loglog(np.degrees(angles), errors, "o-")
 place.set(xlabel="angle between the rails (degrees)", ylabel="largest error for 0.1° (mm)")

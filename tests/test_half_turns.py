@@ -171,7 +171,7 @@ def pathed(case: Case, pose: Pose) -> Answer:
 
 
 def exact(case: Case, pose: Pose) -> Answer:
-    (error,) = accuracies.accuracy(case.robot, case.observe, cones=1e-3, at=[pose]).poses
+    (error,) = accuracies.accuracy(case.robot, case.observe, cone=1e-3, at=[pose]).poses
     assert rotation(error.pose) == pytest.approx(rotation(pose), abs=NEAR)
     return reached(case, pose)
 
@@ -179,7 +179,7 @@ def exact(case: Case, pose: Pose) -> Answer:
 def mapped(case: Case, pose: Pose) -> Answer:
     """A grid of two poses: the error at the first is that of the single pose."""
     grid, at = beside(case, pose), reached(case, pose)
-    field = accuracies.accuracy(case.robot, case.observe, cones=1e-3, grid=grid).field
+    field = accuracies.accuracy(case.robot, case.observe, cone=1e-3, grid=grid).field
     assert field is not None
     if field.reached[0]:
         single = accuracies.errors_at(case.setting, np.full(len(case.setting.observed), 1e-3), at[0])

@@ -28,7 +28,7 @@ ASKED = {
     "check": lambda: hrsynth.check(hrsynth.load("quattro"), LEGS, at=[START], grid="x=-0.1:0.1:3,y=0,z=-0.7"),
     "singular": lambda: hrsynth.singular(hrsynth.load("quattro"), LEGS, points=50),
     "advise": lambda: hrsynth.advise(hrsynth.load("quattro"), ["1"]),
-    "accuracy": lambda: hrsynth.accuracy(hrsynth.load("quattro"), LEGS, cones="0.1deg", plane="z=-0.7", steps=5),
+    "accuracy": lambda: hrsynth.accuracy(hrsynth.load("quattro"), LEGS, cone="0.1deg", plane="z=-0.7", steps=5),
     "modes": lambda: hrsynth.modes(hrsynth.load("quattro"), LEGS, at=GOAL),
     "modes planar": lambda: hrsynth.modes(hrsynth.load("3rrr_m1")),
     "path": lambda: hrsynth.path(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05"),

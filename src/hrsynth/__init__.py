@@ -14,8 +14,9 @@ if TYPE_CHECKING:
     from .analysis.controllability import legs
     from .analysis.derive import derive
     from .analysis.modes.modes import modes
+    from .analysis.question import forget
     from .analysis.singularity.singular import singular
-    from .description import load, save, shipped
+    from .description import examples, load, save, shipped
     from .present.show import draw, html, text
     from .present.view.view import view
     from .progress import following
@@ -23,8 +24,9 @@ if TYPE_CHECKING:
     from .simulation.servo import servo
 
 __version__ = "0.2.0"
-__all__ = ["__version__", "accuracy", "advise", "catalog", "check", "derive", "draw", "following", "html", "legs",
-           "load", "modes", "observe", "path", "save", "select", "servo", "shipped", "singular", "text", "view"]
+__all__ = ["__version__", "accuracy", "advise", "catalog", "check", "derive", "draw", "examples", "following",
+           "forget", "html", "legs", "load", "modes", "observe", "path", "save", "select", "servo", "shipped",
+           "singular", "text", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
@@ -32,7 +34,9 @@ _HOME = {
     "check": ".analysis.check",
     "derive": ".analysis.derive",
     "draw": ".present.show",
+    "examples": ".description",
     "following": ".progress",
+    "forget": ".analysis.question",
     "html": ".present.show",
     "legs": ".analysis.controllability",
     "load": ".description",

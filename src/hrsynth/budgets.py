@@ -153,5 +153,11 @@ PARTS_AHEAD = 3
 LARGEST_WORD = 12
 """Legs of a word of the catalog."""
 
-REMEMBERED = 8
+# What is remembered
+
+REMEMBERED = 32
 """Observed robots that are kept for further questions about them."""
+REMEMBERED_ANSWERS = 64
+"""Answers that are kept where the same is asked again."""
+REMEMBERED_GRIDS = 2
+"""Answers over grids and planes of poses that are kept: they may be large."""

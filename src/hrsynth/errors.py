@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any, ClassVar
 
 
 class HrsynthError(Exception):
@@ -13,10 +14,19 @@ class HrsynthError(Exception):
     file: str | None = None
     """The robot file that the error is about, where its text does not say so itself."""
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled by what it says, whatever it was made of: workers tell their errors so."""
+        return _error, (type(self), self.args), self.__dict__
+
     def lines(self) -> list[str]:
         """One line a defect, without the program's name."""
         text = " ".join(str(self).split())
         return [text if self.file is None else f"{self.file}: {text}"]
+
+
+def _error(kind: type[HrsynthError], args: tuple[Any, ...]) -> HrsynthError:
+    """An error of a kind, its constructor not called."""
+    return kind.__new__(kind, *args)
 
 
 @dataclass(frozen=True)
@@ -50,6 +60,12 @@ class BadRobotFile(HrsynthError):
         return [str(defect) for defect in self.defects]
 
 
+def shortened(text: str, length: int = 200) -> str:
+    """A text on one line, its end left out where it is too long."""
+    line = " ".join(text.split())
+    return line if len(line) <= length else line[: length - 1] + "…"
+
+
 class BadRequest(HrsynthError):
     """An argument that does not fit the robot: what, the value found, what is allowed."""
 
@@ -58,7 +74,7 @@ class BadRequest(HrsynthError):
         self.allowed = allowed if allowed is None or isinstance(allowed, str) else ", ".join(allowed)
         text = what
         if value is not None:
-            text += f", found {value!r}"
+            text += f", found {shortened(repr(value))}"
         if self.allowed:
             text += f", allowed: {self.allowed}"
         super().__init__(text)
@@ -199,9 +215,14 @@ class NotCertified(Unanswered):
 class MissingExtra(Unanswered):
     """Something that needs an optional package which is not installed: what, and the extra that brings it."""
 
+    met: ClassVar[int] = 0
+    """How often that happened: an answer that goes on without a package is not remembered."""
+
     def __init__(self, what: str, extra: str) -> None:
         self.what, self.extra = what, extra
-        self.reason = f'{what} needs an optional package: pip install "hrsynth[{extra}]"'
+        self.reason = (f'{what} needs an optional package: pip install "hrsynth[{extra}]", '
+                       f'in a checkout pip install ".[{extra}]"')
+        MissingExtra.met += 1
         super().__init__(self.reason)
 
 

@@ -113,8 +113,9 @@ def by_name(value: type[Any], keyword: str) -> Callable[[Callable[..., Any]], Ca
             return question(*args, **given | {keyword: replace(given.get(keyword) or value(), **own)})
 
         known = signature(question)
+        own = [each.replace(default=None) if each.name == keyword else each for each in known.parameters.values()]
         more = [field.replace(kind=Parameter.KEYWORD_ONLY) for field in fields.values()]
-        asked.__signature__ = known.replace(parameters=[*known.parameters.values(), *more])  # type: ignore[attr-defined]
+        asked.__signature__ = known.replace(parameters=[*own, *more])  # type: ignore[attr-defined]
         return asked
 
     return named

@@ -106,7 +106,7 @@ def test_a_cure_that_does_not_cure_is_found():
 
 def test_a_false_error_bound_is_found():
     case = shipped("3rrr_m1")
-    told = hrsynth.accuracy(case.engine, cones=errors.PSI)
+    told = hrsynth.accuracy(case.engine, cone=errors.PSI)
     errors.judge(case, told)
     assert outcomes(case, "error bound") == {HELD}
     for factor in (0.99, 1.01):

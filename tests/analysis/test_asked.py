@@ -38,7 +38,7 @@ def test_every_command_takes_a_mode():
     (posture,) = hrsynth.check(robot, "1,3,5", at=["mode:2"]).postures
     assert str(posture.pose) == str(listed.modes[1].pose)
     assert posture.distances.type2 == pytest.approx(listed.modes[1].type2_distance, rel=1e-9)
-    found = hrsynth.accuracy(robot, "1,3,5", cones="0.1deg", at=["mode:2"])
+    found = hrsynth.accuracy(robot, "1,3,5", cone="0.1deg", at=["mode:2"])
     assert str(found.poses[0].pose) == str(listed.modes[1].pose)
     answer = hrsynth.path(robot, "1,3,5", start="mode:1", goal="mode:2")
     assert [str(end.pose) for end in (answer.start, answer.goal)] == [str(mode.pose) for mode in listed.modes]

@@ -30,7 +30,7 @@ ASKED = {
     "modes": (lambda robot: hrsynth.modes(robot, at=GOAL), ["--at", GOAL]),
     "path": (lambda robot: hrsynth.path(robot, start=GOAL, goal=OTHER), ["--from", GOAL, "--to", OTHER]),
     "servo": (lambda robot: hrsynth.servo(robot, start=OTHER, goal=GOAL), ["--from", OTHER, "--to", GOAL]),
-    "accuracy": (lambda robot: hrsynth.accuracy(robot, cones="0.1deg", at=[GOAL]), ["--cone", "0.1deg", "--at", GOAL]),
+    "accuracy": (lambda robot: hrsynth.accuracy(robot, cone="0.1deg", at=[GOAL]), ["--cone", "0.1deg", "--at", GOAL]),
     "select": (lambda robot: hrsynth.select(robot, start=GOAL, goal=OTHER, runs=0),
                ["--from", GOAL, "--to", OTHER, "--runs", "0"]),
 }
@@ -134,7 +134,7 @@ def test_pictures_of_results_are_shown_in_notebooks_and_saved(command: str, tmp_
 def test_pictures_of_grids():
     robot = load("rrrrr_m1")
     grid = "x=-0.02:0.02:3,y=0.3:0.34:3"
-    for found in (hrsynth.check(robot, grid=grid), hrsynth.accuracy(robot, cones="0.1deg", grid=grid)):
+    for found in (hrsynth.check(robot, grid=grid), hrsynth.accuracy(robot, cone="0.1deg", grid=grid)):
         assert hrsynth.draw(found)._repr_png_().startswith(b"\x89PNG")
 
 

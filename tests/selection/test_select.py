@@ -33,7 +33,7 @@ START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 @cache
 def found() -> Selection:
     return select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65",
-                  cones="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1)
+                  cone="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1)
 
 
 @cache
@@ -70,7 +70,7 @@ def test_verdicts_are_those_of_legs() -> None:
 def test_answers_are_those_of_the_single_commands(watched: str) -> None:
     robot = load("quattro")
     mine = work().decided(first(watched))
-    theirs = accuracy(robot, watched, cones="0.1deg", at=[GOAL]).poses[0]
+    theirs = accuracy(robot, watched, cone="0.1deg", at=[GOAL]).poses[0]
     assert mine.errors is not None
     assert mine.errors.position.largest == pytest.approx(theirs.position.largest, rel=1e-7)
     assert mine.errors.orientation.largest == pytest.approx(theirs.orientation.largest, rel=1e-7)
@@ -110,7 +110,7 @@ def test_what_is_kept_does_not_depend_on_the_clock(monkeypatch: pytest.MonkeyPat
     ticks = itertools.count(step=3600.0)
     monkeypatch.setattr("time.monotonic", lambda: next(ticks))
     slow = select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65",
-                  cones="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1)
+                  cone="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1)
     assert told(slow) == told(found())
     assert slow.left is None
 
@@ -119,7 +119,7 @@ def test_what_is_kept_does_not_depend_on_the_clock(monkeypatch: pytest.MonkeyPat
 def test_what_is_not_examined_is_neither_kept_nor_discarded(examine: int, seconds: float | None) -> None:
     """And nothing else is said of the others than with all examined."""
     part = select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65", runs=1, size=2,
-                  cones="1=0.2deg,2=0.1deg,3=0.1deg", examine=examine, seconds=seconds)
+                  cone="1=0.2deg,2=0.1deg,3=0.1deg", examine=examine, seconds=seconds)
     begun = 0 if seconds else examine
     whole, left = told(found()), {each.legs for each in part.unexamined}
     assert len(part.kept) == begun
@@ -193,7 +193,7 @@ def test_a_blind_camera_discards_every_set() -> None:
 
 
 @pytest.mark.parametrize(("options", "word"), [
-    ({"cones": "90deg"}, "half-angle"), ({"cones": "1=0.1deg"}, "no cone"), ({"size": 0}, "largest sets"),
+    ({"cone": "90deg"}, "half-angle"), ({"cone": "1=0.1deg"}, "no cone"), ({"size": 0}, "largest sets"),
     ({"runs": -1}, "runs"), ({"sight": "x=0"}, "camera"), ({"sight": "x=0,y=0,z=0,rpy=0/0/0", "focal": 0.0}, "focal"),
     ({"seconds": 0.0}, "seconds"), ({"examine": 0}, "examined"), ({"start": "w=1"}, "unknown part")])
 def test_bad_requests(options: dict, word: str) -> None:

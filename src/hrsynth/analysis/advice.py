@@ -14,13 +14,14 @@ from ..errors import HrsynthError, RankUndecided
 from ..geometry.ranks import kernel_basis, largest_angle, range_basis, singular_values
 from ..geometry.vectors import Array
 from ..kinematics.sampling import Samples
-from ..mechanism import Direction, JointType, Mechanism, Observation
+from ..mechanism import Direction, JointType, Observation
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.sensors import encoders, line_position, observation_of
 from ..progress import tell
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
-from .observed import ObservedRobot, restricted
+from .observed import LegsLike, ObservedRobot, RobotLike, restricted
+from .question import question
 from .verdict import CONTROLLABLE, Verdict, verdict_of
 
 AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide", "turn")}
@@ -170,7 +171,8 @@ class Advice(Result, shown_as="advise"):
                 "complete": self.complete, "undecided": self.undecided}
 
 
-def advise(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+@question()
+def advise(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
            most: int | None = None, seed: int = 0) -> Advice:
     """The smallest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3).
 

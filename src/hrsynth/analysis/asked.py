@@ -11,16 +11,15 @@ from ..errors import BadRequest, HrsynthError, PoseNotReached
 from ..kinematics.assembly import of_links
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezero
-from ..mechanism import Mechanism
-from ..mechanism.pose import ModeNumber, Pose, asked_pose
-from .observed import SAMPLES, ObservedRobot
+from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
+from .observed import SAMPLES, LegsLike, ObservedRobot, RobotLike, as_robot
 
 if TYPE_CHECKING:
     from .modes.modes import AssemblyModes
 
 
-def observe(robot: Mechanism | ObservedRobot, legs: Sequence[str] | str | None = None, camera: str | None = None, *,
-            at: Pose | str | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
+def observe(robot: RobotLike, legs: LegsLike = None, camera: str | None = None, *,
+            at: PoseLike | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
     """A robot with what is watched of it, its normal form and samples of its motion: what every question takes.
 
     ``legs`` holds leg labels or link names (a string sets them apart by commas); None or ``["all"]`` means all legs at
@@ -31,6 +30,7 @@ def observe(robot: Mechanism | ObservedRobot, legs: Sequence[str] | str | None =
 
     Raises ``BadRequest`` for labels, links, parts of a pose and modes that there are not, ``PoseNotReached``.
     """
+    robot = as_robot(robot)
     if at is None:
         return ObservedRobot.of(robot, legs, camera, samples=samples, seed=seed)
     if isinstance(robot, ObservedRobot):

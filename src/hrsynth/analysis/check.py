@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..batch.reach import sweep
-from ..mechanism import Mechanism
-from ..mechanism.pose import SCALARS, Grid, Pose, asked_pose
+from ..mechanism.pose import SCALARS, Grid, PoseLike, asked_poses
 from ..progress import tell
 from ..results import Result
 from .asked import configurations_at
 from .classes import Redundancy, listed
-from .observed import ObservedRobot
+from .observed import LegsLike, ObservedRobot, RobotLike
 from .posture import ConfigurationAnalysis, Posture
+from .question import question
 
 UNREACHABLE = "unreachable"
 MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degrees_per_degree")
@@ -77,8 +77,9 @@ class Check(Result, shown_as="check"):
                 "grid": self.grid and self.grid.to_dict()}
 
 
-def check(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-          at: Sequence[Pose | str] = (), grid: Grid | str | None = None, seed: int = 0) -> Check:
+@question()
+def check(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+          at: PoseLike | Iterable[PoseLike] = (), grid: Grid | str | None = None, seed: int = 0) -> Check:
     """Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six, constraint singularities and redundant constraints
     (docs/pages/theory.md, section 7) at the poses ``at`` (default: the zero configuration) and over ``grid``.
 
@@ -89,7 +90,7 @@ def check(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
     Raises ``BadRequest`` for names that there are not and for parts of a pose that the platform cannot change,
     ``PoseNotReached`` for poses out of reach.
     """
-    poses = [asked_pose(each) for each in at]
+    poses = asked_poses(at)
     cells = Grid.parse(grid) if isinstance(grid, str) else grid
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     examiner = ConfigurationAnalysis(setting)

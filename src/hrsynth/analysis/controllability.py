@@ -6,17 +6,18 @@ from dataclasses import dataclass, field
 from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
-from ..mechanism import Mechanism
 from ..mechanism.observation import labels_of
+from ..mechanism.pose import PoseLike
 from ..progress import tell
 from ..results import Result
 from .asked import observe
 from .exact import ExactVerdict, architecture
-from .observed import ObservedRobot, restricted
+from .observed import ObservedRobot, RobotLike, restricted
+from .question import question
 from .verdict import Verdict, verdict_of
 
 if TYPE_CHECKING:
-    from ..mechanism.pose import Pose
+    pass
 
 LARGEST_COMPLETE = 10
 """Number of legs up to which all sets are tried; beyond, sets of up to three legs and the whole."""
@@ -54,8 +55,8 @@ class Legs(Result, shown_as="legs"):
                 "minimal": [list(each) for each in self.minimal], **self.setting.modes_dict()}
 
 
-def legs(robot: Mechanism | ObservedRobot, camera: str | None = None, *, at: Pose | str | None = None, seed: int = 0
-         ) -> Legs:
+@question()
+def legs(robot: RobotLike, camera: str | None = None, *, at: PoseLike | None = None, seed: int = 0) -> Legs:
     """The verdict of every set of legs at their default segments (theory.md 6), on the branch of the zero
     configuration, or of the pose ``at`` (``mode:2``: a mode with all legs watched)."""
     setting = observe(robot, None, camera, at=at, seed=seed)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
@@ -27,11 +26,12 @@ from .asked import observe as observed_robot
 from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
-from .observed import Mobility, ObservedRobot
+from .observed import LegsLike, Mobility, ObservedRobot, RobotLike
+from .question import question
 from .verdict import Verdict, verdict_of
 
 if TYPE_CHECKING:
-    from ..mechanism.pose import Pose
+    from ..mechanism.pose import PoseLike
     from .modes.modes import AssemblyModes
 
 STEP_SAMPLES = 3
@@ -89,7 +89,7 @@ class Derivation(Result, shown_as="derive"):
         return (f"{self.robot.name} {self.architecture}, watching {legs}: "
                 f"hidden robot {self.hidden_architecture or 'none'}, {self.verdict.verdict}")
 
-    def modes(self, at: Pose | str | None = None, *, real: bool = False) -> AssemblyModes:
+    def modes(self, at: PoseLike | None = None, *, real: bool = False) -> AssemblyModes:
         """All poses with the directions (``real``: the motors' coordinates) of the pose ``at``, as ``hrsynth.modes``
         lists them."""
         from .modes.modes import modes
@@ -123,8 +123,9 @@ class Derivation(Result, shown_as="derive"):
         }
 
 
-def derive(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-           at: Pose | str | None = None, form: str = "simplified", paper: bool = True, seed: int = 0) -> Derivation:
+@question()
+def derive(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+           at: PoseLike | None = None, form: str = "simplified", paper: bool = True, seed: int = 0) -> Derivation:
     """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3
     to 5).
 

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+import os
+from collections.abc import Hashable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
+from numbers import Integral
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ..budgets import REMEMBERED
+from ..description import load
 from ..errors import BadMechanism, BadRequest, HrsynthError, NoSegment, NotSampled
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
@@ -34,6 +38,10 @@ SAMPLES = 20
 """Configurations of a certificate and of a generic verdict."""
 
 
+LegsLike = str | int | Iterable[str | int] | None
+"""Legs by their labels, or links, as a user gives them: one, several, a text with commas, ``all``; None: all."""
+
+
 @dataclass(frozen=True)
 class Mobility:
     """Freedoms of a mechanism: all of them, and those that move neither the platform nor any default segment."""
@@ -56,20 +64,19 @@ class ObservedRobot(Value):
     """How many of the observations of ``everything`` are default segments; they come first."""
 
     @classmethod
-    def of(cls, robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None,
-           *, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
+    def of(cls, robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *, samples: int = SAMPLES,
+           seed: int = 0) -> ObservedRobot:
         """What a question is asked of: an observed robot itself, or a robot with what is watched of it, as
         :func:`.asked.observe`."""
+        robot, names = as_robot(robot), as_names(observe)
         if isinstance(robot, ObservedRobot):
             if (observe, camera) != (None, None):
                 raise BadRequest(f"{robot.headline()}: what is watched is asked twice", observe or camera,
                                  "nothing besides an observed robot")
             return robot
         tell("sampling")
-        listed = [name.strip() for name in observe.split(",")] if isinstance(observe, str) else observe
-        names = None if listed is None else tuple(listed)
         try:
-            return _observed_robot(robot, names, camera, samples, seed)
+            return _observed_robot(robot, (robot.file, robot.notes), names, camera, samples, seed)
         except (BadMechanism, NotSampled) as error:
             error.file = robot.file
             raise
@@ -192,10 +199,42 @@ class ObservedRobot(Value):
                      "pose": Pose.of(mode.at.pose(drawn.question.platform)).to_dict()} for mode in drawn.met]}
 
 
+RobotLike = Mechanism | ObservedRobot | str | Path
+"""A robot as a user gives it: as it was read or observed, the path of its file, the name of a shipped one."""
+
+
+def as_robot(given: RobotLike) -> Mechanism | ObservedRobot:
+    """The robot that is given; raises ``BadRequest``, and what ``load`` raises."""
+    if isinstance(given, Mechanism | ObservedRobot):
+        return given
+    if isinstance(given, str | os.PathLike):
+        return load(given)
+    raise BadRequest("a robot", given, "what hrsynth.load or hrsynth.observe gives, the path of a robot file, the name "
+                     "of a shipped robot, example:NAME")
+
+
+def as_names(given: LegsLike) -> tuple[str, ...] | None:
+    """The legs or links that are given, None for all; raises ``BadRequest``."""
+    if given is None:
+        return None
+    every: Any = given.split(",") if isinstance(given, str) else given if isinstance(given, Iterable) else [given]
+    every = sorted(every, key=str) if isinstance(every, set | frozenset) else list(every)
+    if not all(isinstance(each, str | Integral) and not isinstance(each, bool) for each in every):
+        raise BadRequest("legs to watch", given, "a label or a link such as 1 or 'rod_1a', several in a list or in a "
+                         "text with commas, or 'all'")
+    return tuple(str(each).strip() for each in every)
+
+
+def forget_robots() -> None:
+    """Forget the samples that are remembered."""
+    _observed_robot.cache_clear()
+
+
 @lru_cache(maxsize=REMEMBERED)
-def _observed_robot(robot: Mechanism, observe: tuple[str, ...] | None, camera: str | None, samples: int, seed: int
-                    ) -> ObservedRobot:
-    """The answer to the same words for the same value of a robot is the same value: it is drawn once."""
+def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...] | None, camera: str | None,
+                    samples: int, seed: int) -> ObservedRobot:
+    """The answer to the same words for the same value of a robot, of one ``source``, is the same value: it is drawn
+    once."""
     if camera is not None:
         if camera not in robot.links:
             raise BadRequest(f"{robot.name} has no link for the camera", camera, sorted(robot.links))

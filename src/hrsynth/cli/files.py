@@ -6,17 +6,26 @@ from typing import Any
 
 import typer
 
-from .options import JSON, NEEDED, SOURCE, Option, add_command, robot_of, warn
+from .options import JSON, NEEDED, SOURCE, Option, add_command, flag, robot_of, warn
 
 
-def robots(json: bool) -> None:
-    """Print the table of the shipped robots."""
+def robots(examples: bool, json: bool) -> None:
+    """Print the table of the shipped robots, or of those of the package example-robot-data."""
+    from ..description import examples as found
     from ..description import shipped
     from ..families.table import ROBOTS
     from ..mechanism.notation import parse
     from ..present.show import record
     from ..present.text.tables import table
 
+    if examples:
+        if json:
+            typer.echo(record("robots", None, {"robots": [{"name": f"example:{name}", "file": str(file)}
+                                                          for name, file in found().items()]}))
+        else:
+            typer.echo(table([(f"example:{name}", file.suffix[1:], file.parts[-3]) for name, file in found().items()],
+                             ("name", "format", "from example-robot-data")))
+        return
     files = shipped()
     if json:
         rows = [{"name": each.name, "file": str(files.get(each.name, "")), "architecture_ascii": each.architecture,
@@ -49,7 +58,9 @@ def convert(target: str, to: str | None, json: bool, **source: Any) -> None:
 
 def add(app: typer.Typer) -> None:
     """Make them commands."""
-    add_command(app, "robots", "The shipped robots.", (JSON,), robots)
+    add_command(app, "robots", "The shipped robots.",
+                (flag("examples", "The robots of the package example-robot-data instead: legged robots, arms, hands."),
+                 JSON), robots)
     add_command(app, "convert", "Read a robot in any dialect and write it in another: .urdf native, .yaml Gepetto, "
                 ".xml MJCF, .sdf SDFormat.",
                 (*SOURCE, Option("target", "The file to write; its extension says the dialect.", "OUT", default=NEEDED,

@@ -59,7 +59,7 @@ CAMERA = Option("camera", "The link that carries the camera.", "LINK")
 WATCHED = (OBSERVE, CAMERA)
 SEED = Option("seed", "Seed of the random configurations.", kind=int, default=0, low=0)
 SOURCE = (
-    Option("robot", "A robot file in any dialect, or the name of a shipped robot.", "ROBOT", default=NEEDED,
+    Option("robot", "A robot file in any dialect, a shipped robot's name, or example:NAME.", "ROBOT", default=NEEDED,
            argument=True),
     Option("base", "Look only at what lies between this link and the platform.", "LINK"),
     Option("platform", "The platform, where the file names none.", "LINK"),

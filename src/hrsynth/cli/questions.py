@@ -196,21 +196,21 @@ QUESTIONS = (
                      default="exact"),
               _file("servo"))),
     Question("accuracy", "How far the platform can be off where the observed directions are off by up to given angles.",
-             (Option("cones", "Half-angle of the cone about each observed direction, as 0.1deg; or one a leg: "
-                     "1=0.1deg,2=0.2deg.", "ANGLE", default=NEEDED, flags=("--cone",)),
+             (Option("cone", "Half-angle of the cone about each observed direction, as 0.1deg; or one a leg: "
+                     "1=0.1deg,2=0.2deg.", "ANGLE", default=NEEDED),
               *WATCHED, Option("at", f"A pose, as x=0.02,y=0.1,z=-0.7; {POSES}", "POSE", list[str]),
               Option("plane", "Plane of poses, as z=-0.7: all of it that is reached.", "PART=VALUE"),
               Option("grid", "A line, plane or box of poses, such as x=-0.3:0.3:21,y=0,z=-0.7 (from:to:count).",
                      "GRID"),
               Option("steps", "Poses along each side of the plane.", None, int, low=5, high=300),
-              Option("samples", "Try this many errors (four at least) at each pose; of a plane or grid, at its worst "
-                     "ones.", "COUNT", int, 0, ("--nonlinear",), low=0),
+              Option("nonlinear", "Try this many errors (four at least) at each pose; of a plane or grid, at its worst "
+                     "ones.", "COUNT", int, 0, low=0),
               _file("accuracy"))),
     Question("select", "Which legs to watch for a displacement: all sets, ranked by accuracy, and why the others are "
              "discarded.",
              (START, _goal("Goal pose."),
-              Option("cones", "Half-angle of the cone about each direction, or one a leg: 1=0.1deg,2=0.2deg,…", "ANGLE",
-                     default="0.1deg", flags=("--cone",)),
+              Option("cone", "Half-angle of the cone about each direction, or one a leg: 1=0.1deg,2=0.2deg,…", "ANGLE",
+                     default="0.1deg"),
               CAMERA, Option("size", "Legs of the largest sets.", None, int, 4, low=1),
               Option("runs", "How many sets must pass a simulated run, best first.", None, int, 3, low=0),
               Option("sight", "Pose of the camera on the link that carries it (x right, y down, z ahead), as "

@@ -13,13 +13,14 @@ from ..errors import BadRequest
 from ..mechanism.model import Mechanism, Note
 from . import formats
 from .dialect import Dialect
+from .example_data import PREFIX, examples
 from .files import require_same, write_whole
 from .formats import native
 from .overrides import Overrides, names
 from .reading import read
 from .tree import spanning
 
-__all__ = ["load", "native", "save", "shipped", "spanning", "targets"]
+__all__ = ["examples", "load", "native", "save", "shipped", "spanning", "targets"]
 
 
 def shipped() -> dict[str, Path]:
@@ -29,10 +30,11 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.urdf"), key=lambda path: path.stem)}
 
 
-def load(robot: str | Path, *, base: str | None = None, platform: str | None = None,
+def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: str | None = None,
          motors: Iterable[str] | str | None = None, observe: Iterable[str] | str | None = None,
          close: Iterable[str] | str = (), freeze: Iterable[str] | str = ()) -> Mechanism:
-    """The mechanism of a robot file in any dialect, or of a shipped robot given by its name.
+    """The mechanism of a robot file in any dialect, of a shipped robot given by its name, or of one of the package
+    example-robot-data (``example:cassie``); a mechanism is given back as it is.
 
     What a file does not say may be given: the ``platform`` link, the joints of the ``motors``, the links to
     ``observe`` at their default segments, closures ``A:B[:type]`` that make the frames of two links meet, joints to
@@ -42,27 +44,40 @@ def load(robot: str | Path, *, base: str | None = None, platform: str | None = N
     Raises
     ------
     BadRequest
-        For a name that is neither; with the shipped names closest to it. For what has to be given, and for names given
-        that the file does not have.
+        For a name that is neither; with the names closest to it. For what has to be given, and for names given that
+        the file does not have.
     BadRobotFile
         With every defect of the file and its line.
     LoopsNotClosed, RankUndecided
         For a file whose loops stay open, or in which rounded numbers leave no gap between free and held.
     """
     overrides = Overrides(base, platform, names(motors), names(close) or (), names(freeze) or (), names(observe))
+    if isinstance(robot, Mechanism):
+        if overrides.any or base is not None or observe is not None:
+            raise BadRequest("what a file does not say is given for a robot that was read", robot.name,
+                             "the file of a robot, or its name")
+        return robot
     path = Path(robot)
+    if isinstance(robot, str) and robot.startswith(PREFIX) and not os.path.exists(robot):
+        found = _named(robot.removeprefix(PREFIX), examples(), "not a robot of example-robot-data", "robots --examples")
+        return read(found, overrides)
     if isinstance(robot, str) and not path.suffix and len(path.parts) == 1:
         robots = shipped()
         with contextlib.suppress(OSError, ValueError):
             if path.is_file():
                 return read(path, overrides)
-        if robot in robots:
-            return read(robots[robot], overrides)
-        if not os.path.exists(robot):
-            close_names = difflib.get_close_matches(robot, robots, n=5) or list(robots)
-            raise BadRequest("neither a file nor a shipped robot", robot,
-                             "a file, or a name that `hrsynth robots` lists, such as " + ", ".join(close_names))
+        if robot in robots or not os.path.exists(robot):
+            return read(_named(robot, robots, "neither a file nor a shipped robot", "robots"), overrides)
     return read(path, overrides)
+
+
+def _named(name: str, files: dict[str, Path], what: str, command: str) -> Path:
+    """The file of a robot by its name; raises ``BadRequest`` with the names closest to it."""
+    if name in files:
+        return files[name]
+    close = difflib.get_close_matches(name, files, n=5) or list(files)
+    raise BadRequest(what, name,
+                     f"a file, or a name that `hrsynth {command}` lists, such as " + ", ".join(close[:12]))
 
 
 def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
@@ -70,8 +85,9 @@ def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
     return _dialect(Path(path), dialect).files(Path(path))
 
 
-def save(mechanism: Mechanism, path: str | Path, dialect: str | None = None) -> tuple[Note, ...]:
-    """Write a robot file, whole or not at all; what the dialect cannot say is returned as warnings.
+def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | None = None) -> tuple[Note, ...]:
+    """Write a robot file, whole or not at all, of a mechanism or of a robot by its file or name; what the dialect
+    cannot say is returned as warnings.
 
     ``dialect`` is ``native``, ``gepetto``, ``mjcf`` or ``sdf``; without it the file's ending decides: ``.urdf`` the
     native dialect, ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.yaml`` Gepetto (with a ``.urdf`` of the same name
@@ -82,7 +98,7 @@ def save(mechanism: Mechanism, path: str | Path, dialect: str | None = None) -> 
     BadRequest
         For an unknown dialect or ending; where the file cannot be written, or the mechanism not be said in the dialect.
     """
-    chosen = _dialect(Path(path), dialect)
+    chosen, mechanism = _dialect(Path(path), dialect), load(mechanism)
     written = formats.writer(chosen.name)(mechanism)
     contents = dict(zip(chosen.files(Path(path)), (text.encode() for text in written.texts), strict=True))
     for file, content in contents.items():

@@ -6,16 +6,19 @@ The platform's frame in the base frame, metres and radians.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..budgets import FARTHEST_POSE, LARGEST_GRID
 from ..errors import BadRequest
 from ..geometry.vectors import Array, rotation_from_rpy
+from ..tolerances import AS_PRINTED
 
 SCALARS = ("x", "y", "z", "phi")
 PARTS = (*SCALARS, "rpy")
@@ -89,10 +92,76 @@ class ModeNumber:
         return f"mode:{self.number}"
 
 
-def asked_pose(given: Pose | str) -> Pose | ModeNumber:
-    """The pose that a text says, by its parts or as ``mode:3``; raises ``BadRequest``."""
-    if not isinstance(given, str):
+class RigidTransform(Protocol):
+    """What has a homogeneous matrix, as ``pinocchio.SE3``."""
+
+    @property
+    def homogeneous(self) -> Array: ...
+
+
+PoseLike = Pose | ModeNumber | str | Mapping[str, Any] | ArrayLike | RigidTransform
+"""A pose as a user gives it: a text, a dict of its parts, x y z (roll pitch yaw), a matrix (4, 4), an SE3 of
+Pinocchio."""
+POSES = (f"a text such as {EXAMPLE}; a dict of these; numbers x, y, z or x, y, z, roll, pitch, yaw; a 4 × 4 matrix; "
+         "a pinocchio.SE3")
+
+
+def as_pose(given: PoseLike) -> Pose:
+    """The pose that is given in any of the ways of ``PoseLike`` but by the number of a mode; raises ``BadRequest``."""
+    if isinstance(given, Pose):
         return given
+    if isinstance(given, str):
+        return Pose.parse(given)
+    try:
+        if isinstance(given, Mapping):
+            return Pose.parse(",".join(f"{name}={_as_text(value)}" for name, value in given.items()
+                                       if value is not None))
+        numbers = np.asarray(getattr(given, "homogeneous", given), dtype=float)
+    except (TypeError, ValueError):
+        raise BadRequest("a pose", given, POSES) from None
+    if numbers.shape == (4, 4):
+        R = numbers[:3, :3]
+        if not (np.max(np.abs(R @ R.T - np.eye(3))) < AS_PRINTED and np.linalg.det(R) > 0
+                and np.max(np.abs(numbers[3] - np.eye(4)[3])) < AS_PRINTED):
+            raise BadRequest("a pose: the matrix is not that of a rotation and a translation", numbers.tolist(), POSES)
+        return Pose.of(numbers)
+    if numbers.shape not in ((3,), (6,)):
+        raise BadRequest("a pose", given, POSES)
+    x, y, z, *rpy = numbers.tolist()
+    return Pose(x, y, z, rpy=(rpy[0], rpy[1], rpy[2]) if rpy else None)
+
+
+def _as_text(value: Any) -> str:
+    """A part of a pose as a text says it, to the last digit."""
+    if isinstance(value, str):
+        return value
+    return repr(float(value)) if np.ndim(value) == 0 else "/".join(map(_as_text, value))
+
+
+def asked_poses(given: PoseLike | Iterable[PoseLike] | None) -> list[Pose | ModeNumber]:
+    """The poses that are given, one or several; raises ``BadRequest``."""
+    if given is None:
+        return []
+    several: Any = given
+    if isinstance(given, str | Pose | ModeNumber | Mapping) or hasattr(given, "homogeneous"):
+        several = [given]
+    elif not isinstance(given, Iterable) or (isinstance(given, np.ndarray) and given.ndim == 0):
+        raise BadRequest("poses", given, f"one or several of: {POSES}")
+    else:
+        several = list(given)
+        with suppress(ValueError):
+            numbers = np.array(several)
+            if numbers.dtype.kind in "iuf" and numbers.shape in ((3,), (6,), (4, 4)):
+                several = [numbers]
+    return [asked_pose(each) for each in several]
+
+
+def asked_pose(given: PoseLike) -> Pose | ModeNumber:
+    """The pose that is given, by its parts or as ``mode:3``; raises ``BadRequest``."""
+    if isinstance(given, ModeNumber):
+        return given
+    if not isinstance(given, str):
+        return as_pose(given)
     name, colon, number = given.strip().partition(":")
     if not colon or name != "mode":
         return Pose.parse(given)

@@ -16,16 +16,16 @@ from ..analysis.accuracy.pose_errors import PoseErrors
 from ..analysis.asked import configurations_at
 from ..analysis.aspects.path import SEPARATED, Aspects
 from ..analysis.modes.modes import AssemblyModes, modes
-from ..analysis.observed import ObservedRobot
+from ..analysis.observed import ObservedRobot, RobotLike
 from ..analysis.posture import ConfigurationAnalysis, Posture
+from ..analysis.question import question
 from ..analysis.verdict import CONTROLLABLE, verdict_of
 from ..budgets import AXIS_SEEN
 from ..errors import BadRequest, HrsynthError, PoseNotReached
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..mechanism import Mechanism
 from ..mechanism.observation import Direction
-from ..mechanism.pose import Pose, asked_pose
+from ..mechanism.pose import Pose, PoseLike, asked_pose
 from ..progress import tell
 from ..results import Compared, Result, by_name
 from ..simulation.camera import cylinders, placed
@@ -184,11 +184,12 @@ class Selection(Result, shown_as="select"):
                 "sets": [each.to_dict() for each in self.candidates]}
 
 
+@question(cones="cone")
 @by_name(Criteria, "criteria")
-def select(robot: Mechanism | ObservedRobot, camera: str | None = None, *, start: Pose | str, goal: Pose | str,
-           cones: Cones = "0.1deg", criteria: Criteria, seed: int = 0) -> Selection:
+def select(robot: RobotLike, camera: str | None = None, *, start: PoseLike, goal: PoseLike, cone: Cones = "0.1deg",
+           criteria: Criteria, seed: int = 0) -> Selection:
     """All sets of legs for the displacement from ``start`` to ``goal``, ranked by the largest position error at the
-    goal for ``cones`` about the directions (MMT A.2).
+    goal for cones about the directions (``cone``: the half-angle of all, or one a leg; MMT A.2).
 
     The fields of :class:`Criteria` can be given by their names: ``size``, ``examine``, ``runs``, ``sight``, ``focal``,
     ``seconds``. A set is discarded where it does not see every freedom, where an end is singular, where the camera
@@ -202,7 +203,7 @@ def select(robot: Mechanism | ObservedRobot, camera: str | None = None, *, start
     setting = ObservedRobot.of(robot, None, camera, seed=seed)
     directions = tuple(o for o in setting.segments if isinstance(o, Direction))
     setting = replace(setting, observed=directions)
-    half = half_angles(cones, directions)
+    half = half_angles(cone, directions)
     try:
         ends = configurations_at(setting, wanted)
     except PoseNotReached as error:

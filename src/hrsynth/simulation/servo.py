@@ -3,22 +3,22 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..analysis.asked import configurations_at
-from ..analysis.observed import ObservedRobot
+from ..analysis.observed import LegsLike, ObservedRobot, RobotLike
 from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
+from ..analysis.question import question
 from ..analysis.verdict import verdict_of
 from ..budgets import LONGEST_RUN, RUN_EVALUATIONS
 from ..errors import BadRequest, PoseNotReached, RankUndecided
 from ..geometry.so3 import angle_of
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..mechanism import Mechanism
-from ..mechanism.pose import Pose, asked_pose
+from ..mechanism.pose import PoseLike, asked_pose
 from ..progress import tell
 from ..results import by_name
 from ..tolerances import RANK_GAP
@@ -107,9 +107,10 @@ class Conditions:
         return self.time or (self.duration or 0.0) + lasts / self.gain
 
 
+@question()
 @by_name(Conditions, "conditions")
-def servo(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-          start: Pose | str, goal: Pose | str, conditions: Conditions, seed: int = 0) -> Servo:
+def servo(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+          start: PoseLike, goal: PoseLike, conditions: Conditions, seed: int = 0) -> Servo:
     """The servo loop of MMT 2.3 from the pose ``start`` towards the directions at ``goal``.
 
     ``observe`` and ``camera`` as for ``derive``. The fields of :class:`Conditions` can be given by their names:
@@ -137,7 +138,7 @@ class ServoTask:
     seed: int = 0
 
     @classmethod
-    def of(cls, setting: ObservedRobot, *, start: Pose | str, goal: Pose | str, conditions: Conditions = Conditions(),
+    def of(cls, setting: ObservedRobot, *, start: PoseLike, goal: PoseLike, conditions: Conditions = Conditions(),
            seed: int = 0) -> ServoTask:
         """The task of a request; raises what :func:`servo` raises."""
         wanted = [asked_pose(each) for each in (start, goal)]

@@ -19,7 +19,7 @@ def errors(case: Case) -> None:
     """``accuracy`` at zero and at a pose near it."""
     import hrsynth
 
-    seen = case.asked("error bound", lambda: hrsynth.accuracy(case.engine, case.observe(), cones=PSI))
+    seen = case.asked("error bound", lambda: hrsynth.accuracy(case.engine, case.observe(), cone=PSI))
     if seen is not None:
         judge(case, seen)
 

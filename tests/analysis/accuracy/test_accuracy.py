@@ -72,7 +72,7 @@ def largest(J: Array, cones: Array) -> Array:
 
 @cache
 def rigid(legs: str) -> Accuracy:
-    return accuracy(load("quattro_rigid"), legs, cones=CONE, grid="x=-0.3:0.3:100,y=-0.29:0.31:100,z=-0.75")
+    return accuracy(load("quattro_rigid"), legs, cone=CONE, grid="x=-0.3:0.3:100,y=-0.29:0.31:100,z=-0.75")
 
 
 @pytest.mark.parametrize("legs", ["1,2", "1,3", "2,4"])
@@ -156,7 +156,7 @@ def test_samples_approach_the_linear_maxima_as_cones_shrink(robot: str) -> None:
 
 @pytest.mark.slow
 def test_near_a_singularity_samples_do_not_follow_the_linear_law() -> None:
-    found = accuracy(load("quattro"), "1,4", cones="0.5deg", at=["x=-0.17,y=0,z=-0.7,phi=0"], samples=12)
+    found = accuracy(load("quattro"), "1,4", cone="0.5deg", at=["x=-0.17,y=0,z=-0.7,phi=0"], nonlinear=12)
     (true,), (linear,) = found.sampled, found.poses
     assert true is not None
     assert true.missed or true.position < 0.5 * linear.position.largest
@@ -164,7 +164,7 @@ def test_near_a_singularity_samples_do_not_follow_the_linear_law() -> None:
 
 def test_cones_of_their_own_scale_their_legs() -> None:
     robot = load("quattro_rigid")
-    one, two, both = (accuracy(robot, "1,3", cones=cones).poses[0].position.largest
+    one, two, both = (accuracy(robot, "1,3", cone=cones).poses[0].position.largest
                       for cones in (f"{CONE}", f"{2 * CONE}", f"1={CONE},3={2 * CONE}"))
     assert two == pytest.approx(2 * one, rel=1e-12)
     assert one < both < two
@@ -185,7 +185,7 @@ def test_a_grid_in_parts_is_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
     found = []
     for part in (10_000, 50):
         monkeypatch.setattr("hrsynth.analysis.accuracy.error_map.PART", part)
-        found.append(accuracy(load("quattro_rigid"), "1,2,3", cones=0.002, grid=grid).field)
+        found.append(accuracy(load("quattro_rigid"), "1,2,3", cone=0.002, grid=grid).field)
     whole, parts = found
     assert 0 < whole.reached.sum() < whole.reached.size
     for name in ("reached", "position", "smallest"):
@@ -193,7 +193,7 @@ def test_a_grid_in_parts_is_the_whole(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_a_plane_of_a_robot_whose_legs_are_iterated() -> None:
-    field = accuracy(load("3rps"), cones=CONE, grid="z=0.4:0.5:4").field
+    field = accuracy(load("3rps"), cone=CONE, grid="z=0.4:0.5:4").field
     assert field is not None
     assert field.spots is None
     assert field.reached.all()
@@ -201,12 +201,12 @@ def test_a_plane_of_a_robot_whose_legs_are_iterated() -> None:
 
 
 def test_singular_poses_of_a_plane_are_singular() -> None:
-    found = accuracy(load("quattro_rigid"), "1,3", cones=CONE, plane="z=-0.7", steps=61)
+    found = accuracy(load("quattro_rigid"), "1,3", cone=CONE, plane="z=-0.7", steps=61)
     assert found.field is not None
     spots = singular_poses(found.field)
     assert len(spots) > 10
     x, y = map(float, spots[len(spots) // 2])
-    near = accuracy(load("quattro_rigid"), "1,3", cones=CONE, at=[f"x={x!r},y={y!r},z=-0.7"])
+    near = accuracy(load("quattro_rigid"), "1,3", cone=CONE, at=[f"x={x!r},y={y!r},z=-0.7"])
     assert near.poses[0].position.largest > 1.0
 
 
@@ -224,23 +224,23 @@ def test_singular_poses_of_a_plane_are_singular() -> None:
     ("1,9", "0.1deg", {}, "no leg or link"),
     ("1,4", "0.1deg", {"plane": "z=-0.7", "grid": "x=0:1:2"}, "both"),
     ("1,4", "0.1deg", {"steps": 5}, "poses a side"),
-    ("1,4", "0.1deg", {"samples": -1}, "samples"),
+    ("1,4", "0.1deg", {"nonlinear": -1}, "samples"),
     ("1,4", "0.1deg", {"plane": "w=1"}, "unknown part"),
 ])
 def test_bad_requests(legs: str, cones: str, options: dict, word: str) -> None:
     with pytest.raises(BadRequest) as caught:
-        accuracy(load("quattro"), legs, cones=cones, **options)
+        accuracy(load("quattro"), legs, cone=cones, **options)
     assert word in str(caught.value)
     assert len(caught.value.lines()) == 1
 
 
 def test_poses_and_planes_out_of_reach() -> None:
     with pytest.raises(PoseNotReached):
-        accuracy(load("quattro"), "1,4", cones=CONE, at=["x=3"])
+        accuracy(load("quattro"), "1,4", cone=CONE, at=["x=3"])
     with pytest.raises(PlaneNotMet):
-        accuracy(load("quattro"), "1,4", cones=CONE, plane="z=3")
+        accuracy(load("quattro"), "1,4", cone=CONE, plane="z=3")
     with pytest.raises(PlaneNotMet):
-        accuracy(load("quattro"), "1,4", cones=CONE, grid="x=3:4:3,y=0,z=-0.7")
+        accuracy(load("quattro"), "1,4", cone=CONE, grid="x=3:4:3,y=0,z=-0.7")
 
 
 def test_cones_by_link_and_by_leg() -> None:

@@ -56,7 +56,7 @@ def rested(P: Array, legs: list[int], way: Array, parts: int) -> tuple[Array, bo
 
 @cache
 def told(legs: str, at: str) -> Accuracy:
-    return accuracy(load("quattro_rigid"), legs, cones="2deg", at=[at], samples=40)
+    return accuracy(load("quattro_rigid"), legs, cone="2deg", at=[at], nonlinear=40)
 
 
 @pytest.mark.slow

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
@@ -11,13 +11,13 @@ import numpy as np
 from ...errors import BadRequest
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
-from ...mechanism.pose import Grid, ModeNumber, Pose, asked_pose
+from ...mechanism.pose import Grid, ModeNumber, Pose, PoseLike, as_pose, asked_poses
 from ...progress import tell
 from ...results import Result
 from ..asked import configurations_at
-from ..observed import ObservedRobot
+from ..observed import LegsLike, ObservedRobot, RobotLike
+from ..question import question
 from ..verdict import verdict_of
 from .cones import Cones, half_angles
 from .error_map import ErrorMap, Mapper
@@ -59,33 +59,34 @@ class Accuracy(Result, shown_as="accuracy"):
                 "poses": poses}
 
 
-def accuracy(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-             cones: Cones, at: Sequence[Pose | str] = (), plane: Pose | str | None = None,
-             grid: Grid | str | None = None, steps: int | None = None, samples: int = 0, seed: int = 0) -> Accuracy:
-    """The largest position and orientation error of the platform over all errors of the directions inside ``cones``
+@question(cones="cone", samples="nonlinear")
+def accuracy(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+             cone: Cones, at: PoseLike | Iterable[PoseLike] = (), plane: PoseLike | None = None,
+             grid: Grid | str | None = None, steps: int | None = None, nonlinear: int = 0, seed: int = 0) -> Accuracy:
+    """The largest position and orientation error of the platform over all errors of the directions inside the cones
     (docs/pages/theory.md, section 10; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
 
-    At the poses ``at``, over ``plane`` (what is reached of it, ``steps`` poses a side), or over ``grid``; default: the
-    zero configuration. In a grid free parts stay as at the zero configuration where legs are known subproblems.
-    ``samples`` true errors are tried at each single pose, of a grid at its worst ones. ``observe`` and ``camera`` as
-    for ``derive``.
+    ``cone`` is the half-angle of all cones, or one a leg. At the poses ``at``, over ``plane`` (what is reached of it,
+    ``steps`` poses a side), or over ``grid``; default: the zero configuration. In a grid free parts stay as at the zero
+    configuration where legs are known subproblems. ``nonlinear`` true errors are tried at each single pose, of a grid
+    at its worst ones. ``observe`` and ``camera`` as for ``derive``.
 
     Raises ``BadRequest`` for names that there are not, cones that are none, legs that do not see every freedom (their
     error is infinite everywhere), ``PoseNotReached``, ``PlaneNotMet``.
     """
-    wanted: list[Pose | ModeNumber] = [asked_pose(each) for each in at]
+    wanted: list[Pose | ModeNumber] = asked_poses(at)
     if plane is not None and grid is not None:
         raise BadRequest("both a plane and a grid are given", f"{plane} and {grid}", "one of them")
     if steps is not None and plane is None:
         raise BadRequest("poses a side", steps, "only of a plane")
-    if samples < 0:
-        raise BadRequest("number of samples", samples, "none or more")
-    held = Pose.parse(plane) if isinstance(plane, str) else plane
+    if nonlinear < 0:
+        raise BadRequest("number of samples", nonlinear, "none or more")
+    held = None if plane is None else as_pose(plane)
     cells = Grid.parse(grid, LARGEST_FIELD) if isinstance(grid, str) else grid
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     if not all(isinstance(o, Direction) for o in setting.observed):
         raise BadRequest("cones apply to directions only", ", ".join(setting.labels), "directions of legs")
-    half = half_angles(cones, setting.observed)
+    half = half_angles(cone, setting.observed)
     sees_all(setting)
     mapper = Mapper(setting, half)
     field = None
@@ -93,7 +94,7 @@ def accuracy(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | No
         cells = mapper.plane(held, steps)
     if cells is not None:
         field = mapper.over(cells, seed)
-    if field is not None and samples and not wanted:
+    if field is not None and nonlinear and not wanted:
         wanted = [*field.worst(WORST)]
     start, motion = setting.everything.start, setting.motion
     configurations = configurations_at(setting, wanted)
@@ -101,8 +102,8 @@ def accuracy(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | No
         configurations = [start]
     tell("errors")
     poses = tuple(errors_at(setting, half, each) for each in configurations)
-    true = tuple(sampled(each, mapper.question, motion, half, errors, samples, seed)
-                 if samples else None for each, errors in zip(configurations, poses, strict=True))
+    true = tuple(sampled(each, mapper.question, motion, half, errors, nonlinear, seed)
+                 if nonlinear else None for each, errors in zip(configurations, poses, strict=True))
     return Accuracy(setting, half, poses, true, field)
 
 

@@ -15,7 +15,7 @@ from ...tolerances import NARROWEST_CONE
 EXAMPLE = "0.1deg, 0.002 (radians), or one for each leg such as 1=0.1deg,2=0.2deg"
 ALLOWED = "more than 0 and less than 90deg"
 
-Cones = float | str | Mapping[str, float]
+Cones = float | str | Mapping[str, float | str] | Mapping[int, float | str]
 """One half-angle (rad) for all observed directions, one for each leg or link, or either as text."""
 
 
@@ -25,6 +25,7 @@ def half_angles(cones: Cones, observed: Sequence[Observation]) -> Array:
     given = _parsed(cones) if isinstance(cones, str) else cones
     if not isinstance(given, Mapping):
         return np.full(len(observed), _checked(float(given), given))
+    given = {str(name): _angle(value) if isinstance(value, str) else value for name, value in given.items()}
     names = {name for o in observed for name in (o.leg, o.link)}
     unknown = [name for name in given if name not in names]
     if unknown:

@@ -15,14 +15,14 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.steps import track
-from ...mechanism import Mechanism
-from ...mechanism.pose import Pose, asked_pose
+from ...mechanism.pose import Pose, PoseLike, asked_pose
 from ...progress import tell
 from ...results import Result
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
 from ..asked import configurations_at
 from ..measured import MeasuredRobot
-from ..observed import ObservedRobot
+from ..observed import LegsLike, ObservedRobot, RobotLike
+from ..question import question
 from ..singularity.agreement import smallest_of
 from .condition_enclosure import ConditionEnclosure, PathSegment, enclosed, sign_of
 from .leg_forms import LegPattern, pattern
@@ -152,7 +152,7 @@ class Aspects:
     """Freedoms that are never seen: then every pose is singular."""
 
     @classmethod
-    def of(cls, robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None,
+    def of(cls, robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
            *, seed: int = 0) -> Aspects:
         """The condition of a robot from random samples of its motion."""
         setting = ObservedRobot.of(robot, observe, camera, seed=seed)
@@ -253,8 +253,9 @@ class Aspects:
         return replace(answer, coordinates=known.coordinates, ways=found.ways, poses=poses)
 
 
-def path(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-         start: Pose | str, goal: Pose | str, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
+@question()
+def path(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+         start: PoseLike, goal: PoseLike, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
     """Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
 
     Both are reached from the zero configuration in its working mode; on the way legs may pass their limits into other

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,13 +18,13 @@ from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Task, system
-from ...mechanism import Mechanism
-from ...mechanism.pose import Pose
+from ...mechanism.pose import Pose, PoseLike, as_pose
 from ...progress import tell
 from ...results import Result
 from ...tolerances import CHAIN_ROUNDING, MOVED, SAME_RELATION
 from ..measured import MeasuredRobot
-from ..observed import ObservedRobot
+from ..observed import LegsLike, ObservedRobot, RobotLike
+from ..question import question
 from ..singularity.agreement import weakest
 from .branches import Model, solve_all
 from .search import FoundMode, search
@@ -152,8 +151,9 @@ class AssemblyModes(Result, shown_as="modes"):
                 "meant": [each.to_dict(self.labels) for each in found.meant]}
 
 
-def modes(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
-          at: Pose | str | ClosedConfiguration | None = None, real: bool = False, as_written: bool = False,
+@question()
+def modes(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+          at: PoseLike | ClosedConfiguration | None = None, real: bool = False, as_written: bool = False,
           seed: int = 0) -> AssemblyModes:
     """All poses with the directions that are observed at ``at`` (default: the zero configuration), or with ``real`` the
     motors' coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).
@@ -175,8 +175,8 @@ def modes(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     motion, wanted = setting.motion, None
     goal = at if isinstance(at, ClosedConfiguration) else setting.everything.start
-    if isinstance(at, Pose | str):
-        asked = Pose.parse(at) if isinstance(at, str) else at
+    if at is not None and not isinstance(at, ClosedConfiguration):
+        asked = as_pose(at)
         wanted = motion.goal(asked, setting.robot.name)
         goal = reach(goal, setting.everything.question, asked, motion)
     measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)

@@ -19,7 +19,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...mechanism import Mechanism
-from ...mechanism.pose import Grid, Pose
+from ...mechanism.pose import Grid, Pose, as_pose
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
@@ -89,7 +89,7 @@ def locus(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None 
     if any(joint.actuated for joint in setting.mechanism.joints.values()):
         driven = MeasuredRobot.driven(setting)
         real = driven if driven.rank == setting.dof else None
-    return _locus(hidden, real, Pose.parse(plane) if isinstance(plane, str) else plane, steps)
+    return _locus(hidden, real, None if plane is None else as_pose(plane), steps)
 
 
 def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None, steps: int) -> Locus:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,14 +11,14 @@ from ...constraints.pattern import ConstraintPattern
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import solve
-from ...mechanism import Mechanism
 from ...mechanism.pose import Pose
 from ...progress import tell
 from ...results import Result
 from ...tolerances import SOLVED
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
-from ..observed import ObservedRobot
+from ..observed import LegsLike, ObservedRobot, RobotLike
+from ..question import question
 from ..verdict import Verdict
 from .agreement import Agreement, agreement, weakest
 
@@ -89,7 +88,8 @@ class Singularity(Result, shown_as="singular"):
         }
 
 
-def singular(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+@question()
+def singular(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
              real: bool = False, points: int = POINTS, seed: int = 0) -> Singularity:
     """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory.md 7; MMT 3.3.
 

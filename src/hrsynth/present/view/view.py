@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...analysis.derive import Derivation, derive
-from ...analysis.observed import ObservedRobot
+from ...analysis.observed import LegsLike, ObservedRobot, RobotLike
+from ...analysis.question import question
 from ...geometry.vectors import Array
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
@@ -110,7 +111,8 @@ class View(Result, shown_as="view"):
         }
 
 
-def view(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: str | None = None, *,
+@question()
+def view(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
          hidden: bool = False, seed: int = 0) -> View:
     """What there is to see of a robot, and with ``hidden`` of its hidden robot too: every position of a slider is a
     closed configuration, in which one of the platform's coordinates alone differs from the zero configuration's.

@@ -1,0 +1,99 @@
+"""What all questions share: robots by value, name or path; old names of options; answers that are remembered."""
+
+from __future__ import annotations
+
+import warnings
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from functools import wraps
+from inspect import signature
+from threading import Lock
+from typing import Any, ParamSpec, TypeVar
+
+from ..budgets import REMEMBERED_ANSWERS, REMEMBERED_GRIDS
+from ..errors import MissingExtra
+from ..mechanism import Mechanism
+from ..results import content
+from .observed import as_robot, forget_robots
+
+P = ParamSpec("P")
+R = TypeVar("R")
+
+
+class AnswerMemory:
+    """The answers that were asked for last, at most so many."""
+
+    def __init__(self, most: int) -> None:
+        self.most, self.lock = most, Lock()
+        self.kept: OrderedDict[Hashable, Any] = OrderedDict()
+
+    def answer(self, key: Hashable, ask: Callable[[], Any]) -> Any:
+        """What was answered before, or is now; not kept where an optional package was missing, which may come."""
+        with self.lock:
+            if key in self.kept:
+                self.kept.move_to_end(key)
+                return self.kept[key]
+        missed = MissingExtra.met
+        found = ask()
+        if MissingExtra.met == missed:
+            with self.lock:
+                self.kept[key] = found
+                while len(self.kept) > self.most:
+                    self.kept.popitem(last=False)
+        return found
+
+
+_ANSWERS, _GRIDS = AnswerMemory(REMEMBERED_ANSWERS), AnswerMemory(REMEMBERED_GRIDS)
+
+
+def forget() -> None:
+    """Forget all answers and samples that are remembered."""
+    forget_answers()
+    forget_robots()
+
+
+def forget_answers() -> None:
+    """Forget the answers alone."""
+    for memory in (_ANSWERS, _GRIDS):
+        memory.kept.clear()
+
+
+def question(**old: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+    """A function of a robot whose answers are frozen values: the robot is also taken by its name or path, and what was
+    asked before is not computed again. ``old`` names of options, each with the one that it has now, are taken for one
+    version more.
+
+    The same question is one with equal arguments about an equal robot, read from the same file.
+    """
+
+    def made(function: Callable[P, R]) -> Callable[P, R]:
+        known = signature(function)
+
+        @wraps(function)
+        def asked(*args: Any, **given: Any) -> Any:
+            for name in sorted(old.keys() & given.keys()):
+                if old[name] in given:
+                    raise TypeError(f"{function.__name__}: {name} is the old name of {old[name]}, which is given too")
+                warnings.warn(f"{function.__name__}: {name} is called {old[name]} now; the old name goes with the next "
+                              "version", DeprecationWarning, stacklevel=2)
+                given[old[name]] = given.pop(name)
+            bound = known.bind(*args, **given)
+            robot = bound.arguments["robot"] = as_robot(bound.arguments["robot"])
+            if given.get("seconds") is not None:
+                return function(*bound.args, **bound.kwargs)
+            source = robot if isinstance(robot, Mechanism) else robot.robot
+            every = known.bind(*args, **given)
+            every.apply_defaults()
+            options = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
+            key = (function.__qualname__, robot, source.file, source.notes, *options)
+            try:
+                hash(key)
+            except TypeError:
+                return function(*bound.args, **bound.kwargs)
+            large = any(given.get(name) is not None for name in ("plane", "grid"))
+            return (_GRIDS if large else _ANSWERS).answer(key, lambda: function(*bound.args, **bound.kwargs))
+
+        asked.__signature__ = known  # type: ignore[attr-defined]
+        return asked
+
+    return made

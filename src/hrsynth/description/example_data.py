@@ -1,0 +1,29 @@
+"""The robots of the package example-robot-data by name, ``example:cassie``: URDF and SDF files, nothing is imported."""
+
+from __future__ import annotations
+
+from collections import Counter
+from importlib.metadata import PackageNotFoundError, distribution
+from pathlib import Path
+
+from ..errors import MissingExtra
+
+PREFIX = "example:"
+PACKAGE = "example-robot-data"
+FOLDER = f"cmeel.prefix/share/{PACKAGE}/robots"
+
+
+def examples() -> dict[str, Path]:
+    """Name to file, sorted by name: the file's, with the folder's before it where several files have one name.
+
+    Raises ``MissingExtra`` where the package is not installed.
+    """
+    try:
+        folder = Path(str(distribution(PACKAGE).locate_file(FOLDER)))
+    except PackageNotFoundError:
+        raise MissingExtra("the examples of " + PACKAGE, "examples") from None
+    files = [path for ending in ("urdf", "sdf") for path in folder.glob(f"*/*/*.{ending}")]
+    count = Counter(path.stem for path in files)
+    named = {path.stem if count[path.stem] == 1 else f"{path.parts[-3].removesuffix('_description')}-{path.stem}": path
+             for path in files}
+    return dict(sorted(named.items()))
