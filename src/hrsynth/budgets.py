@@ -107,6 +107,10 @@ FINEST_INTERVAL = 2.0**-16
 """Length of an interval (of its way) below which such a proof is given up."""
 REGION_WIDER = 1.5
 """How much wider than the known poses the region is from which poses of a road map are drawn."""
+HOMOTOPY_ROUNDS = 3
+"""How often all paths of a homotopy are followed, each time on other ways, where some were lost."""
+HOMOTOPY_STEPS = 400
+"""Steps of a path after which it is given up."""
 SEARCH_STARTS = 300
 """Random starts of the whole robot, at most, from which modes are looked for where no system of equations is known for
 them."""

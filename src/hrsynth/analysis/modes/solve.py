@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from itertools import islice
 from typing import Any
@@ -11,17 +11,18 @@ import numpy as np
 
 from ...geometry.vectors import Array, frozen
 from ...tolerances import FARTHEST, NEARLY_DOUBLE, SAME_RELATION, TIP_ROUNDING, VANISHES
+from .bounds import Bound
 from .curves import Point
 from .fits import Meant, as_meant, dimension, excluded, meets, residual, stationary, torn, words
-from .msolve import solve_whole, wholes
 from .quadrics import PoseSystem
 from .roots import Root, Roots, nearly_double, solve_square
 from .squares import SquareSystem
 from .systems import System
 from .translating import Translating
+from .wholes import Proposed, by_msolve, enclosed, proposed, wholes
 
 CHOICES = 5
-"""Choices of legs that are given to msolve until one has finitely many solutions, and, besides the first, whose
+"""Choices of legs that are given to a solver until one has finitely many solutions, and, besides the first, whose
 solutions are starts for near modes."""
 
 Part = SquareSystem | PoseSystem
@@ -103,8 +104,8 @@ def solve(system: System, *, near: bool = True, goal: Array | None = None) -> Sy
     proved to be a mode; others are modes that fit if their residual is at most ``VANISHES`` and they are not excluded.
     ``near`` are the poses with a residual up to ``NEAR_MODE`` where the sum of squares is stationary, found from
     several square parts (unless ``near`` is false).
-    Tips on surfaces are left to :func:`solve_by_msolve` where no square part decides the pose; it raises
-    ``MissingExtra`` where that is not installed.
+    Where no square part decides the pose, tips on surfaces are left to a solver that proposes poses: a homotopy for
+    a rigid body, else msolve (``MissingExtra`` where that is not installed).
     """
     system, told = as_meant(system)
     return replace(_solved(system, near, goal), meant=told)
@@ -123,28 +124,31 @@ def _solved(system: System, near: bool, goal: Array | None) -> SystemModes:
             return _judged(system, square, roots,
                            ((each, solve_square(each)) for each in islice(others, CHOICES)), goal)
     if system.surfaces and not isinstance(system, Translating):
-        return _proposed(system, near, goal)
+        return _proposed(system, near, goal, proposed)
     return _undecided(system, square is not None, goal)
 
 
 def solve_by_msolve(system: System, *, near: bool = True, goal: Array | None = None) -> SystemModes:
-    """All modes of a system in the pose's own coordinates, counted by msolve and enclosed here.
+    """All modes of a system in the pose's own coordinates, proposed by msolve and enclosed here.
 
     As :func:`solve`, but solutions that coincide are counted once, and near modes are looked for from the solutions of
     one choice of legs alone. Raises ``MissingExtra``, ``Unsolved``.
     """
     system, told = as_meant(system)
-    return replace(_proposed(system, near, goal), meant=told)
+    return replace(_proposed(system, near, goal, lambda part, enough: by_msolve(part)), meant=told)
 
 
-def _proposed(system: System, near: bool, goal: Array | None) -> SystemModes:
+def _proposed(system: System, near: bool, goal: Array | None,
+              proposer: Callable[[PoseSystem, int | None], Proposed | None]) -> SystemModes:
     if system.missing:
         return _too_few(system)
     part = None
     for part in islice(wholes(system), CHOICES):
-        roots = solve_whole(part, system.balls(part.chart.frame), system.farthest)
-        if not roots.continuum:
-            return _judged(system, part, roots, () if near else None, goal)
+        most = system.bound(part.legs)
+        found = proposer(part, None if most is None else most.most)
+        if found is not None:
+            roots = enclosed(part, found, system.balls(part.chart.frame), system.farthest)
+            return _judged(system, part, roots, () if near else None, goal, most)
     return _undecided(system, part is not None, goal)
 
 
@@ -171,13 +175,13 @@ def continuum(text: str, size: int) -> SystemModes:
 
 
 def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[Part, Roots]] | None,
-            goal: Array | None) -> SystemModes:
-    """The modes among the solutions of a square part; near ones are looked for from those of others too (not at all
-    where these are None)."""
+            goal: Array | None, most: Bound | None = None) -> SystemModes:
+    """The modes among the solutions of a square part, ``most`` at most; near ones are looked for from those of others
+    too (not at all where these are None)."""
     found = [_mode(system, square, root) for root in roots.real]
     enclosed = roots.complete and all(mode.proved for mode in found)
     bound, proof = (("resultant", _proof(system, roots)) if isinstance(square, SquareSystem)
-                    else _bounded(system, square, roots))
+                    else _bounded(system, most, roots))
     if square.whole:
         return SystemModes(roots.complex, tuple(found), enclosed and bound != "none", proof, (), _special(roots), None,
                            bound, enclosed)
@@ -222,14 +226,14 @@ def _same(system: System, q: Array, goal: Array) -> bool:
     return float(np.abs(system.reached(q) - system.reached(goal)).max()) <= SAME_RELATION * system.size
 
 
-def _bounded(system: System, part: PoseSystem, roots: Roots) -> tuple[str, str]:
-    """By what there are no more solutions than msolve proposes, and the proof in words (theory.md 8)."""
-    most, proof = system.bound(part.legs), _proof(system, roots)
-    if most is not None and roots.apart and roots.complex == most[0]:
+def _bounded(system: System, most: Bound | None, roots: Roots) -> tuple[str, str]:
+    """By what there are no more solutions than a solver proposes, and the proof in words (theory.md 8)."""
+    proof = _proof(system, roots)
+    if most is not None and roots.apart and roots.complex == most.most:
         return "class", (f"{proof}; the complex ones are enclosed too, apart from each other, and there are at most "
-                         f"{most[0]}: {most[1]}")
-    limit = "" if most is None else f", of at most {most[0]}"
-    return "none", f"{proof}; found by msolve, whose count is trusted{limit}"
+                         f"{most.most}: {most.why}")
+    limit = "" if most is None else f", of at most {most.most}: {most.why}"
+    return "none", f"{proof}; that is what the solver found{limit}"
 
 
 def _near(system: System, found: Sequence[SystemMode], modes: Sequence[SystemMode], others: Iterable[tuple[Part, Roots]]

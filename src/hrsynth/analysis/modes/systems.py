@@ -18,6 +18,7 @@ import numpy as np
 from ...errors import BadRequest
 from ...geometry.vectors import Array, frozen, pose
 from ...tolerances import FARTHEST, TIP_ROUNDING
+from .bounds import Bound
 from .curves import Point, Reach, curves_of, extent, length, shifted
 from .quadrics import SLACK, UNIT, Balls, PoseParametrization, Within, WorkingFrame, spatial_frame
 from .squares import SquareSystem
@@ -141,7 +142,7 @@ class System:
         """The choices of legs that can be solved by elimination, best first."""
         raise NotImplementedError
 
-    def bound(self, legs: Sequence[int]) -> tuple[int, str] | None:
+    def bound(self, legs: Sequence[int]) -> Bound | None:
         """How many complex poses meet the conditions of a choice of legs, as many as freedoms, at most where they are
         finitely many, and why; None where that is not known."""
         return None

@@ -13,6 +13,7 @@ import numpy as np
 from ...errors import BadRequest
 from ...geometry.vectors import Array, cross
 from ...tolerances import PARALLEL, TIP_ROUNDING, VANISHES
+from .bounds import Bound
 from .curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, extent, length, shifted
 from .polynomials import Equation
 from .quadrics import (
@@ -176,7 +177,7 @@ class Articulated(Shifting):
         sides = [[each for k, each in apart.items() if self.bodies[k] == body] for body in (0, 1)]
         return max(min(side, default=math.inf) for side in sides), 0.0
 
-    def bound(self, legs: Sequence[int]) -> tuple[int, str] | None:
+    def bound(self, legs: Sequence[int]) -> Bound | None:
         """Bézout for p in space and the slide's circle (degree 2): of a body's spheres all but one are planes by their
         differences, and those of the other body are linear in p then: 2 · 2 m, m the other body's conditions; without
         spheres 2 m."""
@@ -186,7 +187,7 @@ class Articulated(Shifting):
         if sum(counts) != self.freedoms or not all(counts):
             return None
         found = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
-        return min(found), "the product of degrees in space and on the circle (Bézout)"
+        return Bound(min(found), "the product of degrees in space and on the circle (Bézout)")
 
     def chart(self, number: int) -> PoseParametrization:
         """p, cos θ and sin θ."""

@@ -1,0 +1,222 @@
+"""How many poses of a rigid body six conditions on its points leave, at most (docs/pages/theory.md, section 8).
+
+A pose is a point (h : M : x : y : r) of P¹⁶ with M = h R, x = h Rᵀp, y = h p, r = h |p|². Such points and their limits
+are an irreducible variety X of dimension 6 and degree 40 (M. Gallet, G. Nawratil, J. Schicho, J. Geom. 106, 2015;
+F. Ronga, T. Vust 1995), and a condition on a point b is one linear equation there,
+
+    a₀ b₀ r + 2 a₀ x·b − 2 b₀ y·a − 2 aᵀM b + c h = 0,
+
+*on a sphere* about a with a₀ = b₀ = 1, *in a plane* of normal a with a₀ = 0, an *angle* of an arrow b with a₀ = b₀ = 0.
+So six conditions have at most 40 isolated poses, and 40 of them leave no curve of poses: each component of the
+intersection counts its degree at least, and an isolated point its multiplicity on X (W. Fulton, Intersection theory,
+12.3 and 12.4).
+
+That lowers the bound where points with h = 0 are known. M = v uᵀ, x = μ u, y = λ v, r = 2 λ μ, with v·v = u·u = 0,
+gives −2 (v·a − μ a₀)(u·b + λ b₀) for the left side: it vanishes for all conditions where each has its a on the real
+line that v and μ determine, or its b on that of u and λ. Near such a point X is C⁴ × {h r = ν²} to first order, with
+tangents M = s₁ n uᵀ + s₂ v mᵀ + h n mᵀ, x = μ u + ν m, y = λ v + ν n, r, where n and m are the unit vectors along the
+lines: a double point. It is isolated among all solutions if the six equations leave one direction of these seven, off
+the cone.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import combinations, product
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .curves import Circle, Line, Plane, Point, Sphere
+from .quadrics import UNIT, direction, normals
+from .roots import PRECISION
+
+if TYPE_CHECKING:
+    from .rigid import Spatial
+
+DEGREE = 40
+"""The degree of X: of the poses of a rigid body among 16 coordinates."""
+
+FORMS = 7
+"""Directions in which X extends at one of its double points."""
+
+
+_Name = tuple[float, ...]
+_Pair = tuple[_Name, _Name]
+
+
+@dataclass(frozen=True)
+class Bound:
+    """At most so many isolated poses, none besides if that many are, and why.
+
+    ``doubles``: two (a₀, a) and two (b₀, b) each, on the lines of double points of X that solve all equations.
+    """
+
+    most: int
+    why: str
+    doubles: tuple[tuple[_Pair, _Pair], ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class _Condition:
+    """One linear equation: a, a₀, b, b₀, c as above, a and b with the origins of base and platform at o and w.
+
+    ``names`` are (a₀, a) and (b₀, b) in the system's own coordinates, equal for equal points."""
+
+    names: tuple[_Name, _Name]
+    a0: int
+    b0: int
+    a: Any
+    b: Any
+    squared: Any
+    """ρ² of a sphere; 2 a · (what is in the plane) of a plane."""
+
+    def moved(self, o: Any, w: Any) -> tuple[Any, Any, Any]:
+        """a, b, c about other origins."""
+        a, b = self.a - self.a0 * o, self.b - self.b0 * w
+        c = a @ a + b @ b - self.squared if self.a0 else self.squared - 2 * self.b0 * (a @ o)
+        return a, b, c
+
+
+def rigid_bound(system: Spatial, legs: Sequence[int]) -> Bound:
+    """The least of the bounds that hold for the six conditions of some legs."""
+    curves = [system.curves[k] for k in legs]
+    if sorted(system.forbids[k] for k in legs) == [1, 2, 3]:
+        return Bound(4, "two places of a tip on its curve, two turns about the line to the tip at rest for each")
+    if any(isinstance(curve, Point) for curve in curves) or all(isinstance(curve, Line | Plane) for curve in curves):
+        # with planes p is a linear function of R
+        return Bound(8, "three quadrics of the quaternion (Bézout)")
+    tower = _tower(system, legs) if all(isinstance(curve, Sphere) for curve in curves) else None
+    degree = degree_bound(system, legs)
+    return degree if tower is None or degree.most < tower.most else tower
+
+
+def _tower(system: Spatial, legs: Sequence[int]) -> Bound | None:
+    """Rods that share a ball, one after another: three leave it two places."""
+    sides = [{k: tuple(system.tips[k].tolist()) for k in legs},
+             {k: tuple(system.curves[k].centre.tolist()) for k in legs}]
+    three = next(([k for k in legs if side[k] == ball] for side in sides for ball, count in
+                  Counter(side.values()).items() if count == 3), None)
+    if three is None:
+        return None
+    rest = [k for k in legs if k not in three]
+    if any(len({side[k] for k in rest}) == 2 for side in sides):
+        # the ball of two more rods is at known distances from three points of the other body, the first ball for one;
+        # then a turn about the line through both balls is left
+        return Bound(8, "two places of a ball with three rods, two of a ball with two more, two turns about their line")
+    return Bound(16, "two places of a ball with three rods, three quadrics of the quaternion for each (Bézout)")
+
+
+def degree_bound(system: Spatial, legs: Sequence[int]) -> Bound:
+    """40, or less by the double points that are proved to be isolated solutions, for all input in the balls."""
+    from flint import ctx
+
+    found, known = list[tuple[_Pair, _Pair]](), list[_Double]()
+    with ctx.workprec(PRECISION):
+        rows = list(_conditions(system, legs))
+        for a, b in _covers(rows):
+            points = [each for each in _doubles(rows, a, b) if all(each.apart(other) for other in known)]
+            known += points
+            found += [(a, b)] * bool(points)
+    why = "six conditions on points of a rigid body (degree of the poses among 16 coordinates"
+    if known:
+        why += f", less 2 for each of {len(known)} isolated double points at infinity"
+    return Bound(DEGREE - 2 * len(known), f"{why})", tuple(found))
+
+
+def _conditions(system: Spatial, legs: Sequence[int]) -> Iterator[_Condition]:
+    """The equations of some legs in working coordinates."""
+    frame = system.frame
+    numbers = system.balls(frame)
+    for k in legs:
+        reach, arrow = system.curves[k], k >= len(system.points)
+        b, b0 = numbers.vector(system.tips[k] / frame.size) / UNIT, int(not arrow)
+        centre = numbers.vector(frame.point(reach.centre)) / UNIT
+        start = numbers.vector(frame.point(system.hub)) / UNIT if arrow else 0
+        name = (b0, *system.tips[k].tolist())
+        for n in normals(reach) if isinstance(reach, Circle | Line | Plane) else ():
+            a = direction(n, frame, numbers) / UNIT
+            yield _Condition(((0, *n.tolist()), name), 0, b0, a, b, 2 * (a @ (centre - start)))
+        if isinstance(reach, Circle | Sphere):
+            rho = numbers.vector(np.array([reach.radius / frame.size]))[0] / UNIT
+            yield _Condition(((1, *reach.centre.tolist()), name), 1, b0, centre, b, rho * rho)
+
+def _covers(rows: Sequence[_Condition]) -> Iterator[tuple[_Pair, _Pair]]:
+    """Two a's and two b's, not both of either at infinity, such that each condition has one of them, and all needed."""
+    sides = [list(dict.fromkeys(row.names[side] for row in rows)) for side in (0, 1)]
+    pairs = [[pair for pair in combinations(names, 2) if pair[0][0] or pair[1][0]] for names in sides]
+    for a, b in product(*pairs):
+        if ({row.names[0] for row in rows if row.names[1] not in b} == set(a)
+                and {row.names[1] for row in rows if row.names[0] not in a} == set(b)):
+            yield a, b
+
+
+@dataclass(frozen=True, eq=False)
+class _Double:
+    """A double point: v on a line through o of the base, u on one through w of the platform; shapes (3,)."""
+
+    o: Any
+    v: Any
+    n: Any
+    w: Any
+    u: Any
+    m: Any
+
+    def apart(self, other: _Double) -> bool:
+        """Whether two of them are surely not one."""
+        tests = [*np.cross(self.v, other.v), *np.cross(self.u, other.u), other.v @ (self.o - other.o),
+                 other.u @ (self.w - other.w)]
+        return any(not each.contains(0) for each in tests)
+
+    def solves_alone(self, rows: Sequence[_Condition]) -> bool:
+        """Whether no other solution is near."""
+        from flint import acb, acb_mat
+
+        table = []
+        for row in rows:
+            a, b, c = row.moved(self.o, self.w)
+            va, na, ub, mb = self.v @ a, self.n @ a, self.u @ b, self.m @ b
+            table.append([-2 * na * ub, -2 * va * mb, 2 * row.a0 * ub, -2 * row.b0 * va, c - 2 * na * mb,
+                          2 * (row.a0 * mb - row.b0 * na), acb(row.a0 * row.b0)])
+        middles = np.array([[complex(each) for each in row] for row in table])
+        k = int(np.argmax(np.abs(np.linalg.svd(middles)[2][-1])))
+        try:
+            rest = acb_mat([row[:k] + row[k + 1:] for row in table]).solve(acb_mat([[-row[k]] for row in table]))
+        except ZeroDivisionError:
+            return False
+        left = [rest[i, 0] for i in range(FORMS - 1)]
+        h, nu, r = [*left[:k], acb(1), *left[k:]][-3:]
+        return not (h * r - nu * nu).contains(0)
+
+
+def _doubles(rows: Sequence[_Condition], a: _Pair, b: _Pair) -> Iterator[_Double]:
+    """The double points of two lines that are proved to be isolated solutions."""
+    base, platform = ([next((row.a, row.b)[side] for row in rows if row.names[side] == name) for name in pair]
+                      for side, pair in enumerate((a, b)))
+    (o, n, first), (w, m, second) = _line(a, base), _line(b, platform)
+    for sign, other in product((1, -1), repeat=2):
+        # v = e₁ + i e₂, n = e₁ × e₂, but u = f₁ − i f₂, m = f₁ × f₂: R is a turn from (f₁, f₂, m) to (e₁, e₂, n)
+        found = _Double(o, _isotropic(first, sign * n, 1), sign * n, w, _isotropic(second, other * m, -1), other * m)
+        if found.solves_alone(rows):
+            yield found
+
+
+def _line(names: _Pair, points: Sequence[Any]) -> tuple[Any, Any, Any]:
+    """A point of the line through two, one of which may be a direction, its unit vector and one normal to that."""
+    one, other = points if names[0][0] else reversed(points)
+    along = other - one if names[0][0] and names[1][0] else other
+    across = np.eye(3, dtype=int).astype(object)[int(np.argmin([abs(float(x)) for x in along]))]
+    return one, _unit(along), _unit(np.cross(along, across))
+
+
+def _isotropic(first: Any, n: Any, sign: int) -> Any:
+    """first ± i n × first."""
+    from flint import acb
+
+    return np.array([acb(x, sign * y) for x, y in zip(first, np.cross(n, first), strict=True)], dtype=object)
+
+
+def _unit(v: Any) -> Any:
+    return v / (v @ v).sqrt()

@@ -1,0 +1,235 @@
+"""All poses of a rigid body under six conditions on its points, proposed by a homotopy (theory.md, section 8).
+
+In Study's coordinates (e, g) such conditions are combinations of seventeen quadrics, so that six with random complex
+coefficients (a *section*, with 40 solutions, which are kept in a file) can be moved to the wanted ones along a straight
+line. Its solutions move along 40 paths, and each isolated wanted one is the end of a path: with probability one (A.
+Sommese, C. Wampler, The numerical solution of systems of polynomials, 2005, 7.1), and up to rounding. So nothing is
+proved here: what is found is enclosed, and counted against a bound, elsewhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+
+from ...budgets import HOMOTOPY_ROUNDS, HOMOTOPY_STEPS
+from ...geometry.vectors import Array
+from ...tolerances import FARTHEST, POLISHED, SAME_END, SAME_SINGULAR_END, SINGULAR_END
+from .polynomials import Quadric
+from .study import forms
+
+FIRST_STEP, SHORTEST_STEP, LAST_STEP = 0.05, 1e-12, 1e-9
+"""Part of the way that is gone first, at which a path is given up, and that may be left at its end."""
+NEAR_PATH, ON_PATH, EASY = 1e-2, 1e-6, 0.05
+"""Newton's first step after a step of the way, its second (unit vectors), and the part of the first one allowed at
+which the next step of the way is twice as long."""
+POLISHES, ROUNDS = 4, 40
+"""Newton's steps at each end, and at a singular one."""
+
+
+@dataclass(frozen=True, eq=False)
+class Ends:
+    """Where the paths end: at ``solutions`` (m, 7), singular ones ``multiple`` times, real or with their conjugates;
+    ``infinite``: how many end at no solution, ``lost``: how many were given up.
+
+    ``loose``: singular ends, each met by one path: a continuum of solutions ends paths anywhere.
+    """
+
+    solutions: Array
+    multiple: tuple[int, ...]
+    infinite: int
+    lost: int
+    loose: int
+
+
+def section() -> Array:
+    """The start: the equation e·g = 0 and six combinations of the forms, with coefficients of length one; shape
+    (7, 8, 8)."""
+    normal, quadrics = forms()
+    turns = np.array([pow(5, k + 1, 10007) for k in range(6 * len(quadrics))]) / 10007
+    return np.concatenate([normal[None], np.tensordot(np.exp(2j * np.pi * turns).reshape(6, -1), quadrics, 1)])
+
+
+@lru_cache(maxsize=1)
+def _start() -> tuple[Array, Array]:
+    """The section and its solutions (40, 8), unit vectors, found once by monodromy."""
+    x = np.load(Path(__file__).with_name("section.npy")).astype(complex)
+    return section(), _newton(section(), x, 2)[0]
+
+
+def ends(quadrics: Sequence[Quadric], study: Array, resting: Sequence[int] = (), enough: int | None = None) -> Ends:
+    """The ends of all paths to seven quadrics in unknowns x; other paths are taken where some were lost and fewer than
+    ``enough`` solutions found.
+
+    ``study`` (8, 8) times (1, x) are (e, g). The first quadric is e·g = 0, the others are conditions on points, and
+    ``resting`` are those three that hold one of them: with the first, they make g a linear function of e. Then three
+    quadrics of e are left, and eight paths.
+    """
+    back = np.linalg.inv(study)
+    wanted = np.array([back.T @ np.asarray(each.A, dtype=float) @ back for each in quadrics])
+    wanted = wanted + wanted.transpose(0, 2, 1)
+    wanted = wanted / np.abs(wanted).max(axis=(1, 2))[:, None, None]
+    lift = np.vstack([np.eye(4), _turning(wanted[[0, *resting]])]) if resting else np.eye(8)
+    to = lift.T @ np.delete(wanted, [0, *resting] if resting else [], axis=0) @ lift
+    start, x = _corners() if resting else _start()
+    found = _Sorted()
+    for number in range(HOMOTOPY_ROUNDS):
+        with np.errstate(all="ignore"):
+            at = _normed(_followed(start * np.exp(1j * (1.2 + 2.0 * number)), to, x) @ lift.T)
+            found = _sorted(wanted, at, found.sharp)
+        if not found.lost or len(found.sharp) >= (enough or len(x)):
+            break
+    at = np.array([*found.sharp, *found.singular]).reshape(-1, 8) @ back.T
+    multiple = (1,) * len(found.sharp) + found.multiple
+    return Ends(at[:, 1:] / at[:, :1], multiple, found.infinite, found.lost, found.loose)
+
+
+def _corners() -> tuple[Array, Array]:
+    """Three quadrics of e, shape (3, 4, 4), and their eight solutions (8, 4): eₖ² = cₖ² e₀²."""
+    c, one = np.exp(1j * np.arange(4)), np.eye(4)
+    start = np.array([np.diag(one[k] - c[k] ** 2 * one[0]) for k in range(1, 4)])
+    return start, _normed(np.array([c * signs for signs in product((1.0,), *[(1.0, -1.0)] * 3)]))
+
+
+def _turning(quadrics: Array) -> Array:
+    """G, shape (4, 4), with g = G e where quadrics (4, 8, 8) without squares of g vanish: on (e, G e) they are zero."""
+    columns = [[form + form.T for form in quadrics[:, :4, 4:] @ unit.reshape(4, 4)] for unit in np.eye(16)]
+    table = np.array(columns).reshape(16, -1).T
+    return np.asarray(np.linalg.lstsq(table, -quadrics[:, :4, :4].ravel(), rcond=None)[0].reshape(4, 4))
+
+
+def _followed(start: Array, wanted: Array, x: Array) -> Array:
+    """The ends of the paths from x (m, d), or how far they were followed: Runge and Kutta's steps, each corrected by
+    Newton's method, all paths at once and each with steps of its own."""
+    both = np.moveaxis(np.concatenate([start, wanted]), 0, 1).reshape(x.shape[1], -1)
+    t, h, x = np.zeros(len(x)), np.full(len(x), FIRST_STEP), x.copy()
+
+    def jacobians(x: Array, t: Array) -> tuple[Array, Array]:
+        parts = 2.0 * (x @ both).reshape(len(x), 2, -1, x.shape[1])
+        return parts[:, 0] + t[:, None, None] * (parts[:, 1] - parts[:, 0]), parts[:, 1] - parts[:, 0]
+
+    def tangent(x: Array, t: Array) -> Array:
+        J, change = jacobians(x, t)
+        return _step(J, x, np.einsum("nij,nj->ni", change, x) / 2.0)
+
+    def correction(x: Array, t: Array) -> Array:
+        J, _ = jacobians(x, t)
+        return _step(J, x, np.einsum("nij,nj->ni", J, x) / 2.0)
+
+    active = np.arange(len(x))
+    for _ in range(HOMOTOPY_STEPS):
+        if not len(active):
+            break
+        at, now = x[active], t[active]
+        step = np.where(1.0 - now - h[active] < LAST_STEP, 1.0 - now, h[active])
+        half, then = now + step / 2.0, np.where(step >= 1.0 - now, 1.0, now + step)
+        s = step[:, None]
+        k1 = tangent(at, now)
+        k2 = tangent(at + s / 2.0 * k1, half)
+        k3 = tangent(at + s / 2.0 * k2, half)
+        k4 = tangent(at + s * k3, then)
+        at = _normed(at + s / 6.0 * (k1 + 2.0 * k2 + 2.0 * k3 + k4))
+        first = correction(at, then)
+        at = at + first
+        second = correction(at, then)
+        first, second = np.linalg.norm(first, axis=1), np.linalg.norm(second, axis=1)
+        good = (first < NEAR_PATH) & (second < ON_PATH)
+        x[active[good]], t[active[good]] = _normed(at)[good], then[good]
+        h[active] = np.where(good, np.where(first < EASY * NEAR_PATH, 2.0 * step, step), step / 2.0)
+        active = active[(t[active] < 1.0) & (h[active] > SHORTEST_STEP)]
+    return x
+
+
+@dataclass(frozen=True, eq=False)
+class _Sorted:
+    """As :class:`Ends`, in unit vectors."""
+
+    sharp: Sequence[Array] = ()
+    singular: Sequence[Array] = ()
+    multiple: tuple[int, ...] = ()
+    infinite: int = 0
+    lost: int = 0
+    loose: int = 0
+
+
+def _sorted(wanted: Array, x: Array, known: Sequence[Array]) -> _Sorted:
+    """What the ends (m, 8) of paths are, with solutions that are ``known`` already."""
+    paths = len(x)
+    x, steps = _newton(wanted, x, POLISHES)
+    infinite = _distance(x) > FARTHEST
+    sharp = ~infinite & (steps < POLISHED)
+    poses = _conjugates([*known, *x[sharp]])
+    vague, steps = _newton(wanted, x[~infinite & ~sharp], ROUNDS)
+    values = np.linalg.svd(_bordered(2.0 * np.einsum("kij,nj->nki", wanted, vague), vague), compute_uv=False)
+    vague = vague[(steps < SAME_END) & (values[:, -1] < SINGULAR_END) & (_distance(vague) < FARTHEST)]
+    groups: list[list[Array]] = []
+    for each in vague:
+        group = next((group for group in groups if _apart(each, group[0]) < SAME_SINGULAR_END), [])
+        groups += [] if group else [group]
+        group.append(each)
+    several = [group for group in groups if len(group) > 1]
+    multiple = tuple(len(group) for group in several)
+    far = int(infinite.sum())
+    return _Sorted(poses, [_turned(group[0]) for group in several], multiple, far,
+                  max(0, paths - far - len(poses) - sum(multiple)), len(groups) - len(several))
+
+
+def _conjugates(x: Sequence[Array]) -> list[Array]:
+    """Distinct vectors up to factors, each with its conjugate; real ones without imaginary parts."""
+    found: list[Array] = []
+    for each in map(_turned, x):
+        if all(_apart(each, other) > SAME_END for other in found):
+            found += [each] if np.isrealobj(each) else [each, each.conj()]
+    return found
+
+
+def _turned(x: Array) -> Array:
+    """A vector with its largest entry made real; real if all others are then, nearly."""
+    largest = x[np.argmax(np.abs(x))]
+    x = x * (abs(largest) / largest)
+    return x.real if np.abs(x.imag).max() < SAME_END else x
+
+
+def _apart(one: Array, other: Array) -> float:
+    """How far two unit vectors are apart, up to factors."""
+    return float(np.linalg.norm(one - other * np.vdot(other, one)))
+
+
+def _distance(x: Array) -> Array:
+    """How far the poses (n, 8) are away (sizes), at least."""
+    e, g = x[:, :4], x[:, 4:]
+    return 2.0 * np.linalg.norm(g, axis=1) * np.linalg.norm(e, axis=1) / (np.abs((e * e).sum(axis=1)) + 1e-300)
+
+
+def _newton(quadrics: Array, x: Array, rounds: int) -> tuple[Array, Array]:
+    """Unit vectors (m, 8) after so many of Newton's steps, and how long the last ones were."""
+    steps = np.zeros(len(x))
+    for _ in range(rounds):
+        J = 2.0 * np.einsum("kij,nj->nki", quadrics, x)
+        step = _step(J, x, np.einsum("nki,ni->nk", J, x) / 2.0)
+        steps = np.linalg.norm(step, axis=1)
+        x = np.where(steps[:, None] < 1.0, _normed(x + step), x)
+    return x, steps
+
+
+def _step(J: Array, x: Array, F: Array) -> Array:
+    """The solution of J d = −F, normal to x; not finite where there is none."""
+    right = np.concatenate([-F, np.zeros((len(x), 1))], axis=1)[:, :, None]
+    try:
+        return np.asarray(np.linalg.solve(_bordered(J, x), right)[:, :, 0])
+    except np.linalg.LinAlgError:
+        return np.full(x.shape, np.inf, dtype=complex)
+
+
+def _bordered(J: Array, x: Array) -> Array:
+    """J (m, n, n + 1) with the conjugate of x below."""
+    return np.concatenate([J, x.conj()[:, None]], axis=1)
+
+
+def _normed(x: Array) -> Array:
+    return np.asarray(x / np.linalg.norm(x, axis=1, keepdims=True))

@@ -1,0 +1,180 @@
+"""All poses for tips on curves or surfaces, with the pose's own coordinates as unknowns.
+
+Solutions are proposed, for a rigid body by a homotopy, else by msolve. Each is enclosed here, from the equations, with
+existence and uniqueness proved.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from ...tolerances import BALL_ZERO, BOXES_APART, FARTHEST
+from .curves import Point
+from .homotopy import ends
+from .msolve import Parametrisation, parametrised
+from .polynomials import Quadric, krawczyk
+from .quadrics import UNIT, Balls, Moving, PoseParametrization, PoseSystem, Rounded, Within
+from .roots import PRECISION, PRECISIONS, Enclosing, Roots, Solution, all_solutions, is_real, sharp
+from .systems import System
+
+
+@dataclass(frozen=True, eq=False)
+class Proposed:
+    """Solutions that a solver proposes, of so many in all but ``extraneous`` ones that are no poses; ``lost``: how many
+    more there may be."""
+
+    solutions: tuple[Solution, ...]
+    method: str
+    extraneous: int = 0
+    lost: int = 0
+
+
+def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
+    """The choices of legs with just as many equations as freedoms, then those with too many."""
+    chart = system.chart(number)
+    for size in range(1, len(system.curves) + 1):
+        for legs in combinations(range(len(system.curves)), size):
+            if sum(system.forbids[k] for k in legs) == system.freedoms and not system.left(legs):
+                yield PoseSystem(legs, chart, size == len(system.curves))
+    for size in range(1, len(system.curves) + 1):
+        for legs in combinations(sorted(range(len(system.curves)), key=lambda k: -system.forbids[k]), size):
+            given = [system.forbids[k] for k in legs]
+            if sum(given) > system.freedoms > sum(given[:-1]) and not system.left(legs):
+                yield PoseSystem(legs, chart, False)
+
+
+def proposed(part: PoseSystem, enough: int | None) -> Proposed | None:
+    """All solutions, up to rounding, ``enough`` at most; None where there seem to be infinitely many.
+
+    Raises ``MissingExtra``, ``Unsolved`` where msolve is needed."""
+    return by_msolve(part) if part.chart.study is None else by_homotopy(part, enough)
+
+
+def by_homotopy(part: PoseSystem, enough: int | None) -> Proposed | None:
+    """All poses of a rigid body, up to rounding, ``enough`` at most; None where there seems to be a continuum."""
+    from flint import acb
+
+    assert part.chart.study is not None
+    found = ends(part.equations(), part.chart.study, _resting(part), enough)
+    if found.loose:
+        return None
+    values = [[acb(v.real, v.imag) for v in row] for row in found.solutions.tolist()]
+    return Proposed(tuple(zip(values, found.multiple, strict=True)), "homotopy", found.infinite, found.lost)
+
+
+def _resting(part: PoseSystem) -> tuple[int, ...]:
+    """The places of the three equations of a tip at rest among all; none where there is none."""
+    counts = [3 - part.chart.reaches[k].freedoms for k in part.legs]
+    first = next((k for k, leg in enumerate(part.legs) if isinstance(part.chart.reaches[leg], Point)), None)
+    if first is None or sum(counts) != part.chart.count - len(part.chart.own):
+        return ()
+    before = len(part.chart.own) + sum(counts[:first])
+    return tuple(range(before, before + 3))
+
+
+def by_msolve(part: PoseSystem) -> Proposed | None:
+    """All solutions, distinct ones once; None where they are infinitely many.
+
+    Raises ``MissingExtra``, ``Unsolved``."""
+    equations, nonzero = part.equations(), part.chart.nonzero
+    answer = parametrised(equations)
+    if answer is None and nonzero is not None:
+        answer, nonzero = parametrised(equations, nonzero), None
+    if answer is None:
+        return None
+    solutions = all_solutions(answer.polynomial, lambda t, m: _over(answer, nonzero, t, m))
+    poses = tuple(each for each in solutions if not _no_pose(nonzero, each[0]))
+    lost = answer.polynomial.degree() - len(solutions)
+    return Proposed(poses, "msolve's parametrisation", len(solutions) - len(poses), lost)
+
+
+def enclosed(part: PoseSystem, proposed: Proposed | None, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
+    """What is proposed for a choice of legs, as :func:`solve_square` gives it."""
+    from flint import ctx
+
+    if proposed is None:
+        return Roots(complete=False, continuum=True)
+    with ctx.workprec(PRECISION):
+        thick = part.equations(balls)
+    found = _Tips(balls, part.equations(), thick, part.chart).all_of(
+        proposed.solutions, len(proposed.solutions) + proposed.lost, farthest)
+    with ctx.workprec(PRECISION):
+        apart = not found.far and all(root.real and root.thick for root in found.real) and _apart(
+            part.chart, thick, [root.parameters for root in found.real],
+            [values for values in found.values if not is_real(values)])
+    return replace(found, extraneous=proposed.extraneous, apart=apart, method=proposed.method)
+
+
+@dataclass(frozen=True, eq=False)
+class _Tips(Enclosing):
+    """Solutions in the pose's own coordinates, told by where the legs' tips are."""
+
+    chart: PoseParametrization
+    method = ""
+
+    @cached_property
+    def _rounded(self) -> list[Moving]:
+        return self.chart.tips(Rounded)
+
+    def distance(self, values: Sequence[Any]) -> float:
+        x = np.array([1.0, *(complex(v) for v in values)])
+        return max(float(np.abs(np.einsum("i,ijd,j->d", x, tip.N.astype(float), x)).max()
+                         / (abs(x @ tip.w.astype(float) @ x) * UNIT + 1e-300)) for tip in self._rounded)
+
+    def parameters(self, values: Sequence[Any]) -> tuple[Any, ...]:
+        return tuple(values)
+
+    def misses(self, own: Sequence[Any], values: Sequence[Any]) -> tuple[float, ...]:
+        x = np.array([1, *values], dtype=object)
+        found = []
+        for tip in self.chart.tips(self.balls):
+            w = (x @ tip.w @ x) * UNIT
+            radii = [float(((x @ tip.N[:, :, k] @ x) / w).rad()) for k in range(tip.N.shape[2])]
+            found.append(2.0 * self.chart.frame.size * math.hypot(*radii))
+        return tuple(found)
+
+
+def _apart(chart: PoseParametrization, thick: Sequence[Any], real: Sequence[Sequence[Any]],
+           values: Sequence[Sequence[Any]]) -> bool:
+    """Whether all solutions, ``real`` ones in their boxes already, have boxes with one pose each, and no two the same;
+    complex ones with their conjugates, so that none is real."""
+    boxes = list(real)
+    upper = [each for each in values if next(float(v.imag) for v in each if not v.imag.is_zero()) > 0]
+    for start in upper:
+        box = krawczyk(thick, start)
+        if box is None:
+            return False
+        boxes += [box, [v.conjugate() for v in box]]
+    if 2 * len(upper) != len(values) or any(
+            chart.nonzero is not None and chart.nonzero.value(box).contains(0) for box in boxes):
+        return False
+    if not boxes:
+        return True
+    m = np.array([[complex(v.mid()) for v in box] for box in boxes])
+    r = np.array([[float(v.rad()) for v in box] for box in boxes]) * (1.0 + BOXES_APART) + BOXES_APART * np.abs(m)
+    touching = np.all(np.abs(m[:, None] - m[None]) <= r[:, None] + r[None], axis=2)
+    return bool(touching.sum() == len(m))
+
+
+def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
+    """The solution over a root; none where it is not finite or it cannot be told whether it is a pose."""
+    values = answer.others(t)
+    if not all(sharp(v) for v in values):
+        return []
+    told = nonzero is None or float(nonzero.value(values).rad()) < BALL_ZERO
+    return [(values, multiplicity)] if told else []
+
+
+def _no_pose(nonzero: Quadric | None, values: Sequence[Any]) -> bool:
+    """Whether what vanishes at no pose vanishes, to ``BALL_ZERO``, at complex coordinates."""
+    from flint import ctx
+
+    with ctx.workprec(PRECISION << PRECISIONS):
+        return nonzero is not None and bool(nonzero.value(values).contains(0))
