@@ -17,7 +17,7 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "pictures"
-FAR = "--from x=0,y=0,z=-0.75,phi=0 --to x=-0.2,y=0,z=-0.56,phi=0"
+FAR = "--start x=0,y=0,z=-0.75,phi=0 --goal x=-0.2,y=0,z=-0.56,phi=0"
 """The displacement of MMT 5.1.3."""
 
 
@@ -57,7 +57,7 @@ PICTURES: dict[str, str | Page] = {
     "report_quattro.png": report("quattro --observe 1,4"),
     "report_rrrrr_m1.png": report("rrrrr_m1"),
     "report_uranesx.png": report("uranesx"),
-    "servo_3rpr.png": "servo 3rpr_m1 --from x=-0.08,y=-0.06,phi=-10deg --to x=0.034,y=0.23,phi=23deg",
+    "servo_3rpr.png": "servo 3rpr_m1 --start x=-0.08,y=-0.06,phi=-10deg --goal x=0.034,y=0.23,phi=23deg",
     "servo_quattro.gif": f"servo quattro --observe 1,4 {FAR} --physics --sense pictures",
     "servo_quattro.png": f"servo quattro --observe 1,4 {FAR}",
     "view_3rrr.png": view("3rrr_m1"),

@@ -451,9 +451,9 @@ def test_singular_answers_3_where_condition_and_rank_disagree(run, tmp_path: Pat
 
 
 @pytest.mark.parametrize(("arguments", "verdict"), [
-    (["rrrrr_m1", "--from", "x=0.05", "--to", "x=-0.01,y=0.03"], "same aspect"),
-    (["3rrr_m1", "--from", "x=0,y=0", "--to", "x=-0.091,y=-0.053,phi=0.1"], "separated"),
-    (["3rps", "--from", "z=0.5", "--to", "z=0.51"], "undecided")])
+    (["rrrrr_m1", "--start", "x=0.05", "--goal", "x=-0.01,y=0.03"], "same aspect"),
+    (["3rrr_m1", "--start", "x=0,y=0", "--goal", "x=-0.091,y=-0.053,phi=0.1"], "separated"),
+    (["3rps", "--start", "z=0.5", "--goal", "z=0.51"], "undecided")])
 def test_path_json_is_the_contract_whatever_the_verdict(run, arguments: list[str], verdict: str):
     data = run("path", *arguments, "--json").data
     check_record(data, "path", arguments[0])
@@ -472,13 +472,13 @@ def test_path_json_is_the_contract_whatever_the_verdict(run, arguments: list[str
 
 @pytest.mark.parametrize("name", ["delta", "linear_delta", "quattro_rigid", "rrrrr_m1"])
 def test_path_of_too_few_legs_is_undecided(run, name: str):
-    data = run("path", name, "--observe", "1", "--from", "x=0.01", "--to", "x=0.02", "--json").data
+    data = run("path", name, "--observe", "1", "--start", "x=0.01", "--goal", "x=0.02", "--json").data
     assert data["verdict"] == "undecided"
     assert "every pose is singular" in data["reason"]
 
 
 def test_path_text_has_the_verdict_the_path_and_what_is_not_proved(run):
-    answer = run("path", "quattro", "--observe", "1,4", "--from", "x=0.05", "--to", "x=-0.05,phi=20deg")
+    answer = run("path", "quattro", "--observe", "1,4", "--start", "x=0.05", "--goal", "x=-0.05,phi=20deg")
     assert (answer.status, answer.err) == (0, "")
     assert re.search(r"^verdict +same aspect \(certified\)$", answer.out, re.MULTILINE)
     assert re.search(r"^path +x=0.05,", answer.out, re.MULTILINE)
@@ -486,11 +486,11 @@ def test_path_text_has_the_verdict_the_path_and_what_is_not_proved(run):
 
 
 @pytest.mark.parametrize(("arguments", "status", "words"), [
-    (["--from", "x=0", "--to", "x=9"], 3, ["x=9", "is not reached"]),
-    (["--from", "x=0", "--to", "w=9"], 2, ["unknown part", "'w'"]),
-    (["--from", "x=0", "--to", "z=0.1"], 2, ["cannot change z"]),
-    (["--from", "x=0", "--to", "x=0.01", "--observe", "7"], 2, ["no leg or link", "'7'"]),
-    (["--from", "x=0"], 2, ["--to"])])
+    (["--start", "x=0", "--goal", "x=9"], 3, ["x=9", "is not reached"]),
+    (["--start", "x=0", "--goal", "w=9"], 2, ["unknown part", "'w'"]),
+    (["--start", "x=0", "--goal", "z=0.1"], 2, ["cannot change z"]),
+    (["--start", "x=0", "--goal", "x=0.01", "--observe", "7"], 2, ["no leg or link", "'7'"]),
+    (["--start", "x=0"], 2, ["--goal"])])
 def test_path_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
     (line,) = run("path", "3rrr_m1", *arguments).refused(status)
     assert all(word in line for word in words)
@@ -553,7 +553,7 @@ def test_modes_refuses_what_does_not_fit(run, arguments: list[str], status: int,
 
 def test_servo_json_is_the_contract(run, tmp_path: Path):
     picture = tmp_path / "run.png"
-    data = run("servo", "rrrrr_m1", "--from", "x=0,y=0.2", "--to", "x=0.02,y=0.22", "-o", picture, "--json").data
+    data = run("servo", "rrrrr_m1", "--start", "x=0,y=0.2", "--goal", "x=0.02,y=0.22", "-o", picture, "--json").data
     check_record(data, "servo", "rrrrr_m1")
     assert (data["ended"], data["matched_mode"], data["noise"]) == ("goal", None, None)
     assert data["pose"]["x"] == pytest.approx(0.02, abs=1e-8)
@@ -566,7 +566,7 @@ def test_servo_json_is_the_contract(run, tmp_path: Path):
 
 
 def test_servo_text_names_the_mode_and_how_far_it_is(run):
-    answer = run("servo", "quattro_rigid", "--observe", "1,2", "--from", "x=0.1,y=0.04,z=-0.93", "--to",
+    answer = run("servo", "quattro_rigid", "--observe", "1,2", "--start", "x=0.1,y=0.04,z=-0.93", "--goal",
                  "x=0,y=-0.25,z=-0.7", "--gain", "5")
     assert (answer.status, answer.err) == (0, "")
     assert re.search(r"^ended +mode after", answer.out, re.MULTILINE)
@@ -576,25 +576,25 @@ def test_servo_text_names_the_mode_and_how_far_it_is(run):
 
 
 @pytest.mark.parametrize(("arguments", "words"), [
-    (["--to", "x=9"], ["x=9", "is not reached"]),
-    (["--to", "x=0.1", "--observe", "1"], ["do not see", "hrsynth legs"]),
-    (["--to", "x=0.1", "--observe", "7"], ["no leg or link", "'7'"]),
-    (["--to", "x=0.1", "--noise", "90deg"], ["noise", "90deg", "less than 90deg"]),
-    (["--to", "x=0.1", "--noise", "1px"], ["1px", "an angle"]),
-    (["--to", "x=0.1", "--sense", "edges", "--noise", "1deg"], ["1deg", "pixels"]),
-    (["--to", "x=0.1", "--sense", "touch"], ["touch", "exact, edges, pictures"]),
-    (["--to", "x=0.1", "--gain", "0"], ["gain", "positive"]),
-    (["--to", "x=0.1", "--time", "nan"], ["time", "positive"]),
-    (["--to", "x=0.1", "-o", "run.svg"], ["run.svg", ".png"])])
+    (["--goal", "x=9"], ["x=9", "is not reached"]),
+    (["--goal", "x=0.1", "--observe", "1"], ["do not see", "hrsynth legs"]),
+    (["--goal", "x=0.1", "--observe", "7"], ["no leg or link", "'7'"]),
+    (["--goal", "x=0.1", "--noise", "90deg"], ["noise", "90deg", "less than 90deg"]),
+    (["--goal", "x=0.1", "--noise", "1px"], ["1px", "an angle"]),
+    (["--goal", "x=0.1", "--sense", "edges", "--noise", "1deg"], ["1deg", "pixels"]),
+    (["--goal", "x=0.1", "--sense", "touch"], ["touch", "exact, edges, pictures"]),
+    (["--goal", "x=0.1", "--gain", "0"], ["gain", "positive"]),
+    (["--goal", "x=0.1", "--time", "nan"], ["time", "positive"]),
+    (["--goal", "x=0.1", "-o", "run.svg"], ["run.svg", ".png"])])
 def test_servo_refuses_what_does_not_fit(run, arguments: list[str], words: list[str]):
-    (line,) = run("servo", "delta", "--from", "x=0,y=0", *arguments).refused(2)
+    (line,) = run("servo", "delta", "--start", "x=0,y=0", *arguments).refused(2)
     assert all(word in line for word in words)
 
 
 @pytest.mark.parametrize(("module", "arguments"), [("mujoco", ["--physics"]), ("cv2", ["--sense", "pictures"])])
 def test_servo_names_the_extra_that_is_missing(run, monkeypatch: pytest.MonkeyPatch, module: str, arguments: list[str]):
     monkeypatch.setitem(sys.modules, module, None)
-    (line,) = run("servo", "delta", "--from", "x=0,y=0", "--to", "x=0.05,y=0", *arguments).refused(3)
+    (line,) = run("servo", "delta", "--start", "x=0,y=0", "--goal", "x=0.05,y=0", *arguments).refused(3)
     assert "hrsynth[bench]" in line
 
 

@@ -28,11 +28,11 @@ ASKED = {
     "singular": (lambda robot: hrsynth.singular(robot, points=50), ["--points", "50"]),
     "advise": (lambda robot: hrsynth.advise(robot), []),
     "modes": (lambda robot: hrsynth.modes(robot, at=GOAL), ["--at", GOAL]),
-    "path": (lambda robot: hrsynth.path(robot, start=GOAL, goal=OTHER), ["--from", GOAL, "--to", OTHER]),
-    "servo": (lambda robot: hrsynth.servo(robot, start=OTHER, goal=GOAL), ["--from", OTHER, "--to", GOAL]),
+    "path": (lambda robot: hrsynth.path(robot, start=GOAL, goal=OTHER), ["--start", GOAL, "--goal", OTHER]),
+    "servo": (lambda robot: hrsynth.servo(robot, start=OTHER, goal=GOAL), ["--start", OTHER, "--goal", GOAL]),
     "accuracy": (lambda robot: hrsynth.accuracy(robot, cone="0.1deg", at=[GOAL]), ["--cone", "0.1deg", "--at", GOAL]),
     "select": (lambda robot: hrsynth.select(robot, start=GOAL, goal=OTHER, runs=0),
-               ["--from", GOAL, "--to", OTHER, "--runs", "0"]),
+               ["--start", GOAL, "--goal", OTHER, "--runs", "0"]),
 }
 """Each command's function, and the same question on the command line."""
 

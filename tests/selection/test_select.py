@@ -214,7 +214,7 @@ def test_a_camera_has_a_whole_pose() -> None:
 
 
 def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
-    arguments = ["select", "rrrrr_m1", "--from", "x=0.05", "--to", "x=-0.01,y=0.03", "--runs", "1"]
+    arguments = ["select", "rrrrr_m1", "--start", "x=0.05", "--goal", "x=-0.01,y=0.03", "--runs", "1"]
     assert execute([*arguments, "--sight", "auto", "--json"]) == 0
     data = json.loads(capsys.readouterr().out)
     assert data["command"] == "select"
@@ -226,7 +226,7 @@ def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert err == ""
     assert execute([*arguments, "--size", "1", "--seconds", "100"]) == 0
     assert "deprecated" in capsys.readouterr().err
-    assert execute(["select", "quattro", "--from", "x=9", "--to", "x=0"]) == 2
+    assert execute(["select", "quattro", "--start", "x=9", "--goal", "x=0"]) == 2
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 

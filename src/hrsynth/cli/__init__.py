@@ -9,18 +9,20 @@ from typing import Annotated
 
 import typer
 
-from . import files
+from . import completion, files
 from .catalog import catalog
+from .commands import HELP, WholeGroup
 from .questions import QUESTIONS
 
 app = typer.Typer(
-    name="hrsynth", invoke_without_command=True, add_completion=False, rich_markup_mode=None,
-    pretty_exceptions_enable=False,
+    name="hrsynth", cls=WholeGroup, invoke_without_command=True, add_completion=False, rich_markup_mode=None,
+    pretty_exceptions_enable=False, context_settings=HELP,
     help="Hidden robots of parallel robots that are controlled by watching the directions of their legs.")
 for question in QUESTIONS:
     question.add(app)
 files.add(app)
 app.add_typer(catalog)
+completion.add(app)
 
 
 def _version(wanted: bool) -> None:
@@ -55,7 +57,7 @@ def main(arguments: list[str] | None = None) -> None:
 def execute(arguments: list[str] | None = None) -> int:
     """Run a command; the exit status."""
     try:
-        status = app(args=arguments, standalone_mode=False)
+        status = app(args=arguments, prog_name="hrsynth", standalone_mode=False)
         sys.stdout.flush()
         return int(status or 0)
     except BrokenPipeError:

@@ -14,10 +14,11 @@ from typing import Any
 
 import typer
 
-from .options import JSON, NEEDED, Option, add_command, flag, output, warn
+from .commands import WholeGroup, add_command
+from .options import JSON, NEEDED, Option, flag, output, warn
 from .progress import Progress
 
-catalog = typer.Typer(name="catalog", invoke_without_command=True, rich_markup_mode=None,
+catalog = typer.Typer(name="catalog", cls=WholeGroup, invoke_without_command=True, rich_markup_mode=None,
                       help="The catalog of architectures: what can be controlled by watching legs.")
 KEPT = Option("kept", "A folder or SQLite file (default: what is shipped).", "PATH", flags=("--catalog",))
 WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
@@ -27,7 +28,7 @@ FILTER = (
     Option("dof", "Freedoms of the platform.", kind=int),
     Option("motion", "Its translations and rotations, as 3T or 2T1R."),
     Option("verdict", "controllable, partially controllable, uncontrollable."),
-    Option("group", "planar, pods, deltas, spatial."),
+    Option("group", "planar, pods, deltas, spatial.", words=("planar", "pods", "deltas", "spatial")),
     Option("base_motors", "All motors on the base, or not.", kind=bool, flags=("--base-motors/--moving-motors",)),
     Option("fewest", "Number of legs that must be watched.", kind=int),
     Option("text", "Text that occurs in any field."),

@@ -6,7 +6,8 @@ from typing import Any
 
 import typer
 
-from .options import JSON, NEEDED, SOURCE, Option, add_command, flag, robot_of, warn
+from .commands import add_command
+from .options import JSON, NEEDED, SOURCE, Option, flag, robot_of, warn
 
 
 def robots(examples: bool, json: bool) -> None:
@@ -60,9 +61,11 @@ def add(app: typer.Typer) -> None:
     """Make them commands."""
     add_command(app, "robots", "The shipped robots.",
                 (flag("examples", "The robots of the package example-robot-data instead: legged robots, arms, hands."),
-                 JSON), robots)
+                 JSON), robots, ("", "--examples"))
     add_command(app, "convert", "Read a robot in any dialect and write it in another: .urdf native, .yaml Gepetto, "
                 ".xml MJCF, .sdf SDFormat.",
                 (*SOURCE, Option("target", "The file to write; its extension says the dialect.", "OUT", default=NEEDED,
                                  argument=True),
-                 Option("to", "native, gepetto, mjcf or sdf, whatever the ending.", "DIALECT"), JSON), convert)
+                 Option("to", "native, gepetto, mjcf or sdf, whatever the ending.", "DIALECT",
+                                       words=("native", "gepetto", "mjcf", "sdf")), JSON), convert,
+                ("quattro quattro.xml", "leg.urdf robot.yaml --to gepetto"))

@@ -1,9 +1,10 @@
-"""Options as data: each is declared once, the commands' tables put them together, typer reads them."""
+"""Options as data: each is declared once, the commands' tables put them together; typer reads them, the help and the
+completion of shells are made of them."""
 
 from __future__ import annotations
 
 import inspect
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -14,11 +15,14 @@ if TYPE_CHECKING:
 
 NEEDED: Any = inspect.Parameter.empty
 """The default of what must be given."""
+OWN, WATCHING, OUTPUT, READING = "Options", "What is watched", "Output", "The robot, where its file does not say"
+"""Groups of options, in the order of the help."""
 
 
 @dataclass(frozen=True)
 class Option:
-    """One option or (``argument``) one word of the command line; ``flags`` are its names, by default its own."""
+    """One option or (``argument``) one word of the command line; ``flags`` are its names, by default its own; ``old``
+    ones are taken too, and told. ``words`` are what its value can be, where that can be told."""
 
     name: str
     help: str
@@ -29,6 +33,34 @@ class Option:
     low: float | None = None
     high: float | None = None
     argument: bool = False
+    group: str = OWN
+    words: Callable[[], Iterable[str]] | tuple[str, ...] = ()
+    old: tuple[str, ...] = ()
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Its names on the command line: none of an argument, ``--open/--no-open`` of a flag that can be denied."""
+        return () if self.argument else self.flags or (f"--{self.name.replace('_', '-')}",)
+
+    @property
+    def value(self) -> str:
+        """How the help calls what is given."""
+        return self.metavar or {int: "COUNT", float: "NUMBER"}.get(self.kind, self.name.upper())
+
+    @property
+    def shown(self) -> str:
+        """How the help names it."""
+        names = ", ".join(self.names).replace("/", " / ")
+        return f"{names} {'' if self.kind is bool else self.value}".strip()
+
+    @property
+    def told(self) -> str:
+        """What the help says of it: what it is for, its default, its range."""
+        given = not isinstance(self.default, bool) and self.default not in (NEEDED, None, "")
+        facts = [f"default: {self.default}"] if given else ["required"] if self.default is NEEDED else []
+        facts += [] if self.low is None else [f"at least {self.low}"]
+        facts += [] if self.high is None else [f"at most {self.high}"]
+        return f"{self.help}  [{'; '.join(facts)}]" if facts else self.help
 
     def parameter(self) -> inspect.Parameter:
         """As typer reads it from a signature."""
@@ -37,50 +69,45 @@ class Option:
         if self.argument:
             told = typer.Argument(metavar=self.metavar, help=self.help)
         else:
-            flags = self.flags or (f"--{self.name.replace('_', '-')}",)
-            told = typer.Option(*flags, metavar=self.metavar, help=self.help, min=self.low, max=self.high)
+            told = typer.Option(*self.names, *self.old, metavar=self.metavar, help=self.help, min=self.low,
+                                max=self.high)
         return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=self.default,
                                  annotation=Annotated[kind, told])
 
 
-def flag(name: str, help: str) -> Option:
+def flag(name: str, help: str, group: str = OWN) -> Option:
     """An option that is given or not."""
-    return Option(name, help, kind=bool, default=False)
+    return Option(name, help, kind=bool, default=False, group=group)
 
 
 def output(help: str, metavar: str = "FILE", default: Any = None) -> Option:
     """What is written with ``-o``."""
-    return Option("output", help, metavar, default=default, flags=("-o", "--output"))
+    return Option("output", help, metavar, default=default, flags=("-o", "--output"), group=OUTPUT)
 
 
-JSON = flag("json", "Print the result as one JSON object.")
-OBSERVE = Option("observe", "Legs to watch (1,4), links, or all.", "LEGS", default="all")
-CAMERA = Option("camera", "The link that carries the camera.", "LINK")
+def shipped() -> Iterable[str]:
+    """The names of the shipped robots."""
+    from ..description import shipped
+
+    return shipped()
+
+
+JSON = flag("json", "Print the result as one JSON object; its schema: hrsynth schema COMMAND.", OUTPUT)
+OBSERVE = Option("observe", "Legs to watch (1,4), links, or all.", "LEGS", default="all", group=WATCHING)
+CAMERA = Option("camera", "The link that carries the camera.", "LINK", group=WATCHING)
 WATCHED = (OBSERVE, CAMERA)
-SEED = Option("seed", "Seed of the random configurations.", kind=int, default=0, low=0)
+SEED = Option("seed", "Seed of the random configurations.", "NUMBER", int, 0, low=0)
 SOURCE = (
     Option("robot", "A robot file in any dialect, a shipped robot's name, or example:NAME.", "ROBOT", default=NEEDED,
-           argument=True),
-    Option("base", "Look only at what lies between this link and the platform.", "LINK"),
-    Option("platform", "The platform, where the file names none.", "LINK"),
-    Option("motors", "The driven joints, where the file names none.", "JOINTS"),
+           argument=True, words=shipped),
+    Option("base", "Look only at what lies between this link and the platform.", "LINK", group=READING),
+    Option("platform", "The platform, where the file names none.", "LINK", group=READING),
+    Option("motors", "The driven joints, where the file names none.", "JOINTS", group=READING),
     Option("close", "A closure: the frames of two links meet (default: in a point); again for more.", "A:B[:TYPE]",
-           kind=list[str]),
-    Option("freeze", "Joints to hold at zero.", "JOINTS", default=""),
+           kind=list[str], group=READING),
+    Option("freeze", "Joints to hold at zero.", "JOINTS", default="", group=READING),
 )
 """A robot as the command line names it, with what its file does not say."""
-
-
-def add_command(app: typer.Typer, name: str, help: str, options: Sequence[Option], run: Callable[..., None]) -> None:
-    """Add a command: what must be given comes first, ``run`` is called with all by name."""
-    parameters = sorted((each.parameter() for each in options), key=lambda each: each.default is not NEEDED)
-
-    def called(**values: Any) -> None:
-        run(**values)
-
-    called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    called.__annotations__ = {each.name: each.annotation for each in parameters}
-    app.command(name, help=help)(called)
 
 
 def robot_of(values: dict[str, Any]) -> Mechanism:

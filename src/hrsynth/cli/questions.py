@@ -12,15 +12,17 @@ import typer
 
 from ..present.outputs import OUTPUTS
 from ..progress import following
+from .colour import painted
+from .commands import add_command
 from .options import (
     CAMERA,
     JSON,
     NEEDED,
+    OUTPUT,
     SEED,
     SOURCE,
     WATCHED,
     Option,
-    add_command,
     flag,
     listed,
     output,
@@ -32,20 +34,22 @@ from .progress import Progress
 
 @dataclass(frozen=True)
 class Question:
-    """A command: the public function of its ``name``, what it says of itself, and its own options, named as the
-    function's parameters and those of the files. ``before`` gets the options before the work, ``after`` the answer and
-    the options at the end; ``shows`` does so instead of printing the text where nothing was written."""
+    """A command: the public function of its ``name``, what it says of itself, its own options, named as the function's
+    parameters and those of the files, and examples. ``before`` gets the options before the work, ``after`` the answer
+    and the options at the end; ``shows`` does so instead of printing the text where nothing was written."""
 
     name: str
     help: str
     options: tuple[Option, ...]
+    examples: tuple[str, ...] = ()
     before: Callable[[], object] | None = None
     shows: Callable[..., None] | None = None
     after: Callable[..., None] | None = None
 
     def add(self, app: typer.Typer) -> None:
         """Make it a command."""
-        add_command(app, self.name, self.help, (*self.options, JSON, SEED, *SOURCE), self.answer)
+        add_command(app, self.name, self.help, (SOURCE[0], *self.options, SEED, JSON, *SOURCE[1:]), self.answer,
+                    self.examples)
 
     def answer(self, *, json: bool, **values: Any) -> None:
         """Ask, write the files that are asked for, print."""
@@ -84,7 +88,7 @@ class Question:
         elif self.shows is not None and not any(written.values()):
             self.shows(found, **values)
         else:
-            typer.echo(text(found, *written.values()))
+            typer.echo(painted(text(found, *written.values())))
         if self.after is not None:
             self.after(found, **values)
 
@@ -139,50 +143,59 @@ def _served(found: Any, port: int, open_: bool, **_: Any) -> None:
 def _file(command: str, option: str = "output") -> Option:
     """The option of a file that a command's answer can be written to."""
     (found,) = (each for each in OUTPUTS[command].files if each.option == option)
-    return output(found.help) if option == "output" else Option(option, found.help, "FILE")
+    return output(found.help) if option == "output" else Option(option, found.help, "FILE", group=OUTPUT)
 
 
 def _goal(help: str) -> Option:
-    return Option("goal", help, "POSE", default=NEEDED, flags=("--to",))
+    return Option("goal", help, "POSE", default=NEEDED, old=("--to",))
 
 
 POSES = "or mode:2, of the list that modes gives; again for more (default: the zero configuration)."
 BEGIN = Option("at", "Start there instead of at the zero configuration, in another operation mode if need be; or "
                "mode:2.", "POSE")
 START = Option("start", "Start pose, such as x=0.02,y=0.1,z=-0.7, or mode:2 of the other pose.", "POSE",
-               default=NEEDED, flags=("--from",))
+               default=NEEDED, old=("--from",))
 QUESTIONS = (
     Question("derive", "The hidden robot of a robot, how it is derived, its certificate, and what the controller can "
              "see.",
              (*WATCHED, BEGIN,
-              Option("form", "simplified (as in the paper) or general (sliders, all legs kept).", default="simplified"),
-              _file("derive"), _file("derive", "report"))),
+              Option("form", "simplified (as in the paper) or general (sliders, all legs kept).", default="simplified",
+                     words=("simplified", "general")),
+              _file("derive"), _file("derive", "report")),
+             ("quattro --observe 1,4", "quattro --observe 1,4 -o hidden.urdf --report quattro.html",
+              "robot.urdf --platform plate --motors hip_1,hip_2,hip_3")),
     Question("legs", "Every set of observed legs: its verdict, the freedoms it loses, and the smallest sets that see "
              "most.",
-             (CAMERA, BEGIN)),
+             (CAMERA, BEGIN), ("quattro", "quattro --camera platform")),
     Question("check", "Mobility, ranks, singularities and redundant constraints at poses, and over a grid of poses.",
              (*WATCHED, Option("at", f"A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; {POSES}", "POSE", list[str]),
               Option("grid", "A line, plane or box of poses, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 "
                      "(from:to:count).", "GRID"),
-              _file("check")), after=_decided),
+              _file("check")),
+             ("quattro --at x=0.02,phi=30deg", "quattro --grid x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 -o map.png"),
+             after=_decided),
     Question("singular", "Where a freedom of the platform is lost: the Type 2 condition in words, as an expression and "
              "drawn.",
              (*WATCHED, flag("real", "The real robot with its own motors instead of the hidden one."),
               Option("plane", "Plane of poses to draw, as z=-0.7.", "PART=VALUE"), _file("singular"),
               Option("points", "Random poses at which the condition is checked.", None, int, 10_000, low=1),
-              Option("steps", "Poses along each side of the plane.", None, int, 51, low=5, high=300))),
+              Option("steps", "Poses along each side of the plane.", None, int, 51, low=5, high=300)),
+             ("quattro --observe 1,4", "quattro --observe 1,4 --plane z=-0.7,phi=0 -o locus.png")),
     Question("advise", "What is missing: the smallest sets of further measurements that make a robot controllable.",
-             WATCHED),
+             WATCHED, ("uranesx", "quattro --observe 1")),
     Question("modes", "All assembly modes: every pose of the platform with the same directions.",
              (Option("at", "Pose whose directions are held, as x=0.02,y=0.1,z=-0.7 (default: the zero "
                      "configuration's).", "POSE"),
               *WATCHED, flag("real", "The real robot with its own motors held instead."),
               flag("as_written", "Take the file's numbers as they are: joint centres that coincide but for rounding "
                    "stay apart."),
-              _file("modes"))),
+              _file("modes")),
+             ("quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7", "3rrr_m1 --real -o modes.png")),
     Question("path", "Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, "
              "undecided.",
-             (START, _goal("Where it ends; mode:2 is a mode with the directions at the start."), *WATCHED)),
+             (START, _goal("Where it ends; mode:2 is a mode with the directions at the start."), *WATCHED),
+             ("quattro --observe 1,4 --start x=0.05 --goal x=-0.05,phi=20deg",
+              "3rrr_m1 --start x=0,y=0 --goal mode:2")),
     Question("servo", "A servo run on the directions of legs, simulated: where it ends, and what it passes on the way.",
              (START, _goal("Pose whose directions are desired."), *WATCHED,
               Option("gain", "λ of the control law (1/s).", None, float, 0.8),
@@ -193,8 +206,10 @@ QUESTIONS = (
               Option("time", "Longest run.", "SECONDS", float),
               flag("physics", "Drive a mock-up with rods, masses and velocity servos."),
               Option("sense", "exact, edges (of the legs before a camera) or pictures (rendered).", "SENSE",
-                     default="exact"),
-              _file("servo"))),
+                     default="exact", words=("exact", "edges", "pictures")),
+              _file("servo")),
+             ("quattro --observe 1,4 --start x=0.1 --goal x=-0.05 -o run.png",
+              "delta --start x=0 --goal x=0.05 --noise 0.1deg --json")),
     Question("accuracy", "How far the platform can be off where the observed directions are off by up to given angles.",
              (Option("cone", "Half-angle of the cone about each observed direction, as 0.1deg; or one a leg: "
                      "1=0.1deg,2=0.2deg.", "ANGLE", default=NEEDED),
@@ -205,7 +220,8 @@ QUESTIONS = (
               Option("steps", "Poses along each side of the plane.", None, int, low=5, high=300),
               Option("nonlinear", "Try this many errors (four at least) at each pose; of a plane or grid, at its worst "
                      "ones.", "COUNT", int, 0, low=0),
-              _file("accuracy"))),
+              _file("accuracy")),
+             ("delta --cone 0.1deg --at x=0.1", "delta --cone 0.1deg --plane z=-0.6 -o map.png")),
     Question("select", "Which legs to watch for a displacement: all sets, ranked by accuracy, and why the others are "
              "discarded.",
              (START, _goal("Goal pose."),
@@ -219,12 +235,14 @@ QUESTIONS = (
               Option("examine", "Sets, the most accurate first, whose modes, aspects and runs are computed.", None,
                      int, 20, low=1),
               Option("seconds", "Deprecated, as the answer then depends on the machine: time after which no further "
-                     "set is examined.", None, float)), after=_deprecated),
+                     "set is examined.", None, float)),
+             ("quattro --start x=0.1 --goal x=-0.05,phi=20deg",), after=_deprecated),
     Question("view", "A 3D view in the browser: sliders that keep the loops closed, what is observed, assembly modes.",
              (*WATCHED, flag("hidden", "The hidden robot too, its virtual actuators highlighted."),
               _file("view", "static"),
               Option("port", "Port of the server (default: any that is free).", None, int, 0, low=0, high=65535),
               Option("open_", "Open the page in the browser.", None, bool, True, ("--open/--no-open",))),
+             ("quattro --observe 1,4 --hidden", "quattro --observe 1,4 --static quattro.html"),
              before=_viewer, shows=_served),
 )
 """The commands in the order of the help."""

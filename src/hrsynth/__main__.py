@@ -1,0 +1,5 @@
+"""``python -m hrsynth``."""
+
+from .cli import main
+
+main()

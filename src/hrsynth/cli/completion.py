@@ -1,0 +1,83 @@
+"""Completion for bash, zsh and fish: a script that asks the command line itself, which answers from its tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import typer
+
+from .commands import add_command
+from .options import NEEDED, Option
+
+WORDS = "words"
+"""What a script asks for instead of the name of a shell, followed by the words typed so far."""
+SCRIPTS = {
+    "bash": """_hrsynth() {
+    local IFS=$'\\n'
+    COMPREPLY=($(hrsynth completion words -- "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null))
+}
+complete -o default -o bashdefault -F _hrsynth hrsynth""",
+    "zsh": """#compdef hrsynth
+_hrsynth() {
+    local -a found
+    found=("${(@f)$(hrsynth completion words -- "${(@)words[2,CURRENT]}" 2>/dev/null)}")
+    [[ -n "$found" ]] && compadd -a found
+    _files
+}
+(( $+functions[compdef] )) || { autoload -Uz compinit && compinit }
+compdef _hrsynth hrsynth""",
+    "fish": """function __hrsynth_words
+    set -l typed (commandline -opc)
+    hrsynth completion words -- $typed[2..-1] (commandline -ct) 2>/dev/null
+end
+complete -c hrsynth -a '(__hrsynth_words)'""",
+}
+
+
+def candidates(root: Any, typed: Sequence[str]) -> list[str]:
+    """What can stand in the place of the last word that was typed (it may be empty), after the words before it."""
+    *before, last = typed or [""]
+    command, used = root, 0
+    while used < len(before) and before[used] in getattr(command, "commands", {}):
+        command, used = command.commands[before[used]], used + 1
+    return [each for each in _next(command, before[used:], last) if each.startswith(last)]
+
+
+def _next(command: Any, before: Sequence[str], last: str) -> Iterable[str]:
+    """The commands of a group; the values of the option before, the options, or the values of the argument."""
+    if hasattr(command, "commands"):
+        return ["--help", "--version"] if last.startswith("-") else list(command.commands)
+    options: Sequence[Option] = command.options
+    by_name = {name: each for each in options for name in each.names}
+    named = by_name.get(before[-1]) if before else None
+    if named is not None and named.kind is not bool:
+        return _words(named)
+    if last.startswith("-"):
+        return ["--help", *(part for name in by_name for part in name.split("/") if part.startswith("--"))]
+    return [word for each in options if each.argument for word in _words(each)]
+
+
+def _words(option: Option) -> Iterable[str]:
+    return option.words() if callable(option.words) else option.words
+
+
+def add(app: typer.Typer) -> None:
+    """Make it a command."""
+    def completion(shell: str, typed: list[str] | None) -> None:
+        """Print a shell's script, or (asked by that) the words that can follow."""
+        from ..errors import BadRequest
+
+        if shell == WORDS:
+            for each in candidates(typer.main.get_command(app), typed or []):
+                typer.echo(each)
+        elif shell in SCRIPTS:
+            typer.echo(SCRIPTS[shell])
+        else:
+            raise BadRequest("no completion for the shell", shell, tuple(SCRIPTS))
+
+    add_command(app, "completion", "Completion of commands, options and robots: a script for bash, zsh or fish.",
+                (Option("shell", "bash, zsh or fish.", "SHELL", default=NEEDED, argument=True, words=tuple(SCRIPTS)),
+                 Option("typed", "What was typed so far, asked by a script.", "[WORD]...", list[str], argument=True)),
+                completion, ('bash >> ~/.bashrc', 'zsh >> ~/.zshrc',
+                             'fish > ~/.config/fish/completions/hrsynth.fish'))

@@ -1,0 +1,176 @@
+"""The help, the names of options and the completion of shells: what a person meets before any answer."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import pty
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+import typer
+
+from hrsynth.cli import app, execute
+from hrsynth.cli.completion import candidates
+from hrsynth.cli.options import OUTPUT, READING, WATCHING
+from hrsynth.cli.questions import QUESTIONS
+from hrsynth.description import shipped
+
+ROOT = typer.main.get_command(app)
+LEAVES = [(name,) for name, each in ROOT.commands.items() if not hasattr(each, "commands")] + [
+    (name, inner) for name, each in ROOT.commands.items() for inner in getattr(each, "commands", {})]
+
+
+def called(capsys: pytest.CaptureFixture[str], *arguments: str) -> str:
+    assert execute(list(arguments)) == 0
+    return capsys.readouterr().out
+
+
+def command(path: tuple[str, ...]):
+    found = ROOT
+    for name in path:
+        found = found.commands[name]
+    return found
+
+
+@pytest.mark.parametrize("path", LEAVES, ids=" ".join)
+def test_help_shows_every_option_in_its_group_and_its_examples(capsys, path: tuple[str, ...]):
+    shown = called(capsys, *path, "-h")
+    assert shown == called(capsys, *path, "--help")
+    assert shown.startswith(f"Usage: hrsynth {' '.join(path)} ")
+    blocks = dict(re.findall(r"^(\S.*):\n((?:  .*\n)+)", shown, re.MULTILINE))
+    assert "-h, --help" in blocks[OUTPUT]
+    for option in command(path).options:
+        block = blocks["Arguments" if option.argument else option.group]
+        assert re.search(rf"^  {re.escape(option.shown)}(  |$)", block, re.MULTILINE)
+        assert " ".join(option.told.split()) in " ".join(block.split())
+    assert "..." not in re.sub(r"\[\w+\]\.\.\.", "", shown)
+    assert blocks.get("Examples", "").count(f"hrsynth {' '.join(path)}") == len(command(path).examples)
+
+
+def test_every_question_has_examples_and_its_options_in_groups(capsys):
+    for question in QUESTIONS:
+        shown = called(capsys, question.name, "-h")
+        assert all(f"\n{title}:\n" in shown for title in (WATCHING, OUTPUT, READING, "Examples"))
+
+
+@pytest.mark.parametrize("width", ["50", "80", "200"])
+def test_summaries_are_whole_at_any_width(capsys, monkeypatch: pytest.MonkeyPatch, width: str):
+    monkeypatch.setenv("COLUMNS", width)
+    shown = " ".join(called(capsys, "-h").split())
+    assert all(" ".join((each.help or "?").split()) in shown for each in ROOT.commands.values())
+    assert shown == " ".join(called(capsys).split())
+
+
+def examples() -> Iterator[tuple[str, ...]]:
+    for path in LEAVES:
+        for text in command(path).examples:
+            yield *path, *shlex.split(text.partition(" >")[0])
+
+
+@pytest.mark.parametrize("arguments", list(examples()), ids=" ".join)
+def test_examples_are_commands(arguments: tuple[str, ...]):
+    """Typer reads every option of an example with its type."""
+    path = next(path for path in LEAVES if arguments[: len(path)] == path)
+    read = command(path).make_context("hrsynth", list(arguments[len(path):]))
+    assert set(read.params) == {each.name for each in command(path).options}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("arguments", [each for each in examples() if each[0] not in ("view", "catalog")
+                                       and not any(part.endswith(".urdf") for part in each[1:2])], ids=" ".join)
+def test_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, arguments: tuple[str, ...]):
+    monkeypatch.chdir(tmp_path)
+    assert execute(list(arguments)) == 0, capsys.readouterr().err
+    assert capsys.readouterr().err == ""
+
+
+def test_python_m_hrsynth_is_the_command_line():
+    done = [subprocess.run([sys.executable, "-m", module, "-h"], capture_output=True, text=True)
+            for module in ("hrsynth", "hrsynth.cli")]
+    assert [each.returncode for each in done] == [0, 0]
+    assert done[0].stdout == done[1].stdout
+    assert done[0].stdout.startswith("Usage: hrsynth ")
+
+
+def test_the_old_names_of_start_and_goal_are_taken_and_told(capsys):
+    for old, new in (("--from", "--start"), ("--to", "--goal")):
+        given = {"--start": "x=0.05", "--goal": "x=0.01"}
+        told = []
+        for name in (old, new):
+            arguments = [part for pair in ({**given, name: given[new]} | ({} if name == new else {new: None})).items()
+                         if pair[1] is not None for part in pair]
+            assert execute(["path", "rrrrr_m1", *arguments]) == 0
+            told.append(capsys.readouterr())
+        assert told[0].out == told[1].out
+        assert told[1].err == ""
+        assert told[0].err == f"hrsynth: {old} is called {new} now; the old name goes with 0.4\n"
+
+
+@pytest.mark.parametrize(("typed", "expected"), [
+    (["der"], ["derive"]), (["catalog", "s"], ["show", "site"]), (["derive", "quattro", "--form", ""],
+                                                                  ["simplified", "general"]),
+    (["derive", "quattro", "--rep"], ["--report"]), (["servo", "delta", "--sense", "e"], ["exact", "edges"]),
+    (["derive", "quattro", "-o", ""], []), (["view", "delta", "--no"], ["--no-open"]), (["--v"], ["--version"]),
+    (["completion", ""], ["bash", "zsh", "fish"]),
+    (["derive", "quattro", "--json", "--observe", "1", "--j"], ["--json"]),
+    (["nothing", "x"], [])])
+def test_completion_knows_commands_options_and_words(typed: list[str], expected: list[str]):
+    assert candidates(ROOT, typed) == expected
+
+
+def test_completion_knows_robots_and_every_option():
+    assert candidates(ROOT, ["derive", ""]) == list(shipped())
+    for path in LEAVES:
+        offered = candidates(ROOT, [*path, "--"])
+        known = {part for each in command(path).params for part in (*each.opts, *each.secondary_opts)}
+        old = {name for each in command(path).options for name in each.old}
+        assert {*offered} - {"--help"} == {name for name in known if name.startswith("--")} - old
+
+
+INTERACTIVE = {
+    "bash": 'source {script}; COMP_WORDS=(hrsynth derive qua); COMP_CWORD=2; _hrsynth; echo "${{COMPREPLY[@]}}"',
+    "zsh": 'autoload -Uz compinit; compinit -u -D; compadd() {{ print -r -- ${{(P)@[-1]}} }}; _files() {{ : }}; '
+           'source {script}; words=(hrsynth derive qua); CURRENT=3; _hrsynth',
+    "fish": 'source {script}; complete -C "hrsynth derive qua"',
+}
+
+
+@pytest.mark.parametrize("shell", INTERACTIVE)
+def test_a_shell_completes_with_its_script(capsys, tmp_path: Path, shell: str):
+    if shutil.which(shell) is None:
+        pytest.skip(f"no {shell} here")
+    program = tmp_path / "hrsynth"
+    program.write_text(f'#!/bin/sh\nexec {sys.executable} -m hrsynth "$@"\n')
+    program.chmod(0o755)
+    script = tmp_path / f"completion.{shell}"
+    script.write_text(called(capsys, "completion", shell))
+    done = subprocess.run([shell, "-c", INTERACTIVE[shell].format(script=script)], capture_output=True, text=True,
+                          env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}", "HOME": str(tmp_path)})
+    assert done.stdout.split() == ["quattro", "quattro_rigid"], done.stderr
+
+
+@pytest.mark.parametrize(("more", "coloured"), [({}, True), ({"NO_COLOR": "1"}, False), ({"TERM": "dumb"}, False)])
+def test_colour_is_for_terminals_whose_user_wants_it(more: dict[str, str], coloured: bool):
+    plain = subprocess.run([sys.executable, "-m", "hrsynth", "legs", "3rrr_m1"], capture_output=True, text=True)
+    assert "\x1b" not in plain.stdout
+    main, end = pty.openpty()
+    env = {name: value for name, value in os.environ.items() if name not in ("NO_COLOR", "TERM")}
+    done = subprocess.run([sys.executable, "-m", "hrsynth", "legs", "3rrr_m1"], stdout=end, stderr=subprocess.DEVNULL,
+                          env={**env, "TERM": "xterm", **more})
+    os.close(end)
+    shown = b""
+    with contextlib.suppress(OSError):
+        while part := os.read(main, 65536):
+            shown += part
+    text = shown.decode().replace("\r\n", "\n")
+    assert done.returncode == 0
+    assert ("\x1b[" in text) is coloured
+    assert ("\x1b[32mcontrollable\x1b[0m" in text) is coloured
+    assert re.sub(r"\x1b\[\d*m", "", text) == plain.stdout
