@@ -12,6 +12,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -22,7 +23,7 @@ from hrsynth.cli.options import OUTPUT, READING, WATCHING
 from hrsynth.cli.questions import QUESTIONS
 from hrsynth.description import shipped
 
-ROOT = typer.main.get_command(app)
+ROOT: Any = typer.main.get_command(app)
 LEAVES = [(name,) for name, each in ROOT.commands.items() if not hasattr(each, "commands")] + [
     (name, inner) for name, each in ROOT.commands.items() for inner in getattr(each, "commands", {})]
 
