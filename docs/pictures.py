@@ -17,6 +17,8 @@ from pathlib import Path
 
 ROOT = Path(__file__).resolve().parent.parent
 FOLDER = ROOT / "docs" / "pictures"
+LARGEST = 300_000
+"""Bytes of a picture above which its colours are made fewer."""
 FAR = "--start x=0,y=0,z=-0.75,phi=0 --goal x=-0.2,y=0,z=-0.56,phi=0"
 """The displacement of MMT 5.1.3."""
 
@@ -43,7 +45,8 @@ def view(command: str) -> Page:
 
 PICTURES: dict[str, str | Page] = {
     "accuracy_quattro.png": "accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7",
-    "catalog.png": Page("catalog site --group planar --legs '3-R*RR'", "-o", 1000, 1100, "p/96081be379a6.html"),
+    "catalog.png": Page("catalog site --group spatial --base-motors --verdict controllable --motion 1T2R", "-o", 1250, 1100, "index.html"),
+    "catalog_page.png": Page("catalog site --group planar --legs '3-R*RR'", "-o", 1250, 1100, "p/96081be379a6.html"),
     "derivation_quattro.svg": "quattro 1,4",
     "modes_3rrr.png": "modes 3rrr_m1",
     "modes_delta.png": "modes delta",
@@ -70,7 +73,17 @@ PICTURES: dict[str, str | Page] = {
 
 
 def draw(name: str) -> None:
-    """Draw one picture again."""
+    """Draw one picture again, small enough to be kept."""
+    made(name)
+    file = FOLDER / name
+    if file.suffix == ".png" and file.stat().st_size > LARGEST:
+        from PIL import Image
+
+        Image.open(file).convert("RGB").quantize(256).save(file, optimize=True)
+
+
+def made(name: str) -> None:
+    """Draw one picture as it comes."""
     import hrsynth
 
     what, file = PICTURES[name], FOLDER / name

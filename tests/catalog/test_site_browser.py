@@ -12,6 +12,7 @@ from hrsynth.catalog.entry import entry
 from hrsynth.catalog.jsonl import line, record
 from hrsynth.catalog.site import index, site
 from hrsynth.catalog.site.structures import named, structures
+from hrsynth.catalog.words import parse
 
 pytestmark = pytest.mark.browser
 READY = "document.readyState == 'complete'"
@@ -94,3 +95,41 @@ def test_twelve_thousand_records_are_filtered_within_a_moment(tab: Tab, target: 
     assert took < 1000
     tab.page.get_by_role("button", name="Next").click()
     assert tab.page.locator("#place").inner_text() == "page 2 of 120"
+
+
+def test_a_search_finds_what_is_on_the_screen_and_known_names(tab: Tab, tmp_path: Path):
+    known = {"3(Rt-Pl*-S)": "3-RP*S", "3(Rt*-2SSt)": "3-R*-{2-SS}", "6(Utn-Pl*-S)": "6-UP*S",
+             "(Ph*-Pj-Rz)+2(Rz*-Rz-Rz)": "P*PR+2-R*RR"}
+    facts = [{"word": word, "group": "none", "legs": len(parse(word).legs), "notation": notation}
+             for word, notation in known.items()]
+    index.write(tmp_path, structures(facts))
+    tab.open(tmp_path / "index.html", f"{LISTED} == 4")
+    assert rows(tab)[-1] == "(Ph*-Pj-Rz)+2(Rz*-Rz-Rz)"
+    for asked, found in (("3-RPS", 0), ("delta", 1), ("RPS", 0), ("2-SS", 1), ("3-RP*S", 0), ("refused 6-UPS", 2),
+                         ("Delta", 1), ("Stewart", 2)):
+        tab.page.get_by_label("Search").fill(asked)
+        tab.page.wait_for_function(f"new URLSearchParams(location.hash.slice(1)).get('q') == {asked!r}")
+        assert rows(tab) == [facts[found]["word"]], asked
+    tab.page.get_by_text("What the words mean").click()
+    assert tab.page.get_by_text("2T1R are two translations").is_visible()
+
+
+def test_rows_have_drawings_and_a_page_turns_its_robot(tab: Tab, target: Path):
+    tab.open(target / "index.html", f"{LISTED} == 5")
+    tab.page.wait_for_function("[...document.images].every(i => i.complete && i.naturalWidth > 50)")
+    assert tab.page.locator("#list tbody img").count() == 5
+    assert "controllable" in (tab.page.locator("#list td[data-field=verdict]").first.get_attribute("class") or "")
+    tab.page.locator("#list tbody a").first.click()
+    tab.page.wait_for_function("document.querySelector('#stage svg') !== null")
+    before = tab.page.locator("#stage").inner_html()
+    tab.page.locator("#stage").focus()
+    tab.page.keyboard.press("ArrowLeft")
+    after = tab.page.locator("#stage").inner_html()
+    assert before.count("<path") == after.count("<path") > 5
+    assert before != after
+    box = tab.page.locator("#stage").bounding_box()
+    tab.page.mouse.move(box["x"] + 50, box["y"] + 50)
+    tab.page.mouse.down()
+    tab.page.mouse.move(box["x"] + 90, box["y"] + 70)
+    tab.page.mouse.up()
+    assert tab.page.locator("#stage").inner_html() != after

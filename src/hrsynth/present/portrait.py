@@ -30,11 +30,13 @@ DIGITS = 4
 
 @dataclass(frozen=True, eq=False)
 class Mark:
-    """A stroke, an area or a joint: ``kind`` line, area, dot or sleeve (a slider), its ``role``, its points (n, 3)."""
+    """A stroke, an area or a joint: ``kind`` line, area, dot or sleeve (a slider), its ``role``, its points (n, 3), the
+    name of a joint."""
 
     kind: str
     role: str
     points: Array
+    joint: str | None = None
 
 
 @dataclass(frozen=True, eq=False)
@@ -66,7 +68,7 @@ class Portrait:
                 marks.append(Mark("area", role, shape.points))
             elif shape.joint is not None:
                 at = shape.points if shape.kind == "slider" else shape.points.mean(axis=0)[None]
-                marks.append(Mark("sleeve" if shape.kind == "slider" else "dot", role, at))
+                marks.append(Mark("sleeve" if shape.kind == "slider" else "dot", role, at, shape.joint))
         return cls(mechanism.name, tuple(marks), normal)
 
     @cached_property
@@ -107,11 +109,13 @@ class Portrait:
                 + (", the watched segments orange" if legs else "") + ".")
 
     def scene(self) -> dict[str, Any]:
-        """What a page is given that turns it: marks about the middle, scaled to a size of one."""
+        """What a page is given that turns it: marks about the middle, inside a sphere of diameter one."""
         every = np.vstack([mark.points for mark in self.marks])
-        middle, size = (every.min(axis=0) + every.max(axis=0)) / 2, float(np.max(np.ptp(every, axis=0))) or 1.0
+        middle = (every.min(axis=0) + every.max(axis=0)) / 2
+        size = 2 * float(np.max(np.linalg.norm(every - middle, axis=1))) or 1.0
         return {"axes": np.round(self.axes, DIGITS).tolist(), "marks": [
-            [mark.kind, mark.role, np.round((mark.points - middle) / size, DIGITS).tolist()] for mark in self.marks]}
+            [mark.kind, mark.role, (np.round((mark.points - middle) / size, DIGITS) + 0.0).tolist(), mark.joint]
+            for mark in self.marks]}
 
 
 def _drawn(mark: Mark, at: list[svg.Place], thin: float) -> str:

@@ -16,9 +16,9 @@ from ..store import writable
 
 STAMP = "site.json"
 """Says that a folder is a site, and of what."""
-FOLDERS = ("p", "r")
-"""Folders of the pages and of the robot files."""
-OWN = frozenset({STAMP, *FOLDERS, "index.html", "data.js", "index.js", "page.js", "site.css"})
+FOLDERS = ("p", "r", "d")
+"""Folders of the pages, of the robot files and of the small drawings."""
+OWN = frozenset({STAMP, *FOLDERS, "index.html", "data.js", "index.js", "page.js", "turn.js", "site.css"})
 """All that lies in a site."""
 
 

@@ -12,6 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ... import __version__
+from .folder import FOLDERS
+from .known import alias, order
 from .structures import Structure, named
 
 if TYPE_CHECKING:
@@ -23,7 +25,23 @@ TEXTS = ("group", "motion", "verdict", "notation", "hidden", "condition", "cure"
 LISTS = ("steps", "lost")
 """The same of fields that are lists, joined."""
 NUMBERS = ("legs", "dof", "rank", "fewest")
-SCRIPTS = ("site.css", "index.js", "page.js")
+EXPLAINED = {
+    "hidden robot": "The mechanism that a controller moves when a camera watches only the directions of the legs.",
+    "dof": "How many small motions the platform has: 2T1R are two translations and one rotation. Mobility counts the "
+           "motions of all links; idle ones leave the platform at rest.",
+    "verdict": "Controllable: the watched directions show all motions of the platform. Partially controllable: some of "
+               "them. Uncontrollable: none.",
+    "exact": "Whether the verdict is proved in exact arithmetic for the architecture, or for random dimensions.",
+    "legs needed": "The smallest sets of legs that show as much as all legs do.",
+    "Type 2": "Where the platform gains a motion that the watched directions do not show.",
+    "modes": "How many poses of the platform have the same watched directions.",
+    "cure": "What to measure as well, so that nothing is lost.",
+    "lost": "Motions of the platform that the watched directions do not show.",
+    "confirmed": "At so many closed configurations the rank was computed as well.",
+    "rules": "The steps from the robot to its hidden robot, with the legs in which they were taken.",
+}
+"""What the words of a page mean."""
+SCRIPTS = ("site.css", "index.js", "page.js", "turn.js")
 
 
 def write(folder: Path, structures: Iterable[Structure]) -> None:
@@ -31,7 +49,10 @@ def write(folder: Path, structures: Iterable[Structure]) -> None:
     assets = resources.files("hrsynth.catalog.site").joinpath("assets")
     for name in SCRIPTS:
         (folder / name).write_bytes(assets.joinpath(name).read_bytes())
-    (folder / "data.js").write_text(f"const CATALOG = {_compact(columns(structures))};\n", encoding="utf-8")
+    every = list(structures)
+    drawn = [int((folder / FOLDERS[2] / f"{each.name}.svg").exists()) for each in every]
+    held = {**columns(every), "drawn": drawn}
+    (folder / "data.js").write_text(f"const CATALOG = {_compact(held)};\n", encoding="utf-8")
     (folder / "index.html").write_text(rendered("index.html", version=__version__), encoding="utf-8")
 
 
@@ -43,6 +64,8 @@ def columns(structures: Iterable[Structure]) -> dict[str, Any]:
     records = [record for _, record in rows]
     found["word"] = [record["word"] for record in records]
     found["name"] = [named(record["word"]) for record in records]
+    found["order"] = _ranks([(*order(record), record["word"]) for record in records])
+    found["alias"] = _places([alias(record["word"]) for record in records])
     for field in NUMBERS:
         found[field] = [record.get(field) for record in records]
     found["base"] = [None if "base_motors" not in record else int(record["base_motors"]) for record in records]
@@ -50,6 +73,14 @@ def columns(structures: Iterable[Structure]) -> dict[str, Any]:
         found[field] = _places([record.get(field) for record in records])
     for field in LISTS:
         found[field] = _places(["; ".join(record.get(field) or ()) or None for record in records])
+    return found
+
+
+def _ranks(keys: list[tuple[Any, ...]]) -> list[int]:
+    """The place of each key among all."""
+    found = [0] * len(keys)
+    for rank, i in enumerate(sorted(range(len(keys)), key=keys.__getitem__)):
+        found[i] = rank
     return found
 
 
@@ -83,4 +114,5 @@ def _environment() -> Environment:
     made = Environment(loader=PackageLoader("hrsynth.catalog.site"), autoescape=True, trim_blocks=True,
                        lstrip_blocks=True, undefined=StrictUndefined)
     made.filters.update(notation=notation, named=named)
+    made.globals.update(explained=EXPLAINED)
     return made

@@ -15,7 +15,9 @@ from ...description.files import replacement
 from ...errors import HrsynthError
 from ...mechanism.model import Mechanism
 from ...present.drawings.schematic import robot_svg
+from ...present.portrait import Portrait
 from ...present.text.catalog import facts, motors
+from ...present.view.view import plane_normal
 from ...rewrite.strategy import Step
 from ..entry import SAMPLES, model
 from ..executors import Made, Stopped
@@ -24,10 +26,14 @@ from ..jsonl import Record
 from ..words import parse
 from .folder import FOLDERS
 from .index import rendered
+from .known import alias
+from .sentences import cure, rules
 from .structures import Structure, named
 
-PAGES, ROBOTS = FOLDERS
-"""Folders of the pages and of the robot files."""
+PAGES, ROBOTS, DRAWINGS = FOLDERS
+"""Folders of the pages, of the robot files and of the small drawings."""
+SMALL = (104.0, 78.0)
+"""Width and height of a small drawing (pixels)."""
 
 
 def written(folder: str, parts: Iterable[str]) -> Made:
@@ -55,18 +61,33 @@ def _write(folder: Path, structure: Structure, studied: Study) -> None:
             continue
         (folder / ROBOTS / f"{named(record['word'])}.urdf").write_bytes(content)
         robots[record["word"]] = robot
+    shown = robots.get(structure.fact["word"])
+    drawn = None if shown is None else _portrait(shown, studied)
+    if drawn is not None:
+        (folder / DRAWINGS / f"{structure.name}.svg").write_text(drawn.svg(*SMALL), encoding="utf-8")
     with replacement(folder / PAGES / f"{structure.name}.html") as draft:
-        draft.write_text(page(structure, studied, robots), encoding="utf-8")
+        draft.write_text(page(structure, studied, robots, drawn), encoding="utf-8")
 
 
-def page(structure: Structure, studied: Study, robots: dict[str, Mechanism]) -> str:
-    """The page; ``robots`` are the mechanisms that have a file, by word."""
+def _portrait(robot: Mechanism, studied: Study) -> Portrait:
+    """The robot in space, its watched links and the plane in which it moves marked where they are known."""
+    if studied.derivation is None:
+        return Portrait.drawn(robot, [robot.platform], (), None)
+    setting = studied.derivation.setting
+    return Portrait.drawn(robot, [link for link in setting.anatomy.platform if link in robot.links] or [robot.platform],
+                          _known(studied.observed, robot) or (), plane_normal(setting.motion))
+
+
+def page(structure: Structure, studied: Study, robots: dict[str, Mechanism], drawn: Portrait | None) -> str:
+    """The page; ``robots`` are the mechanisms that have a file, by word; ``drawn`` is the robot in space."""
     derivation = studied.derivation
     hidden = None if derivation is None else derivation.hidden
     shown = robots.get(structure.fact["word"])
     real = None if shown is None else robot_svg(shown, observed=_known(studied.observed, shown), title="Real robot")
     return rendered(
         "page.html", structure=structure, fact=structure.fact, facts=list(facts(structure.fact)),
+        turned=None if drawn is None else drawn.scene(), alias=alias(structure.fact["word"]),
+        cure=cure(structure.fact), rules=list(rules(structure.fact)),
         differs=studied.differs, real=real,
         hidden=None if hidden is None else robot_svg(hidden, virtual=_driven(hidden), title="Hidden robot"),
         blind=derivation is not None and hidden is None,

@@ -62,19 +62,19 @@ def structures(records: Iterable[Record]) -> tuple[Structure, ...]:
         common = line({**each, **dict.fromkeys(OF_MOTORS), "word": ""})
         alike.setdefault(str(parse(each["word"]).unmoved), {}).setdefault(common, []).append(each)
     own: dict[str, list[Record]] = {}
-    unseen: dict[str, list[str]] = {}
+    alike_unseen: dict[str, list[str]] = {}
     for unmoved, parts in alike.items():
         for part in parts.values():
             word = part[0]["word"] if unmoved in own else unmoved
             own[word] = part
-            unseen.setdefault(str(_unseen(parse(unmoved))), []).append(word)
-    kin = {word: words for words in unseen.values() for word in words}
+            alike_unseen.setdefault(str(unseen(parse(unmoved))), []).append(word)
+    kin = {word: words for words in alike_unseen.values() for word in words}
     return tuple(Structure(word, tuple(own[word]), tuple((other, own[other][0].get("verdict", "refused"))
                                                          for other in sorted(kin[word]) if other != word))
                  for word in sorted(own))
 
 
-def _unseen(word: RobotWord) -> RobotWord:
+def unseen(word: RobotWord) -> RobotWord:
     """The word with no link marked as observed."""
     return RobotWord.of(*[[_blind(leg) for leg in body] for body in word.bodies], platform=word.platform)
 

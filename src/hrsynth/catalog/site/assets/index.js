@@ -4,10 +4,11 @@ const PAGE = 50;
 const FACETS = ["group", "legs", "dof", "motion", "verdict", "fewest", "base"];
 const BASE = { 1: "on the base", 0: "some move" };
 const HEADS = [
+  ["order", "drawing"],
   ["notation", "robot"], ["hidden", "hidden robot"], ["dof", "freedoms"], ["verdict", "verdict"],
   ["fewest", "legs to watch"], ["base", "motors"], ["group", "group"],
 ];
-const TEXTS = ["group", "motion", "verdict", "notation", "hidden", "condition", "cure", "refused", "steps", "lost"];
+const TEXTS = ["alias", "group", "motion", "verdict", "notation", "hidden", "condition", "cure", "refused", "steps", "lost"];
 const count = CATALOG.word.length;
 const form = document.getElementById("filters");
 const element = (id) => document.getElementById(id);
@@ -19,9 +20,12 @@ function value(field, i) {
   return Array.isArray(column) ? column[i] : column.values[column.at[i]] ?? null;
 }
 
-/** All that a search looks at, in small letters. */
-const haystack = CATALOG.word.map((word, i) =>
-  [word, ...TEXTS.map((field) => value(field, i) ?? "")].join("\n").toLowerCase());
+/** All that a search looks at, in small letters: what is stored, and what is on the screen, where a motor is a line. */
+const haystack = CATALOG.word.map((word, i) => {
+  const shown = [value("notation", i), value("hidden", i)].map((own) => (own ?? "").replaceAll("*", ""));
+  const cells = [`${value("fewest", i)} of ${value("legs", i)}`, BASE[value("base", i)] ?? "", value("verdict", i) ?? "refused"];
+  return [word, ...TEXTS.map((field) => value(field, i) ?? ""), ...shown, ...cells].join("\n").toLowerCase();
+});
 
 let state = { q: "", sort: "", page: 1 };
 
@@ -75,11 +79,11 @@ function compare(a, b) {
 function sorted(found) {
   const down = state.sort.startsWith("-");
   const field = state.sort.replace("-", "");
-  if (!HEADS.some(([name]) => name === field)) return found;
+  if (!HEADS.some(([name]) => name === field)) return found.sort((i, j) => CATALOG.order[i] - CATALOG.order[j]);
   return found.sort((i, j) => {
     const [a, b] = [value(field, i), value(field, j)];
     const order = compare(a, b);
-    return (down && a !== null && b !== null ? -order : order) || i - j;
+    return (down && a !== null && b !== null ? -order : order) || CATALOG.order[i] - CATALOG.order[j];
   });
 }
 
@@ -100,13 +104,21 @@ function notation(text) {
 function content(field, i) {
   const own = value(field, i);
   switch (field) {
+    case "order": {
+      if (!CATALOG.drawn?.[CATALOG.page[i]]) return [];
+      const image = document.createElement("img");
+      Object.assign(image, { src: `d/${CATALOG.pages[CATALOG.page[i]]}.svg`, alt: "", width: 104, height: 78, loading: "lazy" });
+      return [image];
+    }
     case "notation": {
       const link = document.createElement("a");
       link.href = `p/${CATALOG.pages[CATALOG.page[i]]}.html#${CATALOG.name[i]}`;
       link.append(own ? notation(own) : "not drawn");
       const word = document.createElement("code");
       word.textContent = CATALOG.word[i];
-      return [link, word];
+      const known = document.createElement("small");
+      known.textContent = value("alias", i) ?? "";
+      return [link, known, word];
     }
     case "hidden": return own === null ? [] : [notation(own)];
     case "dof": return own === null ? [] : [`${own} (${value("motion", i)})`];
@@ -121,7 +133,9 @@ function row(i) {
   const made = document.createElement("tr");
   for (const [field, head] of HEADS) {
     const cell = document.createElement("td");
-    if (field !== "notation") cell.dataset.head = head;
+    cell.dataset.field = field;
+    if (!["notation", "order"].includes(field)) cell.dataset.head = head;
+    if (field === "verdict") cell.className = (value(field, i) ?? "refused").split(" ")[0];
     cell.append(...content(field, i));
     made.append(cell);
   }

@@ -1,0 +1,38 @@
+"""The names under which robots are known, as data, and the order that they give: known robots first, then symmetric
+ones."""
+
+from __future__ import annotations
+
+import tomllib
+from functools import cache
+from importlib import resources
+
+from ..jsonl import Record
+from ..words import parse
+from .structures import unseen
+
+
+@cache
+def aliases() -> dict[str, str]:
+    """Names by word, without motors and marks of watched links."""
+    text = resources.files("hrsynth.catalog.site").joinpath("aliases.toml").read_text(encoding="utf-8")
+    return {word: each["names"] for each in tomllib.loads(text)["robot"] for word in each["words"]}
+
+
+def alias(word: str) -> str | None:
+    """Under which names a word's robot is known."""
+    return aliases().get(bare(word))
+
+
+def bare(word: str) -> str:
+    """A word without motors and marks of watched links."""
+    return str(unseen(parse(word).unmoved))
+
+
+def order(record: Record) -> tuple[bool, bool, bool, bool, bool, bool]:
+    """The place of a record in the list, smaller first: known by a name, with an answer, all legs equal, every default
+    link watched, all motors on the base, controllable."""
+    word = record["word"]
+    legs = len(set(parse(word).legs))
+    return (alias(word) is None, "refused" in record, legs > 1, "!" in word, not record.get("base_motors"),
+            record.get("verdict") != "controllable")

@@ -1,0 +1,69 @@
+"""What a record says in a few words, in whole sentences: what is to be measured more, what each rule did."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+
+from ..jsonl import Record
+
+RULES = {
+    "motors off": "The motors are set free: the controller moves what the camera measures, not the motors.",
+    "lift": "A virtual chain that holds nothing is set beside {legs}; its driven U joint measures the watched "
+            "direction.",
+    "anchor locus": "In {legs} the point that carries this U joint moves on a surface or a curve, or rests, so that "
+                    "fewer virtual sliders carry it.",
+    "direction locus": "In {legs} the watched direction turns about one axis or does not turn, so that one driven R "
+                       "joint or none measures it.",
+    "takeover": "In {legs} the virtual actuator takes the place of the real joint before the watched segment.",
+    "companion": "In {legs} the rod beside the watched one goes along with it.",
+    "end change": "In {legs} the last S joint becomes a U joint.",
+    "pi form": "In {legs} a planar parallelogram (Π) carries the actuator, for it moves on a circle.",
+    "prismatic merge": "In {legs} the virtual actuator takes the place of the real joint on the base.",
+    "leg removal": "The platform and the watched legs move as before without {legs}: left out.",
+    "keep": "Without {legs} the platform would move otherwise; so much is kept, though nothing is measured there.",
+}
+"""What each rule did; ``{legs}`` are the legs in which."""
+_STEP = re.compile(r"(?P<rule>.*?)(?: (?P<legs>[0-9,]+))?")
+_PART = re.compile(r"(?P<kind>direction|line|encoder) (?P<name>\w+)")
+_PLACE = re.compile(r"(?:link|rod|joint)_(?P<leg>\d+)_(?P<joint>\d+)[ab]?")
+_KINDS = {"direction": "the direction of {}", "line": "the direction and the place of {}",
+          "encoder": "the encoder of {}"}
+
+
+def rules(record: Record) -> Iterator[str]:
+    """A sentence for each step of the derivation."""
+    for step in record.get("steps", ()):
+        found = _STEP.fullmatch(step)
+        rule, legs = (step, None) if found is None else (found["rule"], found["legs"])
+        yield RULES[rule].format(legs=_legs(legs)) if rule in RULES else f"{step[:1].upper()}{step[1:]}."
+
+
+def cure(record: Record) -> str | None:
+    """What to measure as well, so that nothing is lost."""
+    said = record.get("cure")
+    if not said:
+        return None
+    if said.startswith("none of"):
+        return "Of the measurements that were tried, up to four at a time, none shows all freedoms."
+    parts = [_KINDS[each["kind"]].format(_where(each["name"])) for each in _PART.finditer(said)]
+    listed = ", ".join(parts[:-1]) + " and " * (len(parts) > 1) + parts[-1]
+    if said.startswith("not all by"):
+        return f"Measure {listed} as well: that shows more, but not all freedoms."
+    return f"Measure {listed} as well: then all {record['dof']} freedoms are seen."
+
+
+def _legs(labels: str | None) -> str:
+    if labels is None:
+        return "all legs"
+    each = labels.split(",")
+    return f"leg {each[0]}" if len(each) == 1 else f"legs {', '.join(each[:-1])} and {each[-1]}"
+
+
+def _where(name: str) -> str:
+    found = _PLACE.fullmatch(name)
+    if found is None:
+        return name
+    what = {"j": f"joint {found['joint']}", "l": f"the link after joint {found['joint']}",
+            "r": f"the rod at joint {found['joint']}"}[name[0]]
+    return f"{what} of leg {found['leg']} ({name})"

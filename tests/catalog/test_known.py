@@ -1,0 +1,65 @@
+"""Known names, the order of the list, and sentences for cures and rules."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import pytest
+
+from hrsynth.catalog.site.known import alias, aliases, bare, order
+from hrsynth.catalog.site.sentences import RULES, cure, rules
+from hrsynth.catalog.words import parse
+from hrsynth.rewrite.rules import rules as known_rules
+
+CATALOG = Path(__file__).resolve().parents[2] / "catalog"
+
+
+def records(group: str) -> list[dict[str, object]]:
+    lines = (CATALOG / f"{group}.jsonl").read_text(encoding="utf-8").splitlines()[1:]
+    return [json.loads(line) for line in lines]
+
+
+def test_every_known_robot_is_in_the_catalog_under_its_canonical_word():
+    held = {bare(str(each["word"])) for group in ("deltas", "planar", "pods", "spatial")
+            for each in records(group) if "!" not in str(each["word"])}
+    assert set(aliases()) <= held
+    assert all(str(parse(word)) == word for word in aliases())
+
+
+def test_a_name_holds_whatever_is_driven_or_watched():
+    assert alias("3(Rt*-Pl-S)") == alias("3(Rt-Pl*-S)") == "3-RPS tripod (Hunt)"
+    assert alias("(Rz!-Rz-Rz*)+2(Rz*!-Rz-Rz)") == "planar 3-RRR robot"
+    assert alias("3(Rz-Rz*-Ph)") is None
+
+
+def test_known_robots_come_first_then_those_with_equal_legs():
+    words = ("(Rz*-Rz-Rz)+2(Ph*-Rz-Rz)", "3(Ph*-Pj-Rz)", "3(Rz*-Rz-Rz)", "3(Ra*!-Rb-Ra-Ph)")
+    facts = [{"word": word, "base_motors": True, "verdict": "controllable"} for word in words]
+    facts[3]["refused"] = "for some reason"
+    assert [each["word"] for each in sorted(facts, key=order)] == [words[k] for k in (2, 1, 0, 3)]
+
+
+def test_every_rule_has_its_sentence():
+    assert {rule.name for rule in known_rules()} <= set(RULES)
+    said = list(rules({"steps": ["motors off", "lift 1,2,3", "leg removal 2"]}))
+    assert said[1].startswith("A virtual chain that holds nothing is set beside legs 1, 2 and 3;")
+    assert said[2] == "The platform and the watched legs move as before without leg 2: left out."
+
+
+@pytest.mark.parametrize("group", ["pods", "spatial"])
+def test_every_cure_and_every_step_of_the_catalog_is_told_in_sentences(group: str):
+    for each in records(group):
+        for text in (*rules(each), *filter(None, [cure(each)])):
+            assert re.fullmatch(r"[A-Z].*\.", text)
+            assert "{" not in text
+        assert (cure(each) is None) == (not each.get("cure"))
+        for part in re.findall(r"(?:link|rod|joint)_\w+", str(each.get("cure", ""))):
+            assert f"({part})" in str(cure(each))
+
+
+def test_a_cure_names_what_is_measured_and_where():
+    assert cure({"dof": 3, "cure": "direction link_1_2 and encoder joint_3_1"}) == (
+        "Measure the direction of the link after joint 2 of leg 1 (link_1_2) and the encoder of joint 1 of leg 3 "
+        "(joint_3_1) as well: then all 3 freedoms are seen.")
