@@ -33,6 +33,7 @@ FOLDERS = [
     {"analysis"},
     {"simulation"},
     {"selection"},
+    {"certificates"},
     {"present"},
     {"catalog"},
     {"cli", "__main__"},
@@ -40,7 +41,7 @@ FOLDERS = [
 LEVEL = {name: level for level, names in enumerate(FOLDERS) for name in names}
 
 ENGINE = {"geometry", "mechanism", "description", "kinematics", "closed_forms", "batch", "rewrite", "constraints"} | {
-    "analysis", "simulation", "selection", "present"}
+    "analysis", "simulation", "selection", "certificates", "present"}
 ROBOTS = re.compile(
     r"(?<![a-z])(quattro|delta|orthoglide|gough|stewart|hexaglide|uranesx|i4l|tsai)(?![a-z])", re.IGNORECASE
 )

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from .analysis.modes.modes import modes
     from .analysis.question import forget
     from .analysis.singularity.singular import singular
+    from .certificates import certificate, verify
     from .description import examples, load, save, shipped
     from .present.show import draw, html, text
     from .present.view.view import view
@@ -24,13 +25,14 @@ if TYPE_CHECKING:
     from .simulation.servo import servo
 
 __version__ = "0.2.0"
-__all__ = ["__version__", "accuracy", "advise", "catalog", "check", "derive", "draw", "examples", "following",
-           "forget", "html", "legs", "load", "modes", "observe", "path", "save", "select", "servo", "shipped",
-           "singular", "text", "view"]
+__all__ = ["__version__", "accuracy", "advise", "catalog", "certificate", "check", "derive", "draw", "examples",
+           "following", "forget", "html", "legs", "load", "modes", "observe", "path", "save", "select", "servo",
+           "shipped", "singular", "text", "verify", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
     "advise": ".analysis.advice",
+    "certificate": ".certificates",
     "check": ".analysis.check",
     "derive": ".analysis.derive",
     "draw": ".present.show",
@@ -49,6 +51,7 @@ _HOME = {
     "shipped": ".description",
     "singular": ".analysis.singularity.singular",
     "text": ".present.show",
+    "verify": ".certificates",
     "view": ".present.view.view",
 }
 

@@ -212,6 +212,22 @@ class NotCertified(Unanswered):
         )
 
 
+class NoCertificate(Unanswered):
+    """A list of modes, or a verdict, for which there is no certificate: why."""
+
+    def __init__(self, robot: str, reason: str) -> None:
+        self.robot, self.reason = robot, reason
+        super().__init__(f"{robot}: no certificate: {reason}")
+
+
+class CertificateRefused(Unanswered):
+    """A certificate that the checker does not accept: which, and why."""
+
+    def __init__(self, source: str, reason: str) -> None:
+        self.source, self.reason = source, reason
+        super().__init__(f"{source}: refused: {reason}")
+
+
 class MissingExtra(Unanswered):
     """Something that needs an optional package which is not installed: what, and the extra that brings it."""
 

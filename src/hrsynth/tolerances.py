@@ -138,6 +138,8 @@ TIP_ROUNDING = 2.0 ** -46
 """What sixty-four roundings make of a length, relative to the size: poses and tips computed in floats."""
 SHARP_ROOT = 2.0 ** -60
 """Radius of a ball, relative to 1 plus its middle, above which a solution is sought with more digits."""
+NO_POSE_START = 1e-6
+"""How well a start that is no pose satisfies the equations, and how far two of them are apart (each of size one)."""
 BOXES_APART = 1e-12
 """What is added to boxes around solutions, relative to their places and radii, before they count as apart."""
 POLISHED = 1e-12

@@ -57,6 +57,10 @@ class Instance:
     """The twists of all links for each joint's rates (6, rates)."""
     free: Numbers
     """The basis of ker A (rates, mobility)."""
+    loops: Numbers
+    """A: what the loops ask of the joints' rates (rows, rates)."""
+    rows: tuple[Numbers, ...]
+    """The twist and the rates for each joint's rates, before they are taken on ker A."""
 
     @property
     def idle(self) -> int:
@@ -124,9 +128,9 @@ def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[
     for observation, sight in zip(observations, relations.sights, strict=True):
         turn = velocities[observation.link] - velocities[observation.seen_from or mechanism.reference]
         parts.append(cross(scaled(seen(sight, drawn))[0][:, None], turn[3:], axis=-2))
-    rows, (free, _) = np.vstack(parts), _reduced(loops)
-    t, *rates = np.split(_times(rows, free), np.cumsum([len(part) for part in parts[:-1]]))
-    return Instance(drawn, t, tuple(rates), velocities, free)
+    free, _ = _reduced(loops)
+    t, *rates = np.split(_times(np.vstack(parts), free), np.cumsum([len(part) for part in parts[:-1]]))
+    return Instance(drawn, t, tuple(rates), velocities, free, loops, tuple(parts))
 
 
 def _screws(joint: Joint, relations: Relations, drawn: Geometry) -> Numbers:

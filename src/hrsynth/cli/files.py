@@ -57,8 +57,25 @@ def convert(target: str, to: str | None, json: bool, **source: Any) -> None:
                     f"written to {' and '.join(files)}")
 
 
+def verify(certificate: str, robot: str | None, json: bool) -> None:
+    """Check a certificate by its own arithmetic."""
+    from ..certificates import verify as checked
+    from ..description import load
+    from ..present.show import record
+
+    mechanism = None if robot is None else load(robot)
+    proved = checked(certificate, mechanism)
+    fields = {"file": certificate, "accepted": True, "proved": proved}
+    typer.echo(record("verify", None if mechanism is None else mechanism.name, fields)
+               if json else f"accepted: {proved}")
+
+
 def add(app: typer.Typer) -> None:
     """Make them commands."""
+    add_command(app, "verify", "Check a certificate that modes or derive wrote, with integers and fractions alone.",
+                (Option("certificate", "The certificate's file.", "FILE", default=NEEDED, argument=True),
+                 Option("robot", "See that its geometry is that of this robot.", "ROBOT"), JSON), verify,
+                ("c.json", "c.json --robot quattro"))
     add_command(app, "robots", "The shipped robots.",
                 (flag("examples", "The robots of the package example-robot-data instead: legged robots, arms, hands."),
                  JSON), robots, ("", "--examples"))

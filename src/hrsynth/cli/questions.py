@@ -161,7 +161,7 @@ QUESTIONS = (
              (*WATCHED, BEGIN,
               Option("form", "simplified (as in the paper) or general (sliders, all legs kept).", default="simplified",
                      words=("simplified", "general")),
-              _file("derive"), _file("derive", "report")),
+              _file("derive"), _file("derive", "report"), _file("derive", "certificate")),
              ("quattro --observe 1,4", "quattro --observe 1,4 -o hidden.urdf --report quattro.html",
               "robot.urdf --platform plate --motors hip_1,hip_2,hip_3")),
     Question("legs", "Every set of observed legs: its verdict, the freedoms it loses, and the smallest sets that see "
@@ -189,8 +189,9 @@ QUESTIONS = (
               *WATCHED, flag("real", "The real robot with its own motors held instead."),
               flag("as_written", "Take the file's numbers as they are: joint centres that coincide but for rounding "
                    "stay apart."),
-              _file("modes")),
-             ("quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7", "3rrr_m1 --real -o modes.png")),
+              _file("modes"), _file("modes", "certificate")),
+             ("quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7", "3rrr_m1 --real -o modes.png",
+              "quattro --observe 1,4 --certificate c.json")),
     Question("path", "Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, "
              "undecided.",
              (START, _goal("Where it ends; mode:2 is a mode with the directions at the start."), *WATCHED),

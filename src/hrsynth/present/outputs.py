@@ -124,6 +124,9 @@ class Outputs:
     files: tuple[File, ...] = ()
 
 
+CERTIFICATE = File("cannot write the certificate", {".json": ".certificates:written"},
+                   "Write a certificate (.json) that the command verify, or one file of plain Python, checks.",
+                   "certificate", "certificate_file")
 PNG, CSV, HTML = ".png", ".csv", (".html", ".htm")
 OUTPUTS = {
     "accuracy": Outputs("text.runs:accuracy", (
@@ -140,10 +143,12 @@ OUTPUTS = {
         File("cannot write the report", dict.fromkeys(HTML, "report.pages:page"),
              "Write a page (.html) with drawings, proof, singularities, assembly modes and accuracy.", "report",
              "report_file", computed="report.parts:parts"),
+        CERTIFICATE,
         File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None))),
     "legs": Outputs("text.robots:legs"),
     "modes": Outputs("text.poses:modes", (
-        File("cannot draw the modes", {PNG: "modes:picture"}, "Draw the modes (.png).", nothing="modes:why_undrawn"),)),
+        File("cannot draw the modes", {PNG: "modes:picture"}, "Draw the modes (.png).", nothing="modes:why_undrawn"),
+        CERTIFICATE)),
     "path": Outputs("text.poses:path"),
     "robot": Outputs("text.robots:robot"),
     "select": Outputs("text.runs:selection"),

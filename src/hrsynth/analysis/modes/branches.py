@@ -167,7 +167,8 @@ def _together(found: Sequence[SystemModes], tips: Sequence[Tip], size: float) ->
     complete = not unclear and all(each.complete for each in found)
     return SystemModes(sum(each.complex or 0 for each in found) - twice, modes, complete, proof, near, special, None,
                  next((each.bound for each in found if each.bound != "resultant"), "resultant"),
-                 all(each.enclosed for each in found), found[0].meant)
+                 all(each.enclosed for each in found), found[0].meant,
+                 tuple(part for each in found for part in each.solved))
 
 
 def _once(modes: Sequence[SystemMode], size: float) -> tuple[SystemMode, ...]:

@@ -86,6 +86,8 @@ class Roots:
     """Whether each complex solution is enclosed, apart from all others, for all input in the balls."""
     values: tuple[Sequence[Any], ...] = ()
     """Balls of the unknowns of all."""
+    turn: float = 0.0
+    """Where circles are counted from (rad), besides each unknown's own origin."""
 
 
 def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
@@ -109,7 +111,7 @@ def solve_square(square: SquareSystem, balls: Within = Balls, farthest: float = 
                 continue
             found = _roots(_Enclosing(balls, equations, thick, square, turn, conics), order, eliminant, farthest)
             if found.complete:
-                return found
+                return replace(found, turn=turn)
             fallback = max(fallback, found, key=lambda each: each.complex)
         if zeros == max(1, len(square.unknowns)):
             return Roots(complete=False, continuum=True)

@@ -66,6 +66,18 @@ class SystemMode:
 
 
 @dataclass(frozen=True, eq=False)
+class Solved:
+    """A square part of a system with all its solutions; ``modes`` are its real ones, in the order of ``roots.real``,
+    and ``kept`` tells which of them are modes of the whole system."""
+
+    system: System
+    part: Part
+    roots: Roots
+    modes: tuple[SystemMode, ...]
+    kept: tuple[bool, ...]
+
+
+@dataclass(frozen=True, eq=False)
 class SystemModes:
     """All modes: ``complex`` solutions counted with multiplicity (None where they are not known), the real ones as
     ``modes``, and in words the proof.
@@ -89,6 +101,8 @@ class SystemModes:
     enclosed: bool = False
     meant: tuple[Meant, ...] = ()
     """What was made exact."""
+    solved: tuple[Solved, ...] = ()
+    """What was solved, one for each choice of the legs' branches, where the solutions of a square part are all."""
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
@@ -184,7 +198,7 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
                     else _bounded(system, most, roots))
     if square.whole:
         return SystemModes(roots.complex, tuple(found), enclosed and bound != "none", proof, (), _special(roots), None,
-                           bound, enclosed)
+                           bound, enclosed, solved=(Solved(system, square, roots, tuple(found), (True,) * len(found)),))
     whole = [mode for mode, root in zip(found, roots.real, strict=True) if not _torn(system, square, root)]
     at_goal = _goal(system, roots, whole, goal)
     left = [mode for mode in whole if mode is at_goal
@@ -203,8 +217,9 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
     fitting = [mode.residual for mode in modes if mode is not at_goal]
     proof = (f"from {len(square.legs)} of {len(system.curves)} legs: {proof}; of these "
              + words(at_goal is not None, lost, fitting, len(found) - len(left), len(open_)))
+    kept = tuple(mode in left and mode not in open_ for mode in found)
     return SystemModes(len(modes), modes, enclosed and bound != "none", proof, near, _special(roots), None, bound,
-                       enclosed)
+                       enclosed, solved=(Solved(system, square, roots, tuple(found), kept),))
 
 
 def _by_construction(system: System, goal: Array, legs: tuple[int, ...]) -> SystemMode:

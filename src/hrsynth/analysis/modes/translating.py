@@ -104,13 +104,13 @@ class Translating(Shifting):
             if isinstance(other, Sphere) or (isinstance(other, Circle) and coplanar(one, other, self.size)):
                 rho = numbers.vector(np.array([other.radius / frame.size]))[0]
                 return [single(on_sphere(conics[0], centre, rho * rho))]
-            normal = direction(_normal(one, other), frame, numbers)
+            normal = direction(met_normal(one, other), frame, numbers)
             return [single(on_plane(conics[0], normal, normal @ centre))]
 
         return SquareSystem(legs, (one,), frame, build, lambda parameters: one.at(parameters[0]), whole)
 
 
-def _normal(one: Curve, other: Reach) -> Array:
+def met_normal(one: Curve, other: Reach) -> Array:
     """The normal of the plane of ``other`` that ``one`` is met with."""
     if isinstance(other, Circle | Plane):
         return other.axis if isinstance(other, Circle) else other.normal

@@ -108,7 +108,7 @@ def singularity(found: Singularity, file: str | None = None) -> str:
     return listing([*rows, *known("drawn in", file)])
 
 
-def modes(found: AssemblyModes, file: str | None = None) -> str:
+def modes(found: AssemblyModes, file: str | None = None, certificate: str | None = None) -> str:
     """The pose whose measurements are held, the count with its proof, a block for each mode."""
     count = found.found
     name, seen = head(found.setting)
@@ -128,7 +128,8 @@ def modes(found: AssemblyModes, file: str | None = None) -> str:
     for number, mode in enumerate(found.near, 1):
         rows += [*GAP, (f"near {number}", [f"{mode.pose}   residual {mode.residual:.2e}: almost a mode"
                  + (", and none" if count.complete else ""), *at_mode(mode, found.kind)])]
-    return listing([*rows, *(() if file is None else [*GAP, ("picture", file)])])
+    told = [*known("picture", file), *known("certificate", certificate)]
+    return listing([*rows, *([*GAP, *told] if told else [])])
 
 
 def all_of(found: AssemblyModes) -> str:

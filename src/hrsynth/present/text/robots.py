@@ -49,7 +49,8 @@ def robot(found: Mechanism) -> str:
     return listing([*rows, ("note", [str(note) for note in found.notes])])
 
 
-def derivation(found: Derivation, hidden_file: str | None = None, report: str | None = None) -> str:
+def derivation(found: Derivation, hidden_file: str | None = None, report: str | None = None,
+               certified: str | None = None) -> str:
     """The hidden robot first, the proof next, the trace last."""
     mobility, hidden, paper, observed = found.mobility, found.hidden_architecture, found.paper, found.setting
     dof = [f"{found.dof} (mobility {mobility.total}, of which {mobility.idle} idle)"]
@@ -72,7 +73,8 @@ def derivation(found: Derivation, hidden_file: str | None = None, report: str | 
                                       *(f"loses {freedom.name}" for freedom in paper.loses)]))
     steps = [(step.rule, step.leg or "all", "yes" if step.accepted else "no",
               "" if step.largest_angle is None else f"{step.largest_angle:.1e}", step.reason) for step in found.steps]
-    return "\n".join([listing([*rows, *known("written to", hidden_file), *known("report", report)]), "",
+    return "\n".join([listing([*rows, *known("written to", hidden_file), *known("report", report),
+                               *known("ranks", certified)]), "",
                       table(steps, ("rule", "leg", "taken", "angle", "why"))])
 
 

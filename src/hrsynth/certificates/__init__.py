@@ -1,0 +1,71 @@
+"""Certificates: what was proved, as files that a checker of plain Python accepts or refuses without this package."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from fractions import Fraction
+from pathlib import Path
+from typing import Any
+
+from ..analysis.derive import Derivation
+from ..analysis.modes.modes import AssemblyModes
+from ..errors import BadRequest, CertificateRefused
+from ..mechanism import Mechanism
+from ..tolerances import SAME_RELATION
+from . import modes, ranks
+from .verify_certificate import NotAccepted
+from .verify_certificate import verify as _verify
+
+
+def certificate(found: AssemblyModes | Derivation) -> dict[str, Any]:
+    """The certificate of a complete list of modes, or of a derivation's verdict in exact arithmetic: plain data, as
+    ``verify`` and the one file ``verify_certificate.py`` check it. Raises ``NoCertificate``."""
+    if isinstance(found, AssemblyModes):
+        return modes.certificate(found)
+    if isinstance(found, Derivation):
+        return ranks.certificate(found)
+    raise BadRequest("what has a certificate", type(found).__name__, "what modes or derive answer")
+
+
+def written(found: AssemblyModes | Derivation) -> bytes:
+    """A certificate as the content of a file."""
+    return (json.dumps(certificate(found), indent=1) + "\n").encode()
+
+
+def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | None = None) -> str:
+    """What a certificate, or the file of one, proves, in words, by the checker's own computation; with ``robot`` also
+    that its geometry is that robot's, to ``SAME_RELATION`` of its size.
+
+    Raises ``CertificateRefused`` where it does not hold, ``BadRequest`` for a file that cannot be read."""
+    if isinstance(source, Mapping):
+        record, name = dict(source), "the certificate"
+    else:
+        name = str(source)
+        try:
+            record = json.loads(Path(source).read_text(encoding="utf-8"))
+        except (OSError, ValueError, RecursionError) as error:
+            raise BadRequest("a certificate that cannot be read", name, f"a file of JSON ({error})") from None
+    try:
+        proved = _verify(record)
+    except NotAccepted as reason:
+        raise CertificateRefused(name, str(reason)) from None
+    if robot is not None:
+        own = (modes if record["claim"] == "modes" else ranks).again(record, robot)
+        if not _same(record, own):
+            raise CertificateRefused(name, f"it is not about {robot.name}: other geometry, legs or pose")
+    return proved
+
+
+def _same(one: Any, other: Any) -> bool:
+    """Whether two records of geometry are alike; what was solved for is left out."""
+    if isinstance(one, dict) and isinstance(other, dict):
+        left_out = {"robot", "boxes", "bound", "sha256", "stacks"}
+        return one.keys() - left_out == other.keys() - left_out and all(
+            _same(one[key], other[key]) for key in one.keys() - left_out)
+    if isinstance(one, list) and isinstance(other, list):
+        return len(one) == len(other) and all(map(_same, one, other))
+    try:
+        return one == other or abs(float(Fraction(one) - Fraction(other))) < SAME_RELATION
+    except (TypeError, ValueError):
+        return False

@@ -1,0 +1,376 @@
+"""The certificate of a complete list of assembly modes (docs/pages/certificates.md).
+
+The engine only proposes: which legs, which solutions. The systems are written anew in rational numbers, circles exactly
+round, within one part in 2⁻⁵² of the size of those that were solved; the checker's own equations are made of them, each
+solution is refined and enclosed, and the smallest bound that proves the count is looked for.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from itertools import product
+from typing import Any
+
+import numpy as np
+
+from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shifted
+from ..analysis.modes.modes import AssemblyModes, modes
+from ..analysis.modes.quadrics import UNIT, PoseSystem, Rounded, WorkingFrame, direction, spokes
+from ..analysis.modes.rigid import Planar, Spatial
+from ..analysis.modes.roots import is_real
+from ..analysis.modes.solve import Solved, SystemModes
+from ..analysis.modes.squares import SquareSystem
+from ..analysis.modes.translating import Articulated, Translating, coplanar, met_normal
+from ..analysis.observed import ObservedRobot
+from ..errors import NoCertificate
+from ..geometry.vectors import Array, cross, unit
+from ..mechanism import Mechanism
+from ..mechanism.pose import Pose
+from ..tolerances import NO_POSE_START
+from .verify_certificate import (
+    KINDS,
+    PRIME,
+    NotAccepted,
+    digest,
+    dot,
+    integral,
+    rank,
+    rational,
+    slope,
+    told,
+    value,
+    verify,
+)
+
+BITS = 320
+"""Bits with which solutions are refined."""
+RADIUS = Fraction(1, 1 << 80)
+"""Radius of the boxes (unknowns of size one)."""
+STEPS = 7
+"""Newton's steps from about the solution."""
+GRAIN = 1 << 140
+"""Middles of boxes are multiples of one over this."""
+CAPS = 6
+"""Largest cap of the monomials of a rank bound."""
+COLUMNS = 220
+"""The largest number of monomials."""
+PATIENCE = 3
+"""After so many bounds that are no better the search for one ends."""
+WITHIN = tuple(Fraction(1, 10 ** k) for k in range(13, 5, -1))
+"""How far the tips of a pose may be from where its box puts them (sizes): the first that is proved."""
+
+Polynomial = Mapping[tuple[int, ...], Any]
+
+
+def certificate(found: AssemblyModes) -> dict[str, Any]:
+    """The certificate of a list of modes, accepted by the checker; raises ``NoCertificate`` where the list is not
+    complete or no bound of the checker proves the count."""
+    about = {"robot": found.setting.robot.name, "kind": found.kind, "at": found.pose.to_dict(),
+             "observed": [[o.leg, o.link] for o in found.setting.observed]}
+    try:
+        return of_systems(found.found, about)
+    except NotAccepted as reason:
+        raise NoCertificate(found.setting.robot.name, str(reason)) from None
+
+
+def of_systems(found: SystemModes, about: Mapping[str, Any]) -> dict[str, Any]:
+    """The certificate of the modes of systems, with what they are ``about``; raises ``NotAccepted``."""
+    if not found.complete or not found.solved:
+        raise NotAccepted("the list is not proved complete")
+    systems = [_system(each) for each in found.solved]
+    record = {"format": "hrsynth-certificate-1", "claim": "modes", **about,
+              "real": sum("pose" in box for each in systems for box in each["boxes"]),
+              "complex": sum(each.roots.complex if each.part.whole else sum(each.kept) for each in found.solved),
+              "systems": systems}
+    record["sha256"] = digest(record)
+    verify(record)
+    return record
+
+
+def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
+    """The certificate of the same question about a robot; raises ``NoCertificate``, and what ``modes`` raises."""
+    parts: dict[str, Any] = {part: tuple(value) if part == "rpy" else value
+                             for part, value in record["at"].items() if value is not None}
+    at = Pose(**parts)
+    if record["kind"] == "real":
+        return certificate(modes(robot, at=at, real=True))
+    setting = ObservedRobot.of(robot, [link for _, link in record["observed"]])
+    start = setting.motion.pose(setting.everything.start.pose(setting.motion.link))
+    return certificate(modes(setting, at=None if start == at else at))
+
+
+def _system(solved: Solved) -> dict[str, Any]:
+    """A system with its boxes and its bound."""
+    record, starts, placed = _written(solved)
+    equations, halves, points, legs = KINDS[record["kind"]](record, rational(record["tips"]))
+    equations = [integral(p) for p in equations]
+    starts += [(each, False) for each in _no_poses(equations, halves)]
+    real = iter(zip(placed, solved.kept, strict=True))
+    record["boxes"] = []
+    for start, is_real_ in starts:
+        middle, inverse = _refined(equations, start, is_real_)
+        box = {"middle": _strings(middle), "radius": str(RADIUS), "inverse": _strings(inverse)}
+        if is_real_:
+            pose, kept = next(real)
+            box |= _pose(record, box, points, pose) if kept else {"misses": _missed(legs, middle)}
+        record["boxes"].append(box)
+    record["bound"] = _bound(record, equations, halves)
+    return record
+
+
+def _missed(legs: Any, middle: Any) -> int:
+    """The leg that misses most at a solution of the square part."""
+    off = [max(sum(map(abs, value(p, middle))) for p in leg) for leg in legs]
+    if not off or max(off) < RADIUS:
+        raise NotAccepted("a solution that no leg is proved to miss")
+    return off.index(max(off))
+
+
+def _pose(record: dict[str, Any], box: dict[str, Any], points: Any, placed: Array) -> dict[str, Any]:
+    """A real pose, and how far it puts tips from where the box does at most (sizes)."""
+    m, r, tips = rational(box["middle"]), rational(box["radius"]), rational(record["tips"])
+    for within in WITHIN:
+        given = {"pose": _strings([[Fraction(float(x)) for x in row] for row in placed]), "within": str(within)}
+        try:
+            told(record, given, points, tips, m, r)
+        except NotAccepted:
+            continue
+        return given
+    raise NotAccepted("a pose that its box does not put where it was told")
+
+
+def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool]], list[Array]]:
+    """A system in rational numbers without boxes and bound; about where its solutions are, and whether they are real;
+    the real ones' poses, as the checker is told them."""
+    system, part, roots = solved.system, solved.part, solved.roots
+    if isinstance(part, PoseSystem):
+        raise NotAccepted("tips on surfaces are not written yet")
+    if not part.unknowns or part.frame is None:
+        raise NotAccepted("tips at rest leave one pose: there is nothing to enclose")
+    frame, turns = part.frame, part.turns(roots.turn)
+    values = [[complex(v) for v in each] for each in roots.values]
+    real = [is_real(each) for each in roots.values]
+    if isinstance(system, Spatial | Planar):
+        legs = [*part.legs, *(k for k in range(len(system.curves)) if k not in part.legs)]
+        d = system.space
+        origins = iter(turns)
+        curves = [system.curves[k] for k in legs]
+        record = {"kind": "planar" if d == 2 else "spatial",
+                  "reaches": [_reach(each, frame, 0.0 if isinstance(each, Point | Surface) else
+                                                         next(origins, 0.0)) for each in curves],
+                  "tips": _strings(_rounded(system.tips[legs] / frame.size)), "square": len(part.legs)}
+        placed = [np.column_stack([frame.R @ mode.pose[:3, :d] if d == 3 else frame.R @ mode.pose[:3, :2],
+                                   frame.point(mode.pose[:3, 3])]) for mode in solved.modes]
+        return record, list(zip(values, real, strict=True)), placed
+    assert isinstance(system, Translating | Articulated)
+    if isinstance(system, Translating):
+        record, starts = _translating(system, part, frame, turns, values)
+    else:
+        record, starts = _articulated(system, part, frame, turns, values)
+    origin = _middle(part, system) if isinstance(system, Articulated) else frame.origin
+    record |= {"kind": "shifting", "square": len(record["reaches"])}
+    if not part.whole:  # then all legs are told, and what is solved first
+        bodies = [0] * len(system.paths) if isinstance(system, Translating) else system.bodies
+        paths = [shifted(each, frame.origin - origin) for each in system.paths]
+        record["reaches"] = [*record["reaches"], *(_reach(each, frame, 0.0) for each in paths)]
+        record["bodies"] = [*record.get("bodies", [0] * record["square"]), *bodies]
+    record["tips"] = [["0"] * 3] * len(record["reaches"])
+    placed = [np.column_stack([np.eye(3), frame.vector(mode.pose[:3, 3] - origin)]) for mode in solved.modes]
+    return record, list(zip(starts, real, strict=True)), placed
+
+
+def _translating(system: Translating, part: SquareSystem, frame: WorkingFrame, turns: Sequence[float],
+                 values: Sequence[list[complex]]) -> tuple[dict[str, Any], list[list[complex]]]:
+    """The position of the platform, of which every path is a place: a curve and what it meets, or three surfaces."""
+    curve = part.unknowns[0]
+    chosen: list[Reach] = [system.paths[k] for k in part.legs]
+    if len(chosen) == 2:
+        chosen = [curve, _met(curve, next(each for each in chosen if each is not curve), system.size)]
+    starts = [list(frame.point(_at(curve, frame, turns[0], t[0]))) for t in values]
+    return {"reaches": [_reach(each, frame, turns[0]) for each in chosen]}, starts
+
+
+def _articulated(system: Articulated, part: SquareSystem, frame: WorkingFrame, turns: Sequence[float],
+                 values: Sequence[list[complex]]) -> tuple[dict[str, Any], list[list[complex]]]:
+    """The first body's position, counted from the middle of the two paths, and the slide's half-angle tangent."""
+    middle = _middle(part, system)
+    paths = [shifted(system.paths[k], -middle) for k in part.legs]
+    bodies = [system.bodies[k] for k in part.legs]
+    starts = []
+    for t in values:
+        tip = paths[0].at(0.0) if isinstance(paths[0], Point) else _at(paths[0], frame, turns[0], t[0])
+        slid = _at(system.slide, frame, turns[-1 if len(t) > 1 else 0], t[-1])
+        starts.append([*frame.vector(tip - slid if bodies[0] else tip), t[-1]])
+    slide = _reach(system.slide, replace(frame, origin=np.zeros(3)), turns[len(part.unknowns) - 1])
+    return {"reaches": [_reach(each, frame, turns[0]) for each in paths], "bodies": bodies, "slide": slide}, starts
+
+
+def _middle(part: SquareSystem, system: Articulated) -> Array:
+    one, other = (system.paths[k].centre for k in part.legs)
+    return np.asarray((one + other) / 2)
+
+
+def _met(curve: Curve, other: Reach, size: float) -> Reach:
+    """The surface that a curve is met with: of a curve of its plane its sphere, or a plane through it."""
+    if isinstance(other, Circle) and coplanar(curve, other, size):
+        return Sphere(other.centre, other.radius)
+    return other if isinstance(other, Sphere | Plane) else Plane(other.centre, met_normal(curve, other))
+
+
+def _at(curve: Reach, frame: WorkingFrame, turn: float, t: complex) -> Any:
+    """The point (3,) of a curve at an unknown, complex ones too."""
+    assert isinstance(curve, Line | Circle)
+    return curve.at(2.0 * np.arctan(t) + turn if isinstance(curve, Circle) else frame.size * t)  # type: ignore[arg-type]
+
+
+def _reach(reach: Reach, frame: WorkingFrame, turn: float) -> dict[str, Any]:
+    """A curve or surface in rational working coordinates (sizes)."""
+    centre = _rounded(frame.point(reach.centre))
+    if isinstance(reach, Sphere):
+        radius = _rounded(reach.radius / frame.size)
+        return {"sphere": _strings([centre, [radius * radius]])}
+    if isinstance(reach, Circle):
+        return {"circle": _strings([centre, *_spokes(reach, frame, turn)])}
+    rest = [] if isinstance(reach, Point) else [reach.direction if isinstance(reach, Line) else reach.normal]
+    exact = [[Fraction(int(x), UNIT) for x in direction(each, frame, Rounded)] for each in rest]
+    return {type(reach).__name__.lower(): _strings([centre, *exact])}
+
+
+def _spokes(circle: Circle, frame: WorkingFrame, turn: float) -> list[list[Fraction]]:
+    """Two spokes of a circle, exactly normal to each other and of one length: those of a rational rotation."""
+    given = spokes(circle, frame, turn, Rounded)
+    a, b = ([Fraction(int(x), UNIT) for x in each] for each in given)
+    if len(a) == 2 or dot(a, b) == 0 == dot(a, a) - dot(b, b):
+        return [a, b]
+    first, second = unit(given[0].astype(float)), unit(given[1].astype(float))
+    w, x, y, z = (Fraction(round(float(c) * UNIT)) for c in _quaternion(np.column_stack(
+        [first, second, cross(first, second)])))
+    s = _rounded(circle.radius / frame.size) / (w * w + x * x + y * y + z * z)
+    return [[s * (w * w + x * x - y * y - z * z), 2 * s * (x * y + w * z), 2 * s * (x * z - w * y)],
+            [2 * s * (x * y - w * z), s * (w * w - x * x + y * y - z * z), 2 * s * (y * z + w * x)]]
+
+
+def _quaternion(R: Array) -> Array:
+    """The unit quaternion (w, x, y, z) of a rotation: the eigenvector of Bar-Itzhack's matrix (2000)."""
+    K = np.array([[R[0, 0] - R[1, 1] - R[2, 2], 0, 0, 0], [R[0, 1] + R[1, 0], R[1, 1] - R[0, 0] - R[2, 2], 0, 0],
+                  [R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], R[2, 2] - R[0, 0] - R[1, 1], 0],
+                  [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], np.trace(R)]])
+    x, y, z, w = np.linalg.eigh(K)[1][:, -1]
+    return np.array([w, x, y, z])
+
+
+def _refined(equations: Sequence[Polynomial], start: Sequence[complex], real: bool) -> tuple[Any, Any]:
+    """A solution near a start, as pairs of fractions, and about the inverse of the equations' derivatives there (each
+    equation over the power of two that the checker takes)."""
+    from flint import acb, acb_mat, ctx
+
+    n = len(equations)
+    scales = [Fraction(1, 2 ** max(map(abs, p.values())).bit_length()) for p in equations]
+    flat = [{e: c * s for e, c in p.items()} for p, s in zip(equations, scales, strict=True)]
+    slopes = [[slope(p, k) for k in range(n)] for p in flat]
+    with ctx.workprec(BITS):
+        x = [acb(z.real) if real else acb(z.real, z.imag) for z in start]
+        for _ in range(STEPS):
+            J = acb_mat([[_value(d, x) for d in row] for row in slopes])
+            try:
+                step = J.solve(acb_mat(n, 1, [_value(p, x) for p in flat]))
+            except ZeroDivisionError:
+                raise NotAccepted("a solution at which the equations are not independent") from None
+            x = [(v - s).mid() for v, s in zip(x, step.entries(), strict=True)]
+        inverse = np.linalg.inv(np.array([[complex(_value(d, x)) for d in row] for row in slopes]))
+        middle = [[_fraction(v.real), Fraction(0) if real else _fraction(v.imag)] for v in x]
+    return middle, [[[Fraction(float(v.real)), Fraction(float(v.imag))] for v in row] for row in inverse]
+
+
+def _value(p: Polynomial, x: Sequence[Any]) -> Any:
+    """A polynomial with rational coefficients at balls."""
+    from flint import acb, fmpq
+
+    total = acb(0)
+    for e, c in p.items():
+        term = acb(fmpq(c.numerator, c.denominator))
+        for v, k in zip(x, e, strict=True):
+            term *= v ** k
+        total += term
+    return total
+
+
+def _fraction(ball: Any) -> Fraction:
+    """The middle of a real ball, to one over ``GRAIN``."""
+    mantissa, exponent = ball.mid().man_exp()
+    exact = Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
+    return Fraction(round(exact * GRAIN), GRAIN)
+
+
+def _bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Sequence[bool]) -> dict[str, Any]:
+    """The first bound of the checker that is the number of boxes."""
+    count, least, worse = len(record["boxes"]), math.inf, 0
+    for bound in _bounds(halves):
+        try:
+            most = rank(equations, halves, {"bound": bound}, _ranks)
+        except NotAccepted:
+            continue
+        if most == count:
+            return bound
+        worse = 0 if most < least else worse + 1
+        least = min(least, most)
+        if worse == PATIENCE:
+            break
+    raise NotAccepted(f"{count} solutions are enclosed, but " + (f"there may be {least}" if least < math.inf else
+                                                             "no bound of their number is known"))
+
+
+def _bounds(halves: Sequence[bool]) -> Iterator[dict[str, Any]]:
+    """The ranks that may bound the number of solutions, those with small caps first."""
+    n = len(halves)
+    groups = [[k for k in range(n) if not halves[k]], *([k] for k in range(n) if halves[k])]
+    groups = [group for group in groups if group]
+    for caps in sorted(product(range(2, CAPS + 1), repeat=len(groups)), key=sum):
+        if math.prod(math.comb(len(group) + cap, cap) for group, cap in zip(groups, caps, strict=True)) <= COLUMNS:
+            yield {"kind": "rank", "groups": [list(each) for each in zip(groups, caps, strict=True)]}
+
+
+def _ranks(rows: Sequence[Sequence[int]], first: int) -> tuple[int, int]:
+    """As the checker computes them, fast."""
+    from flint import nmod_mat
+
+    columns = len(rows[0]) if rows else 0
+    one, two = (int(nmod_mat(len(rows), width, [c for row in rows for c in row[:width]], PRIME).rank())
+                for width in (min(first, columns), columns))
+    return one, two
+
+
+def _no_poses(equations: Sequence[Polynomial], halves: Sequence[bool]) -> list[list[complex]]:
+    """About the solutions of two equations at which the tangent of half an angle is i or −i: they are no poses."""
+    if len(halves) != 2:
+        return []
+    found: list[list[complex]] = []
+    for k, at in ((k, at) for k in (0, 1) if halves[k] for at in (1j, -1j)):
+        rows = []
+        for p in equations:
+            size = max(map(abs, p.values()))
+            row = np.zeros(max(e[1 - k] for e in p) + 1, dtype=complex)
+            for e, c in p.items():
+                row[e[1 - k]] += c / size * at ** e[k]
+            rows.append(row)
+        for y in np.roots(rows[0][::-1]):
+            x = [at, y] if k == 0 else [y, at]
+            new = all(abs(np.subtract(x, z)).max() > NO_POSE_START for z in found)
+            if new and abs(np.polyval(rows[1][::-1], y)) < NO_POSE_START:
+                found.append(x)
+    return found
+
+
+def _rounded(x: Any) -> Any:
+    """Numbers to one part in 2⁻⁵², as fractions."""
+    if np.ndim(x) == 0:
+        return Fraction(round(float(x) * UNIT), UNIT)
+    return [_rounded(each) for each in x]
+
+
+def _strings(values: Any) -> Any:
+    """Fractions as the checker reads them."""
+    return str(values) if isinstance(values, Fraction) else [_strings(each) for each in values]

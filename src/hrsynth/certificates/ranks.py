@@ -1,0 +1,67 @@
+"""The certificate of a verdict in exact arithmetic: the ranks at one rational instance (docs/pages/theory.md, 12)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..analysis.derive import Derivation, derive
+from ..analysis.exact import architecture
+from ..analysis.instances import NotRecognised
+from ..errors import NoCertificate
+from ..mechanism import Mechanism
+from .verify_certificate import PRIME, digest, verify
+
+
+def certificate(found: Derivation) -> dict[str, Any]:
+    """A: what all joints and loops ask of the joints' rates, X: the platform's twist, Y: the rates of the observed
+    directions, at one random rational instance of the architecture, and the ranks of A, [A; X], [A; Y], [A; Y; X].
+
+    The legs see rank [A; X] + rank [A; Y] − rank [A; Y; X] − rank A of the platform's freedoms. Raises
+    ``NoCertificate`` where there are no instances."""
+    exact, name = architecture(found.setting), found.robot.name
+    try:
+        at = exact.instance(0)
+    except NotRecognised as reason:
+        raise NoCertificate(name, str(reason)) from None
+    places = [i for i, o in enumerate(exact.observations) if o.key in {each.key for each in found.setting.observed}]
+    if len(places) != len(found.setting.observed):
+        raise NoCertificate(name, "not all that is measured is a direction")
+    matrices = {"A": at.loops, "X": at.rows[0], "Y": np.vstack([at.rows[1 + i] for i in places])}
+    whole = {key: [[int(c) for c in row] for row in rows] for key, rows in matrices.items()}
+    record = {"format": "hrsynth-certificate-1", "claim": "ranks", "robot": name,
+              "observed": [[o.leg, o.link] for o in found.setting.observed], "matrices": whole,
+              "stacks": [_stack(of, whole) for of in (["A"], ["A", "X"], ["A", "Y"], ["A", "Y", "X"])
+                         if any(whole[key] for key in of)]}
+    record["sha256"] = digest(record)
+    verify(record)
+    return record
+
+
+def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
+    """The certificate of the same question about a robot."""
+    return certificate(derive(robot, [link for _, link in record["observed"]]))
+
+
+def _stack(of: Sequence[str], matrices: dict[str, list[list[int]]]) -> dict[str, Any]:
+    """The rank of a stack of matrices, its minor and its kernel."""
+    from flint import fmpz_mat, nmod_mat
+
+    rows = [row for key in of for row in matrices[key]]
+    columns = len(rows[0])
+    exact = fmpz_mat(rows)
+    kernel, nullity = exact.nullspace()
+    rank = columns - int(nullity)
+    vectors = [[int(kernel[i, j]) for i in range(columns)] for j in range(int(nullity))]
+    modular = nmod_mat(len(rows), columns, [c % PRIME for row in rows for c in row], PRIME)
+    chosen = _pivots(modular.transpose())
+    own = _pivots(nmod_mat(len(chosen), columns, [rows[i][j] % PRIME for i in chosen for j in range(columns)], PRIME))
+    return {"of": list(of), "rank": rank, "rows": chosen, "columns": own, "kernel": vectors}
+
+
+def _pivots(matrix: Any) -> list[int]:
+    """The columns of a matrix that do not depend on those before."""
+    reduced, rank = matrix.rref()
+    return [next(j for j in range(reduced.ncols()) if int(reduced[i, j])) for i in range(rank)]

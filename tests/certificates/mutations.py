@@ -1,0 +1,155 @@
+"""Ways to make a certificate false, or at least no proof, and random changes of its text."""
+
+from __future__ import annotations
+
+import copy
+import json
+import random
+from collections.abc import Callable
+from fractions import Fraction
+from typing import Any
+
+from hrsynth.certificates.verify_certificate import digest
+
+Record = dict[str, Any]
+
+
+def moved(text: str, by: Fraction) -> str:
+    return str(Fraction(text) + by)
+
+
+def amount(rng: random.Random) -> Fraction:
+    """A change that is far larger than the boxes, of either sign."""
+    return rng.choice((-1, 1)) * Fraction(1, 2 ** rng.randint(0, 60))
+
+
+def a_box(record: Record, rng: random.Random) -> tuple[Record, Record]:
+    system = rng.choice(record["systems"])
+    return system, rng.choice(system["boxes"])
+
+
+def drop_box(record: Record, rng: random.Random) -> None:
+    system, box = a_box(record, rng)
+    system["boxes"].remove(box)
+
+
+def double_box(record: Record, rng: random.Random) -> None:
+    system, box = a_box(record, rng)
+    system["boxes"].append(copy.deepcopy(box))
+
+
+def move_box(record: Record, rng: random.Random) -> None:
+    _, box = a_box(record, rng)
+    part = rng.choice(box["middle"])
+    part[0] = moved(part[0], amount(rng))
+
+
+def turn_complex(record: Record, rng: random.Random) -> None:
+    _, box = a_box(record, rng)
+    part = rng.choice(box["middle"])
+    part[1] = moved(part[1], amount(rng))
+
+
+def wrong_radius(record: Record, rng: random.Random) -> None:
+    _, box = a_box(record, rng)
+    box["radius"] = rng.choice(["0", "-1/1208925819614629174706176", "1000", f"1/{2 ** 600}"])
+
+
+def wrong_inverse(record: Record, rng: random.Random) -> None:
+    _, box = a_box(record, rng)
+    for row in box["inverse"]:
+        for entry in row:
+            entry[0] = str(3 * Fraction(entry[0]) + 1)
+
+
+def wrong_count(record: Record, rng: random.Random) -> None:
+    record[rng.choice(("real", "complex"))] += rng.choice((-2, -1, 1, 2))
+
+
+def wrong_pose(record: Record, rng: random.Random) -> None:
+    _, box = a_box(record, rng)
+    if "pose" not in box:
+        return wrong_count(record, rng)
+    row = rng.choice(box["pose"])
+    row[-1] = moved(row[-1], rng.choice((-1, 1)) * Fraction(1, 10 ** rng.randint(0, 5)))
+    return None
+
+
+def forget_pose(record: Record, rng: random.Random) -> None:
+    """A real solution told as if it were complex, and counted so."""
+    _, box = a_box(record, rng)
+    if "pose" not in box:
+        return wrong_count(record, rng)
+    del box["pose"]
+    record["real"] -= 1
+    return None
+
+
+def wrong_caps(record: Record, rng: random.Random) -> None:
+    bound = rng.choice(record["systems"])["bound"]
+    if bound["kind"] != "rank":
+        return wrong_count(record, rng)
+    for group in bound["groups"]:
+        group[1] = rng.choice((0, 1, 13, -1, 2.5, "3"))
+    return None
+
+
+def other_geometry(record: Record, rng: random.Random) -> None:
+    """A curve of another size, or a tip elsewhere."""
+    system = rng.choice(record["systems"])
+    reach = rng.choice(system["reaches"][:system.get("square")])
+    (kind, vectors), = reach.items()
+    if kind == "circle":
+        factor = 1 + amount(rng)
+        vectors[1:] = [[str(Fraction(x) * factor) for x in each] for each in vectors[1:]]
+    elif kind == "sphere":
+        vectors[1][0] = str(Fraction(vectors[1][0]) * (1 + amount(rng)))
+    else:
+        across = vectors[1] if kind == "plane" else other(vectors[1]) if kind == "line" else ["1"] * len(vectors[0])
+        by = amount(rng)
+        vectors[0] = [moved(x, by * Fraction(d)) for x, d in zip(vectors[0], across, strict=True)]
+
+
+def other(direction: list[str]) -> list[str]:
+    """A vector that is not along a direction."""
+    return ["1" if Fraction(x) == 0 else "0" for x in direction] if any(
+        Fraction(x) == 0 for x in direction) else ["1", *["0"] * (len(direction) - 1)]
+
+
+def missing_key(record: Record, rng: random.Random) -> None:
+    holder = rng.choice([record["systems"][0], record["systems"][0]["boxes"][0]])
+    del holder[rng.choice([key for key in holder if key not in ("pose", "within")])]
+
+
+def wrong_type(record: Record, rng: random.Random) -> None:
+    system = rng.choice(record["systems"])
+    key = rng.choice(["kind", "reaches", "tips", "boxes", "bound"])
+    system[key] = rng.choice([None, 3, "x", [], {}])
+
+
+FALSE: tuple[Callable[[Record, random.Random], None], ...] = (
+    drop_box, double_box, move_box, turn_complex, wrong_radius, wrong_inverse, wrong_count, wrong_pose, forget_pose,
+    wrong_caps, other_geometry, missing_key, wrong_type)
+
+
+def false(record: Record, rng: random.Random) -> tuple[str, Record]:
+    """The name of a change, and the changed certificate with a digest that fits."""
+    changed = copy.deepcopy(record)
+    change = rng.choice(FALSE)
+    change(changed, rng)
+    changed["sha256"] = digest(changed)
+    return change.__name__, changed
+
+
+def scribbled(text: str, rng: random.Random) -> str:
+    """A certificate's text with one character changed, left out or doubled."""
+    k = rng.randrange(len(text))
+    return text[:k] + rng.choice(["", text[k] * 2, rng.choice("0123456789-./{}[]\",x")]) + text[k + 1:]
+
+
+def means_the_same(one: str, other: str) -> bool:
+    """Whether two texts are one record: blanks do not count."""
+    try:
+        return bool(json.loads(one) == json.loads(other))
+    except ValueError:
+        return False

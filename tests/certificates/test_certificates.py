@@ -1,0 +1,231 @@
+"""Certificates: accepted by one file of plain Python without this package, refused when anything in them is not so."""
+
+from __future__ import annotations
+
+import ast
+import copy
+import json
+import random
+import subprocess
+import sys
+from collections import Counter
+from dataclasses import replace
+from fractions import Fraction
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from sympy import ZZ
+from sympy.polys.matrices import DomainMatrix
+
+import hrsynth
+from analysis.modes.draws import FAMILIES
+from analysis.modes.laws import draw
+from certificates.mutations import FALSE, false, means_the_same, scribbled
+from hrsynth.analysis.modes.solve import solve
+from hrsynth.certificates import verify_certificate as checker
+from hrsynth.certificates.modes import of_systems
+from hrsynth.cli import execute
+from hrsynth.errors import BadRequest, CertificateRefused, NoCertificate
+from hrsynth.mechanism import Mechanism
+
+FILE = Path(checker.__file__)
+ROBOTS = {"quattro": ("1", "4"), "gough_stewart": ("1", "3", "5"), "3rrr_m1": ("1", "2", "3"), "delta": ("1", "2"),
+          "quattro_rigid": ("1", "2"), "rrrrr_m1": ("1", "2"), "6pus": ("1", "2", "3", "4"), "3rpr_m1": ("1", "2", "3")}
+"""Platforms that turn, turn in a plane, translate, of two bodies; as many legs as needed, and more."""
+
+
+@cache
+def of(name: str) -> str:
+    return json.dumps(hrsynth.certificate(hrsynth.modes(hrsynth.load(name), list(ROBOTS[name]))))
+
+
+@cache
+def ranks(legs: str) -> str:
+    return json.dumps(hrsynth.certificate(hrsynth.derive(hrsynth.load("quattro"), legs.split(","))))
+
+
+def test_the_checker_is_one_short_file_that_needs_python_alone():
+    tree = ast.parse(FILE.read_text(encoding="utf-8"))
+    imports = {name.split(".")[0] for node in ast.walk(tree) for name in (
+        [alias.name for alias in node.names] if isinstance(node, ast.Import) else
+        [node.module or ""] if isinstance(node, ast.ImportFrom) else [])}
+    assert imports <= set(sys.stdlib_module_names)
+    assert len(FILE.read_text(encoding="utf-8").splitlines()) <= 400
+    assert not [node for node in ast.walk(tree) if (isinstance(node, ast.Constant) and isinstance(node.value, float))
+                or (isinstance(node, ast.Name) and node.id == "float")]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_what_is_listed_is_certified(name, tmp_path):
+    found = hrsynth.modes(hrsynth.load(name), list(ROBOTS[name]))
+    record = json.loads(of(name))
+    assert record["real"] == len(found.modes)
+    assert record["complex"] == found.found.complex
+    assert hrsynth.verify(record, hrsynth.load(name)).startswith(f"{len(found.modes)} real of {found.found.complex}")
+    path = tmp_path / "c.json"
+    path.write_text(json.dumps(record))
+    done = subprocess.run([sys.executable, "-I", str(FILE), str(path)], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert done.stdout.startswith("accepted: ")
+
+
+WITHOUT = {"planar, a circle and two lines", "planar, two circles and a line", "spatial, two lines and a circle",
+           "two bodies, a line and a circle", "two bodies, first circle and slide parallel", "two bodies, lines",
+           "two bodies, second circle and slide parallel"}
+"""Families with zeros at infinity, which no bound of the checker leaves out."""
+
+
+@pytest.mark.parametrize("name", sorted(FAMILIES))
+def test_random_platforms(name):
+    """The checker's bound, which trusts no resultant, is the engine's count."""
+    system, _ = draw(name, 1)
+    found = solve(system)
+    if name in WITHOUT:
+        with pytest.raises(checker.NotAccepted, match="no bound of their number is known"):
+            of_systems(found, {})
+        return
+    record = of_systems(found, {})
+    assert (record["real"], record["complex"]) == (len(found.modes), found.complex)
+
+
+def test_another_robot_is_told():
+    record = json.loads(of("quattro"))
+    with pytest.raises(CertificateRefused, match="not about"):
+        hrsynth.verify(record, scaled("quattro"))
+
+
+def scaled(name: str) -> Mechanism:
+    """A robot that is a hundredth larger."""
+    robot = hrsynth.load(name)
+    links = {key: replace(link, pose=np.vstack([np.hstack([link.pose[:3, :3], 1.01 * link.pose[:3, 3:]]),
+                                                link.pose[3:]])) for key, link in robot.links.items()}
+    joints = {key: replace(joint, point=1.01 * joint.point) for key, joint in robot.joints.items()}
+    return replace(robot, links=links, joints=joints)
+
+
+@pytest.mark.parametrize("legs", ["1,4", "1,2", "1"])
+def test_ranks_are_those_of_an_independent_elimination(legs):
+    record = json.loads(ranks(legs))
+    for stack in record["stacks"]:
+        rows = [row for key in stack["of"] for row in record["matrices"][key]]
+        assert DomainMatrix(rows, (len(rows), len(rows[0])), ZZ).to_field().rank() == stack["rank"]
+    seen = {tuple(stack["of"]): stack["rank"] for stack in record["stacks"]}
+    lost = seen["A", "Y", "X"] - seen["A", "Y"]
+    derived = hrsynth.derive(hrsynth.load("quattro"), legs.split(","))
+    assert derived.dof - lost == derived.exact.rank
+
+
+def attacked(text: str, count: int, seed: int) -> Counter[str]:
+    """How many false certificates of each kind were refused; none is accepted."""
+    rng, told = random.Random(seed), Counter()
+    record = json.loads(text)
+    for _ in range(count):
+        name, changed = false(record, rng)
+        with pytest.raises(checker.NotAccepted):
+            print(name, checker.verify(changed))
+        told[name] += 1
+    return told
+
+
+@pytest.mark.parametrize("name", ["3rpr_m1", "delta", "rrrrr_m1", "gough_stewart"])
+def test_false_certificates_are_refused(name):
+    assert sum(attacked(of(name), 40, 1).values()) == 40
+
+
+def test_every_kind_of_falsehood_is_tried():
+    told = attacked(of("3rpr_m1"), 300, 2)
+    assert set(told) == {change.__name__ for change in FALSE}
+
+
+def test_a_changed_text_is_refused():
+    rng = random.Random(3)
+    for text in (of("3rpr_m1"), ranks("1,2")):
+        for _ in range(200):
+            changed = scribbled(text, rng)
+            if means_the_same(text, changed):
+                continue
+            with pytest.raises((checker.NotAccepted, ValueError)):
+                checker.verify(json.loads(changed))
+
+
+@pytest.mark.long
+def test_ten_thousand_false_certificates():
+    told: Counter[str] = Counter()
+    for seed, name in enumerate(ROBOTS):
+        told += attacked(of(name), 1250, seed)
+    assert sum(told.values()) == 10_000
+
+
+def test_false_ranks_are_refused():
+    rng = random.Random(4)
+    record = json.loads(ranks("1,2"))
+    for _ in range(60):
+        changed = copy.deepcopy(record)
+        stack = rng.choice(changed["stacks"])
+        match rng.randrange(5):
+            case 0:
+                stack["rank"] += rng.choice((-1, 1))
+            case 1:
+                stack["kernel"].pop()
+            case 2:
+                stack["kernel"][0] = stack["kernel"][-1] if len(stack["kernel"]) > 1 else [0] * len(stack["kernel"][0])
+            case 3:
+                stack["rows"][0] = stack["rows"][-1]
+            case 4:
+                vector = rng.choice(stack["kernel"])
+                rows = [row for key in stack["of"] for row in changed["matrices"][key]]
+                used = [j for j in range(len(vector)) if any(row[j] for row in rows)]
+                vector[rng.choice(used)] += 1
+        changed["sha256"] = checker.digest(changed)
+        with pytest.raises(checker.NotAccepted):
+            print(checker.verify(changed))
+
+
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_pose_at_infinity_is_never_lost(sign):
+    """A bar of length 1 from a pivot, its end on a circle: two poses, one at t = 0 or (sign −1) at t = ∞."""
+    a, b = ([str(sign * Fraction(x, 5)) for x in each] for each in ((-7, 4), (-4, -7)))
+    system = {"kind": "planar", "square": 2, "tips": [["0", "0"], ["1", "0"]],
+              "reaches": [{"point": [["0", "0"]]}, {"circle": [["2", "0"], a, b]}],
+              "bound": {"kind": "rank", "groups": [[[0], 2]]}}
+    equations, halves, _, _ = checker.planar(system, checker.rational(system["tips"]))
+    equations = [checker.integral(p) for p in equations]
+    if sign == 1:
+        assert checker.rank(equations, halves, system) == 2
+    else:
+        with pytest.raises(checker.NotAccepted):
+            checker.rank(equations, halves, system)
+
+
+def test_command_line(tmp_path, capsys):
+    path = tmp_path / "c.json"
+    assert execute(["modes", "3rpr_m1", "--certificate", str(path)]) == 0
+    assert f"certificate  {path}" in capsys.readouterr().out
+    assert execute(["verify", str(path)]) == 0
+    assert capsys.readouterr().out == "accepted: 2 real of 2 complex poses, and no other\n"
+    assert execute(["verify", str(path), "--robot", "3rpr_m1", "--json"]) == 0
+    assert json.loads(capsys.readouterr().out)["accepted"] is True
+    assert execute(["verify", str(path), "--robot", "3rrr_m1"]) == 3
+    path.write_text(path.read_text().replace('"real": 2', '"real": 1'))
+    assert execute(["verify", str(path)]) == 3
+    assert "refused" in capsys.readouterr().err
+    assert execute(["modes", "3rpr_m1", "--certificate", str(tmp_path / "c.txt")]) == 2
+    assert execute(["modes", "hexa", "--observe", "1,2", "--certificate", str(tmp_path / "d.json")]) == 3
+    assert not (tmp_path / "d.json").exists()
+
+
+@pytest.mark.parametrize("text", ["", "[]", "{}", "null", '{"format": "hrsynth-certificate-1"}', "[" * 100_000])
+def test_no_certificate_at_all(text, tmp_path):
+    path = tmp_path / "c.json"
+    path.write_text(text)
+    with pytest.raises((CertificateRefused, BadRequest)):
+        hrsynth.verify(path)
+
+
+def test_no_certificate_without_a_proof():
+    with pytest.raises(NoCertificate, match="not proved complete"):
+        hrsynth.certificate(hrsynth.modes(hrsynth.load("hexa"), ["1", "2"]))
+    with pytest.raises(BadRequest, match="certificate"):
+        hrsynth.certificate(hrsynth.check(hrsynth.load("3rpr_m1")))
