@@ -146,10 +146,11 @@ POLISHED = 1e-12
 """Newton's step (unit vectors) at which the end of a path counts as sharp."""
 SAME_END = 1e-8
 """Distance (unit vectors) below which two ends of paths are one, and one is real."""
-SAME_SINGULAR_END = 1e-5
+SAME_SINGULAR_END = 1e-4
 """Distance (unit vectors) below which two singular ends of paths are one."""
 SINGULAR_END = 1e-5
-"""Smallest singular value, of quadrics with coefficients of one size, below which an end counts as singular."""
+"""Smallest singular value, of quadrics with coefficients of one size, below which an end counts as singular; a tenth of
+it, as part of the largest, is left out on the way there."""
 BALL_ZERO = 2.0 ** -256
 """Radius of a ball that holds zero at which the number in it counts as zero."""
 

@@ -51,11 +51,13 @@ _Pair = tuple[_Name, _Name]
 class Bound:
     """At most so many isolated poses, none besides if that many are, and why.
 
+    ``law``: ``degree`` where solutions at infinity count among them, ``quadrics``, ``places`` or ``product``.
     ``doubles``: two (a₀, a) and two (b₀, b) each, on the lines of double points of X that solve all equations.
     """
 
     most: int
     why: str
+    law: str
     doubles: tuple[tuple[_Pair, _Pair], ...] = ()
 
 
@@ -84,29 +86,43 @@ def rigid_bound(system: Spatial, legs: Sequence[int]) -> Bound:
     """The least of the bounds that hold for the six conditions of some legs."""
     curves = [system.curves[k] for k in legs]
     if sorted(system.forbids[k] for k in legs) == [1, 2, 3]:
-        return Bound(4, "two places of a tip on its curve, two turns about the line to the tip at rest for each")
+        return Bound(4, "two places of a tip on its curve, two turns about the line to the tip at rest for each",
+                     "places")
     if any(isinstance(curve, Point) for curve in curves) or all(isinstance(curve, Line | Plane) for curve in curves):
         # with planes p is a linear function of R
-        return Bound(8, "three quadrics of the quaternion (Bézout)")
-    tower = _tower(system, legs) if all(isinstance(curve, Sphere) for curve in curves) else None
+        return Bound(8, "three quadrics of the quaternion (Bézout)", "quadrics")
+    places = _places(system, legs) if all(isinstance(curve, Sphere) for curve in curves) else None
     degree = degree_bound(system, legs)
-    return degree if tower is None or degree.most < tower.most else tower
+    return degree if places is None or degree.most < places.most else places
 
 
-def _tower(system: Spatial, legs: Sequence[int]) -> Bound | None:
-    """Rods that share a ball, one after another: three leave it two places."""
-    sides = [{k: tuple(system.tips[k].tolist()) for k in legs},
+def _places(system: Spatial, legs: Sequence[int]) -> Bound | None:
+    """Rods that share balls, one after another: three leave a ball two places, and so do two besides a ball whose
+    distance is known; four between two and two balls leave these two shapes, which turn about both lines."""
+    balls = [{k: tuple(system.tips[k].tolist()) for k in legs},
              {k: tuple(system.curves[k].centre.tolist()) for k in legs}]
-    three = next(([k for k in legs if side[k] == ball] for side in sides for ball, count in
-                  Counter(side.values()).items() if count == 3), None)
-    if three is None:
-        return None
-    rest = [k for k in legs if k not in three]
-    if any(len({side[k] for k in rest}) == 2 for side in sides):
-        # the ball of two more rods is at known distances from three points of the other body, the first ball for one;
-        # then a turn about the line through both balls is left
-        return Bound(8, "two places of a ball with three rods, two of a ball with two more, two turns about their line")
-    return Bound(16, "two places of a ball with three rods, three quadrics of the quaternion for each (Bézout)")
+    for side in balls:
+        shared = Counter(side.values())
+        three = next(([k for k in legs if side[k] == ball] for ball in shared if shared[ball] == 3), None)
+        if three is None:
+            continue
+        if any(len({other[k] for k in legs if k not in three}) == 2 for other in balls):
+            return Bound(8, "two places of a ball with three rods, two of a ball with two more, two turns about their "
+                         "line", "places")
+        return Bound(16, "two places of a ball with three rods, three quadrics of the quaternion for each (Bézout)",
+                     "quadrics")
+    for four in combinations(legs, 4):
+        if all(len({side[k] for k in four}) == 2 for side in balls) and len({(balls[0][k], balls[1][k])
+                                                                             for k in four}) == 4:
+            rest = [k for k in legs if k not in four]
+            if any(len({side[k] for k in rest}) == 1 for side in balls):
+                # the place of the ball that the last two rods share is a linear function of its turn about one line:
+                # the other line's distance is a quadric of that turn
+                return Bound(8, "two shapes of four balls with four rods, a quadric of the turn about a line for each",
+                             "places")
+            return Bound(16, "two shapes of four balls with four rods, two forms of degrees 2 and 2 of the turns about "
+                         "two lines for each (Bézout)", "places")
+    return None
 
 
 def degree_bound(system: Spatial, legs: Sequence[int]) -> Bound:
@@ -123,7 +139,7 @@ def degree_bound(system: Spatial, legs: Sequence[int]) -> Bound:
     why = "six conditions on points of a rigid body (degree of the poses among 16 coordinates"
     if known:
         why += f", less 2 for each of {len(known)} isolated double points at infinity"
-    return Bound(DEGREE - 2 * len(known), f"{why})", tuple(found))
+    return Bound(DEGREE - 2 * len(known), f"{why})", "degree", tuple(found))
 
 
 def _conditions(system: Spatial, legs: Sequence[int]) -> Iterator[_Condition]:

@@ -37,7 +37,8 @@ class Ends:
     """Where the paths end: at ``solutions`` (m, 7), singular ones ``multiple`` times, real or with their conjugates;
     ``infinite``: how many end at no solution, ``lost``: how many were given up.
 
-    ``loose``: singular ends, each met by one path: a continuum of solutions ends paths anywhere.
+    ``loose``: singular ends, each met by one path: a continuum of solutions ends paths anywhere. ``far``: the (e, g)
+    (m, 8) at which paths that end at no solution were left.
     """
 
     solutions: Array
@@ -45,6 +46,7 @@ class Ends:
     infinite: int
     lost: int
     loose: int
+    far: Array
 
 
 def section() -> Array:
@@ -86,7 +88,8 @@ def ends(quadrics: Sequence[Quadric], study: Array, resting: Sequence[int] = (),
             break
     at = np.array([*found.sharp, *found.singular]).reshape(-1, 8) @ back.T
     multiple = (1,) * len(found.sharp) + found.multiple
-    return Ends(at[:, 1:] / at[:, :1], multiple, found.infinite, found.lost, found.loose)
+    far = np.reshape(found.far, (-1, 8))
+    return Ends(at[:, 1:] / at[:, :1], multiple, len(far), found.lost, found.loose, far)
 
 
 def _corners() -> tuple[Array, Array]:
@@ -152,21 +155,19 @@ class _Sorted:
     sharp: Sequence[Array] = ()
     singular: Sequence[Array] = ()
     multiple: tuple[int, ...] = ()
-    infinite: int = 0
+    far: Sequence[Array] = ()
     lost: int = 0
     loose: int = 0
 
 
 def _sorted(wanted: Array, x: Array, known: Sequence[Array]) -> _Sorted:
     """What the ends (m, 8) of paths are, with solutions that are ``known`` already."""
-    paths = len(x)
-    x, steps = _newton(wanted, x, POLISHES)
+    left, (x, steps) = x, _newton(wanted, x, POLISHES)
     infinite = _distance(x) > FARTHEST
     sharp = ~infinite & (steps < POLISHED)
     poses = _conjugates([*known, *x[sharp]])
-    vague, steps = _newton(wanted, x[~infinite & ~sharp], ROUNDS)
-    values = np.linalg.svd(_bordered(2.0 * np.einsum("kij,nj->nki", wanted, vague), vague), compute_uv=False)
-    vague = vague[(steps < SAME_END) & (values[:, -1] < SINGULAR_END) & (_distance(vague) < FARTHEST)]
+    vague, misses, least = _gauss_newton(wanted, left[~infinite & ~sharp])
+    vague = vague[(misses < SAME_END) & (least < SINGULAR_END) & (_distance(vague) < FARTHEST)]
     groups: list[list[Array]] = []
     for each in vague:
         group = next((group for group in groups if _apart(each, group[0]) < SAME_SINGULAR_END), [])
@@ -174,9 +175,10 @@ def _sorted(wanted: Array, x: Array, known: Sequence[Array]) -> _Sorted:
         group.append(each)
     several = [group for group in groups if len(group) > 1]
     multiple = tuple(len(group) for group in several)
-    far = int(infinite.sum())
-    return _Sorted(poses, [_turned(group[0]) for group in several], multiple, far,
-                  max(0, paths - far - len(poses) - sum(multiple)), len(groups) - len(several))
+    far = left[infinite]
+    lost = len(left) - len(far) - len(poses) - sum(multiple)
+    singular = [_turned(group[0], SAME_SINGULAR_END) for group in several]
+    return _Sorted(poses, singular, multiple, tuple(far), max(0, lost), len(groups) - len(several))
 
 
 def _conjugates(x: Sequence[Array]) -> list[Array]:
@@ -188,11 +190,11 @@ def _conjugates(x: Sequence[Array]) -> list[Array]:
     return found
 
 
-def _turned(x: Array) -> Array:
-    """A vector with its largest entry made real; real if all others are then, nearly."""
+def _turned(x: Array, flat: float = SAME_END) -> Array:
+    """A vector with its largest entry made real; real if all others are then, but for ``flat``."""
     largest = x[np.argmax(np.abs(x))]
     x = x * (abs(largest) / largest)
-    return x.real if np.abs(x.imag).max() < SAME_END else x
+    return x.real if np.abs(x.imag).max() < flat else x
 
 
 def _apart(one: Array, other: Array) -> float:
@@ -215,6 +217,20 @@ def _newton(quadrics: Array, x: Array, rounds: int) -> tuple[Array, Array]:
         steps = np.linalg.norm(step, axis=1)
         x = np.where(steps[:, None] < 1.0, _normed(x + step), x)
     return x, steps
+
+
+def _gauss_newton(quadrics: Array, x: Array) -> tuple[Array, Array, Array]:
+    """Unit vectors (m, 8) after steps that leave out what is nearly singular, what is left of the quadrics there, and
+    the smallest singular values."""
+    for _ in range(ROUNDS):
+        J = _bordered(2.0 * np.einsum("kij,nj->nki", quadrics, x), x)
+        F = np.einsum("nki,ni->nk", J, x) / 2.0
+        F[:, -1] = 0.0
+        step = np.linalg.pinv(J, rcond=SINGULAR_END / 10.0) @ F[:, :, None]
+        x = _normed(x - step[:, :, 0])
+    J = _bordered(2.0 * np.einsum("kij,nj->nki", quadrics, x), x)
+    misses: Array = np.abs(np.einsum("nki,ni->nk", J[:, :-1], x)).max(axis=1, initial=0.0)
+    return x, misses, np.linalg.svd(J, compute_uv=False)[:, -1].astype(float)
 
 
 def _step(J: Array, x: Array, F: Array) -> Array:

@@ -84,6 +84,8 @@ class Roots:
     """Whether it is not clear which are."""
     apart: bool = False
     """Whether each complex solution is enclosed, apart from all others, for all input in the balls."""
+    beyond: int = 0
+    """How many solutions at infinity are enclosed, apart from each other."""
     values: tuple[Sequence[Any], ...] = ()
     """Balls of the unknowns of all."""
     turn: float = 0.0

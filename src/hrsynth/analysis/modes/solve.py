@@ -25,6 +25,9 @@ CHOICES = 5
 """Choices of legs that are given to a solver until one has finitely many solutions, and, besides the first, whose
 solutions are starts for near modes."""
 
+CHARTS = 3
+"""Charts of a rigid body's poses in which solutions are sought until all that are found can be enclosed apart."""
+
 Part = SquareSystem | PoseSystem
 
 
@@ -159,9 +162,16 @@ def _proposed(system: System, near: bool, goal: Array | None,
     part = None
     for part in islice(wholes(system), CHOICES):
         most = system.bound(part.legs)
-        found = proposer(part, None if most is None else most.most)
-        if found is not None:
-            roots = enclosed(part, found, system.balls(part.chart.frame), system.farthest)
+        roots = None
+        for number in range(CHARTS):
+            part = replace(part, chart=system.chart(number)) if number else part
+            found = proposer(part, None if most is None else most.most)
+            if found is None:
+                break
+            roots = enclosed(part, found, most, system.balls(part.chart.frame), system.farthest)
+            if roots.apart or not roots.complete or part.chart.study is None:
+                break
+        if roots is not None:
             return _judged(system, part, roots, () if near else None, goal, most)
     return _undecided(system, part is not None, goal)
 
@@ -244,10 +254,11 @@ def _same(system: System, q: Array, goal: Array) -> bool:
 def _bounded(system: System, most: Bound | None, roots: Roots) -> tuple[str, str]:
     """By what there are no more solutions than a solver proposes, and the proof in words (theory.md 8)."""
     proof = _proof(system, roots)
-    if most is not None and roots.apart and roots.complex == most.most:
-        return "class", (f"{proof}; the complex ones are enclosed too, apart from each other, and there are at most "
-                         f"{most.most}: {most.why}")
-    limit = "" if most is None else f", of at most {most.most}: {most.why}"
+    known = f", {roots.beyond} enclosed at infinity" if roots.beyond else ""
+    if most is not None and roots.apart and roots.complex + roots.beyond == most.most:
+        return "class", (f"{proof}; the complex ones are enclosed too, apart from each other{known}, and there are at "
+                         f"most {most.most}: {most.why}")
+    limit = "" if most is None else f"{known}, of at most {most.most}: {most.why}"
     return "none", f"{proof}; that is what the solver found{limit}"
 
 

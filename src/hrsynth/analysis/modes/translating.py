@@ -187,7 +187,7 @@ class Articulated(Shifting):
         if sum(counts) != self.freedoms or not all(counts):
             return None
         found = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
-        return Bound(min(found), "the product of degrees in space and on the circle (Bézout)")
+        return Bound(min(found), "the product of degrees in space and on the circle (Bézout)", "product")
 
     def chart(self, number: int) -> PoseParametrization:
         """p, cos θ and sin θ."""

@@ -15,9 +15,12 @@ from typing import Any
 
 import numpy as np
 
+from ...geometry.vectors import Array
 from ...tolerances import BALL_ZERO, BOXES_APART, FARTHEST
+from .bounds import Bound
 from .curves import Point
 from .homotopy import ends
+from .infinity import beyond
 from .msolve import Parametrisation, parametrised
 from .polynomials import Quadric, krawczyk
 from .quadrics import UNIT, Balls, Moving, PoseParametrization, PoseSystem, Rounded, Within
@@ -27,13 +30,14 @@ from .systems import System
 
 @dataclass(frozen=True, eq=False)
 class Proposed:
-    """Solutions that a solver proposes, of so many in all but ``extraneous`` ones that are no poses; ``lost``: how many
-    more there may be."""
+    """Solutions that a solver proposes, besides ``extraneous`` ones that are no poses; ``lost``: how many more there
+    may be; ``far``: the (e, g) (m, 8) at which paths of a homotopy to infinity were left."""
 
     solutions: tuple[Solution, ...]
     method: str
     extraneous: int = 0
     lost: int = 0
+    far: Array | None = None
 
 
 def wholes(system: System, number: int = 0) -> Iterator[PoseSystem]:
@@ -66,7 +70,7 @@ def by_homotopy(part: PoseSystem, enough: int | None) -> Proposed | None:
     if found.loose:
         return None
     values = [[acb(v.real, v.imag) for v in row] for row in found.solutions.tolist()]
-    return Proposed(tuple(zip(values, found.multiple, strict=True)), "homotopy", found.infinite, found.lost)
+    return Proposed(tuple(zip(values, found.multiple, strict=True)), "homotopy", found.infinite, found.lost, found.far)
 
 
 def _resting(part: PoseSystem) -> tuple[int, ...]:
@@ -95,12 +99,12 @@ def by_msolve(part: PoseSystem) -> Proposed | None:
     return Proposed(poses, "msolve's parametrisation", len(solutions) - len(poses), lost)
 
 
-def enclosed(part: PoseSystem, proposed: Proposed | None, balls: Within = Balls, farthest: float = FARTHEST) -> Roots:
-    """What is proposed for a choice of legs, as :func:`solve_square` gives it."""
+def enclosed(part: PoseSystem, proposed: Proposed, most: Bound | None = None, balls: Within = Balls,
+             farthest: float = FARTHEST) -> Roots:
+    """What is proposed for a choice of legs, as :func:`solve_square` gives it; where a degree bounds their number,
+    solutions at infinity are counted too."""
     from flint import ctx
 
-    if proposed is None:
-        return Roots(complete=False, continuum=True)
     with ctx.workprec(PRECISION):
         thick = part.equations(balls)
     found = _Tips(balls, part.equations(), thick, part.chart).all_of(
@@ -109,7 +113,11 @@ def enclosed(part: PoseSystem, proposed: Proposed | None, balls: Within = Balls,
         apart = not found.far and all(root.real and root.thick for root in found.real) and _apart(
             part.chart, thick, [root.parameters for root in found.real],
             [values for values in found.values if not is_real(values)])
-    return replace(found, extraneous=proposed.extraneous, apart=apart, method=proposed.method)
+        wanted = most.most - found.complex if most is not None and most.law == "degree" and apart else 0
+        away = 0
+        if wanted > 0 and proposed.far is not None and np.isfinite(farthest):
+            away = beyond(part, balls, proposed.far, wanted)
+    return replace(found, extraneous=proposed.extraneous, apart=apart, beyond=away, method=proposed.method)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,6 +131,10 @@ class _Tips(Enclosing):
     def _rounded(self) -> list[Moving]:
         return self.chart.tips(Rounded)
 
+    @cached_property
+    def _moving(self) -> list[Moving]:
+        return self.chart.tips(self.balls)
+
     def distance(self, values: Sequence[Any]) -> float:
         x = np.array([1.0, *(complex(v) for v in values)])
         return max(float(np.abs(np.einsum("i,ijd,j->d", x, tip.N.astype(float), x)).max()
@@ -134,7 +146,7 @@ class _Tips(Enclosing):
     def misses(self, own: Sequence[Any], values: Sequence[Any]) -> tuple[float, ...]:
         x = np.array([1, *values], dtype=object)
         found = []
-        for tip in self.chart.tips(self.balls):
+        for tip in self._moving:
             w = (x @ tip.w @ x) * UNIT
             radii = [float(((x @ tip.N[:, :, k] @ x) / w).rad()) for k in range(tip.N.shape[2])]
             found.append(2.0 * self.chart.frame.size * math.hypot(*radii))
@@ -152,8 +164,7 @@ def _apart(chart: PoseParametrization, thick: Sequence[Any], real: Sequence[Sequ
         if box is None:
             return False
         boxes += [box, [v.conjugate() for v in box]]
-    if 2 * len(upper) != len(values) or any(
-            chart.nonzero is not None and chart.nonzero.value(box).contains(0) for box in boxes):
+    if 2 * len(upper) != len(values) or not all(_is_pose(chart, box) for box in boxes):
         return False
     if not boxes:
         return True
@@ -161,6 +172,16 @@ def _apart(chart: PoseParametrization, thick: Sequence[Any], real: Sequence[Sequ
     r = np.array([[float(v.rad()) for v in box] for box in boxes]) * (1.0 + BOXES_APART) + BOXES_APART * np.abs(m)
     touching = np.all(np.abs(m[:, None] - m[None]) <= r[:, None] + r[None], axis=2)
     return bool(touching.sum() == len(m))
+
+
+def _is_pose(chart: PoseParametrization, box: Sequence[Any]) -> bool:
+    """Whether all of a box are poses, of a rigid body nearer than ``FARTHEST``: |e|² below so many times |e·e|."""
+    if chart.nonzero is None:
+        return True
+    ends, least = np.array([1, *box], dtype=object), float(chart.nonzero.value(box).abs_lower())
+    if chart.study is None:
+        return least > 0.0
+    return sum(float(abs(e).upper()) ** 2 for e in chart.study[:4].astype(int) @ ends) < FARTHEST * least
 
 
 def _over(answer: Parametrisation, nonzero: Quadric | None, t: Any, multiplicity: int) -> list[Solution]:
