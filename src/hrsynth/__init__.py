@@ -9,6 +9,7 @@ if TYPE_CHECKING:
     from .analysis.accuracy.accuracy import accuracy
     from .analysis.advice import advise
     from .analysis.asked import observe
+    from .analysis.aspects.atlas import atlas
     from .analysis.aspects.path import path
     from .analysis.check import check
     from .analysis.controllability import legs
@@ -25,13 +26,14 @@ if TYPE_CHECKING:
     from .simulation.servo import servo
 
 __version__ = "0.2.0"
-__all__ = ["__version__", "accuracy", "advise", "catalog", "certificate", "check", "derive", "draw", "examples",
+__all__ = ["__version__", "accuracy", "advise", "atlas", "catalog", "certificate", "check", "derive", "draw", "examples",
            "following", "forget", "html", "legs", "load", "modes", "observe", "path", "save", "select", "servo",
            "shipped", "singular", "text", "verify", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
     "advise": ".analysis.advice",
+    "atlas": ".analysis.aspects.atlas",
     "certificate": ".certificates",
     "check": ".analysis.check",
     "derive": ".analysis.derive",

@@ -105,6 +105,18 @@ FIRST_INTERVALS = 4
 """Intervals that a way is first cut into where it is to be proved free of singularities."""
 FINEST_INTERVAL = 2.0**-16
 """Length of an interval (of its way) below which such a proof is given up."""
+ATLAS_INTERVALS = 60_000
+"""Intervals that are enclosed for all paths of an atlas together."""
+SECTION_STEPS = 90
+"""Turns of crank and platform at which the singular curve of a section is looked for, each."""
+SECTION_STEP = 0.03
+"""Length of a step along it (characteristic lengths, components of unit vectors)."""
+SECTION_ITERATIONS = 30
+"""Newton steps there."""
+SECTION_PLACES = 4000
+"""Steps after which one of its pieces is followed no further."""
+SECTION_APART = 0.1
+"""Distance from a known piece below which no new one is looked for, and between places whose images are one."""
 REGION_WIDER = 1.5
 """How much wider than the known poses the region is from which poses of a road map are drawn."""
 HOMOTOPY_ROUNDS = 3

@@ -12,6 +12,7 @@ from ..kinematics.assembly import of_links
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezero
 from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
+from ..tolerances import AS_PRINTED
 from .observed import SAMPLES, LegsLike, ObservedRobot, RobotLike, as_robot
 
 if TYPE_CHECKING:
@@ -57,9 +58,11 @@ def _started(setting: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
     raise refused
 
 
-def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber]) -> list[ClosedConfiguration]:
+def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber], by_modes: bool = False
+                      ) -> list[ClosedConfiguration]:
     """The robot at each of the poses. ``mode:3`` is the third mode, with the directions that are watched, of the first
     pose among these that is given by its parts (of the zero configuration where none is), as ``modes`` lists them.
+    With ``by_modes`` a pose to which no small steps lead is that of such a mode, where one is there.
 
     Raises ``BadRequest`` for parts of a pose that the platform cannot change and for modes that there are not,
     ``PoseNotReached`` for poses out of reach and for modes at which the robot was not found assembled.
@@ -67,16 +70,40 @@ def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber]
     from .modes.modes import modes
 
     everything, motion = setting.everything, setting.motion
-    reached = {each: reach(everything.start, everything.question, each, motion)
-               for each in poses if isinstance(each, Pose)}
+    reached: dict[Pose, ClosedConfiguration] = {}
+    refused: list[tuple[Pose, PoseNotReached]] = []
+    for each in poses:
+        if isinstance(each, Pose):
+            try:
+                reached[each] = reach(everything.start, everything.question, each, motion)
+            except PoseNotReached as error:
+                if not by_modes:
+                    raise
+                refused.append((each, error))
     about = next(iter(reached.values()), everything.start)
-    listed = modes(setting, at=about) if any(isinstance(each, ModeNumber) for each in poses) else None
-    return [reached[each] if isinstance(each, Pose) else _assembled(listed, each, about) for each in poses]
+    listed = modes(setting, at=about) if refused or any(isinstance(each, ModeNumber) for each in poses) else None
+    for pose, reason in refused:
+        assert listed is not None
+        reached[pose] = _met(listed, pose, reason)
+    return [reached[each] if isinstance(each, Pose) else at_mode(listed, each) for each in poses]
 
 
-def _assembled(listed: AssemblyModes | None, asked: ModeNumber, about: ClosedConfiguration) -> ClosedConfiguration:
-    """The robot assembled at a mode of those at a configuration, its coordinates counted from the zero configuration.
+def _met(listed: AssemblyModes, pose: Pose, refused: PoseNotReached) -> ClosedConfiguration:
+    """The robot at the one mode with this pose at which it was found assembled; raises ``refused`` where there is none.
     """
+    motion, twin = listed.setting.motion, listed.goal.twin
+    wanted = motion.goal(pose, listed.setting.robot.name)
+    met = [number for number, mode in enumerate(listed.modes, 1)
+           if mode.configuration is not None and mode.reachable
+           and wanted.met(mode.configuration.pose(motion.link), AS_PRINTED * max(1.0, twin.length))]
+    if len(met) != 1:
+        raise refused
+    return at_mode(listed, ModeNumber(met[0]))
+
+
+def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfiguration:
+    """The robot assembled at one of its modes, its coordinates counted from the zero configuration; raises
+    ``BadRequest``, ``PoseNotReached``."""
     assert listed is not None
     name, count = listed.setting.robot.name, len(listed.modes)
     if not 1 <= asked.number <= count:
@@ -84,8 +111,8 @@ def _assembled(listed: AssemblyModes | None, asked: ModeNumber, about: ClosedCon
                          "poses that are no continuum" if listed.found.continuum is not None else
                          f"mode:1 to mode:{count}" if count else "no mode")
     mode = listed.modes[asked.number - 1]
-    at = about if mode.goal else mode.configuration
+    at = listed.goal if mode.goal else mode.configuration
     if at is None:
         raise PoseNotReached(name, f"{asked} ({mode.pose})", 0.0, str(listed.pose), reason="the robot was not found "
                              f"assembled there without leg {', '.join(mode.open)}")
-    return of_links(about.twin, at)
+    return of_links(listed.goal.twin, at)

@@ -192,6 +192,11 @@ QUESTIONS = (
               _file("modes"), _file("modes", "certificate")),
              ("quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7", "3rrr_m1 --real -o modes.png",
               "quattro --observe 1,4 --certificate c.json")),
+    Question("atlas", "Which modes with the same directions can be led to each other without Type 2 singularity, mode "
+             "by mode.",
+             (Option("at", "Pose whose directions are held, as x=0.02,y=0.1,z=-0.7 (default: the zero "
+                     "configuration's).", "POSE"), *WATCHED, _file("atlas")),
+             ("quattro --observe 1,4", "3rrr_m1 --observe 2,1,3 -o atlas.png")),
     Question("path", "Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, "
              "undecided.",
              (START, _goal("Where it ends; mode:2 is a mode with the directions at the start."), *WATCHED),

@@ -200,6 +200,35 @@ def three_rrr(*, motor: int = 1, proximal: float = 0.17, distal: float = 0.16, b
     return _triple(f"3rrr_m{motor}", "RRR", legs, motor, home)
 
 
+def six_poses(*, motor: int = 1, rods: Sequence[float] = (0.25, 0.31, 0.25),
+              directions: Sequence[float] = (math.radians(170), math.radians(285), math.radians(100))) -> Mechanism:
+    """3-RRR that hides the six poses of C. Innocenti and V. Parenti-Castelli's 3-RPR (1992, reprinted in many places).
+
+    With the directions of its rods held the corners of the platform, a triangle of 17.04, 16.54 and 20.84 cm, are
+    14.98, 15.38 and 12 cm from (0, 0), (15.91, 0) and (0, 10): those are the lengths of its cranks.
+
+    Parameters
+    ----------
+    motor
+        The actuated joint of each leg, 1 or 2: 3-R̲RR or 3-RR̲R.
+    rods
+        Lengths of the watched links.
+    directions
+        Their directions at the zero configuration (rad), elbow to platform.
+    """
+    a, b, c = 0.1704, 0.1654, 0.2084
+    along = (a * a + c * c - b * b) / (2 * a)
+    corners = [np.array(corner) for corner in ((0, 0, 0), (a, 0, 0), (along, math.sqrt(c * c - along * along), 0))]
+    cosine, sine = math.cos(0.245309531), math.sin(0.245309531)
+    turn = np.array([[cosine, -sine, 0], [sine, cosine, 0], [0, 0, 1]])
+    tips = [np.array([-0.148961281, 0.0158296166, 0]) + turn @ corner for corner in corners]
+    centres = [np.array(centre) for centre in ((0, 0, 0), (0.1591, 0, 0), (0, 0.1, 0))]
+    held = [rod * radial(angle) for rod, angle in zip(rods, directions, strict=True)]
+    legs = [_PlanarLeg((centre - rod, tip - rod, tip)) for centre, rod, tip in zip(centres, held, tips, strict=True)]
+    x, y, _ = np.mean(tips, axis=0)
+    return _triple("six_poses", "RRR", legs, motor, (float(x), float(y), 0.0))
+
+
 def three_rpr(*, motor: int = 1, base: Pairs = BASE, platform: Pairs = PLATFORM,
               home: Pose = HOME) -> Mechanism:
     """3-RPR: three planar freedoms (MMT 4.1.1, Table 1).

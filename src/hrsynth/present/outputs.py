@@ -134,6 +134,10 @@ OUTPUTS = {
              "Write the plane or grid: map.png, map.csv.", part="field", needs=("plane", "grid"),
              words="a plane or a grid"),)),
     "advise": Outputs("text.robots:advice"),
+    "atlas": Outputs("text.poses:atlas", (
+        File("cannot draw the atlas", {PNG: "atlas:picture"},
+             "Draw the table and, of three rods on cranks in a plane, the singular curve with the modes (.png).",
+             computed="atlas:section", record="section"),)),
     "certificate": Outputs("text.robots:certificate"),
     "check": Outputs("text.poses:check", (
         File("cannot write the grid", {PNG: "maps:distance_map", CSV: "maps:check_table"},

@@ -231,7 +231,6 @@ class Aspects:
             if beyond:
                 return replace(answer, reason=f"at the {end} beyond its limits: joint {', '.join(beyond)}")
         region = PoseRegion.around(coordinates, p, R)
-        region = PoseRegion.around(coordinates, p, R)
         found = plan((enclosures[0], enclosures[1]), region, (p[0], R[0]), (p[1], R[1]), seed=seed, budget=budget)
         answer = self._shown(answer, found, self.pattern)
         if not found.proved:
@@ -258,7 +257,8 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, 
          start: PoseLike, goal: PoseLike, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
     """Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
 
-    Both are reached from the zero configuration in its working mode; on the way legs may pass their limits into other
+    Both are reached from the zero configuration in its working mode, or where no small steps lead there as ``modes``
+    found the robot assembled, if they are modes with the same directions as the other; on the way legs may pass their limits into other
     working modes (Type 1). A certificate encloses, by interval arithmetic, the condition's value away from zero, the
     reach of every leg and the limits of R and P joints all along the path, for all poses within
     ``tolerances.FOLLOWED`` of it; opposite signs of an expression at the two ends separate them. At most ``budget``
@@ -269,7 +269,7 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, 
     wanted = [asked_pose(each) for each in (start, goal)]
     aspects = Aspects.of(robot, observe, camera, seed=seed)
     tell("poses")
-    first, last = configurations_at(aspects.setting, wanted)
+    first, last = configurations_at(aspects.setting, wanted, by_modes=True)
     return aspects.join(first, last, seed=seed, budget=budget)
 
 

@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+import textwrap
 from collections import Counter
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from ...analysis.aspects.path import SAME, SEPARATED
+from ...analysis.aspects.path import UNDECIDED as UNDECIDED_PAIR
 from ...analysis.posture import CONSTRAINT, REGULAR, UNDECIDED
 from ...tolerances import NOISE, RANK_GAP
 from .robots import NO_MATRIX
 from .tables import GAP, Rows, camera, head, known, listing
 
 if TYPE_CHECKING:
+    from ...analysis.aspects.atlas import Atlas, ModePair
     from ...analysis.aspects.path import PathAnswer
     from ...analysis.check import Check
     from ...analysis.modes.modes import AssemblyMode, AssemblyModes
@@ -198,3 +202,57 @@ def path(found: PathAnswer) -> str:
     rows.append(("crossings", [f"leg {leg} changes its working mode at {found.poses[place]}"
                                for leg, place in found.crossings]))
     return listing([*rows, *known("not proved", found.not_proved if found.certified else None)])
+
+
+_SIGNS = {SAME: "=", SEPARATED: "|", UNDECIDED_PAIR: "?"}
+
+
+def atlas(found: Atlas, file: str | None = None) -> str:
+    """The modes, how many aspects hold them, the table mode by mode, and what was asked of which pairs."""
+    listed = found.listed
+    rows = [*head(listed.setting), ("held", f"{_SINCE[listed.kind]} at {listed.pose}")]
+    if listed.found.continuum is not None:
+        return listing([*rows, *known("special", listed.found.degenerate)])
+    few, many = found.count
+    groups = [f"mode{'s' * (len(group) > 1)} {', '.join(map(str, group))}" for group in found.groups]
+    rows += [("modes", f"{listed.count}, {all_of(listed)}"),
+             ("aspects", f"{few if few == many else f'{few} to {many}'} of the hidden robot: {'; '.join(groups)}"),
+             ("cuspidal", _cuspidal(found)), *GAP]
+    numbers = range(1, len(found.places) + 1)
+    wide = len(str(len(found.places)))
+    rows.append(("", "  ".join(f"{k:>{wide}}" for k in numbers)))
+    for k, verdicts in zip(numbers, found.table, strict=True):
+        signs = "  ".join(f"{_SIGNS[verdict]:>{wide}}" for verdict in verdicts)
+        rows.append((f"mode {k}", f"{signs}   {listed.modes[k - 1].pose}"))
+    rows += [("", f"{SAME} =   {SEPARATED} |   {UNDECIDED_PAIR} ?"), *GAP]
+    told: dict[str, list[str]] = {}
+    for pair in found.pairs:
+        if pair.answer is not None or pair.verdict == UNDECIDED_PAIR:
+            told.setdefault(_told(pair), []).append("{}, {}".format(*pair.numbers))
+    rows += [(first, [words, *textwrap.wrap("; ".join(rest), initial_indent="so are modes ")])
+             for words, (first, *rest) in told.items()]
+    return listing([*rows, *known("drawn in", file)])
+
+
+def _cuspidal(found: Atlas) -> list[str]:
+    changes = found.changes
+    if not changes:
+        return ["not shown by the modes at this pose, which says nothing of other poses"]
+    direct = [pair for pair in changes if pair.answer is not None and not pair.answer.crossings]
+    one, other = (direct or changes)[0].numbers
+    how = "no leg changes its working mode" if direct else "legs change their working modes"
+    return [f"yes: modes {one} and {other} have the same directions, and a certified path without",
+            f"Type 2 singularity leads from one to the other; {how} on it"]
+
+
+def _told(pair: ModePair) -> str:
+    """The verdict on two modes, and what shows it."""
+    certified = "" if pair.verdict == UNDECIDED_PAIR else f" ({'certified' if pair.certified else 'not certified'})"
+    found = pair.answer
+    if found is None or pair.verdict != SAME:
+        return f"{pair.verdict}{certified}: {pair.reason}"
+    bends = len(found.poses) - 2
+    way = "straight" if not bends else f"over {bends} pose{'s' * (bends > 1)}"
+    crossed = dict.fromkeys(leg for leg, _ in found.crossings)
+    legs = f", changing the working mode of leg {', '.join(crossed)}" if crossed else ""
+    return f"{pair.verdict}{certified}: {way}{legs}; margin {found.margin:.3g}, {found.boxes} intervals"

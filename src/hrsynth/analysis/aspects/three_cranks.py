@@ -1,0 +1,99 @@
+"""A planar platform whose corners hang on three watched rods, each at the end of a crank: its numbers in the plane.
+
+With the rods' directions held each corner is on a circle: the hidden 3-ΠR̲R (MMT Table 1), with up to six modes.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...closed_forms.legs import OnCrank
+from ...geometry.vectors import Array, perpendicular
+from ...kinematics.configuration import ClosedConfiguration, measure
+from ...tolerances import SAME_RELATION
+from .leg_forms import LegPattern
+from .path import Aspects
+
+Complex = NDArray[np.complex128]
+
+
+@dataclass(frozen=True, eq=False)
+class ThreeCranks:
+    """Feet A_k, lengths of cranks l_k and rods d_k, corners b_k counted from the first at the goal's turn, all (3,), in
+    characteristic lengths, points of the plane as complex numbers; ``labels`` of the legs."""
+
+    labels: tuple[str, ...]
+    feet: Complex
+    cranks: Array
+    rods: Array
+    corners: Complex
+
+
+@dataclass(frozen=True, eq=False)
+class CrankPlace:
+    """The robot at one of its poses: cranks w_k and rods e_k (3,) and how far the platform has turned since the goal
+    (rad)."""
+
+    cranks: Complex
+    rods: Complex
+    turn: float
+
+
+def three_cranks(aspects: Aspects, configurations: Sequence[ClosedConfiguration]
+                 ) -> tuple[ThreeCranks, list[CrankPlace]] | str:
+    """The robot in its plane, legs in the order in which they are watched, the first configuration being the goal; and
+    where it is at each of them. Or why it is no such robot."""
+    setting, pattern = aspects.setting, aspects.pattern
+    if aspects.structure.motion != "planar" or not isinstance(pattern, LegPattern):
+        return "the platform and its legs do not move in a plane, or have no closed forms"
+    labels = [o.leg for o in setting.observed]
+    if (len(labels), len(set(labels))) != (3, 3) or setting.mechanism.reference != setting.mechanism.base:
+        return "not three legs, one direction of each, are watched from the base"
+    limbs = {limb.label: (k, limb) for k, limb in enumerate(pattern.limbs)}
+    chosen = [(k, limb) for k, limb in (limbs[label] for label in labels) if isinstance(limb, OnCrank)]
+    if not len(pattern.limbs) == len(chosen) == 3:
+        return "the legs are not three rods on cranks"
+    x = perpendicular(chosen[0][1].axis)
+    plane = np.array([x, np.cross(chosen[0][1].axis, x)]).T @ [1, 1j]
+    feet = np.array([limb.centre for _, limb in chosen])
+    places, tips = [], []
+    home = pattern.coordinates.of(configurations[:1])[1][0]
+    for at in configurations:
+        (p, R), forms = pattern.coordinates.of([at]), aspects.enclosure(at).forms
+        corners = np.array([limb.tip.value(p, R)[0] for _, limb in chosen])
+        ends = np.array([forms.limbs[k].solve(limb.tip.value(p, R), forms.limbs[k].mode)[1][0] for k, limb in chosen])
+        seen = measure(at.twin, at.q, setting.mechanism.base, setting.observed)[2]
+        rods = corners - ends
+        across = np.linalg.norm(np.cross(rods, seen), axis=1) / np.linalg.norm(rods, axis=1)
+        if np.max(across) > SAME_RELATION:
+            return "what is watched of a leg is not its rod"
+        places.append(CrankPlace((ends - feet) @ plane, rods @ plane, float(np.angle((R[0] @ home.T @ x) @ plane))))
+        tips.append(corners @ plane)
+    cranks, rods = (np.array([getattr(limb, name) for _, limb in chosen]) for name in ("radius", "rod"))
+    return ThreeCranks(tuple(labels), feet @ plane, cranks, rods, tips[0] - tips[0][0]), places
+
+
+def mode_counts(robot: ThreeCranks, held: complex, first: Array, second: Array, steps: int) -> NDArray[np.int_]:
+    """How many modes there are where the second and third rod have these directions (n,), (m,) (rad), (n, m): how often
+    the third corner crosses its circle while the first two go around theirs, looked at in ``steps`` places."""
+    a = robot.feet[0] + robot.rods[0] * held + robot.cranks[0] * np.exp(2j * np.pi * np.arange(steps + 1) / steps)
+    ends = robot.feet[2] + robot.rods[2] * np.exp(1j * second)[:, None]
+    counts = np.zeros((len(first), len(second)), dtype=int)
+    for row, angle in enumerate(first):
+        away, arm = robot.feet[1] + robot.rods[1] * np.exp(1j * angle) - a, abs(robot.corners[1])
+        share = (np.abs(away) ** 2 + arm**2 - robot.cranks[1] ** 2) / 2
+        margin = (np.abs(away) * arm) ** 2 - share**2
+        there, aside = margin > 0, np.sqrt(np.maximum(margin, 0))
+        ways = [np.abs(a + away * (share + sign * 1j * aside) / np.abs(away) ** 2 * robot.corners[2] / robot.corners[1]
+                       - ends) > robot.cranks[2] for sign in (1, -1)]
+        for way in ways:
+            counts[row] += np.sum((way[:, 1:] != way[:, :-1]) & there[1:] & there[:-1], axis=1)
+        # where the second corner's two ways end they meet
+        limits = np.flatnonzero(there[1:] != there[:-1])
+        inner = np.where(there[limits], limits, limits + 1)
+        counts[row] += np.sum(ways[0][:, inner] != ways[1][:, inner], axis=1)
+    return counts

@@ -1,0 +1,156 @@
+"""The atlas of aspects → a picture: the table of modes, and of three rods on cranks the curve of Type 2 singularities,
+among the directions of two rods and on the surface of poses with the third one's direction."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..analysis.aspects.atlas import Atlas
+from ..analysis.aspects.held_leg import HeldLegSection
+from ..analysis.aspects.path import SAME, SEPARATED, UNDECIDED
+from ..analysis.aspects.three_cranks import CrankPlace, mode_counts
+from ..errors import BadRequest
+from ..geometry.vectors import Array
+from . import plots
+from .plots import COLOURS, cell_edges, entry, panels, png, styled
+
+CELLS = {SAME: ("#b9dcb1", "="), SEPARATED: ("#f2c0b0", "|"), UNDECIDED: ("#e3e3e3", "?")}
+CURVE, CUSP, NODE = "black", COLOURS[1], COLOURS[2]
+SHADES = ("white", "#e8eef4", "#c9d9e8", "#9dbbd6")
+"""No mode, two, four, six."""
+COUNTED, PLACES = 161, 480
+"""Directions a side for which modes are counted, and places of the first corner that are looked at for it."""
+
+
+@dataclass(frozen=True, eq=False)
+class DrawnSection:
+    """What is drawn of a section: the curve and the modes' places, or why there is none."""
+
+    found: tuple[HeldLegSection, dict[int, CrankPlace]] | None
+    reason: str | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"reason": self.reason} if self.found is None else self.found[0].to_dict()
+
+
+def section(found: Atlas, seed: int) -> DrawnSection:
+    """The section with the first watched leg held."""
+    made = found.section
+    return DrawnSection(None, made) if isinstance(made, str) else DrawnSection(made, None)
+
+
+@styled
+def picture(found: Atlas, drawn: DrawnSection) -> bytes:
+    """The picture (PNG); raises ``BadRequest`` where there are no modes."""
+    if not found.places:
+        raise BadRequest(f"{found.listed.setting.robot.name}: there is nothing to draw",
+                         found.listed.found.degenerate or "no mode", "isolated modes")
+    count = 1 if drawn.found is None else 3
+    figure, axes = panels(1, count, 5.4 * count, 6.6)
+    _table(axes[0], found)
+    entries = [entry(verdict, linestyle="", marker="s", markersize=10, color=colour, markeredgecolor="0.5")
+               for verdict, (colour, _) in CELLS.items()
+               if any(verdict in row for row in found.table)]
+    if drawn.found is not None:
+        entries += _curves(axes[1:], found, *drawn.found)
+    plots.legend(figure, entries)
+    few, many = found.count
+    aspects = str(few) if few == many else f"{few} to {many}"
+    seen = ", ".join(found.listed.setting.labels)
+    told = ", cuspidal" if found.cuspidal else ""
+    figure.suptitle(f"{found.listed.setting.robot.name}, legs {seen} watched\n{found.listed.count}, aspects: {aspects}"
+                    f"{told}")
+    return png(figure)
+
+
+def _colour(found: Atlas, number: int) -> str:
+    """One colour for all modes of an aspect."""
+    groups = [k for k, group in enumerate(found.groups) if number in group]
+    return COLOURS[groups[0] % len(COLOURS)] if groups else "0.6"
+
+
+def _table(place: Any, found: Atlas) -> None:
+    size = len(found.table)
+    for i, row in enumerate(found.table):
+        for j, verdict in enumerate(row):
+            colour, sign = CELLS[verdict]
+            place.fill([j, j + 1, j + 1, j], [i, i, i + 1, i + 1], facecolor=colour, edgecolor="white", linewidth=1.5)
+            if size <= 20:
+                place.text(j + 0.5, i + 0.5, sign, ha="center", va="center", color="0.35")
+    for axis, name in ((place.xaxis, "x"), (place.yaxis, "y")):
+        axis.set_ticks(np.arange(size) + 0.5, [str(k + 1) for k in range(size)])
+        for k, label in enumerate(axis.get_ticklabels()):
+            label.set(color=_colour(found, k + 1), fontweight="bold")
+        place.tick_params(axis=name, length=0)
+    place.set(xlim=(0, size), ylim=(size, 0), aspect="equal", title="mode × mode")
+    place.set_frame_on(False)
+
+
+def _curves(axes: Any, found: Atlas, drawn: HeldLegSection, modes: dict[int, CrankPlace]) -> list[Any]:
+    """Both views of the section, all angles counted from the goal's; the entries of the legend."""
+    from matplotlib.colors import BoundaryNorm, ListedColormap
+    from matplotlib.patches import Patch
+    from matplotlib.ticker import MultipleLocator
+
+    goal = next(iter(modes.values()))
+    first, second = np.angle(goal.rods[1:])
+    crank = float(np.angle(goal.cranks[0]))
+    labels = drawn.robot.labels
+    there, here = axes
+    ticks = np.linspace(-np.pi, np.pi, COUNTED)
+    counts = mode_counts(drawn.robot, drawn.held, ticks + first, ticks + second, PLACES)
+    there.pcolormesh(cell_edges(np.degrees(ticks)), cell_edges(np.degrees(ticks)), counts.T,
+                     cmap=ListedColormap(SHADES), norm=BoundaryNorm([-1, 1, 3, 5, 7], 4), rasterized=True)
+    for piece in drawn.curve:
+        _line(there, piece[:, 2] - first, piece[:, 3] - second)
+        _line(here, piece[:, 0] - crank, piece[:, 1])
+    for points, colour, mark in ((drawn.cusps, CUSP, "o"), ([a for a, _ in drawn.nodes], NODE, "s")):
+        for point in points:
+            style = {"marker": mark, "color": colour, "markersize": 5,
+                     "markerfacecolor": colour if point.radius is not None else "white"}
+            one, other = point.directions
+            there.plot(*_degrees(one - first, other - second), zorder=4, **style)
+            if mark == "o":
+                here.plot(*_degrees(point.crank - crank, point.turn), zorder=4, **style)
+    there.plot(0, 0, "*", color="gold", markeredgecolor="black", markersize=15, zorder=5)
+    for number, at in modes.items():
+        x, y = _degrees(float(np.angle(at.cranks[0])) - crank, at.turn)
+        here.plot(x, y, "o", color=_colour(found, number), markeredgecolor="black", markersize=13, zorder=5)
+        here.text(x, y, str(number), ha="center", va="center", color="white", fontsize=9, fontweight="bold", zorder=6)
+    there.set(xlabel=f"direction of leg {labels[1]} (degrees from the goal's)",
+              ylabel=f"direction of leg {labels[2]} (degrees from the goal's)",
+              title=f"directions, leg {labels[0]} held")
+    here.set(xlabel=f"crank {labels[0]} (degrees from the goal's)", ylabel="φ (degrees from the goal's)",
+             title=f"poses, leg {labels[0]} held")
+    for place, used in ((there, counts > 0), (here, np.ones((COUNTED, COUNTED), dtype=bool))):
+        shown = [np.degrees(ticks[np.flatnonzero(used.any(axis=axis))[[0, -1]]]) for axis in (1, 0)]
+        place.set(xlim=shown[0], ylim=shown[1], box_aspect=1)
+        place.xaxis.set_major_locator(MultipleLocator(30 if np.ptp(shown[0]) < 240 else 60))
+        place.yaxis.set_major_locator(MultipleLocator(30 if np.ptp(shown[1]) < 240 else 60))
+    kinds = [entry("Type 2 singularities", color=CURVE, linewidth=1.2),
+             entry("the goal's directions", linestyle="", marker="*", color="gold", markeredgecolor="black",
+                   markersize=11)]
+    nodes = [place for place, _ in drawn.nodes]
+    for points, colour, mark, name in ((drawn.cusps, CUSP, "o", "cusp"), (nodes, NODE, "s", "node")):
+        for proved, words in ((True, f"{name}, enclosed"), (False, f"{name}, found")):
+            if any((point.radius is not None) == proved for point in points):
+                kinds.append(entry(words, linestyle="", marker=mark, color=colour,
+                                   markerfacecolor=colour if proved else "white"))
+    return [*kinds, *(Patch(facecolor=shade, edgecolor="0.6", label=f"{number} modes")
+                      for shade, number in zip(SHADES, (0, 2, 4, 6), strict=True) if np.any(counts == number))]
+
+
+def _degrees(*angles: float) -> tuple[float, ...]:
+    """Angles (rad) as degrees from −180 to 180."""
+    return tuple(float(np.degrees((angle + np.pi) % (2 * np.pi) - np.pi)) for angle in angles)
+
+
+def _line(place: Any, x: Array, y: Array) -> None:
+    """A line of angles (rad), broken where it passes ±180 degrees."""
+    flat = np.degrees((np.column_stack([x, y]) + np.pi) % (2 * np.pi) - np.pi)
+    flat[1:][np.max(np.abs(np.diff(flat, axis=0)), axis=1) > 180] = np.nan
+    place.plot(*flat.T, color=CURVE, linewidth=1.2, zorder=3)

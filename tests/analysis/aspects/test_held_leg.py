@@ -1,0 +1,148 @@
+"""Sections with one rod held: cusps and nodes by the derivatives of a coupler curve, modes by counting crossings."""
+
+from __future__ import annotations
+
+from functools import cache
+from itertools import islice
+
+import numpy as np
+import pytest
+
+import hrsynth
+from analysis.aspects.six_modes import six_modes
+from hrsynth.analysis.aspects.atlas import Atlas, atlas
+from hrsynth.analysis.aspects.held_leg import HeldLegSection, SectionPoint
+from hrsynth.analysis.aspects.three_cranks import ThreeCranks, mode_counts, three_cranks
+from hrsynth.families.planar import six_poses
+from hrsynth.kinematics.configuration import ClosedConfiguration
+
+STEP = 2e-3
+
+
+@cache
+def classic() -> Atlas:
+    return atlas(six_poses())
+
+
+@cache
+def drawn_of(seed: int | None) -> HeldLegSection:
+    """The classic robot, or a random robot in a random plane with its second leg held."""
+    if seed is None:
+        made = classic().section
+        assert not isinstance(made, str)
+        return made[0]
+    (instance,) = islice(six_modes(seed), 1)
+    found = atlas(instance.robot, ["2", "3", "1"])
+    made = found.section
+    assert not isinstance(made, str)
+    assert made[0].robot.labels == ("2", "3", "1")
+    return made[0]
+
+
+def misses(drawn: HeldLegSection, place: SectionPoint) -> np.ndarray:
+    """How far (squared) a corner is from its circle while the other two go along theirs by −3 to 3 steps from a place:
+    with the directions held, the modes are its zeros. Of the three corners the one that leaves the others farthest from
+    the end of their way."""
+    robot, held = drawn.robot, np.array([drawn.held, *np.exp(1j * np.array(place.directions))])
+    centres = robot.feet + robot.rods * held
+    start = centres[0] + robot.cranks[0] * np.exp(1j * place.crank)
+    tips = start + robot.corners * np.exp(1j * place.turn)
+    assert np.abs(tips - centres) == pytest.approx(robot.cranks, abs=1e-6)
+    found = [_misses(robot, centres, tips, place.turn, order) for order in ((0, 1, 2), (1, 2, 0), (2, 0, 1))]
+    return max(found, key=lambda each: each[0])[1]
+
+
+def _misses(robot: ThreeCranks, centres: np.ndarray, tips: np.ndarray, turn: float, order: tuple[int, ...]
+            ) -> tuple[float, np.ndarray]:
+    i, j, k = order
+    a = centres[i] + (tips[i] - centres[i]) * np.exp(1j * STEP * np.arange(-3, 4))
+    away, arm = centres[j] - a, robot.corners[j] - robot.corners[i]
+    share = (np.abs(away) ** 2 + abs(arm) ** 2 - robot.cranks[j] ** 2) / 2
+    margin = (np.abs(away) * abs(arm)) ** 2 - share**2
+    aside = np.sqrt(np.maximum(margin, 0))
+    ways = [away * (share + side * 1j * aside) / np.abs(away) ** 2 / arm for side in (1, -1)]
+    way = min(ways, key=lambda each: abs(each[3] - np.exp(1j * turn)))
+    third = a + way * (robot.corners[k] - robot.corners[i])
+    return float(margin.min()), np.abs(third - centres[k]) ** 2 - robot.cranks[k] ** 2
+
+
+def derivatives(values: np.ndarray) -> tuple[float, float, float, float]:
+    """The value and the first three derivatives at the middle of seven places, to fourth order in the step."""
+    first = np.array([-1, 9, -45, 0, 45, -9, 1]) / 60 @ values / STEP
+    second = np.array([2, -27, 270, -490, 270, -27, 2]) / 180 @ values / STEP**2
+    third = np.array([1, -8, 13, 0, -13, 8, -1]) / 8 @ values / STEP**3
+    return float(values[3]), float(first), float(second), float(third)
+
+
+@pytest.fixture(params=[None, 3])
+def drawn(request: pytest.FixtureRequest) -> HeldLegSection:
+    return drawn_of(request.param)
+
+
+def test_three_modes_meet_at_a_cusp(drawn: HeldLegSection):
+    """The distance to the third circle has a triple zero there."""
+    assert len(drawn.cusps) >= 2
+    enclosed = [cusp for cusp in drawn.cusps if cusp.radius is not None]
+    assert len(enclosed) >= 0.8 * len(drawn.cusps)
+    for cusp in enclosed:
+        value, first, second, third = derivatives(misses(drawn, cusp))
+        assert max(abs(value), abs(first), abs(second)) < 1e-4 * max(1.0, abs(third))
+        assert abs(third) > 1e-3
+        assert cusp.radius < 1e-4
+
+
+def test_two_modes_meet_twice_at_a_node(drawn: HeldLegSection):
+    for one, other in drawn.nodes:
+        assert np.max(np.abs(np.exp(1j * np.array(one.directions)) - np.exp(1j * np.array(other.directions)))) < 1e-9
+        angles = np.array([[each.crank, each.turn] for each in (one, other)])
+        assert np.max(np.abs(np.diff(np.exp(1j * angles), axis=0))) > 1e-4
+        for place in (one, other):
+            value, first, second, _ = derivatives(misses(drawn, place))
+            assert max(abs(value), abs(first)) < 1e-4 * max(1.0, abs(second))
+            assert abs(second) > 1e-6
+
+
+def test_the_curve_is_where_two_modes_meet(drawn: HeldLegSection):
+    """All along the curve the distance to the third circle has a double zero, and pieces are closed."""
+    for piece in drawn.curve:
+        assert np.max(np.abs(np.exp(1j * piece[0]) - np.exp(1j * piece[-1]))) < 1e-6
+        for crank, turn, *directions in piece[:: max(1, len(piece) // 60)]:
+            value, first, second, third = derivatives(misses(drawn, SectionPoint(crank, turn, tuple(directions), None)))
+            assert max(abs(value), abs(first)) < 1e-4 * max(1.0, abs(second), abs(third))
+
+
+def test_the_number_of_modes_changes_at_the_curve_alone(drawn: HeldLegSection):
+    """Neighbouring directions with different numbers of modes are apart from the curve's image by a cell at most."""
+    ticks = np.linspace(-np.pi, np.pi, 73)
+    counts = mode_counts(drawn.robot, drawn.held, ticks, ticks, 2000)
+    assert set(np.unique(counts)) <= {0, 2, 4, 6}
+    image = np.vstack([piece[:, 2:] for piece in drawn.curve])
+    cell = ticks[1] - ticks[0]
+    for i, j in np.argwhere(counts[1:] != counts[:-1]):
+        gap = np.abs((image - [ticks[i] + cell / 2, ticks[j]] + np.pi) % (2 * np.pi) - np.pi)
+        assert np.min(gap.max(axis=1)) <= cell
+
+
+def test_the_section_holds_all_modes_of_the_goal():
+    found = classic()
+    made = found.section
+    assert not isinstance(made, str)
+    drawn, places = made
+    goal = places[1]
+    assert sorted(places) == [1, 2, 3, 4, 5, 6]
+    assert mode_counts(drawn.robot, drawn.held, *np.angle(goal.rods[1:])[:, None], 4000) == [[6]]
+    for place in places.values():
+        assert np.max(np.abs(place.rods - goal.rods)) < 1e-9
+        assert np.abs(place.cranks) == pytest.approx(drawn.robot.cranks, abs=1e-9)
+
+
+@pytest.mark.parametrize(("name", "observe", "reason"), [
+    ("quattro", "1,4", "plane"), ("3prr_m1", None, "cranks"), ("3rpr_m1", None, "cranks"), ("rrrrr_m1", None, "plane"),
+    ("3rrr_m1", "prox_1,prox_2,prox_3", "rod"), ("3rrr_m1", "1,2,prox_3", "rod")])
+def test_other_robots_have_no_such_section(name: str, observe: str | None, reason: str):
+    found = atlas(hrsynth.load(name), observe)
+    made = found.section
+    assert isinstance(made, str)
+    assert reason in made
+    at: list[ClosedConfiguration] = [found.listed.goal]
+    assert three_cranks(found.aspects, at) == made
