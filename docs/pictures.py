@@ -43,8 +43,17 @@ def view(command: str) -> Page:
     return Page(f"view {command} --hidden", "--static", 1100, 760)
 
 
-PICTURES: dict[str, str | Page] = {
+@dataclass(frozen=True)
+class Family:
+    """The answer of a ``command`` on a robot that is no shipped file, by its name in ``python -m hrsynth.families``."""
+
+    command: str
+    robot: str
+
+
+PICTURES: dict[str, str | Page | Family] = {
     "accuracy_quattro.png": "accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7",
+    "atlas_six_poses.png": Family("atlas", "six_poses"),
     "catalog.png": Page("catalog site --group spatial --base-motors --verdict controllable --motion 1T2R", "-o", 1250, 1100, "index.html"),
     "catalog_page.png": Page("catalog site --group planar --legs '3-R*RR'", "-o", 1250, 1100, "p/96081be379a6.html"),
     "derivation_quattro.svg": "quattro 1,4",
@@ -93,6 +102,12 @@ def made(name: str) -> None:
             _run(f"{what.command} {what.option} {page}")
             subprocess.run([sys.executable, str(ROOT / "tests" / "browser.py"), str(page / what.inner), str(file),
                             str(what.width), str(what.height)], check=True)
+    elif isinstance(what, Family):
+        from hrsynth.families.__main__ import main
+
+        with tempfile.TemporaryDirectory() as folder:
+            main(folder, what.robot)
+            _run(f"{what.command} {folder}/{what.robot}.urdf -o {file}")
     elif name.startswith("derivation_"):
         robot, legs = what.split()
         hrsynth.draw(hrsynth.derive(hrsynth.load(robot), legs.split(","))).save(str(file))

@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from .simulation.servo import servo
 
 __version__ = "0.2.0"
-__all__ = ["__version__", "accuracy", "advise", "atlas", "catalog", "certificate", "check", "derive", "draw", "examples",
-           "following", "forget", "html", "legs", "load", "modes", "observe", "path", "save", "select", "servo",
-           "shipped", "singular", "text", "verify", "view"]
+__all__ = ["__version__", "accuracy", "advise", "atlas", "catalog", "certificate", "check", "derive", "draw",
+           "examples", "following", "forget", "html", "legs", "load", "modes", "observe", "path", "save", "select",
+           "servo", "shipped", "singular", "text", "verify", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",

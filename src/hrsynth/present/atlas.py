@@ -119,7 +119,8 @@ def _curves(axes: Any, found: Atlas, drawn: HeldLegSection, modes: dict[int, Cra
     there.plot(0, 0, "*", color="gold", markeredgecolor="black", markersize=15, zorder=5)
     for number, at in modes.items():
         x, y = _degrees(float(np.angle(at.cranks[0])) - crank, at.turn)
-        here.plot(x, y, "o", color=_colour(found, number), markeredgecolor="black", markersize=13, zorder=5)
+        here.plot(x, y, "o", color=_colour(found, number), markeredgecolor="black", markersize=13, zorder=5,
+                  clip_on=False)
         here.text(x, y, str(number), ha="center", va="center", color="white", fontsize=9, fontweight="bold", zorder=6)
     there.set(xlabel=f"direction of leg {labels[1]} (degrees from the goal's)",
               ylabel=f"direction of leg {labels[2]} (degrees from the goal's)",

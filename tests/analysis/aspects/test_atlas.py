@@ -17,6 +17,7 @@ from hrsynth.analysis.aspects import atlas as module
 from hrsynth.analysis.aspects.atlas import Atlas, atlas
 from hrsynth.analysis.aspects.path import SAME, SEPARATED, UNDECIDED
 from hrsynth.cli import execute
+from hrsynth.errors import PoseNotReached
 from hrsynth.families.planar import six_poses
 from hrsynth.kinematics.configuration import measure
 
@@ -152,3 +153,18 @@ def test_json_is_the_contract(capsys: pytest.CaptureFixture[str], tmp_path):
     assert data["pairs"][3]["path"]["margin"] > 0
     assert data["section"]["reason"]
     assert picture.read_bytes().startswith(b"\x89PNG")
+
+
+def test_a_pose_that_is_a_mode_is_reached_where_no_small_steps_lead():
+    """Every mode that ``modes`` calls assembled is an end of a path, by its pose as it is printed."""
+    robot = six_poses()
+    found = atlas_of("six")
+    assert {mode.assembly for mode in found.listed.modes} == {"yes"}
+    for mode in found.listed.modes[1:]:
+        by_pose = hrsynth.path(robot, start=str(found.listed.pose), goal=str(mode.pose))
+        assert np.max(np.abs(by_pose.goal.configuration.pose("platform") - mode.configuration.pose("platform"))) < 1e-5
+
+
+def test_what_is_no_mode_is_refused_as_before():
+    with pytest.raises(PoseNotReached, match="is not reached"):
+        hrsynth.path(six_poses(), start="x=-0.064092", goal="x=0.01,y=0.5")

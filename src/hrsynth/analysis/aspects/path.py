@@ -257,8 +257,8 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, 
          start: PoseLike, goal: PoseLike, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
     """Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
 
-    Both are reached from the zero configuration in its working mode, or where no small steps lead there as ``modes``
-    found the robot assembled, if they are modes with the same directions as the other; on the way legs may pass their limits into other
+    Both are reached from the zero configuration in its working mode; or, where no small steps lead to a pose that is a
+    mode of the other, as ``modes`` found the robot assembled there. On the way legs may pass their limits into other
     working modes (Type 1). A certificate encloses, by interval arithmetic, the condition's value away from zero, the
     reach of every leg and the limits of R and P joints all along the path, for all poses within
     ``tolerances.FOLLOWED`` of it; opposite signs of an expression at the two ends separate them. At most ``budget``
