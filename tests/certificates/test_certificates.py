@@ -20,7 +20,7 @@ from sympy import ZZ
 from sympy.polys.matrices import DomainMatrix
 
 import hrsynth
-from analysis.modes.draws import FAMILIES
+from analysis.modes.draws import FAMILIES, MEETING, SURFACES
 from analysis.modes.laws import draw
 from certificates.mutations import FALSE, false, means_the_same, scribbled
 from hrsynth.analysis.modes.solve import solve
@@ -73,17 +73,21 @@ def test_what_is_listed_is_certified(name, tmp_path):
 
 WITHOUT = {"planar, a circle and two lines", "planar, two circles and a line", "spatial, two lines and a circle",
            "two bodies, a line and a circle", "two bodies, first circle and slide parallel", "two bodies, lines",
-           "two bodies, second circle and slide parallel"}
+           "two bodies, second circle and slide parallel", "spatial, two circles and two spheres",
+           "spatial, a line and four spheres"}
 """Families with zeros at infinity, which no bound of the checker leaves out."""
+LONGER = {"spatial, six spheres", "spatial, three planes and three spheres", "spatial, six planes",
+          "spatial, a pivot and three spheres"}
 
 
-@pytest.mark.parametrize("name", sorted(FAMILIES))
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONGER))
+                                  for name in sorted(FAMILIES | MEETING | SURFACES)])
 def test_random_platforms(name):
     """The checker's bound, which trusts no resultant, is the engine's count."""
     system, _ = draw(name, 1)
     found = solve(system)
     if name in WITHOUT:
-        with pytest.raises(checker.NotAccepted, match="no bound of their number is known"):
+        with pytest.raises(checker.NotAccepted, match=r"no bound of their|may be more|not proved complete"):
             of_systems(found, {})
         return
     record = of_systems(found, {})

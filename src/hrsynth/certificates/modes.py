@@ -22,7 +22,7 @@ from ..analysis.modes.quadrics import UNIT, PoseSystem, Rounded, WorkingFrame, d
 from ..analysis.modes.rigid import Planar, Spatial
 from ..analysis.modes.roots import is_real
 from ..analysis.modes.solve import Solved, SystemModes
-from ..analysis.modes.squares import SquareSystem
+from ..analysis.modes.squares import TURNS, SquareSystem
 from ..analysis.modes.translating import Articulated, Translating, coplanar, met_normal
 from ..analysis.observed import ObservedRobot
 from ..errors import NoCertificate
@@ -37,6 +37,7 @@ from .verify_certificate import (
     digest,
     dot,
     integral,
+    poses,
     rank,
     rational,
     slope,
@@ -147,7 +148,7 @@ def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], 
     the real ones' poses, as the checker is told them."""
     system, part, roots = solved.system, solved.part, solved.roots
     if isinstance(part, PoseSystem):
-        raise NotAccepted("tips on surfaces are not written yet")
+        return _pose_system(solved)
     if not part.unknowns or part.frame is None:
         raise NotAccepted("tips at rest leave one pose: there is nothing to enclose")
     frame, turns = part.frame, part.turns(roots.turn)
@@ -179,6 +180,36 @@ def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], 
         record["bodies"] = [*record.get("bodies", [0] * record["square"]), *bodies]
     record["tips"] = [["0"] * 3] * len(record["reaches"])
     placed = [np.column_stack([np.eye(3), frame.vector(mode.pose[:3, 3] - origin)]) for mode in solved.modes]
+    return record, list(zip(starts, real, strict=True)), placed
+
+
+def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool]], list[Array]]:
+    """As :func:`_written`, for tips on surfaces too, solved for in the pose's own coordinates."""
+    system, part = solved.system, solved.part
+    assert isinstance(part, PoseSystem)
+    if not part.whole or sum(system.forbids[k] for k in part.legs) != system.freedoms:
+        raise NotAccepted("tips on surfaces, more than needed")
+    frame, values = part.chart.frame, [[complex(v) for v in each] for each in solved.roots.values]
+    real = [is_real(each) for each in solved.roots.values]
+    if isinstance(system, Spatial) and part.chart.study is not None:
+        record = {"kind": "pose", "reaches": [_reach(system.curves[k], frame, 0.0) for k in part.legs],
+                  "tips": _strings(_rounded(system.tips[list(part.legs)] / frame.size)),
+                  "arrows": sum(k >= len(system.points) for k in part.legs),
+                  "hub": _strings(_rounded(frame.point(system.hub))),
+                  "chart": [[str(round(x)) for x in row] for row in part.chart.study[:4, :4]]}
+        placed = [np.column_stack([frame.R @ mode.pose[:3, :3], frame.point(mode.pose[:3, 3])])
+                  for mode in solved.modes]
+        return record, list(zip(values, real, strict=True)), placed
+    if not isinstance(system, Articulated):
+        raise NotAccepted("tips on surfaces of another platform than the checker knows")
+    turn = TURNS[0]
+    record = {"kind": "shifting", "reaches": [_reach(system.paths[k], frame, turn) for k in part.legs],
+              "bodies": [system.bodies[k] for k in part.legs], "square": len(part.legs),
+              "slide": _reach(system.slide, replace(frame, origin=np.zeros(3)), turn),
+              "tips": [["0"] * 3] * len(part.legs)}
+    c, s = math.cos(turn), math.sin(turn)
+    starts = [[*x[:3], (x[4] * c - x[3] * s) / (1.0 + x[3] * c + x[4] * s)] for x in values]
+    placed = [np.column_stack([np.eye(3), frame.point(mode.pose[:3, 3])]) for mode in solved.modes]
     return record, list(zip(starts, real, strict=True)), placed
 
 
@@ -308,6 +339,10 @@ def _fraction(ball: Any) -> Fraction:
 def _bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Sequence[bool]) -> dict[str, Any]:
     """The first bound of the checker that is the number of boxes."""
     count, least, worse = len(record["boxes"]), math.inf, 0
+    if record["kind"] == "pose":
+        if poses(equations, halves, record) == count:
+            return {"kind": "poses"}
+        raise NotAccepted(f"{count} solutions are enclosed, but there may be more, for all that the checker knows")
     for bound in _bounds(halves):
         try:
             most = rank(equations, halves, {"bound": bound}, _ranks)

@@ -227,12 +227,12 @@ def pose(system, tips):
          for i in (1, 2, 3)]
     there, back = ([times(2, add(mul(e[0], g[k]), times(-1, mul(e[k], g[0])), times(sign, minus(
         mul(e[k % 3 + 1], g[(k + 1) % 3 + 1]), mul(e[(k + 1) % 3 + 1], g[k % 3 + 1]))))) for k in (1, 2, 3)]
-        for sign in (-1, 1))
+        for sign in (1, -1))
     found, points = [inner(e, g)], []
     for k, (b, reach) in enumerate(zip(tips, map(reach_of, system["reaches"]), strict=True)):
         N = [add(*map(times, b, row)) for row in R]
         if k < len(tips) - arrows:
-            Q = add(times(4, inner(g, g)), *(times(-2 * c, p) for c, p in zip(b, back)), times(dot(b, b), w))
+            Q = add(times(4, inner(g, g)), *(times(2 * c, p) for c, p in zip(b, back)), times(dot(b, b), w))
             points.append(([add(p, q) for p, q in zip(there, N)], Q, w))
         else:
             need(reach[0] == "plane", "an arrow keeps to a plane")
