@@ -4,6 +4,7 @@ answers that are remembered."""
 from __future__ import annotations
 
 import inspect
+import pydoc
 import warnings
 from contextlib import suppress
 from pathlib import Path
@@ -151,6 +152,14 @@ def test_help_shows_every_option(name):
     assert not any(each.kind in (each.VAR_KEYWORD, each.VAR_POSITIONAL) for each in known.parameters.values())
     assert function.__doc__
     assert function.__name__ == name
+
+
+def test_help_of_the_package_shows_each_function_with_its_options():
+    text = pydoc.plain(pydoc.render_doc(hrsynth))
+    for name in hrsynth.__all__:
+        if inspect.isfunction(getattr(hrsynth, name)):
+            assert f"    {name}(" in text, name
+    assert "    check(robot: 'RobotLike', observe: 'LegsLike' = None" in text
 
 
 class TestMemory:

@@ -6,7 +6,10 @@ import copy
 import pickle
 import subprocess
 import sys
+from collections.abc import Iterator
+from dataclasses import fields, is_dataclass, replace
 from functools import cache
+from itertools import islice
 from pathlib import Path
 
 import numpy as np
@@ -84,7 +87,6 @@ def test_a_robot_is_equal_to_itself_wherever_it_is_read_and_to_no_other(tmp_path
     assert hash(again) == hash(robot)
     assert again.file != robot.file
     joint = next(iter(robot.joints.values()))
-    from dataclasses import replace
     moved = robot.changed(joints=[replace(joint, point=joint.point + [0, 0, 1e-12])])
     assert moved != robot
 
@@ -94,7 +96,7 @@ def test_what_was_loaded_goes_on_working():
     one, other = asked("observe"), pickle.loads(pickle.dumps(asked("observe")))
     assert hrsynth.derive(other) == hrsynth.derive(one)
     assert hrsynth.check(other, grid="x=-0.1:0.1:3,y=0,z=-0.7") == hrsynth.check(one, grid="x=-0.1:0.1:3,y=0,z=-0.7")
-    for name in ("modes", "servo", "accuracy", "singular"):
+    for name in ("modes planar", "servo", "accuracy"):
         found = asked(name)
         assert hrsynth.draw(pickle.loads(pickle.dumps(found))).content == hrsynth.draw(found).content, name
 
@@ -134,3 +136,41 @@ def test_equal_arrays_of_other_shapes_are_not_equal():
     from hrsynth.results import content
     assert content(np.zeros((2, 3))) != content(np.zeros((3, 2)))
     assert content(np.zeros(3)) == content(-np.zeros(3))
+
+
+LONGEST = 200
+"""Characters of any value at a prompt."""
+
+
+def inside(value: object, depth: int, seen: set[int]) -> Iterator[object]:
+    """All values of the package that are reached from an answer by fields, some of each tuple."""
+    if id(value) in seen or depth < 0:
+        return
+    seen.add(id(value))
+    if isinstance(value, tuple | list | dict):
+        for each in islice(value.values() if isinstance(value, dict) else value, 4):
+            yield from inside(each, depth, seen)
+    elif type(value).__module__.startswith("hrsynth."):
+        yield value
+        for field in fields(value) if is_dataclass(value) else ():
+            yield from inside(getattr(value, field.name), depth - 1, seen)
+
+
+@pytest.mark.parametrize("name", ASKED)
+def test_whatever_an_answer_holds_is_one_line_at_a_prompt(name):
+    complaints = [f"{type(each).__name__}: {len(repr(each))} characters" for each in inside(asked(name), 5, set())
+                  if len(repr(each)) > LONGEST or "\n" in repr(each)]
+    assert complaints == []
+
+
+def test_a_batch_and_what_it_evaluates_are_one_line():
+    seen = asked("observe")
+    for each in (seen.batch, seen.placer, seen.batch.evaluate(seen.batch.home[None], cones=0.01), seen.motion):
+        assert len(repr(each)) <= LONGEST
+        assert "\n" not in repr(each)
+
+
+def test_many_poses_are_one_line():
+    found = hrsynth.check(asked("observe"), at=[[0.001 * k, 0, -0.7] for k in range(20)])
+    assert len(repr(found)) <= LONGEST
+    assert len(str(found).splitlines()) > 100

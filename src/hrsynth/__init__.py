@@ -1,4 +1,15 @@
-"""hrsynth: hidden robots of parallel robots that are controlled by watching the directions of their legs."""
+"""Hidden robots of parallel robots that are controlled by watching the directions of their legs.
+
+    import hrsynth
+
+    found = hrsynth.derive("quattro", [1, 4])           # a name, a path, what load() gave; legs
+    found.verdict == "controllable"
+    hrsynth.check("quattro", at=[0.02, 0.1, -0.7])      # a pose: text, dict, numbers, 4 x 4 matrix, pinocchio.SE3
+    hrsynth.view("quattro", [1, 4])                     # in a notebook: the robot, which moves
+    hrsynth.map("check", ["quattro", "delta"], poses=[[0, 0, -0.7], [0.1, 0, -0.7]])    # in several processes
+
+An answer is one line at a prompt; ``print`` shows it in full, ``to_dict()`` is its JSON, ``hrsynth.draw`` its picture.
+"""
 
 from typing import TYPE_CHECKING
 
@@ -17,6 +28,7 @@ if TYPE_CHECKING:
     from .analysis.modes.modes import modes
     from .analysis.question import forget
     from .analysis.singularity.singular import singular
+    from .analysis.study import map
     from .certificates import certificate, verify
     from .description import examples, load, save, shipped
     from .present.show import draw, html, text
@@ -27,8 +39,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 __all__ = ["__version__", "accuracy", "advise", "atlas", "catalog", "certificate", "check", "derive", "draw",
-           "examples", "following", "forget", "html", "legs", "load", "modes", "observe", "path", "save", "select",
-           "servo", "shipped", "singular", "text", "verify", "view"]
+           "examples", "following", "forget", "html", "legs", "load", "map", "modes", "observe", "path", "save",
+           "select", "servo", "shipped", "singular", "text", "verify", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
@@ -44,6 +56,7 @@ _HOME = {
     "html": ".present.show",
     "legs": ".analysis.controllability",
     "load": ".description",
+    "map": ".analysis.study",
     "modes": ".analysis.modes.modes",
     "observe": ".analysis.asked",
     "path": ".analysis.aspects.path",

@@ -8,10 +8,22 @@ from functools import wraps
 from inspect import Parameter, signature
 from typing import Any, ClassVar
 
+from .errors import shortened
+
+LONGEST_LINE, LONGEST_PART = 160, 48
+"""Characters of a value at a prompt, and of each of its fields there."""
+LISTED = 3
+"""Members of a tuple that are shown; of more their number is."""
+
 
 class Value:
-    """A frozen dataclass that is pickled and copied by its fields: what was computed from them is computed again where
-    it is asked for, and arrays stay read-only."""
+    """A frozen dataclass (with ``repr=False``) that is one line at a prompt, and is pickled and copied by its fields:
+    what was computed from them is computed again where it is asked for, and arrays stay read-only."""
+
+    def __repr__(self) -> str:
+        own = [field for field in fields(self) if field.repr]  # type: ignore[arg-type]
+        parts = (f"{field.name}={brief(getattr(self, field.name))}" for field in own)
+        return shortened(f"{type(self).__name__}({', '.join(parts)})", LONGEST_LINE)
 
     def __getstate__(self) -> dict[str, Any]:
         return {field.name: getattr(self, field.name) for field in fields(self)}  # type: ignore[arg-type]
@@ -22,6 +34,16 @@ class Value:
                 if hasattr(array, "setflags"):
                     array.setflags(write=False)
             object.__setattr__(self, name, value)
+
+
+def brief(value: Any) -> str:
+    """A value in a few characters: of arrays the shape, of long tuples the number of members."""
+    if isinstance(value, Mapping | tuple | list) and len(value) > LISTED:
+        first = next(iter(value.values() if isinstance(value, Mapping) else value))
+        return f"<{len(value)} × {type(first).__name__}>"
+    if hasattr(value, "shape") and value.shape:
+        return f"<array {' × '.join(map(str, value.shape))}>"
+    return shortened(f"{value:.6g}" if isinstance(value, float) else repr(value), LONGEST_PART)
 
 
 def content(value: Any) -> Any:
@@ -92,7 +114,7 @@ class Result(Compared):
         return hash(self.headline() if self.word is None else self.word)
 
     def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self.headline()}>"
+        return f"<{type(self).__name__}: {shortened(self.headline(), LONGEST_LINE)}>"
 
     def __str__(self) -> str:
         return str(Result.public("text")(self))

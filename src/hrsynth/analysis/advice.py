@@ -18,7 +18,7 @@ from ..mechanism import Direction, JointType, Observation
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.sensors import encoders, line_position, observation_of
 from ..progress import tell
-from ..results import Result
+from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
 from .observed import LegsLike, ObservedRobot, RobotLike, restricted
 from .question import question
@@ -28,8 +28,8 @@ AXES = {JointType.UNIVERSAL: ("first", "second"), JointType.CYLINDRICAL: ("slide
 """The names of the coordinates of joints that have two."""
 
 
-@dataclass(frozen=True, eq=False)
-class FurtherMeasurement:
+@dataclass(frozen=True, eq=False, repr=False)
+class FurtherMeasurement(Value):
     """A measurement that could be added.
 
     ``kind`` is leg (its default segment), direction (of another link), line (the position of a line whose direction is
@@ -110,8 +110,8 @@ BATCH = 2000
 """Sets that are tried at once."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cure:
+@dataclass(frozen=True, eq=False, repr=False)
+class Cure(Value):
     """A set of measurements, and the verdict with them at all samples."""
 
     measurements: tuple[FurtherMeasurement, ...]

@@ -11,7 +11,7 @@ import numpy as np
 from ..batch.reach import sweep
 from ..mechanism.pose import SCALARS, Grid, PoseLike, asked_poses
 from ..progress import tell
-from ..results import Result
+from ..results import Result, Value
 from .asked import configurations_at
 from .classes import Redundancy, listed
 from .observed import LegsLike, ObservedRobot, RobotLike
@@ -22,8 +22,8 @@ UNREACHABLE = "unreachable"
 MEASURES = ("type2", "type1", "constraints", "condition", "mm_per_degree", "degrees_per_degree")
 
 
-@dataclass(frozen=True, eq=False)
-class GridCheck:
+@dataclass(frozen=True, eq=False, repr=False)
+class GridCheck(Value):
     """The postures over a grid of poses, in its order; None where a pose is not reached."""
 
     grid: Grid
@@ -93,7 +93,7 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
     poses = asked_poses(at)
     cells = Grid.parse(grid) if isinstance(grid, str) else grid
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
-    examiner = ConfigurationAnalysis(setting)
+    examiner = ConfigurationAnalysis.of(setting)
     start, question, motion = setting.everything.start, setting.everything.question, setting.motion
     configurations = configurations_at(setting, poses) or [start]
     tell("poses")

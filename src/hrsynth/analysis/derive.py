@@ -17,7 +17,7 @@ from ..mechanism import Mechanism
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.notation import Architecture
 from ..progress import tell
-from ..results import Result
+from ..results import Result, Value
 from ..rewrite.evidence import Evidence
 from ..rewrite.state import State
 from ..rewrite.strategy import FORMS, GENERAL, Check, Rewriting, Step, Strategy, trusting
@@ -38,8 +38,8 @@ STEP_SAMPLES = 3
 """Configurations at which a single step is checked."""
 
 
-@dataclass(frozen=True, eq=False)
-class PaperForm:
+@dataclass(frozen=True, eq=False, repr=False)
+class PaperForm(Value):
     """The architecture that the paper's rules alone give, and whether it is equivalent; freedoms it gains or loses."""
 
     hidden: Architecture

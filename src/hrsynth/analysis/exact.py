@@ -72,7 +72,7 @@ class Basis:
                 "largest_defect_held": self.held, "smallest_defect_not_held": self.missed}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ExactVerdict(Compared):
     """What an architecture's generic geometry sees with some legs observed.
 

@@ -10,13 +10,14 @@ from ..geometry.ranks import kernel_basis, range_basis
 from ..geometry.vectors import Array, unit
 from ..mechanism import JointType
 from ..mechanism.legs import LegDecomposition
+from ..results import Value
 from ..tolerances import NAMED
 
 _AXES = "xyz"
 
 
-@dataclass(frozen=True, eq=False)
-class Freedom:
+@dataclass(frozen=True, eq=False, repr=False)
+class Freedom(Value):
     """A twist (vx, vy, vz, wx, wy, wz) at the platform frame's origin, base axes (m, rad), with its name."""
 
     twist: Array

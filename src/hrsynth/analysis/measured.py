@@ -3,30 +3,34 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 
+from ..budgets import REMEMBERED
 from ..constraints.condition import Condition, condition
 from ..constraints.pattern import ConstraintPattern, recognise
 from ..kinematics.relation import Measurement
 from ..kinematics.sampling import Samples
 from ..mechanism.observation import labels_of
+from ..results import Value
 from .observed import ObservedRobot, motors
 from .verdict import Verdict, verdict_of
 
 
-@dataclass(frozen=True, eq=False)
-class MeasuredRobot:
+@dataclass(frozen=True, eq=False, repr=False)
+class MeasuredRobot(Value):
     """A robot with samples for what is measured; verdict, pattern and condition are found when they are asked for."""
 
     setting: ObservedRobot
     samples: Samples
 
     @classmethod
+    @lru_cache(maxsize=REMEMBERED)
     def watched(cls, setting: ObservedRobot) -> MeasuredRobot:
         """The observed directions: the hidden robot."""
         return cls(setting, setting.samples)
 
     @classmethod
+    @lru_cache(maxsize=REMEMBERED)
     def driven(cls, setting: ObservedRobot) -> MeasuredRobot:
         """The motors' coordinates: the real robot. Raises ``BadRequest`` where it has no motor."""
         return cls(setting, setting.measuring(motors(setting).observations))

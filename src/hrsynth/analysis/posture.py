@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
 
+from ..budgets import REMEMBERED
 from ..geometry.ranks import range_basis
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Relation, relation, relation_of
 from ..mechanism.pose import Pose
+from ..results import Value
 from ..tolerances import PASSED_BY, RANK_GAP
 from .classes import (
     Classes,
@@ -33,8 +35,8 @@ from .observed import Mobility, ObservedRobot
 UNDECIDED, REGULAR, CONSTRAINT = "undecided", "regular", "constraint"
 
 
-@dataclass(frozen=True, eq=False)
-class Kinds:
+@dataclass(frozen=True, eq=False, repr=False)
+class Kinds(Value):
     """What one relation says at a configuration: the freedoms that are seen, the gap of all ranks, the six counts (None
     where the gap is too small for a verdict) and the freedoms that are not seen."""
 
@@ -88,8 +90,8 @@ class Distances:
                 "mm_per_degree": self.millimetres, "degrees_per_degree": self.degrees}
 
 
-@dataclass(frozen=True, eq=False)
-class Posture:
+@dataclass(frozen=True, eq=False, repr=False)
+class Posture(Value):
     """All that is said of one configuration."""
 
     configuration: ClosedConfiguration
@@ -132,11 +134,17 @@ class Posture:
                 "redundant": [each.to_dict() for each in self.redundant], "distances": self.distances.to_dict()}
 
 
-@dataclass(frozen=True, eq=False)
-class ConfigurationAnalysis:
+@dataclass(frozen=True, eq=False, repr=False)
+class ConfigurationAnalysis(Value):
     """A setting with its generic values, against which single configurations are held."""
 
     setting: ObservedRobot
+
+    @classmethod
+    @lru_cache(maxsize=REMEMBERED)
+    def of(cls, setting: ObservedRobot) -> ConfigurationAnalysis:
+        """The one of an observed robot: its generic values are computed once."""
+        return cls(setting)
 
     @cached_property
     def usual(self) -> Counts:

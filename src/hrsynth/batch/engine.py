@@ -23,6 +23,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.observation import Direction, Observation
+from ..results import Value
 from ..tolerances import RANK_CUTOFF
 from .direction_rows import direction_rows
 from .error_bounds import ErrorBound, bounds_compiled, bounds_of
@@ -36,8 +37,8 @@ ROWS = ("reached", "u", "M")
 """What the program of closed forms says at each pose."""
 
 
-@dataclass(frozen=True, eq=False)
-class Evaluation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Evaluation(Value):
     """What a batch says of n poses with k legs watched; NaN where a pose is not reached.
 
     ``interaction_matrix`` is Mᵀ (n, 3 k, d): the rates of the directions for the twists of ``twists`` ((6, d) or
@@ -74,8 +75,8 @@ class Evaluation:
         return np.linalg.det(square) if square.shape[1] == square.shape[2] else None
 
 
-@dataclass(frozen=True, eq=False)
-class Batch:
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch(Value):
     """A compiled mechanism: each leg a closed form or solved by iteration, None where it hangs on a link that does not
     go with the platform's pose; ``iterative`` are those by which the platform's freedoms follow from its pose."""
 

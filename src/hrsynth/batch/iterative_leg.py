@@ -19,6 +19,7 @@ from ..geometry.vectors import Array, hat, inverse, perpendicular
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg
 from ..mechanism.observation import Direction
+from ..results import Value
 from ..tolerances import CLOSED, RANK_CUTOFF, SOLVED
 from .platform_coordinates import PlatformCoordinates
 
@@ -34,8 +35,8 @@ _TURNS = {"R": ((0, 2), (1, 2)), "P": ((0, 2), (1, 2), (0, 1)), "C": ((0, 2), (1
 that stay perpendicular."""
 
 
-@dataclass(frozen=True, eq=False)
-class Ties:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ties(Value):
     """The rows of joints: forces (i, j, n in i, point in i, point in j), moments (i, j, α in i, β in j, level); and
     directions that coincide (i, j, α in i, β in j), which moments alone do not tell from opposite ones."""
 
@@ -95,8 +96,8 @@ class Ties:
         return residual, J
 
 
-@dataclass(frozen=True, eq=False)
-class IterativeLeg:
+@dataclass(frozen=True, eq=False, repr=False)
+class IterativeLeg(Value):
     """A leg between the base and the link on which it ends.
 
     ``links`` are the base, the end, then the leg's own; ``free`` numbers those whose poses are sought. Where the end is
@@ -217,8 +218,8 @@ class IterativeLeg:
         return X
 
 
-@dataclass(frozen=True, eq=False)
-class IterativeLegStates:
+@dataclass(frozen=True, eq=False, repr=False)
+class IterativeLegStates(Value):
     """A chain at n poses of its end; ``span`` (6, D) are the platform's twists (m, rad)."""
 
     leg: IterativeLeg

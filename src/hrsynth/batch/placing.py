@@ -22,6 +22,7 @@ from ..kinematics.pinocchio_model import PinocchioModel
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.observation import Direction
+from ..results import Value
 from ..tolerances import CLOSED
 from .engine import Batch, Flags
 from .iterative_leg import IterativeLeg
@@ -33,8 +34,8 @@ CLOSING = 12
 """Gauss-Newton steps from where the subproblem puts a leg's links."""
 
 
-@dataclass(frozen=True, eq=False)
-class Placer:
+@dataclass(frozen=True, eq=False, repr=False)
+class Placer(Value):
     """A batch whose platform poses can be made closed configurations of ``twin``."""
 
     batch: Batch

@@ -16,14 +16,15 @@ from ..closed_forms.platform_points import PlatformPoint
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
+from ..results import Value
 from ..tolerances import SAME_DIRECTION, SAME_GEOMETRY
 
 Frames = Mapping[str, Array]
 """Poses X_BL (m, 4, 4) of links at m closed configurations, metres."""
 
 
-@dataclass(frozen=True, eq=False)
-class PlatformLink:
+@dataclass(frozen=True, eq=False, repr=False)
+class PlatformLink(Value):
     """A link that goes with the platform: its origin is p + R b + c, its rotation R Q (``turns``) or Q."""
 
     turns: bool
@@ -45,8 +46,8 @@ class PlatformLink:
         return X
 
 
-@dataclass(frozen=True, eq=False)
-class PlatformCoordinates:
+@dataclass(frozen=True, eq=False, repr=False)
+class PlatformCoordinates(Value):
     """The platform: its reference point, a basis of its twists, the links that go with it.
 
     ``translations`` (3, k) and ``rotations`` (3, m) are orthonormal: the twist with coordinates (x, y) is the velocity

@@ -35,7 +35,7 @@ Formula = Callable[..., Mapping[str, Components]]
 """From the components of what it reads to those of what it makes, by name."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Kernel(Value):
     """Straight-line code and what it stores."""
 
@@ -60,8 +60,8 @@ class Kernel(Value):
         run(table, numbers, np.empty((count, table.shape[1])))
 
 
-@dataclass(frozen=True, eq=False)
-class KernelLoop:
+@dataclass(frozen=True, eq=False, repr=False)
+class KernelLoop(Value):
     """``step`` is repeated, at most ``limit`` times, at the poses where the place ``open`` is positive."""
 
     step: Kernel
@@ -104,8 +104,8 @@ def _put(table: Array, places: Sequence[int] | set[int], index: Indices, part: A
             table[place, index] = part[place]
 
 
-@dataclass(frozen=True, eq=False)
-class Section:
+@dataclass(frozen=True, eq=False, repr=False)
+class Section(Value):
     """Steps that run where the place ``flag`` is positive (None: everywhere)."""
 
     flag: int | None

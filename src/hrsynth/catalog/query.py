@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import BadRequest
+from ..results import Value
 from .jsonl import Record, record
 from .store import DATABASES, Store, shipped, store
 from .words import parse
@@ -23,8 +24,8 @@ ASKED = (*EXACT, "legs", "text")
 """What can be asked for."""
 
 
-@dataclass(frozen=True, eq=False)
-class Catalog:
+@dataclass(frozen=True, eq=False, repr=False)
+class Catalog(Value):
     """Records, by group and then by word."""
 
     records: tuple[Record, ...]

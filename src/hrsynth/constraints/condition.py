@@ -16,6 +16,7 @@ import numpy as np
 from ..geometry.vectors import Array, hat
 from ..kinematics.locked import interaction
 from ..kinematics.relation import Measurement
+from ..results import Value
 from ..tolerances import SAME_RELATION
 from .named_vectors import BodyVector, NamedVector, Tangent
 from .pattern import ConstraintPattern, LockedLeg, PatternValues, forbidden, projectors
@@ -24,8 +25,8 @@ from .vector_algebra import evaluate, products, vector
 Values = Mapping[str, Array]
 
 
-@dataclass(frozen=True, eq=False)
-class Condition:
+@dataclass(frozen=True, eq=False, repr=False)
+class Condition(Value):
     """When the controller loses a freedom of the platform: in words and as an expression that vanishes there.
 
     ``signed`` says that the expression changes its sign across the locus, ``never`` that it cannot vanish; ``factors``
@@ -52,7 +53,7 @@ class Condition:
         return np.sqrt(np.abs(np.linalg.det(M.transpose(0, 2, 1) @ M)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Named(Condition):
     """A condition in vectors that have names."""
 
@@ -70,7 +71,7 @@ class Named(Condition):
         return found if self.signed else np.sqrt(np.abs(found))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class General(Condition):
     """The condition of any mechanism: the interaction matrix by the screws of all joints loses rank."""
 

@@ -14,12 +14,13 @@ import numpy as np
 from ..geometry.vectors import Array, frozen, inverse
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Joint, Mechanism
+from ..results import Value
 
 Poses = Mapping[str, Array]
 
 
-@dataclass(frozen=True, eq=False)
-class NamedVector:
+@dataclass(frozen=True, eq=False, repr=False)
+class NamedVector(Value):
     """A vector with the symbol it has in expressions and what it means, in words."""
 
     symbol: str
@@ -35,7 +36,7 @@ class NamedVector:
         raise NotImplementedError
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BodyVector(NamedVector):
     """A unit vector fixed in a link, given in the link's frame."""
 
@@ -50,7 +51,7 @@ class BodyVector(NamedVector):
         return np.einsum("...ij,j->...i", poses[self.link][..., :3, :3], self.direction)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class BodyPoint(NamedVector):
     """A point fixed in a link, given in the link's frame (characteristic lengths)."""
 
@@ -67,7 +68,7 @@ class BodyPoint(NamedVector):
         return turned + X[..., :3, 3]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Tangent(NamedVector):
     """The unit tangent a × (Q − P) of the path of Q when the link that carries it turns about the axis (P, a)."""
 
@@ -83,7 +84,7 @@ class Tangent(NamedVector):
         return unit_rows(np.cross(self.axis.value(poses), self.end.value(poses) - self.start.value(poses)))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Segment(NamedVector):
     """The unit vector from a point to another."""
 

@@ -21,14 +21,15 @@ from ..kinematics.relation import Measurement, relation
 from ..mechanism import JointType, Mechanism, Observation
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.observation import Direction
+from ..results import Value
 from ..tolerances import SAME_RELATION
 from .named_vectors import BodyPoint, BodyVector, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at
 
 TURNING = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.CYLINDRICAL)
 
 
-@dataclass(frozen=True, eq=False)
-class LockedLeg:
+@dataclass(frozen=True, eq=False, repr=False)
+class LockedLeg(Value):
     """A leg with its measurements held.
 
     Its end ``tip`` on ``body`` may move along ``line``, or in the plane with this ``normal``, or not at all where
@@ -54,8 +55,8 @@ class LockedLeg:
         return tuple(f for f in (self.tip, self.line, self.normal) if f is not None)
 
 
-@dataclass(frozen=True, eq=False)
-class ConstraintPattern:
+@dataclass(frozen=True, eq=False, repr=False)
+class ConstraintPattern(Value):
     """How the platform can move and what the held legs leave of it.
 
     ``motion`` is ``translations`` (held legs leave translations alone), ``planar``, ``spatial``, ``oriented`` (spatial,
@@ -83,8 +84,8 @@ class ConstraintPattern:
         return PatternValues(self, tuple(configurations))
 
 
-@dataclass(frozen=True, eq=False)
-class PatternValues:
+@dataclass(frozen=True, eq=False, repr=False)
+class PatternValues(Value):
     """A pattern at n configurations: its named vectors, (n, 3) each, and where its bodies are."""
 
     pattern: ConstraintPattern

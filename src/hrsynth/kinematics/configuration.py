@@ -20,7 +20,7 @@ from ..tolerances import CLOSED
 from .pinocchio_model import PinocchioModel
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class ClosedConfiguration(Value):
     """A configuration of a twin whose loops are closed to ``tolerances.CLOSED``; ``q`` is read-only."""
 

@@ -15,6 +15,7 @@ from ..budgets import SLIDER_PART
 from ..geometry.screws import point_velocity
 from ..geometry.so3 import logarithm, logarithm_rate, turn_about, wrap_angle
 from ..geometry.vectors import Array
+from ..results import Value
 from ..tolerances import NO_SLIDER, SAME_DIRECTION
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
@@ -29,8 +30,8 @@ HALVINGS = 4
 """How often a step is halved before a slider stops."""
 
 
-@dataclass(frozen=True, eq=False)
-class Coordinates:
+@dataclass(frozen=True, eq=False, repr=False)
+class Coordinates(Value):
     """Coordinates of a platform, by their places among :data:`NAMES`, as an aim: ``values`` (n,) in metres, radians."""
 
     motion: PlatformMotion

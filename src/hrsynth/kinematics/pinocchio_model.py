@@ -56,6 +56,9 @@ class PinocchioModel:
         self._several: dict[tuple[str, ...], tuple[list[int], Array, Array]] = {}
         self._q: Array | None = None
 
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.mechanism.name}>"
+
     def __reduce__(self) -> tuple[type[PinocchioModel], tuple[Mechanism, float]]:
         """Pickled and copied by its recipe: Pinocchio's own objects are built again."""
         return type(self), (self.mechanism, self.length)

@@ -16,14 +16,15 @@ from ..geometry.screws import point_velocity
 from ..geometry.so3 import between, exponential, logarithm, turn_about, wrap_angle
 from ..geometry.vectors import Array, transform
 from ..mechanism.pose import Pose
+from ..results import Value
 from ..tolerances import AS_PRINTED, RANK_CUTOFF
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, relation
 
 
-@dataclass(frozen=True, eq=False)
-class Goal:
+@dataclass(frozen=True, eq=False, repr=False)
+class Goal(Value):
     """Parts of the pose of ``link`` that are wanted: ``directions`` (k, 3) · position of ``point`` = ``values`` (k,)
     metres, the turn ``phi`` about ``normal`` since the orientation ``zero``, the whole orientation ``rotation``, or
     (``axis``) no turn but about that base direction. The point is given in the link's frame."""
@@ -94,8 +95,8 @@ class Goal:
         return replace(self, values=start + fraction * (self.values - start), phi=phi, rotation=rotation)
 
 
-@dataclass(frozen=True, eq=False)
-class PlatformMotion:
+@dataclass(frozen=True, eq=False, repr=False)
+class PlatformMotion(Value):
     """What a platform does at generic configurations, relative to its pose ``home`` (4, 4) at the zero configuration.
 
     ``translations`` (3, k) spans the velocities of ``point`` (in the platform's frame), ``rotations`` (3, m) the

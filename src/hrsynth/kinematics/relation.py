@@ -14,13 +14,14 @@ from ..geometry.ranks import Rank, kernel_basis, range_basis
 from ..geometry.screws import point_velocity
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
+from ..results import Value
 from ..tolerances import INVERTED
 from .configuration import ClosedConfiguration, measure
 from .tasks import Target
 
 
-@dataclass(frozen=True, eq=False)
-class Measurement:
+@dataclass(frozen=True, eq=False, repr=False)
+class Measurement(Value):
     """What is asked of a mechanism: the twist t of ``platform`` and the rates of ``observations`` seen from
     ``reference``; ``bodies`` are further links whose twists count too.
 
@@ -60,8 +61,8 @@ class Measurement:
         return tuple(o.size for o in self.observations)
 
 
-@dataclass(frozen=True, eq=False)
-class Relation:
+@dataclass(frozen=True, eq=False, repr=False)
+class Relation(Value):
     """ρ(q) as an orthonormal basis (rows: t, then measured rates, then bodies), with mobility and the smallest gap."""
 
     basis: Array

@@ -18,6 +18,7 @@ from ..errors import BadMechanism, BranchPoint, NotSampled
 from ..geometry.ranks import kernel_basis, largest_angle, range_basis
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
+from ..results import Value
 from ..tolerances import CLOSED, EXACT, FOLLOWED, INVERTED, NUDGE, PASSED_BY, RANK_GAP, SHARP, SOLVED, STEADY_TANGENT
 from .branch import CORRECTED, OperationMode, Signature, follows, group_modes, turns_of
 from .configuration import ClosedConfiguration
@@ -45,8 +46,8 @@ WEAKEST = 0.05
 """Fraction to which the loops' smallest singular value may fall below that of the zero configuration."""
 
 
-@dataclass(frozen=True, eq=False)
-class Sample:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sample(Value):
     """A closed configuration, the targets passed on the way to it (the last one its own), and ρ there."""
 
     configuration: ClosedConfiguration
@@ -54,8 +55,8 @@ class Sample:
     relation: Relation
 
 
-@dataclass(frozen=True, eq=False)
-class Samples:
+@dataclass(frozen=True, eq=False, repr=False)
+class Samples(Value):
     """Samples of one mechanism for one question; ``discarded`` draws did not stay on the branch or came too near to a
     singularity. ``met`` are other operation modes that steps too long would have led to."""
 

@@ -16,6 +16,7 @@ from ..geometry.screws import point_velocity
 from ..geometry.so3 import logarithm
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
+from ..results import Value
 from ..tolerances import CLOSED
 from .configuration import measure
 from .pinocchio_model import PinocchioModel
@@ -38,8 +39,8 @@ class GuidedTask(Task, Protocol):
         """What lies ``fraction`` of the way from the pose X (4, 4) to it."""
 
 
-@dataclass(frozen=True, eq=False)
-class Held:
+@dataclass(frozen=True, eq=False, repr=False)
+class Held(Value):
     """Measured values that are to stay as they are, seen from ``reference`` where an observation names no link."""
 
     reference: str
@@ -60,8 +61,8 @@ class Held:
         return np.concatenate(errors), np.vstack(rates)
 
 
-@dataclass(frozen=True, eq=False)
-class Target:
+@dataclass(frozen=True, eq=False, repr=False)
+class Target(Value):
     """What a configuration is to reach besides closed loops: the pose X_BP of ``link`` (only the position of ``point``,
     given in the link's frame, where there is one), and measured values."""
 

@@ -15,6 +15,7 @@ from itertools import combinations, pairwise
 from ..errors import BadMechanism, BadRequest, BadRobotFile, Defect
 from ..geometry import lines
 from ..geometry.vectors import Array
+from ..results import Value
 from ..tolerances import SAME_POINT
 from . import graphs
 from .composites import WordEdge, WordGraph
@@ -37,8 +38,8 @@ class Leg:
     takes_platform: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class LegDecomposition:
+@dataclass(frozen=True, eq=False, repr=False)
+class LegDecomposition(Value):
     """A mechanism taken apart: platform links and legs, in the order of the mechanism's links."""
 
     mechanism: Mechanism

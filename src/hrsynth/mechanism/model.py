@@ -72,7 +72,7 @@ class Motor:
     xml: str | None = None
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Link(Value):
     """A rigid body: its frame's pose X_BL at the zero configuration (4, 4); ``xml`` keeps unknown child elements."""
 
@@ -85,7 +85,7 @@ class Link(Value):
         object.__setattr__(self, "pose", frozen(self.pose))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Joint(Value):
     """A joint: ``point`` its centre (3,), ``axes`` unit vectors (R, P, C: one; planar: the normal; U: the first fixed
     in the predecessor, the second in the successor); its coordinate is the successor's motion seen from the

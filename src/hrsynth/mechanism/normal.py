@@ -18,6 +18,7 @@ import numpy as np
 from ..errors import BadMechanism
 from ..geometry import lines
 from ..geometry.vectors import Array, angle_between
+from ..results import Value
 from ..tolerances import SAME_POINT
 from . import graphs
 from .model import Joint, JointType, Mechanism
@@ -25,8 +26,8 @@ from .observation import Direction
 from .wrist import Interval, Wrist, chained
 
 
-@dataclass(frozen=True, eq=False)
-class NormalForm:
+@dataclass(frozen=True, eq=False, repr=False)
+class NormalForm(Value):
     """The mechanism in normal form, and where its links went: ``into[old]`` is the link that took ``old`` in; how far
     axes and centres were moved, all together, to make one joint of several (m)."""
 

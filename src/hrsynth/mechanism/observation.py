@@ -16,7 +16,7 @@ from ..geometry.vectors import Array, cross, frozen, hat, transform, unit
 from ..results import Value
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Observation(Value):
     """A measurement of one link of a leg, seen from the reference link.
 
@@ -74,7 +74,7 @@ def labels_of(observations: Iterable[Observation]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(each.leg for each in observations))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Direction(Observation):
     """The unit vector u = R_cᵀ R_ℓ d of a direction d fixed in link ℓ (docs/pages/theory.md, section 2; MMT 2.3.1).
 
@@ -118,7 +118,7 @@ class Direction(Observation):
         return found
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LinePosition(Observation):
     """The moment h = p × u of an observed line, u its direction and p any of its points: the second vector of the
     line's Plücker coordinates (MMT 5.3), both seen from the reference link, about its frame's origin.
@@ -163,7 +163,7 @@ class LinePosition(Observation):
         return X_link[:3, :3] @ self.direction, self._at(X_link) - X_reference[:3, 3]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Encoder(Observation):
     """One coordinate of a joint: the motion of ``link`` seen from ``seen_from``, the joint's other link.
 
@@ -179,7 +179,7 @@ class Encoder(Observation):
         return (self.joint, type(self).__name__, self.link)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class AngleEncoder(Encoder):
     """The angle by which a direction fixed in the link has turned about the axis since the zero configuration.
 
@@ -207,7 +207,7 @@ class AngleEncoder(Encoder):
         return ((axis - cosine * mark) / (1 - cosine**2))[None] @ (V_link[3:] - V_reference[3:])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class SlideEncoder(Encoder):
     """The length by which the link has slid along the axis since the zero configuration.
 

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from ..budgets import FARTHEST_POSE, LARGEST_GRID
 from ..errors import BadRequest
 from ..geometry.vectors import Array, rotation_from_rpy
+from ..results import Value
 from ..tolerances import AS_PRINTED
 
 SCALARS = ("x", "y", "z", "phi")
@@ -170,8 +171,8 @@ def asked_pose(given: PoseLike) -> Pose | ModeNumber:
     return ModeNumber(int(number))
 
 
-@dataclass(frozen=True, eq=False)
-class Grid:
+@dataclass(frozen=True, eq=False, repr=False)
+class Grid(Value):
     """A line, plane or box of poses: the parts that vary with their values, over a pose that holds the rest."""
 
     axes: tuple[tuple[str, Array], ...]

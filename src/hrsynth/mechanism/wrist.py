@@ -18,7 +18,7 @@ from ..tolerances import SAME_DIRECTION
 Interval = tuple[float, float]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Wrist(Value):
     """A spherical joint that stands for turns about axes through its centre: the ``first``, fixed in the predecessor,
     and the ``last``, fixed in the successor, unit vectors at the zero configuration, are ``low`` to ``high`` (rad)

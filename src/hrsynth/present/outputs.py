@@ -118,10 +118,12 @@ class HiddenFile(File):
 
 @dataclass(frozen=True)
 class Outputs:
-    """What there is of one kind of answer: ``text`` is called with it and the names of the files written."""
+    """What there is of one kind of answer: ``text`` is called with it and the names of the files written, ``inline``
+    makes HTML for a notebook, where that is more than the text."""
 
     text: str
     files: tuple[File, ...] = ()
+    inline: str | None = None
 
 
 CERTIFICATE = File("cannot write the certificate", {".json": ".certificates:written"},
@@ -167,7 +169,7 @@ OUTPUTS = {
     "verdict": Outputs("text.robots:verdict"),
     "view": Outputs("text.robots:view", (
         File("cannot write the view", dict.fromkeys(HTML, "view.page:static"),
-             "Write a page that needs no server (.html).", "static", allowed=".html"),)),
+             "Write a page that needs no server (.html).", "static", allowed=".html"),), inline="view.page:inline"),
 }
 """The outputs by the name under which a result is shown (:attr:`hrsynth.results.Result.shown_as`): that of its
 command, or of its kind where it is a part of an answer."""

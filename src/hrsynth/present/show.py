@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
-from ..errors import BadRequest
+from ..errors import BadRequest, MissingExtra
 from ..results import Result
 from .outputs import OUTPUTS, function
 
@@ -60,9 +60,15 @@ def record(command: str, robot: str | None, fields: dict[str, Any]) -> str:
 
 
 def html(result: Result) -> str:
-    """The same text for a notebook: in columns, with lines that are not broken; motors underlined by markup, which any
-    font can."""
-    shown = re.sub("(.)\u0332", r"<u>\1</u>", markup.escape(text(result)))
+    """What a notebook shows: a view as it moves; else the same text in columns, with lines that are not broken, motors
+    underlined by markup, which any font can."""
+    said, inline = text(result), OUTPUTS[result.shown_as].inline
+    if inline is not None:
+        try:
+            return str(function(inline)(result))
+        except MissingExtra as error:
+            said = f"{said}\n\n{error}"
+    shown = re.sub("(.)\u0332", r"<u>\1</u>", markup.escape(said))
     return f'<pre style="white-space: pre; overflow-x: auto">{shown}</pre>'
 
 

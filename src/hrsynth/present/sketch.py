@@ -11,6 +11,7 @@ import numpy as np
 
 from ..analysis.freedoms import point_text
 from ..geometry.vectors import Array, perpendicular
+from ..results import Value
 from ..tolerances import SAME_DIRECTION
 
 
@@ -36,8 +37,8 @@ Box = tuple[float, float, float, float]
 """Left, bottom, width, height as parts of the figure."""
 
 
-@dataclass(frozen=True, eq=False)
-class Sketch:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sketch(Value):
     """How points (3,) of the base frame are drawn: along ``axes`` (k, 3), k = 2 in a plane and 3 in space, seen from
     ``view`` (elevation and azimuth in degrees)."""
 

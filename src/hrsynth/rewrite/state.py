@@ -9,10 +9,11 @@ from ..geometry.vectors import Array
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.notation import Architecture
+from ..results import Value
 
 
-@dataclass(frozen=True, eq=False)
-class VirtualChain:
+@dataclass(frozen=True, eq=False, repr=False)
+class VirtualChain(Value):
     """The virtual chain of one observation: reference –sliders– carrier T –actuator– (bearing W –roll R(d)–) link ℓ.
 
     ``anchor`` is A and ``direction`` u at the zero configuration, in the base frame. ``k_joint`` names the real joint
@@ -36,8 +37,8 @@ class VirtualChain:
     """Whether the takeover was of the kind that leaves the actuator's axes free."""
 
 
-@dataclass(frozen=True, eq=False)
-class State:
+@dataclass(frozen=True, eq=False, repr=False)
+class State(Value):
     """A mechanism on its way from the real robot to its hidden robot."""
 
     real: LegDecomposition

@@ -27,7 +27,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.observation import Direction
 from ..mechanism.pose import Pose, PoseLike, asked_pose
 from ..progress import tell
-from ..results import Compared, Result, by_name
+from ..results import Compared, Result, Value, by_name
 from ..simulation.camera import cylinders, placed
 from ..simulation.ending import GOAL
 from ..simulation.servo import servo
@@ -90,7 +90,7 @@ class ModeCount:
         return {"count": self.count, "reachable": self.reachable, "complete": self.complete, "reason": self.why or None}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Decision(Compared):
     """A verdict in a word, and its reason."""
 
@@ -102,8 +102,8 @@ class Decision(Compared):
         return {"verdict": self.verdict, "reason": self.reason}
 
 
-@dataclass(frozen=True, eq=False)
-class Candidate:
+@dataclass(frozen=True, eq=False, repr=False)
+class Candidate(Value):
     """What is known of a set of legs; None where it was not asked, because the set was discarded before or was not
     ``examined``: then it is neither kept nor discarded."""
 
@@ -257,7 +257,7 @@ class _Work:
             if verdict.verdict != CONTROLLABLE:
                 lost = "; ".join(freedom.name for freedom in verdict.lost)
                 return Candidate(legs, verdict.verdict, f"{verdict.verdict}, not seen: {lost}")
-            analysis = ConfigurationAnalysis(setting)
+            analysis = ConfigurationAnalysis.of(setting)
             reasons = [_singular_at(name, analysis.classify(at))
                        for name, at in (("start", self.start), ("goal", self.goal))]
         except HrsynthError as error:

@@ -12,6 +12,7 @@ from ..errors import BadRequest
 from ..geometry.vectors import Array, pose
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Pose
+from ..results import Value
 from ..simulation.camera import Camera, Cylinder
 
 Flags = NDArray[np.bool_]
@@ -19,8 +20,8 @@ PLACES = 101
 """Points of a leg's axis that are looked at."""
 
 
-@dataclass(frozen=True, eq=False)
-class CameraView:
+@dataclass(frozen=True, eq=False, repr=False)
+class CameraView(Value):
     """A camera carried by ``reference``, and the rods of all legs by their labels: those of the default segments."""
 
     camera: Camera

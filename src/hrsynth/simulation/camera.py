@@ -16,6 +16,7 @@ from ..errors import BadRequest
 from ..geometry.vectors import Array, inverse, perpendicular, pose, transform, unit
 from ..mechanism import Mechanism
 from ..mechanism.observation import Direction, Observation
+from ..results import Value
 from ..tolerances import NUDGE
 from .law import Poses
 from .mockup import RADIUS
@@ -29,8 +30,8 @@ SHORTEST, HALF = 0.05, 0.25
 """Rods shorter than this part of the robot's length are drawn with this half-length instead."""
 
 
-@dataclass(frozen=True, eq=False)
-class Cylinder:
+@dataclass(frozen=True, eq=False, repr=False)
+class Cylinder(Value):
     """The cylinder of an observed direction: ends in its link's frame (2, 3), the second ahead along it, radius (m)."""
 
     link: str
@@ -38,8 +39,8 @@ class Cylinder:
     radius: float
 
 
-@dataclass(frozen=True, eq=False)
-class Camera:
+@dataclass(frozen=True, eq=False, repr=False)
+class Camera(Value):
     """Intrinsics (focal length, width and height in pixels, the centre in the middle) and the pose (4, 4) of the
     camera in the frame of the link that carries it."""
 
@@ -99,8 +100,8 @@ def cylinders(mechanism: Mechanism, observations: Sequence[Observation]) -> tupl
     return tuple(found)
 
 
-@dataclass(frozen=True, eq=False)
-class Edges:
+@dataclass(frozen=True, eq=False, repr=False)
+class Edges(Value):
     """Directions rebuilt from the edges of the legs in the picture, each edge known by two points in it that are wrong
     by up to ``pixels`` across the edge."""
 

@@ -15,6 +15,7 @@ from ..errors import HrsynthError
 from ..geometry.vectors import Array, pose_difference
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.limits import margins
+from ..results import Value
 from ..tolerances import DAMPED, SAME_RELATION
 from .law import Command
 from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, SERVED_AT, Run
@@ -24,8 +25,8 @@ UNDECIDED = "undecided"
 ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME, UNDECIDED)
 
 
-@dataclass(frozen=True, eq=False)
-class Ending:
+@dataclass(frozen=True, eq=False, repr=False)
+class Ending(Value):
     """How a run ended and why that is its name; ``matched`` is the number of the assembly mode, counted from 1 in the
     list of all modes of the goal's directions (None where it is none of them, or where they cannot be listed)."""
 
@@ -35,8 +36,8 @@ class Ending:
     modes: AssemblyModes | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class EndingClassifier:
+@dataclass(frozen=True, eq=False, repr=False)
+class EndingClassifier(Value):
     """Names endings by the goal's configuration and directions (k, 3)."""
 
     setting: ObservedRobot
@@ -87,7 +88,7 @@ class EndingClassifier:
                       None, listed)
 
     def _rest(self, at: ClosedConfiguration, last: Command) -> Ending:
-        posture = ConfigurationAnalysis(self.setting).classify(at)
+        posture = ConfigurationAnalysis.of(self.setting).classify(at)
         where = f"‖e‖ = {last.size:.3g} and the command vanishes"
         weak = float(last.values[-1]) < DAMPED
         shifted = at.velocity(self.setting.motion.link) @ last.weak

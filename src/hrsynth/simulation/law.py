@@ -22,6 +22,7 @@ from ..kinematics.configuration import ClosedConfiguration, measure
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..kinematics.relation import Measurement
 from ..kinematics.steps import nearest, track
+from ..results import Value
 from ..tolerances import DAMPED, NEAREST
 
 Desired = Callable[[float], tuple[Array, Array]]
@@ -34,8 +35,8 @@ POSES = 24
 """Poses between start and goal at which the directions of a trajectory are taken."""
 
 
-@dataclass(frozen=True, eq=False)
-class Command:
+@dataclass(frozen=True, eq=False, repr=False)
+class Command(Value):
     """What the law commands at a configuration: joint velocities (nv,), the true error and directions, the measured
     directions (k, 3), and the singular values of the rows that it inverts, as many as the platform has freedoms,
     largest first."""
@@ -59,8 +60,8 @@ class Command:
         return float(np.linalg.norm(self.velocity))
 
 
-@dataclass(frozen=True, eq=False)
-class Law:
+@dataclass(frozen=True, eq=False, repr=False)
+class Law(Value):
     """The law of one robot: ``question`` holds what is observed, ``dof`` its platform's freedoms, ``gain`` is λ."""
 
     question: Measurement
@@ -97,8 +98,8 @@ def directions(configuration: ClosedConfiguration, question: Measurement) -> tup
     return np.array(values), rates
 
 
-@dataclass(frozen=True, eq=False)
-class FixedDirections:
+@dataclass(frozen=True, eq=False, repr=False)
+class FixedDirections(Value):
     """The directions (k, 3) of the goal from the first moment on."""
 
     goal: Array
@@ -107,8 +108,8 @@ class FixedDirections:
         return self.goal, np.zeros_like(self.goal)
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Value):
     """Directions through ``marks`` (n, k, 3) in ``duration`` (s), at rest at both ends, then those of the last mark."""
 
     marks: Array

@@ -12,6 +12,7 @@ import numpy as np
 from ..budgets import WIDEST_NOISE
 from ..errors import BadRequest
 from ..geometry.vectors import Array
+from ..results import Value
 
 PERIOD = 0.04
 """Seconds between two independent errors (25 pictures a second); in between they change linearly."""
@@ -49,8 +50,8 @@ class Noise:
                 + (", constant over time" if self.bias else ""))
 
 
-@dataclass(frozen=True, eq=False)
-class Shocks:
+@dataclass(frozen=True, eq=False, repr=False)
+class Shocks(Value):
     """Random vectors in the unit ball, ``table`` (samples, k, 3), one of them each ``PERIOD``, linear in between, the
     last one from then on."""
 
@@ -72,8 +73,8 @@ class Shocks:
         return np.asarray((1 - part) * self.table[first] + part * self.table[after])
 
 
-@dataclass(frozen=True, eq=False)
-class Cones:
+@dataclass(frozen=True, eq=False, repr=False)
+class Cones(Value):
     """Measured directions inside cones of the given half-angle (rad) about the true ones."""
 
     half_angle: float

@@ -20,6 +20,7 @@ from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.limits import margins
 from ..kinematics.relation import Measurement
+from ..results import Value
 from ..tolerances import (
     ARRIVED,
     AT_REST,
@@ -49,8 +50,8 @@ PERSISTS = 0.9
 """Part of an error that is left a time constant later where a rest is looked for: of one that vanishes, 1 / e is."""
 
 
-@dataclass(frozen=True, eq=False)
-class Run:
+@dataclass(frozen=True, eq=False, repr=False)
+class Run(Value):
     """What happened: times (n,), the configurations and commands at them, and why it stopped: the error vanished
     (``served``), a stable rest was reached (``rest``), the command vanished where none was found (``poised``), a joint
     met its limit (``limit``), the loops' rank falls (``open``), the platform ran away (``away``), the time was over
@@ -68,8 +69,8 @@ class Run:
         return self.configurations[-1]
 
 
-@dataclass(frozen=True, eq=False)
-class Loop:
+@dataclass(frozen=True, eq=False, repr=False)
+class Loop(Value):
     """The closed loop of a law and a robot: desired directions, steady from ``steady`` (s) on; what is sensed (None:
     the true directions) and whether that changes smoothly with the pose (``smooth``); ``moving`` is the question whose
     motions are all that counts."""
@@ -209,8 +210,8 @@ def _loose(at: ClosedConfiguration, start: ClosedConfiguration) -> bool:
     return at.kernel()[1].weakest < LOOPS_LOST * start.kernel()[1].weakest
 
 
-@dataclass(frozen=True, eq=False)
-class Rest:
+@dataclass(frozen=True, eq=False, repr=False)
+class Rest(Value):
     """A zero y (n,) of ẏ, and the largest growth of a motion about it (1/s)."""
 
     y: Array

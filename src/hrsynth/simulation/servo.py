@@ -154,7 +154,7 @@ class ServoTask:
         except PoseNotReached as error:
             error.exit_status = 2
             raise
-        analysis = ConfigurationAnalysis(setting)
+        analysis = ConfigurationAnalysis.of(setting)
         for name, at in zip(("start", "goal"), ends, strict=True):
             _require_regular(analysis, name, at)
         return cls(setting, ends[0], ends[1], law, desired, conditions, seed)

@@ -19,6 +19,7 @@ from ..geometry.vectors import Array
 from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Measurement
+from ..results import Value
 from ..tolerances import DAMPED, INVERTED
 
 TYPE_2, TYPE_1, LIMIT, CONSTRAINT = "type2", "type1", "limit", "constraint"
@@ -32,8 +33,8 @@ class Passage:
     place: int
 
 
-@dataclass(frozen=True, eq=False)
-class Track:
+@dataclass(frozen=True, eq=False, repr=False)
+class Track(Value):
     """Smallest singular value of Mᵀ at each configuration (n,), NaN where Mᵀ does not exist, and the passages; None
     where the robot has motions that its platform and watched legs do not show, so that no sign is defined."""
 

@@ -21,6 +21,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement
 from ...mechanism.pose import SCALARS, Grid, Pose
 from ...progress import tell
+from ...results import Value
 from ...tolerances import SAME_RELATION, USUAL_ERROR
 from ..observed import ObservedRobot
 from ..singularity.locus import framed
@@ -35,8 +36,8 @@ FINE, COARSE = 201, 41
 """Poses a side of a plane by the batch, and one by one."""
 
 
-@dataclass(frozen=True, eq=False)
-class Seen:
+@dataclass(frozen=True, eq=False, repr=False)
+class Seen(Value):
     """Poses of a sweep, in any number: whether each is reached, the largest position (m) and orientation error (rad),
     the determinant of the directions' rates (None where they are not as many as freedoms), the smallest singular value
     of Mᵀ; NaN where not reached, all (n,). ``gap`` bounds how much too large an error may be, relative."""
@@ -49,8 +50,8 @@ class Seen:
     gap: float
 
 
-@dataclass(frozen=True, eq=False)
-class Spots:
+@dataclass(frozen=True, eq=False, repr=False)
+class Spots(Value):
     """Random poses of a grid at which Pinocchio's relation gave the same error maxima: how many, and the largest
     difference (relative)."""
 
@@ -62,8 +63,8 @@ class Spots:
         return {"poses": self.count, "difference": self.difference}
 
 
-@dataclass(frozen=True, eq=False)
-class ErrorMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class ErrorMap(Value):
     """The error maxima over a grid, in its shape: position (m) and orientation (rad), NaN where no pose is reached,
     infinite where a freedom is lost. ``smallest_at`` gives the smallest singular value of Mᵀ (n,) at other poses of the
     same grid (values of its axes (n, ndim)); None where poses are found one by one."""
@@ -112,8 +113,8 @@ def nested(values: Array) -> list[Any]:
     return list(found.tolist())
 
 
-@dataclass(frozen=True, eq=False)
-class Mapper:
+@dataclass(frozen=True, eq=False, repr=False)
+class Mapper(Value):
     """What evaluates grids for observed legs and half-angles (k,)."""
 
     setting: ObservedRobot

@@ -12,6 +12,7 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, relation
 from ...mechanism.pose import Pose
+from ...results import Value
 from ...tolerances import INVERTED, RANK_CUTOFF
 
 VIEWS = 2000
@@ -22,8 +23,8 @@ DESCENTS = 60
 """Views from which the least error is sought."""
 
 
-@dataclass(frozen=True, eq=False)
-class ErrorEllipsoid:
+@dataclass(frozen=True, eq=False, repr=False)
+class ErrorEllipsoid(Value):
     """The largest error in each direction of space, its extremes: ``largest`` with its unit direction (3,), ``least``
     with its own, among the directions in which there are errors at all.
 
@@ -55,8 +56,8 @@ class ErrorEllipsoid:
                 "anisotropy": self.anisotropy}
 
 
-@dataclass(frozen=True, eq=False)
-class PoseErrors:
+@dataclass(frozen=True, eq=False, repr=False)
+class PoseErrors(Value):
     """The error maxima at a pose: position (m) and orientation (rad)."""
 
     pose: Pose

@@ -17,12 +17,13 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...progress import tell
+from ...results import Value
 from .best_fit import ENDS, NOT_FOUND, best_fits, seen, weakest
 from .pose_errors import PoseErrors, finite
 
 
-@dataclass(frozen=True, eq=False)
-class Sampled:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sampled(Value):
     """What the robot truly does with ``count`` errors on the cones' borders, the linearly worst ones first, each led
     there from none: the largest position (m) and orientation error (rad) met on these ways.
 

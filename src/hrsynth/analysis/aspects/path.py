@@ -17,7 +17,7 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.steps import track
 from ...mechanism.pose import Pose, PoseLike, asked_pose
 from ...progress import tell
-from ...results import Result
+from ...results import Result, Value
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
 from ..asked import configurations_at
 from ..measured import MeasuredRobot
@@ -33,8 +33,8 @@ from .vector_expressions import NoLegForm
 SAME, SEPARATED, UNDECIDED = "same aspect", "separated", "undecided"
 
 
-@dataclass(frozen=True, eq=False)
-class PathEnd:
+@dataclass(frozen=True, eq=False, repr=False)
+class PathEnd(Value):
     """A pose that was asked for: the whole pose reached, its configuration, and the condition's value there."""
 
     pose: Pose
@@ -140,8 +140,8 @@ CLEAR = RANK_CUTOFF * RANK_GAP
 """Values of a condition below this may be zero."""
 
 
-@dataclass(frozen=True, eq=False)
-class Aspects:
+@dataclass(frozen=True, eq=False, repr=False)
+class Aspects(Value):
     """A robot with its Type 2 condition, ready to be asked for paths between configurations."""
 
     setting: ObservedRobot

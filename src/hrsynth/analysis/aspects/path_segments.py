@@ -22,14 +22,15 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement, relation
 from ...mechanism.legs import LegDecomposition
+from ...results import Value
 from ...tolerances import FOLLOWED
 
 Place = tuple[Array, Array]
 """A pose: the point (3,) and the platform's rotation (3, 3)."""
 
 
-@dataclass(frozen=True, eq=False)
-class PathCoordinates:
+@dataclass(frozen=True, eq=False, repr=False)
+class PathCoordinates(Value):
     """What changes in a platform's pose: the position of a point, along ``motion.translations``, and its turn, by
     ``motion.rotations``, where ``turning``; together as many as the robot has freedoms."""
 
@@ -68,8 +69,8 @@ def path_coordinates(anatomy: LegDecomposition, question: Measurement, dof: int,
             yield PathCoordinates(motion, motion.body, configurations[0].twin.length)
 
 
-@dataclass(frozen=True, eq=False)
-class StraightSegment:
+@dataclass(frozen=True, eq=False, repr=False)
+class StraightSegment(Value):
     """A way between two poses: the point on a straight line, the platform about one axis; λ from 0 to 1."""
 
     p: Array
@@ -110,8 +111,8 @@ def poses_between(p: Array, R: Array, q: Array, S: Array, fractions: Array) -> t
     return places, turned, np.hypot(np.linalg.norm(q - p, axis=1), np.linalg.norm(turns, axis=1))
 
 
-@dataclass(frozen=True, eq=False)
-class TurningVector:
+@dataclass(frozen=True, eq=False, repr=False)
+class TurningVector(Value):
     """A vector that turns about a unit ``axis`` from ``first`` by ``angle``."""
 
     first: Array
@@ -133,8 +134,8 @@ class TurningVector:
         return np.asarray(along + np.cos(angles)[:, None] * flat + np.sin(angles)[:, None] * aside)
 
 
-@dataclass(frozen=True, eq=False)
-class WorkingModeChange:
+@dataclass(frozen=True, eq=False, repr=False)
+class WorkingModeChange(Value):
     """A limb's way through its limit at one pose: the foot of its rod turns about ``centre`` or moves straight from one
     working mode's place to the other's, its rod turns, the platform keeps its turn ``R``; λ from 0 to 1."""
 

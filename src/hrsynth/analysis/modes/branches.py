@@ -12,6 +12,7 @@ import numpy as np
 
 from ...budgets import BRANCH_CHOICES
 from ...geometry.vectors import Array, inverse, perpendicular, pose, pose_difference, transform
+from ...results import Value
 from ...tolerances import RANK_GAP, SAME_POINT
 from .curves import Circle, Plane, Reach
 from .rigid import Planar, Spatial
@@ -21,8 +22,8 @@ from .tips import Tip, TipLoci
 from .translating import Articulated, Translating
 
 
-@dataclass(frozen=True, eq=False)
-class Model:
+@dataclass(frozen=True, eq=False, repr=False)
+class Model(Value):
     """The system of a confined platform; ``bodies`` gives the poses (4, 4) of the bodies on which legs end, in the base
     frame, at the system's coordinates; ``home`` are the coordinates of the goal itself."""
 

@@ -16,10 +16,11 @@ from numpy.typing import ArrayLike
 
 from ...errors import BadRequest
 from ...geometry.vectors import Array, cross, frozen, perpendicular
+from ...results import Value
 from ...tolerances import EXACT
 
 
-class _Checked:
+class _Checked(Value):
     """Something through or about a ``centre``, whose vectors and radius are checked, directions of length one."""
 
     def __post_init__(self) -> None:
@@ -30,7 +31,7 @@ class _Checked:
                 object.__setattr__(self, name, _vector(value) if name == "centre" else _unit(value))
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Point(_Checked):
     """The tip rests at ``centre``, shape (3,)."""
 
@@ -46,7 +47,7 @@ class Point(_Checked):
         return tip - self.centre
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Line(_Checked):
     """The tip is centre + s d, with d the unit vector along ``direction`` and s in metres."""
 
@@ -64,7 +65,7 @@ class Line(_Checked):
         return v - self.direction * float(self.direction @ v)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Circle(_Checked):
     """The tip is centre + ρ (cos θ e₁ + sin θ e₂), with e₁ the part of ``start`` normal to ``axis`` and e₂ = n × e₁."""
 
@@ -101,7 +102,7 @@ class Circle(_Checked):
         return along + spoke * (1.0 - self.radius / reach)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sphere(_Checked):
     """The tip is at the distance ``radius`` from ``centre``."""
 
@@ -116,7 +117,7 @@ class Sphere(_Checked):
         return v * (1.0 - self.radius / reach) if reach > 0.0 else np.array([-self.radius, 0.0, 0.0])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Plane(_Checked):
     """The tip is in the plane through ``centre`` that the unit vector along ``normal`` is normal to."""
 

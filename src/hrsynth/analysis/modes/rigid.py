@@ -38,7 +38,7 @@ from .study import study
 from .systems import System, registered
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Planar(System):
     """A platform that moves in the plane of ``X_plane`` (4, 4), whose z axis is the normal: q = (x, y, φ).
 
@@ -182,7 +182,7 @@ def _complex(v: Any) -> Any:
     return np.array([[v[0], -v[1]], [v[1], v[0]]], dtype=object)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Spatial(System):
     """A rigid platform in space: q = (p, rotation vector); ``tips`` has shape (n, 3), no three used on one line.
 

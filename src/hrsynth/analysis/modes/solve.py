@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...geometry.vectors import Array, frozen
+from ...results import Value
 from ...tolerances import FARTHEST, NEARLY_DOUBLE, SAME_RELATION, TIP_ROUNDING, VANISHES
 from .bounds import Bound
 from .curves import Point
@@ -31,8 +32,8 @@ CHARTS = 3
 Part = SquareSystem | PoseSystem
 
 
-@dataclass(frozen=True, eq=False)
-class SystemMode:
+@dataclass(frozen=True, eq=False, repr=False)
+class SystemMode(Value):
     """A pose with the directions that are held.
 
     The exact pose is within ``shift`` (m, the origins of all bodies) and ``turn`` (rad) of ``pose`` (4, 4), the
@@ -68,8 +69,8 @@ class SystemMode:
                 "fits": self.residual if self.fits else None}
 
 
-@dataclass(frozen=True, eq=False)
-class Solved:
+@dataclass(frozen=True, eq=False, repr=False)
+class Solved(Value):
     """A square part of a system with all its solutions; ``modes`` are its real ones, in the order of ``roots.real``,
     and ``kept`` tells which of them are modes of the whole system."""
 
@@ -80,8 +81,8 @@ class Solved:
     kept: tuple[bool, ...]
 
 
-@dataclass(frozen=True, eq=False)
-class SystemModes:
+@dataclass(frozen=True, eq=False, repr=False)
+class SystemModes(Value):
     """All modes: ``complex`` solutions counted with multiplicity (None where they are not known), the real ones as
     ``modes``, and in words the proof.
 

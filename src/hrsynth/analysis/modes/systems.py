@@ -17,6 +17,7 @@ import numpy as np
 
 from ...errors import BadRequest
 from ...geometry.vectors import Array, frozen, pose
+from ...results import Value
 from ...tolerances import FARTHEST, TIP_ROUNDING
 from .bounds import Bound
 from .curves import Point, Reach, curves_of, extent, length, shifted
@@ -24,8 +25,8 @@ from .quadrics import SLACK, UNIT, Balls, PoseParametrization, Within, WorkingFr
 from .squares import SquareSystem
 
 
-@dataclass(frozen=True, eq=False)
-class System:
+@dataclass(frozen=True, eq=False, repr=False)
+class System(Value):
     """A platform of which ``tips`` (n, d) are confined to ``curves`` (or surfaces), one a leg."""
 
     curves: tuple[Reach, ...]
@@ -182,7 +183,7 @@ def _spread(points: tuple[tuple[float, ...], ...], arrows: tuple[tuple[float, ..
     return length(mean), seen
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Shifting(System):
     """A platform whose bodies only translate; q starts with the position p of the first."""
 

@@ -29,6 +29,7 @@ from ...kinematics.tasks import Held, solve
 from ...mechanism import Observation
 from ...mechanism.composites import WordGraph
 from ...mechanism.legs import LegDecomposition, decompose
+from ...results import Value
 from ...tolerances import CLOSED, FOLLOWED, MOVED, SAME_POINT, SAME_RELATION, SOLVED
 from .chain import Underived, chain
 from .curves import Circle, Line, Plane, Point, Reach, Sphere
@@ -42,8 +43,8 @@ MIXED = 4
 """Combinations of its freedoms along which a leg with several of them is moved besides."""
 
 
-@dataclass(frozen=True, eq=False)
-class Tip:
+@dataclass(frozen=True, eq=False, repr=False)
+class Tip(Value):
     """The tip of a held leg: the body that carries it, where (3,) in the body's frame (m), and the curve or surface in
     the base frame (m) on which it is at the goal.
 
@@ -61,8 +62,8 @@ class Tip:
     """How far what the leg's geometry was taken to be is from it (m)."""
 
 
-@dataclass(frozen=True, eq=False)
-class KeptAngle:
+@dataclass(frozen=True, eq=False, repr=False)
+class KeptAngle(Value):
     """A direction (3,), in the frame of the body that carries it, whose angle with ``axis`` (3,) in the base frame a
     held leg keeps as it is at the goal."""
 
@@ -74,8 +75,8 @@ class KeptAngle:
     """How far what the leg's geometry was taken to be is from it (m)."""
 
 
-@dataclass(frozen=True, eq=False)
-class TipLoci:
+@dataclass(frozen=True, eq=False, repr=False)
+class TipLoci(Value):
     """The platform at one configuration with its directions held: tips on curves and surfaces, and kept ``angles``.
 
     ``motion`` is that of :class:`ConstraintPattern`; ``plane`` the normal of planar motion; ``slide`` the circle on

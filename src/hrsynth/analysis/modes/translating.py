@@ -36,7 +36,7 @@ from .squares import SquareSystem, resting, single, three_surfaces
 from .systems import Shifting
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Translating(Shifting):
     """A platform that only translates: q = p, shape (3,). ``tips`` has shape (n, 3).
 
@@ -133,7 +133,7 @@ def coplanar(one: Curve, other: Curve, size: float) -> bool:
     return all(abs(value) < VANISHES for value in [*tilt, float(n @ between)])
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Articulated(Shifting):
     """Two bodies that translate: q = (p, θ), p (3,) the first body's origin, θ where the second is on ``slide``.
 

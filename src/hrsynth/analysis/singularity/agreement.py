@@ -24,6 +24,7 @@ from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.sampling import WEAKEST, random_walk
 from ...kinematics.tasks import solve
 from ...progress import tell
+from ...results import Value
 from ...tolerances import CLOSED, FOLLOWED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT, SHARP
 from .batch_spectrum import SPOTS, Quick
 
@@ -34,8 +35,8 @@ TRIES = 4
 """Weakest poses from which a pose is sought on a locus across which the expression has no sign, or none was met."""
 
 
-@dataclass(frozen=True, eq=False)
-class Agreement:
+@dataclass(frozen=True, eq=False, repr=False)
+class Agreement(Value):
     """How many poses were tried, and how far words, expression and rank are apart.
 
     ``largest_angle`` is the largest angle between what each watched leg lets the platform do by its named vectors and

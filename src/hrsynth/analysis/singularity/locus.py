@@ -20,6 +20,7 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...mechanism import Mechanism
 from ...mechanism.pose import Grid, Pose, as_pose
+from ...results import Value
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from ..measured import MeasuredRobot
 from ..observed import ObservedRobot
@@ -33,8 +34,8 @@ STEPS = 51
 """Poses a side of a drawn plane."""
 
 
-@dataclass(frozen=True, eq=False)
-class SingularityMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class SingularityMap(Value):
     """A robot over a plane: the expression's value, the smallest singular value (Type 2 where zero) and the inverse of
     the largest (Type 1 where zero), each (nx, ny), NaN where no pose is reached; ``spots`` are singular poses (k, 2)
     where the locus is no curve."""
@@ -46,8 +47,8 @@ class SingularityMap:
     spots: Array
 
 
-@dataclass(frozen=True, eq=False)
-class Locus:
+@dataclass(frozen=True, eq=False, repr=False)
+class Locus(Value):
     """The fields of the hidden and, where it has motors that determine its platform, the real robot over a plane."""
 
     grid: Grid

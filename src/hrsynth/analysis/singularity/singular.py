@@ -13,7 +13,7 @@ from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.tasks import solve
 from ...mechanism.pose import Pose
 from ...progress import tell
-from ...results import Result
+from ...results import Result, Value
 from ...tolerances import SOLVED
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
@@ -27,8 +27,8 @@ POINTS = 10_000
 EXAMPLES = 3
 
 
-@dataclass(frozen=True, eq=False)
-class Example:
+@dataclass(frozen=True, eq=False, repr=False)
+class Example(Value):
     """A singular pose constructed from the condition: the freedoms lost there, Pinocchio's smallest singular value
     there, and the largest a centimetre away."""
 

@@ -13,11 +13,12 @@ from ...errors import HrsynthError
 from ...geometry.vectors import Array, inverse
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import Pose
+from ...results import Value
 from .states import page_values, place
 
 
-@dataclass(frozen=True, eq=False)
-class ModeOutline:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModeOutline(Value):
     """An assembly mode that is not the pose itself: its number as in ``modes``, its pose, whether the robot can be
     assembled there, as ``AssemblyMode`` says it twice, and the displacement (7,) of each link, None of those whose
     place is not known."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,12 @@ FOLDER = Path(__file__).parent
 def static(found: View) -> bytes:
     """The view as a page that needs no server."""
     return page(found).encode()
+
+
+def inline(found: View) -> str:
+    """The same page in a frame, for a notebook; raises ``MissingExtra``."""
+    return (f'<iframe srcdoc="{escape(page(found))}" title="{escape(found.headline())}" '
+            'style="width: 100%; height: 560px; border: 0"></iframe>')
 
 
 def page(found: View, *, live: bool = False) -> str:

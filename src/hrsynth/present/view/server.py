@@ -8,12 +8,13 @@ from __future__ import annotations
 
 import contextlib
 import json
+import webbrowser
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from http import HTTPStatus
 from http.client import HTTP_PORT
 from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
-from threading import Lock
+from threading import Lock, Thread
 from typing import Any
 
 import numpy as np
@@ -133,17 +134,51 @@ class Handler(BaseHTTPRequestHandler):
         """Nothing: the library never prints."""
 
 
+class BackgroundServer:
+    """A view that is served while other things are done: its ``address``, and how it ends."""
+
+    def __init__(self, server: Server) -> None:
+        self.server, self.address = server, address_of(server)
+        Thread(target=server.serve_forever, daemon=True).start()
+
+    def stop(self) -> None:
+        """End it."""
+        self.server.shutdown()
+        self.server.server_close()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.address}>"
+
+
+def served(found: View, port: int, open_: bool) -> BackgroundServer:
+    """Answer until ``stop()`` or the end of the process; ``open_`` opens the page in the browser. Raises as
+    :func:`serve`."""
+    here = BackgroundServer(bound(found, port))
+    if open_:
+        Thread(target=webbrowser.open, args=(here.address,), daemon=True).start()
+    return here
+
+
+def bound(found: View, port: int) -> Server:
+    """A server at a port, any that is free for 0; raises ``BadRequest`` for one that cannot be had."""
+    try:
+        return Server(found, port)
+    except (OSError, OverflowError) as error:
+        reason = getattr(error, "strerror", None) or "no such port"
+        raise BadRequest(f"cannot serve the view: {reason}", port, "a free port, or 0 for any") from None
+
+
+def address_of(server: Server) -> str:
+    """Where its page is."""
+    return f"http://{HOST}:{server.server_port}/"
+
+
 def serve(found: View, port: int, ready: Callable[[Server, str], None]) -> None:
     """Answer until an interrupt or the server's ``shutdown``; ``ready`` is told the server and its address once the
     page can be opened. Port 0 is any that is free.
 
     Raises ``BadRequest`` for a port that cannot be had.
     """
-    try:
-        server = Server(found, port)
-    except (OSError, OverflowError) as error:
-        reason = getattr(error, "strerror", None) or "no such port"
-        raise BadRequest(f"cannot serve the view: {reason}", port, "a free port, or 0 for any") from None
-    with server, contextlib.suppress(KeyboardInterrupt):
-        ready(server, f"http://{HOST}:{server.server_port}/")
+    with bound(found, port) as server, contextlib.suppress(KeyboardInterrupt):
+        ready(server, address_of(server))
         server.serve_forever()

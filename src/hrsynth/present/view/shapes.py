@@ -15,6 +15,7 @@ import numpy as np
 
 from ...geometry.vectors import Array
 from ...mechanism import Joint, JointType, Mechanism
+from ...results import Value
 from ...tolerances import SAME_POINT
 from ..skeleton import outline
 
@@ -29,8 +30,8 @@ PAGE_DIGITS = 7
 """Digits of metres that the page is given."""
 
 
-@dataclass(frozen=True, eq=False)
-class Shape:
+@dataclass(frozen=True, eq=False, repr=False)
+class Shape(Value):
     """A shape on a link, its ``points`` (n, 3) and half-width ``size`` (m).
 
     ``kind``: rod, rail and span run from the first point to the second, a span from a point of ``link`` to one of
@@ -58,8 +59,8 @@ class Shape:
         return record if self.joint is None else {**record, "joint": self.joint}
 
 
-@dataclass(frozen=True, eq=False)
-class Drawer:
+@dataclass(frozen=True, eq=False, repr=False)
+class Drawer(Value):
     """A mechanism to be drawn beside the ``real`` robot (or that itself), whose links keep their form: which links are
     the platform's, and the ``meshes`` that stand for the rods of their links; ``radius`` is that of rods (m)."""
 

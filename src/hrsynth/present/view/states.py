@@ -20,6 +20,7 @@ from ...kinematics.pinocchio_model import PinocchioModel
 from ...kinematics.steps import track
 from ...kinematics.tasks import Target, solve
 from ...mechanism import Mechanism
+from ...results import Value
 from ...tolerances import FOLLOWED, SOLVED
 from .shapes import PAGE_DIGITS
 
@@ -34,8 +35,8 @@ EASY = 60
 """Iterations in which the hidden robot is to follow."""
 
 
-@dataclass(frozen=True, eq=False)
-class ViewState:
+@dataclass(frozen=True, eq=False, repr=False)
+class ViewState(Value):
     """The places (links, 7) of each machine's links, and the smallest singular value of Mᵀ (characteristic lengths;
     None where Mᵀ does not exist)."""
 
@@ -48,8 +49,8 @@ class ViewState:
                 "distance": None if self.distance is None else float(f"{self.distance:.5g}")}
 
 
-@dataclass(frozen=True, eq=False)
-class Slider:
+@dataclass(frozen=True, eq=False, repr=False)
+class Slider(Value):
     """One freedom of the platform: its coordinate's values (n,) in metres or radians, the state at each of them, and
     which of them is home."""
 
@@ -70,16 +71,16 @@ class Slider:
                 "home": self.home, "states": [state.scene() for state in self.states]}
 
 
-@dataclass(frozen=True, eq=False)
-class Posed:
+@dataclass(frozen=True, eq=False, repr=False)
+class Posed(Value):
     """A configuration of the real robot and the coordinates (nq,) of the hidden one that goes with it."""
 
     real: ClosedConfiguration
     hidden: Array | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Mover:
+@dataclass(frozen=True, eq=False, repr=False)
+class Mover(Value):
     """The real robot with its platform's coordinates, and the twin of the hidden robot that follows it."""
 
     setting: ObservedRobot
@@ -93,7 +94,7 @@ class Mover:
         start = setting.everything.start
         twin = None if hidden is None else PinocchioModel(hidden, start.twin.length)
         coordinates = Coordinates.of(start, setting.everything.question, setting.motion)
-        return cls(setting, coordinates, ConfigurationAnalysis(setting), twin)
+        return cls(setting, coordinates, ConfigurationAnalysis.of(setting), twin)
 
     @property
     def home(self) -> Posed:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,8 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
 from ...progress import tell
-from ...results import Result
+from ...results import Result, Value
+from ..outputs import OUTPUTS, function
 from .meshes import meshes
 from .mode_outlines import ModeOutline, mode_outlines
 from .shapes import PAGE_DIGITS, RADIUS, Drawer, Shape
@@ -29,8 +31,8 @@ MARGIN = 4.0
 """What a rail is longer than the way of its slider, at each end (radii of rods)."""
 
 
-@dataclass(frozen=True, eq=False)
-class Machine:
+@dataclass(frozen=True, eq=False, repr=False)
+class Machine(Value):
     """A robot that is drawn: ``key`` real or hidden, what it is called, its links in order, its shapes, the base's
     and the platform's frame (7,) at the zero configuration."""
 
@@ -50,8 +52,8 @@ class Machine:
                 "frames": [{"link": places[link], "place": page_values(X[None])[0]} for link, X in self.frames]}
 
 
-@dataclass(frozen=True, eq=False)
-class Arrow:
+@dataclass(frozen=True, eq=False, repr=False)
+class Arrow(Value):
     """An observed direction: its leg, its link, and where the arrow runs (2, 3) at the zero configuration."""
 
     leg: str
@@ -83,6 +85,18 @@ class View(Result, shown_as="view"):
         """The largest of the smallest singular values that are shown: the far end of the scale of colours."""
         found = [state.distance for slider in self.sliders for state in slider.states]
         return max((value for value in found if value is not None), default=self.home.distance)
+
+    def save(self, file: str | Path) -> None:
+        """Write the view as one page (.html) that needs neither server nor network; raises ``BadRequest``,
+        ``MissingExtra``."""
+        (each,) = OUTPUTS[self.shown_as].files
+        each.require(str(file), {})
+        each.writer(self, str(file), {})[0]()
+
+    def serve(self, port: int = 0, *, open_: bool = True) -> Any:
+        """Serve the view on this machine, where all sliders move together, and open it in the browser: a server with
+        ``address`` and ``stop()``. Port 0 is any that is free. Raises ``BadRequest``, ``MissingExtra``."""
+        return function("view.server:served")(self, port, open_)
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""

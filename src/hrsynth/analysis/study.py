@@ -1,0 +1,122 @@
+"""One question over many robots, legs and poses, in several processes."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Generator, Iterable
+from contextlib import closing
+from functools import partial
+from inspect import signature
+from itertools import product
+from math import ceil
+from typing import Any
+
+from ..errors import BadRequest, HrsynthError
+from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_poses
+from ..progress import tell
+from ..results import Result, brief
+from .observed import LegsLike, RobotLike, as_names, as_robot
+
+PARTS_EACH = 2
+"""Parts of the work for each process, at least, where there are so many questions."""
+RAISE, KEEP = "raise", "keep"
+"""What becomes of a question that cannot be answered: it ends all, or its error takes the place of the answer."""
+
+Given = dict[str, Any]
+"""The arguments of one question."""
+
+
+def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLike], *,
+        poses: PoseLike | Iterable[PoseLike] | None = None, legs: Iterable[LegsLike] | None = None,
+        jobs: int | None = None, errors: str = RAISE, **options: Any) -> list[Any]:
+    """The answers to one question about each of the ``robots``, with each of the sets of ``legs``, at each of the
+    ``poses``: in this order, poses fastest, whoever is done first.
+
+    ``question`` is a public function or its name, or a function of your own with the same parameters: a pose is given
+    to it as ``at``, or as ``goal`` where it has no ``at``, legs as ``observe``; ``options`` are the same for all. There
+    are ``jobs`` processes, by default as many as cores; with 1 all is done in this one. A robot's samples are drawn
+    once in each process that is asked about it. ``errors`` is ``raise``, or ``keep``: what a question raised (an
+    ``HrsynthError``) then stands in the place of its answer. The error says what was asked.
+
+    Raises ``BadRequest``, and what the question raises.
+    """
+    function: Callable[..., Any] = _function(question)
+    if errors not in (RAISE, KEEP):
+        raise BadRequest("errors", errors, (RAISE, KEEP))
+    if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
+        raise BadRequest("number of processes", jobs, "1 or more")
+    several: Any = [robots] if isinstance(robots, str | os.PathLike) or not isinstance(robots, Iterable) else robots
+    every = [as_robot(each) for each in several]
+    watched: list[Given] = [{}] if legs is None else [{"observe": as_names(each)} for each in legs]
+    asked: list[Given] = [{}] if poses is None else [{_place(function): each} for each in asked_poses(poses)]
+    groups = [{"robot": robot, **seen, **options} for robot, seen in product(every, watched)]
+    workers = jobs or os.cpu_count() or 1
+    size = max(1, ceil(len(asked) / ceil(PARTS_EACH * workers / max(1, len(groups)))))
+    parts = [[{**group, **at} for at in asked[k : k + size]] for group in groups for k in range(0, len(asked), size)]
+    answers: list[Any] = []
+    with closing(_done(partial(_answered, function, errors), parts, min(workers, len(parts)))) as done:
+        for found in done:
+            answers += found
+            tell("questions")
+            if errors == RAISE and isinstance(answers[-1], HrsynthError):
+                raise answers[-1]
+    return answers
+
+
+def _function(question: str | Callable[..., Any]) -> Callable[..., Any]:
+    if callable(question):
+        return question
+    try:
+        found = Result.public(question)
+    except (AttributeError, TypeError):
+        found = None
+    if not (callable(found) and "robot" in signature(found).parameters):
+        raise BadRequest("a question", question, "a function of hrsynth that takes a robot, or its name, such as check")
+    return found
+
+
+def _done(answered: Callable[[list[Given]], list[Any]], parts: list[list[Given]], workers: int
+          ) -> Generator[list[Any], None, None]:
+    """What the parts give, in their order; the others are given up where it is closed."""
+    if workers <= 1:
+        yield from (answered(part) for part in parts)
+        return
+    from joblib import Parallel, delayed
+
+    done = Parallel(n_jobs=workers, batch_size=1, return_as="generator")(delayed(answered)(part) for part in parts)
+    try:
+        for found in done:  # noqa: UP028 (the rest is closed in silence)
+            yield found
+    finally:
+        with warnings.catch_warnings(action="ignore"):
+            done.close()
+
+
+def _answered(function: Callable[..., Any], errors: str, part: list[Given]) -> list[Any]:
+    """The answers of a part, to its first error where that ends all; the error is told what was asked."""
+    found: list[Any] = []
+    for given in part:
+        try:
+            found.append(function(**given))
+        except Exception as error:
+            error.add_note("asked: " + ", ".join(f"{name} {_told(value)}" for name, value in given.items()))
+            if not isinstance(error, HrsynthError):
+                raise
+            found.append(error)
+            if errors == RAISE:
+                break
+    return found
+
+
+def _told(value: Any) -> str:
+    return str(value) if isinstance(value, Pose | ModeNumber | tuple) else brief(value)
+
+
+def _place(function: Callable[..., Any]) -> str:
+    """The parameter that takes a pose."""
+    known = signature(function).parameters
+    for name in ("at", "goal"):
+        if name in known:
+            return name
+    raise BadRequest(f"poses for {function.__name__}", "no parameter for a pose", "a question with at or goal")
