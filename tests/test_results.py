@@ -96,6 +96,8 @@ def test_what_was_loaded_goes_on_working():
     one, other = asked("observe"), pickle.loads(pickle.dumps(asked("observe")))
     assert hrsynth.derive(other) == hrsynth.derive(one)
     assert hrsynth.check(other, grid="x=-0.1:0.1:3,y=0,z=-0.7") == hrsynth.check(one, grid="x=-0.1:0.1:3,y=0,z=-0.7")
+    found = asked("modes planar")
+    assert hrsynth.certificate(pickle.loads(pickle.dumps(found))) == hrsynth.certificate(found)
     for name in ("modes planar", "servo", "accuracy"):
         found = asked(name)
         assert hrsynth.draw(pickle.loads(pickle.dumps(found))).content == hrsynth.draw(found).content, name
@@ -153,6 +155,8 @@ def inside(value: object, depth: int, seen: set[int]) -> Iterator[object]:
     elif type(value).__module__.startswith("hrsynth."):
         yield value
         for field in fields(value) if is_dataclass(value) else ():
+            if not field.repr:
+                continue
             yield from inside(getattr(value, field.name), depth - 1, seen)
 
 

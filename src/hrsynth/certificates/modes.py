@@ -71,8 +71,12 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
     complete or no bound of the checker proves the count."""
     about = {"robot": found.setting.robot.name, "kind": found.kind, "at": found.pose.to_dict(),
              "observed": [[o.leg, o.link] for o in found.setting.observed]}
+    listed = found.found
+    if listed.complete and not listed.solved and found.confined is not None:  # a copy: solved again
+        listed = modes(found.setting, at=found.goal, real=found.kind == "real",
+                       as_written=found.confined.as_written).found
     try:
-        return of_systems(found.found, about)
+        return of_systems(listed, about)
     except NotAccepted as reason:
         raise NoCertificate(found.setting.robot.name, str(reason)) from None
 

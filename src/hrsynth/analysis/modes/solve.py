@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import islice
 from typing import Any
 
@@ -105,8 +105,12 @@ class SystemModes(Value):
     enclosed: bool = False
     meant: tuple[Meant, ...] = ()
     """What was made exact."""
-    solved: tuple[Solved, ...] = ()
-    """What was solved, one for each choice of the legs' branches, where the solutions of a square part are all."""
+    solved: tuple[Solved, ...] = field(default=(), repr=False)
+    """What was solved, one for each choice of the legs' branches, where the solutions of a square part are all: working
+    material, which a copy or a pickle does not hold."""
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**super().__getstate__(), "solved": ()}
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
