@@ -130,6 +130,12 @@ SEARCH_QUIET = 100
 """Starts in a row that close without a new mode after which the search ends."""
 SEARCH_ITERATIONS = 100
 """Iterations in which each of them is closed, at most."""
+SEARCH_MOTIONS = 12
+"""Self-motions that one search follows at most."""
+MOTION_STEPS = 100
+"""Steps over which a self-motion is followed either way, at most."""
+MOTION_HALVINGS = 6
+"""How often such a step is tried, each time half as long."""
 BRANCH_CHOICES = 256
 """Choices of branches of held legs that are solved; where there are more the list of modes is not complete."""
 FINEST_BOX = 2.0 ** -100

@@ -14,6 +14,16 @@ SHARP = 1e-15
 """Residual that is asked for where a singular pose is wanted as exactly as numbers allow."""
 CLOSED = 1e-10
 """Residual (characteristic lengths, radians) below which a configuration counts as closed."""
+MOTION_STEP = 0.1
+"""Longest step (nv,) along a self-motion (characteristic lengths, radians)."""
+MOTION_BEND = 0.3
+"""How long the correction of such a step may be, as part of it, and by how much the cosine of the angle between one
+tangent and the next may fall short of one: a step that returns to where it began is no motion."""
+MOTION_FREE = 1e-3
+"""Singular values of loops and measurements, as part of the largest, below which a self-motion is looked for: whether
+there is one is decided by following it."""
+MOTION_LEAST = 0.2
+"""Distance (characteristic lengths and radians together) over which a self-motion must stay closed to count as one."""
 PASSED_BY = 1e-3
 """Residual at which a configuration on the way to another is near enough to go on from."""
 AS_PRINTED = 1e-5

@@ -108,8 +108,8 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
     name, count = listed.setting.robot.name, len(listed.modes)
     if not 1 <= asked.number <= count:
         raise BadRequest(f"{name}: a mode at {listed.pose}", str(asked),
-                         "poses that are no continuum" if listed.found.continuum is not None else
-                         f"mode:1 to mode:{count}" if count else "no mode")
+                         f"mode:1 to mode:{count}" if count else "no mode" if listed.found.continuum is None else
+                         "poses that are no continuum")
     mode = listed.modes[asked.number - 1]
     at = listed.goal if mode.goal else mode.configuration
     if at is None:

@@ -85,11 +85,13 @@ def test_a_platform_that_is_a_point_has_modes_at_points():
 
 
 def test_poses_that_the_measurements_leave_free_are_told_and_not_listed():
-    """Watched legs that see all freedoms at a generic pose, at a zero pose where they do not."""
+    """Watched legs that see all freedoms at a generic pose, at a zero pose where they do not: it moves in two ways."""
     found = hrsynth.modes(robot("3(Ra-Rb*-Ph-Rb-Pj)"))
-    assert found.found.degenerate is not None
-    assert "leave the platform a freedom" in found.found.degenerate
-    assert [mode.goal for mode in found.modes] == [True]
+    (motion,) = found.motions
+    assert (motion.goal, motion.dimension, found.found.continuum) == (True, 2, 2)
+    assert "platform" in motion.links
+    assert not {o.link for o in found.setting.observed} & set(motion.links)
+    assert found.modes == ()
 
 
 def test_without_the_solver_the_modes_are_found_and_the_extra_is_named(monkeypatch: pytest.MonkeyPatch):

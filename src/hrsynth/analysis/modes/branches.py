@@ -169,7 +169,7 @@ def _together(found: Sequence[SystemModes], tips: Sequence[Tip], size: float) ->
     return SystemModes(sum(each.complex or 0 for each in found) - twice, modes, complete, proof, near, special, None,
                  next((each.bound for each in found if each.bound != "resultant"), "resultant"),
                  all(each.enclosed for each in found), found[0].meant,
-                 tuple(part for each in found for part in each.solved))
+                 tuple(part for each in found for part in each.solved), any(each.open for each in found))
 
 
 def _once(modes: Sequence[SystemMode], size: float) -> tuple[SystemMode, ...]:

@@ -27,7 +27,8 @@ from ..observed import LegsLike, ObservedRobot, RobotLike
 from ..question import question
 from ..singularity.agreement import weakest
 from .branches import Model, solve_all
-from .search import FoundMode, search
+from .motions import SelfMotion, self_motion
+from .search import FoundMode, leaves_free, search
 from .solve import SystemMode, SystemModes, continuum
 from .tips import TipLoci, tip_loci
 
@@ -104,8 +105,9 @@ class AssemblyModes(Result, shown_as="modes"):
     """All assembly modes with the measurements of one pose, the goal.
 
     ``complex``, ``complete``, ``proof``, ``degenerate`` and ``continuum`` as for :class:`SystemModes`; ``kind`` is
-    ``hidden`` or ``real``; ``confined`` holds the curves of the tips (None where the measurements never decide the
-    pose, or where the modes were searched for because no such curves are known).
+    ``hidden`` or ``real``; ``motions`` are continua of modes, with what moves, as far as they were followed, and
+    ``modes`` those that lie on none; ``confined`` holds the curves of the tips (None where the measurements never
+    decide the pose, or where the modes were searched for because no such curves are known).
     """
 
     setting: ObservedRobot
@@ -117,6 +119,7 @@ class AssemblyModes(Result, shown_as="modes"):
     near: tuple[AssemblyMode, ...]
     confined: TipLoci | None = None
     model: Model | None = None
+    motions: tuple[SelfMotion, ...] = ()
 
     @property
     def within(self) -> str | None:
@@ -135,9 +138,16 @@ class AssemblyModes(Result, shown_as="modes"):
     @property
     def count(self) -> str:
         """How many there are, in words."""
-        if self.found.continuum is not None:
+        if self.found.continuum is not None and self.found.complex is not None:
             return "a continuum"
+        if self.motions:
+            return (f"{len(self.motions)} self-motion{'s' * (len(self.motions) > 1)}, and {len(self.modes)} real that "
+                    f"{'lies' if len(self.modes) == 1 else 'lie'} on none")
         return f"{len(self.modes)} real" + ("" if self.found.complex is None else f" of {self.found.complex} complex")
+
+    def pose_of(self, motion: SelfMotion) -> Pose:
+        """A pose on a self-motion, from which it was followed."""
+        return self.setting.motion.pose(motion.configuration.pose(self.setting.motion.link))
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
@@ -148,6 +158,7 @@ class AssemblyModes(Result, shown_as="modes"):
                 "bound": found.bound, "proof": found.proof,
                 "modes": [each.to_dict() for each in self.modes], "near": [each.to_dict() for each in self.near],
                 "degenerate": found.degenerate, "continuum": found.continuum,
+                "motions": [{"pose": self.pose_of(each).to_dict(), **each.to_dict()} for each in self.motions],
                 "meant": [each.to_dict(self.labels) for each in found.meant]}
 
 
@@ -165,7 +176,8 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
 
     Where the tips' paths are none of those known, or the solver that they need gives up or is not installed, the whole
     robot is closed from random starts (:mod:`.search`): modes that are found, of any kind of closing, and nothing says
-    that they are all.
+    that they are all. So it is where modes lie on a self-motion: there the equations have infinitely many solutions, or
+    rounding makes some of them seem isolated.
 
     Raises ``BadRequest`` for names that there are not, ``PoseNotReached`` for a pose out of reach, ``MeaningUndecided``
     where special geometry may be meant or not.
@@ -185,22 +197,41 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
     free = setting.dof - measured.rank
     if free:
         text = f"the {'motors' if real else 'directions'} leave {free} of the platform's freedoms undetermined"
+        own = self_motion(goal, measured.question, attached(setting.anatomy), goal=True)
         return AssemblyModes(setting, kind, goal, pose, continuum(f"{text}: a continuum of dimension {free}", free),
-                             (), ())
+                             (), (), motions=() if own is None else (own,))
     tell("modes")
     try:
-        return _listed(setting, measured, goal, wanted, pose, kind, as_written)
+        if not as_written and _moves(setting, measured.question, goal):
+            return _searched(setting, measured.question, goal, pose, kind, "the pose lies on a self-motion")
+        listed = _listed(setting, measured, goal, wanted, pose, kind, as_written)
     except (NotConfined, Unsolved, MissingExtra) as error:
         return _searched(setting, measured.question, goal, pose, kind, error.reason)
+    moving = not listed.found.complete and not as_written and any(
+        mode.configuration is not None and _moves(setting, measured.question, mode.configuration)
+        for mode in listed.modes)
+    if not moving and not listed.found.open:
+        return listed
+    why = "some of the solutions lie on a self-motion" if moving else str(listed.found.degenerate)
+    found = _searched(setting, measured.question, goal, pose, kind, why)
+    return found if moving or not any(mode.proved for mode in listed.modes) else replace(listed, motions=found.motions)
+
+
+def _moves(setting: ObservedRobot, question: Measurement, at: ClosedConfiguration) -> bool:
+    """Whether a closing lies on a self-motion that can be followed."""
+    return leaves_free(at, question) and self_motion(at, question, attached(setting.anatomy)) is not None
 
 
 def _searched(setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, pose: Pose, kind: str,
               reason: str) -> AssemblyModes:
     """The modes that a search finds, and why there is no list that could be complete."""
     done = search(goal, question, attached(setting.anatomy))
-    found = SystemModes(None, (), False, f"{done.words}; not counted: {reason}", degenerate=done.degenerate)
+    size = max((motion.dimension for motion in done.motions), default=None)
+    found = SystemModes(None, (), False, f"{done.words}; not counted: {reason}", degenerate=done.degenerate,
+                        continuum=size)
     return AssemblyModes(setting, kind, goal, pose, found,
-                         tuple(_closed(setting, question, mode, k == 0) for k, mode in enumerate(done.modes)), ())
+                         tuple(_closed(setting, question, mode, mode.configuration is goal) for mode in done.modes),
+                         (), motions=done.motions)
 
 
 def _closed(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal: bool) -> AssemblyMode:

@@ -7,18 +7,19 @@ may be more. How often each mode was met tells how well the search has covered t
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...budgets import SEARCH_ITERATIONS, SEARCH_QUIET, SEARCH_STARTS
-from ...geometry.vectors import Array, pose_difference
+from ...budgets import SEARCH_ITERATIONS, SEARCH_MOTIONS, SEARCH_QUIET, SEARCH_STARTS
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement, relation
 from ...kinematics.tasks import Held, solve
 from ...progress import tell
 from ...tolerances import CLOSED, SAME_RELATION, SOLVED
+from .motions import SelfMotion, bodies_apart, self_motion
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +35,12 @@ class FoundMode:
 
 @dataclass(frozen=True, eq=False)
 class ModeSearch:
-    """What random starts found: modes at which the measurements decide the pose, the goal first; how many of the
-    ``starts`` ``closed``, and how many of those ended where the measurements leave the platform a freedom
-    (``loose``)."""
+    """What random starts found: modes at which the measurements decide the pose, the goal first where it is one;
+    ``motions`` along which the robot moves with the measurements at rest; how many of the ``starts`` ``closed``, and
+    how many of those ended elsewhere where the measurements leave the platform a freedom (``loose``)."""
 
     modes: tuple[FoundMode, ...]
+    motions: tuple[SelfMotion, ...]
     starts: int
     closed: int
     loose: int
@@ -46,25 +48,30 @@ class ModeSearch:
     @property
     def words(self) -> str:
         """What was done, and how well it covers."""
-        once = sum(mode.met == 1 for mode in self.modes[1:])
+        once = sum(mode.met == 1 for mode in self.modes[0 if any(motion.goal for motion in self.motions) else 1:])
         rare = "" if not once else f"; {once} of the modes {'was' if once == 1 else 'were'} met only once"
-        return f"found from {self.starts} random starts of the whole robot, of which {self.closed} closed{rare}"
+        moving = sum(motion.met for motion in self.motions)
+        on = f", {moving} of them on self-motions" if moving else ""
+        return f"found from {self.starts} random starts of the whole robot, of which {self.closed} closed{on}{rare}"
 
     @property
     def degenerate(self) -> str | None:
-        """What is special: closings at which the platform is free to move."""
+        """What is special: closings at which the platform is free to move to first order."""
         if not self.loose:
             return None
         return (f"{self.loose} starts ended at poses, not listed, at which the measurements leave the platform a "
-                "freedom: singular poses or a continuum")
+                "freedom, and from which no self-motion was followed: singular poses")
 
 
 def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[str]) -> ModeSearch:
     """All closings with the measurements at the goal that random starts lead to, each pose of the bodies once; of the
-    closings at one pose the first within the joints' limits, where there is one."""
+    closings at one pose the first within the joints' limits, where there is one. From closings at which the platform
+    is free, self-motions are followed."""
     twin, rng = goal.twin, np.random.default_rng(0)
     held = Held.at(twin, goal.q, question.reference, question.observations)
-    found = [FoundMode(goal, _poses(goal, bodies), goal.residual, 1)]
+    own = self_motion(goal, question, bodies, goal=True) if leaves_free(goal, question) else None
+    found = [FoundMode(goal, _poses(goal, bodies), goal.residual, 1)] if own is None else []
+    motions = [] if own is None else [replace(own, met=0)]
     starts = closed = loose = quiet = 0
     while starts < SEARCH_STARTS and quiet < SEARCH_QUIET:
         number, starts = starts, starts + 1
@@ -77,24 +84,35 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
         closed, quiet = closed + 1, quiet + 1
         at = ClosedConfiguration.of(twin, q)
         poses = _poses(at, bodies)
-        known = next((k for k, mode in enumerate(found) if _same(mode.bodies, poses, question, twin.length)), None)
+        known = next((k for k, mode in enumerate(found)
+                      if bodies_apart(mode.bodies, poses, question, twin.length) <= SAME_RELATION), None)
         if known is not None:
             mode = found[known]
-            better = known > 0 and outside(twin, mode.configuration.q) and not outside(twin, q)
+            better = mode.configuration is not goal and outside(twin, mode.configuration.q) and not outside(twin, q)
             found[known] = FoundMode(at if better else mode.configuration, mode.bodies, mode.residual, mode.met + 1)
-        elif (there := relation(at, question)).rank < there.dof.value:
-            loose += 1
-        else:
+        elif not leaves_free(at, question):
             found.append(FoundMode(at, poses, residual, 1))
             quiet = 0
-    return ModeSearch(tuple(found), starts, closed, loose)
+        elif (on := next((k for k, motion in enumerate(motions) if motion.passes(at, question)), None)) is not None:
+            motions[on] = replace(motions[on], met=motions[on].met + 1)
+        else:
+            motion = self_motion(at, question, bodies, motions) if len(motions) < SEARCH_MOTIONS else None
+            if motion is None:
+                loose += 1
+            elif motion in motions:
+                on = motions.index(motion)
+                motions[on] = replace(motion, met=motion.met + 1)
+            else:
+                motions.append(motion)
+                quiet = 0
+    return ModeSearch(tuple(found), tuple(motions), starts, closed, loose)
+
+
+def leaves_free(at: ClosedConfiguration, question: Measurement) -> bool:
+    """Whether the measurements leave the platform a freedom, to first order."""
+    there = relation(at, question)
+    return there.rank < there.dof.value
 
 
 def _poses(at: ClosedConfiguration, bodies: Sequence[str]) -> dict[str, Array]:
     return {body: at.pose(body) for body in bodies}
-
-
-def _same(one: dict[str, Array], other: dict[str, Array], question: Measurement, length: float) -> bool:
-    """Whether all bodies are at the same poses, to ``SAME_RELATION``; of a platform that is a point, the point."""
-    return all(pose_difference(X, other[body], length, question.point if body == question.platform else None)
-               <= SAME_RELATION for body, X in one.items())

@@ -108,6 +108,8 @@ class SystemModes(Value):
     solved: tuple[Solved, ...] = field(default=(), repr=False)
     """What was solved, one for each choice of the legs' branches, where the solutions of a square part are all: working
     material, which a copy or a pickle does not hold."""
+    open: bool = False
+    """Whether no choice of legs has finitely many solutions, on some branches of the legs at least."""
 
     def __getstate__(self) -> dict[str, Any]:
         return {**super().__getstate__(), "solved": ()}
@@ -190,12 +192,13 @@ def _undecided(system: System, tried: bool, goal: Array | None) -> SystemModes:
     known = () if goal is None else (_by_construction(system, goal, ()),)
     if not tried:
         return SystemModes(len(known), known, False, "nothing proved", degenerate="no choice of legs decides the pose: "
-                           "tips on one line, in one point, or at rest")
+                           "tips on one line, in one point, or at rest", open=True)
     size = dimension(system)
     if size is None:
         return SystemModes(len(known), known, False, "nothing proved",
-                           degenerate="the equations depend on each other, but no continuum of poses was found")
-    return continuum(f"the tips can move together: a continuum of dimension {size}", size)
+                           degenerate="the equations depend on each other, but no continuum of poses was found",
+                           open=True)
+    return replace(continuum(f"the tips can move together: a continuum of dimension {size}", size), open=True)
 
 
 def continuum(text: str, size: int) -> SystemModes:

@@ -117,7 +117,7 @@ def modes(found: AssemblyModes, file: str | None = None, certificate: str | None
     count = found.found
     name, seen = head(found.setting)
     rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_SINCE[found.kind]} at {found.pose}")]
-    if count.continuum is None:
+    if count.continuum is None or count.complex is None:
         rows += [("modes", f"{found.count}, {all_of(found)}"),
                  ("proof", count.proof)]
     for each in count.meant:
@@ -125,6 +125,10 @@ def modes(found: AssemblyModes, file: str | None = None, certificate: str | None
         rows.append(("meant", f"legs {legs} share a joint centre of the {each.where} (to {each.defect:.1e} m; "
                               "--as-written takes the numbers as they are)"))
     rows += known("special", count.degenerate)
+    for number, motion in enumerate(found.motions, 1):
+        place = "the pose itself" if motion.goal else str(found.pose_of(motion))
+        met = f"; {motion.met} starts ended on it, or on one like it" if motion.met else ""
+        rows += [*GAP, (f"motion {number}", [f"through {place}, found, not proved: a self-motion {motion.words}{met}"])]
     for number, mode in enumerate(found.modes, 1):
         rows += [*GAP, (f"mode {number}", [f"{mode.pose}" + ("   (the pose itself)" if mode.goal else ""),
                  proved(mode) if mode.fits is not None else f"{proved(mode)}, residual {mode.residual:.1e}",

@@ -1,0 +1,241 @@
+"""Self-motions: curves of modes, along which the robot moves with all that is measured at rest.
+
+At a closing where the measurements leave the platform a freedom to first order, the robot is led along it by steps that
+are closed again (predictor and corrector). Where it stays closed over a distance a self-motion is *found*; where it
+does not, the closing is a singular pose. Samples of a curve prove neither.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...budgets import MOTION_HALVINGS, MOTION_STEPS, SEARCH_ITERATIONS
+from ...geometry.ranks import range_basis
+from ...geometry.screws import point_velocity
+from ...geometry.so3 import logarithm
+from ...geometry.vectors import Array, pose, pose_difference, transform
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.pinocchio_model import PinocchioModel
+from ...kinematics.relation import Measurement
+from ...kinematics.tasks import Held, shortened, solve, system
+from ...tolerances import (
+    CLOSED,
+    INVERTED,
+    MOTION_BEND,
+    MOTION_FREE,
+    MOTION_LEAST,
+    MOTION_STEP,
+    SAME_RELATION,
+    SOLVED,
+    SURELY_SOMETHING,
+)
+
+
+@dataclass(frozen=True, eq=False)
+class SelfMotion:
+    """A motion of the robot with the measurements at rest, as far as it was followed from one of its poses.
+
+    ``dimension``: in how many independent ways the platform's bodies were led to closings nearby; ``links``: those that
+    are elsewhere, or turned, on the way; ``shift`` (m) and ``turn`` (rad): how far the platform went; ``returns``:
+    whether it came back to where it began; ``goal``: whether it began at the pose from
+    which the measurements were taken; ``met``: how many starts of a search ended on it, as far as could be told.
+    """
+
+    configuration: ClosedConfiguration
+    dimension: int
+    links: tuple[str, ...]
+    shift: float
+    turn: float
+    returns: bool
+    goal: bool = False
+    met: int = 1
+    way: tuple[dict[str, Array], ...] = field(default=(), repr=False)
+    """The poses (4, 4) of the platform's bodies on the way."""
+
+    @cached_property
+    def words(self) -> str:
+        """What moves, and how far it was followed."""
+        mechanism = self.configuration.twin.mechanism
+        resting = [link for link in mechanism.links if link not in self.links and link != mechanism.base]
+        moving = ", ".join(self.links) if resting else "all links"
+        parts = [f"{self.shift:.3g} m"] * (self.shift > 0) + [f"{self.turn:.3g} rad"] * (self.turn > 0)
+        far = " and ".join(parts) + (", until it came back" if self.returns else "")
+        return f"of dimension {self.dimension}, which moves {moving} (followed over {far})"
+
+    def passes(self, at: ClosedConfiguration, question: Measurement) -> bool:
+        """Whether it was followed by where the platform's bodies are at a closing, to a step."""
+        poses = {body: at.pose(body) for body in self.way[0]}
+        return any(bodies_apart(poses, each, question, at.twin.length) <= MOTION_STEP for each in self.way)
+
+    def like(self, dimension: int, links: Sequence[str]) -> bool:
+        """Whether a closing where these links can move in so many ways may lie on it, beyond where it was followed."""
+        return not (self.dimension == 1 and self.returns) and (self.dimension, self.links) == (dimension, tuple(links))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"dimension": self.dimension, "links": list(self.links), "followed_m": self.shift,
+                "followed_rad": self.turn, "returns": self.returns, "goal": self.goal, "met": self.met}
+
+
+def self_motion(at: ClosedConfiguration, question: Measurement, bodies: Sequence[str],
+                known: Sequence[SelfMotion] = (), *, goal: bool = False) -> SelfMotion | None:
+    """The motion through a closing with the measurements there held, one of those ``known`` where it may be that; None
+    where the platform's bodies cannot move even to first order, or where no step stays closed: a singular pose."""
+    twin = at.twin
+    held = Held.at(twin, at.q, question.reference, question.observations)
+    walker = _Follower(twin, held, question, tuple(dict.fromkeys((*bodies, question.platform))))
+    ways, near = walker.around(at.q)
+    if not ways.shape[1]:
+        return None
+    alike = next((each for each in known if each.like(ways.shape[1], walker.moved(at.q, near))), None)
+    if alike is not None:
+        return alike
+    walks = [walk for w in ways.T if (walk := walker.walk(at.q, w)).far >= MOTION_LEAST]
+    if not walks:
+        return None
+    longest = max(walks, key=lambda walk: walk.far)
+    places = [q for walk in walks for q in walk.places]
+    middle = [walk.places[len(walk.places) // 2] for walk in walks]
+    size = min(each for each in [ways.shape[1], *(walker.around(q)[0].shape[1] for q in middle)] if each)
+    return SelfMotion(at, size, walker.moved(at.q, places), longest.shift * twin.length, longest.turn, longest.returns,
+                      goal, 1, tuple(map(walker.bodies, places)))
+
+
+@dataclass(frozen=True, eq=False)
+class _Followed:
+    """Configurations along one tangent and back along the other, how far the platform went (characteristic lengths,
+    radians), and whether it came back."""
+
+    places: tuple[Array, ...]
+    shift: float
+    turn: float
+    returns: bool
+
+    @property
+    def far(self) -> float:
+        """How far the platform went, shift and turn together."""
+        return self.shift + self.turn
+
+
+@dataclass(frozen=True, eq=False)
+class _Follower:
+    """Steps along motions of a robot with measurements held."""
+
+    twin: PinocchioModel
+    held: Held
+    question: Measurement
+    names: tuple[str, ...]
+
+    def bodies(self, q: Array) -> dict[str, Array]:
+        """The poses (4, 4) of the platform's bodies."""
+        return dict(zip(self.names, self.twin.poses(q, self.names), strict=True))
+
+    def tangents(self, q: Array, least: float = SURELY_SOMETHING) -> tuple[Array, Array]:
+        """The ways in which the bodies can move to first order, where singular values below ``least`` are zero: an
+        orthonormal basis of their twists, (rows, d), and joint velocities (nv, d), without idle ones, that make
+        them."""
+        _, values, right = np.linalg.svd(system(self.twin, q, self.held)[1])
+        kernel = right[int(np.sum(values > least * values.max(initial=1.0))):].T
+        X, V = self.twin.frames(q, self.names)
+        point = self.question.point
+        rows = [v if point is None or name != self.question.platform
+                else point_velocity(v, x[:3, :3] @ point / self.twin.length)
+                for name, x, v in zip(self.names, X, V, strict=True)]
+        moves = np.vstack(rows) @ kernel
+        basis, _ = range_basis(moves, 1.0)
+        return basis, np.asarray(kernel @ np.linalg.lstsq(moves, basis, rcond=INVERTED)[0])
+
+    def around(self, q: Array) -> tuple[Array, list[Array]]:
+        """The ways in which closings lie about one: an orthonormal basis of the bodies' twists that lead to them
+        (rows, d), fewer than :meth:`tangents` where a freedom is one to first order only; and the closings."""
+        basis, joints = self.tangents(q, MOTION_FREE)
+        found, home, rng = [], self.bodies(q), np.random.default_rng(0)
+        for c in rng.normal(size=(2 * basis.shape[1], basis.shape[1])):
+            step = shortened(MOTION_STEP * joints @ (c / np.linalg.norm(c)), MOTION_STEP)
+            there, residual = solve(self.twin, self.twin.moved(q, step), self.held, tolerance=SOLVED,
+                                    iterations=SEARCH_ITERATIONS)
+            if residual <= CLOSED:
+                found.append(there)
+        twists = np.array([np.concatenate([
+            part for name, X in self.bodies(there).items() for part in self._twist(name, X, home[name])])
+            for there in found]).reshape(-1, len(basis))
+        _, values, right = np.linalg.svd(twists @ basis, full_matrices=False)
+        return basis @ right[values > MOTION_BEND * MOTION_STEP].T, found
+
+    def _twist(self, name: str, X: Array, home: Array) -> tuple[Array, ...]:
+        """The twist that leads a body from one pose to another, in parts, as rows of :meth:`tangents`."""
+        if self.question.point is not None and name == self.question.platform:
+            return ((transform(X, self.question.point) - transform(home, self.question.point)) / self.twin.length,)
+        return (X[:3, 3] - home[:3, 3]) / self.twin.length, logarithm(X[:3, :3] @ home[:3, :3].T)
+
+    def moved(self, q: Array, places: Sequence[Array]) -> tuple[str, ...]:
+        """The links that are elsewhere, or turned, at one of some configurations."""
+        links = tuple(link for link in self.twin.mechanism.links if link != self.twin.mechanism.base)
+        home = self.twin.poses(q, links)
+        found = [max((pose_difference(X, Y, self.twin.length) for X, Y in (
+            (self.twin.poses(there, (link,))[0], home[k]) for there in places)), default=0.0)
+            for k, link in enumerate(links)]
+        return tuple(link for link, far in zip(links, found, strict=True) if far > SAME_RELATION)
+
+    def walk(self, q: Array, w: Array) -> _Followed:
+        """As far as the motion leads along the bodies' twist w (rows,), and then the other way."""
+        places, shift, turn, returns = [q], 0.0, 0.0, False
+        for sign in (1.0, -1.0):
+            before = self._platform(q)
+            for number, there in enumerate(self.steps(q, sign * w), 1):
+                now = self._platform(there)
+                places.append(there)
+                shift += float(np.linalg.norm(now[:3, 3] - before[:3, 3])) / self.twin.length
+                turn += float(np.linalg.norm(logarithm(now[:3, :3] @ before[:3, :3].T)))
+                before = now
+                returns = number > 2 and bodies_apart(self.bodies(there), self.bodies(q), self.question,
+                                                      self.twin.length) <= MOTION_STEP / 2
+                if returns:
+                    break
+            if returns:
+                break
+        small = SAME_RELATION * len(places)
+        return _Followed(tuple(places), shift if shift > small else 0.0, turn if turn > small else 0.0, returns)
+
+    def steps(self, q: Array, w: Array) -> Iterator[Array]:
+        """Closed configurations one step apart, until no step is closed again or the motion ends."""
+        for _ in range(MOTION_STEPS):
+            basis, joints = self.tangents(q)
+            ahead = basis.T @ w
+            size = float(np.linalg.norm(ahead))
+            if size < 1.0 - MOTION_BEND:
+                return
+            w = basis @ ahead / size
+            step = shortened(MOTION_STEP * (joints @ ahead) / size, MOTION_STEP)
+            there = self._closed(q, step)
+            if there is None:
+                return
+            q = there
+            yield q
+
+    def _closed(self, q: Array, step: Array) -> Array | None:
+        """The closed configuration beside the end of a step, or of a part of it; None where there is none."""
+        for part in 0.5 ** np.arange(MOTION_HALVINGS):
+            predicted = self.twin.moved(q, part * step)
+            there, residual = solve(self.twin, predicted, self.held, tolerance=SOLVED, iterations=15)
+            if residual <= CLOSED and (np.linalg.norm(self.twin.difference(predicted, there))
+                                       <= MOTION_BEND * part * np.linalg.norm(step)):
+                return there
+        return None
+
+    def _platform(self, q: Array) -> Array:
+        """The platform's pose (4, 4); of a point, without turn."""
+        X = self.twin.pose(q, self.question.platform)
+        return X if self.question.point is None else pose(transform(X, self.question.point))
+
+
+def bodies_apart(one: dict[str, Array], other: dict[str, Array], question: Measurement, length: float) -> float:
+    """How far bodies are from where they are elsewhere, as :func:`pose_difference`; of a platform that is a point, the
+    point."""
+    return max(pose_difference(X, other[body], length, question.point if body == question.platform else None)
+               for body, X in one.items())
