@@ -58,12 +58,10 @@ def picture(found: Atlas, drawn: DrawnSection) -> bytes:
     if drawn.found is not None:
         entries += _curves(axes[1:], found, *drawn.found)
     plots.legend(figure, entries)
-    few, many = found.count
-    aspects = str(few) if few == many else f"{few} to {many}"
     seen = ", ".join(found.listed.setting.labels)
     told = ", cuspidal" if found.cuspidal else ""
-    figure.suptitle(f"{found.listed.setting.robot.name}, legs {seen} watched\n{found.listed.count}, aspects: {aspects}"
-                    f"{told}")
+    figure.suptitle(f"{found.listed.setting.robot.name}, legs {seen} watched\n{found.listed.count}, "
+                    f"aspects: {found.aspects_met}{told}")
     return png(figure)
 
 

@@ -64,7 +64,7 @@ class Atlas(Result, shown_as="atlas"):
 
     def headline(self) -> str:
         """The robot, how many modes, in how many aspects."""
-        return f"{self.listed.headline()}, aspects: {self.count}"
+        return f"{self.listed.headline()}, aspects: {self.aspects_met}"
 
     def verdict(self, one: int, other: int) -> str:
         """The verdict on two modes by their numbers; each lies in one aspect with itself."""
@@ -100,6 +100,12 @@ class Atlas(Result, shown_as="atlas"):
         apart.add_edges_from((i, j) for i, j in combinations(apart, 2)
                              if self.verdict(self.groups[i][0], self.groups[j][0]) == SEPARATED)
         return max(map(len, nx.find_cliques(apart)), default=0), len(apart)
+
+    @property
+    def aspects_met(self) -> str:
+        """How many, in words."""
+        few, many = self.count
+        return str(few) if few == many else f"{few} to {many}"
 
     @cached_property
     def section(self) -> tuple[HeldLegSection, dict[int, CrankPlace]] | str:

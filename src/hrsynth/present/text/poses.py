@@ -217,10 +217,9 @@ def atlas(found: Atlas, file: str | None = None) -> str:
     rows = [*head(listed.setting), ("held", f"{_SINCE[listed.kind]} at {listed.pose}")]
     if listed.found.continuum is not None:
         return listing([*rows, *known("special", listed.found.degenerate)])
-    few, many = found.count
     groups = [f"mode{'s' * (len(group) > 1)} {', '.join(map(str, group))}" for group in found.groups]
     rows += [("modes", f"{listed.count}, {all_of(listed)}"),
-             ("aspects", f"{few if few == many else f'{few} to {many}'} of the hidden robot: {'; '.join(groups)}"),
+             ("aspects", f"{found.aspects_met} of the hidden robot: {'; '.join(groups)}"),
              ("cuspidal", _cuspidal(found)), *GAP]
     numbers = range(1, len(found.places) + 1)
     wide = len(str(len(found.places)))

@@ -1,0 +1,142 @@
+# %% [markdown]
+# # 9. Six poses, seen by a camera
+#
+# In 1992 Innocenti and Parenti-Castelli described a planar robot that can be assembled in six ways with the same
+# lengths of its legs, and that can go from one of them to another without a singularity. Until then most people had
+# believed that a robot must pass a singularity to change its assembly mode.
+#
+# A camera that watches the legs of a 3-RRR drives such a robot without knowing it. This notebook finds its six poses,
+# proves which of them belong together, and leads the controller from one to another.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+import hrsynth
+from hrsynth.families.planar import six_poses
+
+robot = six_poses()
+hidden = hrsynth.derive(robot)
+print(hidden.architecture, "hides", hidden.hidden_architecture)
+
+# %% [markdown]
+# The three rods are watched. Hold their directions: each rod only translates then, so its end at the platform runs on
+# a circle, as large as the crank's. A triangle with its corners on three circles is what the 3-RPR of 1992 is with its
+# legs' lengths held. Here triangle, circles and centres are those of that robot, in centimetres.
+#
+# ## Six poses
+
+# %%
+listed = hrsynth.modes(robot)
+print(listed.count)
+print(listed.found.proof)
+hrsynth.draw(listed)
+
+# %% [markdown]
+# All six are real, all six are poses of the real robot, and in all six the camera sees the same. A servo loop that is
+# told to go from the first to the fifth does nothing at all, because there is no error to correct:
+
+# %%
+idle = hrsynth.servo(robot, start="mode:1", goal="mode:5")
+print(idle)
+
+# %% [markdown]
+# ## The atlas
+#
+# Two modes lie in one *aspect* if a path without Type 2 singularity joins them. Which do?
+
+# %%
+atlas = hrsynth.atlas(robot)
+print(atlas)
+
+# %% [markdown]
+# Six modes, two aspects, three modes in each. *Separated* is proved by the sign of a determinant, which cannot change
+# without a zero. *Same aspect* is proved by a path: it is cut into intervals, and on each of them interval arithmetic
+# keeps the determinant away from zero. On some paths a leg is stretched out and folds to its other side. That is a
+# singularity of Type 1, at which the camera loses nothing of the platform, but the directions change infinitely fast.
+# One path needs nothing of that kind, and it is a straight line:
+
+# %%
+one, other = next(pair.numbers for pair in atlas.changes if pair.answer is not None and not pair.answer.crossings)
+path = hrsynth.path(robot, start=f"mode:{one}", goal=f"mode:{other}")
+print(path)
+
+# %% [markdown]
+# ## How a controller changes its mode
+#
+# Let the desired directions move along that line for thirty seconds. The controller only follows directions, as it
+# always does.
+
+# %%
+run = hrsynth.servo(robot, start=f"mode:{one}", goal=f"mode:{other}", duration=30, time=40)
+print(run)
+
+# %%
+hrsynth.draw(run)
+
+# %% [markdown]
+# It ends at the other mode. The directions are those that it began with, and the platform is 13 cm and 108 degrees away
+# from where it was. No rank was lost, no matrix was singular, no error was large. (The way bends a little at first: the
+# desired directions are interpolated between poses of the line, and where the singular value is small that matters.)
+# A program that watches the smallest singular value for a sign of danger sees a regular motion:
+
+# %%
+starts = np.linspace(0, 1, 60)
+first, last = (np.array([p.x, p.y]) for p in (path.start.pose, path.goal.pose))
+turn = path.goal.pose.rpy[2] - path.start.pose.rpy[2]
+line = first + starts[:, None] * (last - first)
+poses = [f"x={x},y={y},phi={f * turn}" for (x, y), f in zip(line.tolist(), starts, strict=True)]
+values = [posture.distances.type2 for posture in hrsynth.check(robot, at=poses).postures]
+figure, place = plt.subplots(figsize=(6, 3.4))
+place.plot(starts, values)
+place.set(xlabel="part of the way from mode to mode", ylabel="smallest singular value of Mᵀ", ylim=(0, None))
+plt.show()
+assert min(values) > 0
+
+# %% [markdown]
+# ## Why: cusps
+#
+# Hold the direction of the first rod. The poses that are left make a surface, and the other two directions are a map
+# from it to a plane. Above each point of this plane lie as many modes as the colour says.
+
+# %%
+hrsynth.draw(atlas)
+
+# %% [markdown]
+# Where the surface is folded two modes meet: these are the Type 2 singularities, the black curve. Where a fold ends in
+# a *cusp* three modes meet. Go around the cusp, once, on one of the outer two, and you are on the other, although you
+# met no fold. Every cusp and node of the drawing is enclosed: there is exactly one within the radius.
+
+# %%
+section, places = atlas.section
+print(len(section.cusps), "cusps,", sum(cusp.radius is not None for cusp in section.cusps), "of them enclosed")
+print(len(section.nodes), "nodes,", sum(node[0].radius is not None for node in section.nodes), "of them enclosed")
+print("the widest enclosure:", f"{max(cusp.radius for cusp in section.cusps):.1e}")
+
+# %% [markdown]
+# What is an engineer to do? A goal that stays away from the cusps, a start in the goal's own part of its aspect, or one
+# more measurement: an encoder at one crank tells the six poses apart.
+#
+# ## Exercises
+#
+# 1. The Quattro of the paper with legs 1 and 4 watched has four modes. Is its hidden robot cuspidal?
+# 2. Choose other lengths of the rods. Do the six modes still lie in two aspects?
+# 3. Hold the direction of another rod. How many cusps does that section have?
+
+# %% [markdown]
+# ## Solutions
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 1. yes: two of its modes are joined, and no leg has to change its working mode
+print(hrsynth.atlas("quattro", "1,4"))
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 2. the modes stay where they are, as their circles do; which path joins them changes
+for rods in ((0.3, 0.3, 0.3), (0.2, 0.25, 0.4)):
+    found = hrsynth.atlas(six_poses(rods=rods))
+    print(rods, len(found.places), "modes, aspects:", found.aspects_met, "cuspidal:", found.cuspidal)
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 3. the leg that is watched first is held
+found = hrsynth.atlas(robot, ["2", "1", "3"])
+print(found.section[0].robot.labels[0], "held:", len(found.section[0].cusps), "cusps")
