@@ -32,8 +32,8 @@ from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.locked import rezero
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 
-SYSTEMS, EXTERNAL = 12, 3
-"""Instances of each family of assembly modes, and how many of them msolve is given."""
+SYSTEMS, PLATFORMS, EXTERNAL = 12, 20, 3
+"""Instances of each family of assembly modes, of platforms with 40 poses, and how many of them msolve is given."""
 EVALUATIONS = 2000
 """Evaluations of the loops' Jacobian in a turn."""
 GROWTH = (500, 1600, 5000)
@@ -68,6 +68,25 @@ def modes() -> Iterator[Row]:
                              lambda s=few: [solve_by_msolve(each) for each in s], turns=1)
         yield (what, f"{1e3 * ours / EXTERNAL:.1f} ms",
                f"msolve, with the same proof: {1e3 * theirs / EXTERNAL:.0f} ms", f"{theirs / ours:.0f}")
+
+
+def platforms() -> Iterator[Row]:
+    """All 40 poses of six-legged platforms with their motors held, proved, against msolve, enclosed and proved too."""
+    from analysis.modes.draws import dietmaier, spatial
+    from analysis.modes.laws import installed
+    from hrsynth.analysis.modes.solve import solve, solve_by_msolve
+
+    generic = [spatial(np.random.default_rng(seed), "SSSSSS").system for seed in range(PLATFORMS)]
+    for what, systems in (("Dietmaier's platform", [dietmaier()]), (f"{PLATFORMS} generic platforms", generic)):
+        found = [solve(each, near=False) for each in systems]
+        if not all((each.complex, each.complete) == (40, True) for each in found):
+            raise SystemExit(f"{what}: not all 40 poses were proved")
+        few = systems[:EXTERNAL] if installed() else []
+        ours, theirs = least(lambda s=systems: [solve(each, near=False) for each in s],
+                             lambda s=few: [solve_by_msolve(each, near=False) for each in s], turns=1)
+        each, other = 1e3 * ours / len(systems), 1e3 * theirs / max(1, len(few))
+        against = (f"msolve, with the same proof: {other:.0f} ms", f"{other / each:.0f}") if few else ("–", "–")
+        yield (f"all 40 poses with proof, motors held: {what}", f"{each:.0f} ms each", *against)
 
 
 def jacobians() -> Iterator[Row]:

@@ -13,7 +13,7 @@ from collections.abc import Iterator, Sequence
 from pathlib import Path
 
 from measure import Row
-from others import catalog, derivations, jacobians, modes
+from others import catalog, derivations, jacobians, modes, platforms
 from sweeps import exact_maxima, growth, matrices
 
 from hrsynth.present.readme import replaced
@@ -36,6 +36,7 @@ def lines() -> Iterator[Row]:
     yield from exact_maxima()
     yield from matrices()
     yield from modes()
+    yield from platforms()
     yield from jacobians()
     yield derivations()
     yield from catalog()

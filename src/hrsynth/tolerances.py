@@ -152,7 +152,7 @@ NO_POSE_START = 1e-6
 """How well a start that is no pose satisfies the equations, and how far two of them are apart (each of size one)."""
 BOXES_APART = 1e-12
 """What is added to boxes around solutions, relative to their places and radii, before they count as apart."""
-POLISHED = 1e-12
+POLISHED = 1e-9
 """Newton's step (unit vectors) at which the end of a path counts as sharp."""
 SAME_END = 1e-8
 """Distance (unit vectors) below which two ends of paths are one, and one is real."""

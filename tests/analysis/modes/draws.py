@@ -160,3 +160,17 @@ def six_rods(rng: Rng, platform: str, base: str, noise: float = 0.0) -> Draw:
     at = goal[:3, 3] + tips @ goal[:3, :3].T
     spheres = tuple(Sphere(c, float(np.linalg.norm(tip - c))) for tip, c in zip(at, centres, strict=True))
     return Draw(Spatial(spheres, tips), goal)
+
+
+DIETMAIER = (
+    ((0, 0, 0), (1.107915, 0, 0), (0.549094, 0.756063, 0), (0.735077, -0.223935, 0.525991),
+     (0.514188, -0.526063, -0.368418), (0.590473, 0.094733, -0.205018)),
+    ((0, 0, 0), (0.542805, 0, 0), (0.956919, -0.528915, 0), (0.665885, -0.353482, 1.402538),
+     (0.478359, 1.158742, 0.107672), (-0.137087, -0.235121, 0.353913)),
+    (1, 0.645275, 1.086284, 1.503439, 1.281933, 0.771071))
+"""Balls of the base, of the platform, and lengths (P. Dietmaier, Advances in Robot Kinematics, 1998)."""
+
+
+def dietmaier() -> Spatial:
+    base, platform, lengths = DIETMAIER
+    return Spatial(tuple(Sphere(a, d) for a, d in zip(base, lengths, strict=True)), np.array(platform, dtype=float))

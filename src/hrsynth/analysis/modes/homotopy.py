@@ -238,8 +238,10 @@ def _step(J: Array, x: Array, F: Array) -> Array:
     right = np.concatenate([-F, np.zeros((len(x), 1))], axis=1)[:, :, None]
     try:
         return np.asarray(np.linalg.solve(_bordered(J, x), right)[:, :, 0])
-    except np.linalg.LinAlgError:
-        return np.full(x.shape, np.inf, dtype=complex)
+    except np.linalg.LinAlgError:  # NumPy does not say of which
+        if len(x) == 1:
+            return np.full(x.shape, np.inf, dtype=complex)
+        return np.concatenate([_step(J[k:k + 1], x[k:k + 1], F[k:k + 1]) for k in range(len(x))])
 
 
 def _bordered(J: Array, x: Array) -> Array:

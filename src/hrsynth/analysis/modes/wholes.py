@@ -67,7 +67,7 @@ def by_homotopy(part: PoseSystem, enough: int | None) -> Proposed | None:
 
     assert part.chart.study is not None
     found = ends(part.equations(), part.chart.study, _resting(part), enough)
-    if found.loose:
+    if found.loose and (enough is None or len(found.solutions) < enough):
         return None
     values = [[acb(v.real, v.imag) for v in row] for row in found.solutions.tolist()]
     return Proposed(tuple(zip(values, found.multiple, strict=True)), "homotopy", found.infinite, found.lost, found.far)
