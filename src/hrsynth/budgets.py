@@ -138,6 +138,10 @@ MOTION_HALVINGS = 6
 """How often such a step is tried, each time half as long."""
 BRANCH_CHOICES = 256
 """Choices of branches of held legs that are solved; where there are more the list of modes is not complete."""
+EFFORT = 120.0
+"""Seconds of one core that a list of modes may need, by its size (the answer does not depend on the machine)."""
+ELIMINATION_SECONDS, HOMOTOPY_SECONDS, MSOLVE_SECONDS = 0.02, 0.4, 2.0
+"""What one system of equations needs, about: by an exact resultant, by forty paths, by an external program."""
 FINEST_BOX = 2.0 ** -100
 """Radius of the smallest box that is tried around a solution, relative to 1 plus the unknown."""
 LARGEST_RANDOM = 10**9

@@ -250,6 +250,16 @@ class Unsolved(Unanswered):
         super().__init__(f"{solver} did not solve the system: {reason}")
 
 
+class TooLarge(Unanswered):
+    """A system that needs more effort than is allowed: what, how large it is, about how many seconds, and how many may
+    be spent."""
+
+    def __init__(self, what: str, size: str, needed: float, effort: float) -> None:
+        self.needed = needed
+        self.reason = f"{what}, {size}, needs about {needed:g} s, more than the effort of {effort:g} s"
+        super().__init__(self.reason)
+
+
 class NotRendered(Unanswered):
     """Pictures that cannot be rendered on this machine: why."""
 

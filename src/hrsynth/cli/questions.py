@@ -10,6 +10,7 @@ from typing import Any
 
 import typer
 
+from ..budgets import EFFORT
 from ..present.outputs import OUTPUTS
 from ..progress import following
 from .colour import painted
@@ -189,6 +190,8 @@ QUESTIONS = (
               *WATCHED, flag("real", "The real robot with its own motors held instead."),
               flag("as_written", "Take the file's numbers as they are: joint centres that coincide but for rounding "
                    "stay apart."),
+              Option("effort", "Seconds of one core that a list may need, by its size; what needs more is left out "
+                     "and told.", "SECONDS", float, EFFORT, low=0),
               _file("modes"), _file("modes", "certificate")),
              ("quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7", "3rrr_m1 --real -o modes.png",
               "quattro --observe 1,4 --certificate c.json")),

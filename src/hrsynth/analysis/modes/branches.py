@@ -10,7 +10,8 @@ from itertools import combinations, islice, product
 
 import numpy as np
 
-from ...budgets import BRANCH_CHOICES
+from ...budgets import BRANCH_CHOICES, EFFORT
+from ...errors import TooLarge
 from ...geometry.vectors import Array, inverse, perpendicular, pose, pose_difference, transform
 from ...results import Value
 from ...tolerances import RANK_GAP, SAME_POINT
@@ -115,9 +116,15 @@ def choices(confined: TipLoci) -> Iterator[TipLoci]:
         yield replace(confined, tips=tips, error=confined.error * max(gain for _, gain in chosen))
 
 
-def solve_all(confined: TipLoci, *, near: bool = True) -> tuple[Model, SystemModes]:
-    """The goal's own system, and the modes of all choices of branches together, each pose once."""
-    made = [model(each) for each in islice(choices(confined), BRANCH_CHOICES)]
+def solve_all(confined: TipLoci, *, near: bool = True, effort: float = EFFORT) -> tuple[Model, SystemModes]:
+    """The goal's own system, and the modes of all choices of branches together, each pose once; of those as many as
+    ``effort`` (s, by their size) allows. Raises ``TooLarge`` where it allows none."""
+    first = model(next(choices(confined))).system
+    if first.seconds > effort:
+        raise TooLarge("a system of equations", f"{len(first.curves)} legs and {first.freedoms} freedoms",
+                       first.seconds, effort)
+    most = min(BRANCH_CHOICES, int(effort / first.seconds))
+    made = [model(each) for each in islice(choices(confined), most)]
     size = made[0].system.size
     found = [_scaled(solve(each.system, near=near, goal=None if k else each.home), each.system.size / size)
              for k, each in enumerate(made)]
@@ -126,7 +133,8 @@ def solve_all(confined: TipLoci, *, near: bool = True) -> tuple[Model, SystemMod
     doubts = [f"leg {tip.leg}: {tip.doubt}" for tip in confined.tips if tip.doubt is not None]
     doubts += [] if confined.doubt is None else [confined.doubt]
     if total > len(made):
-        doubts.append(f"only {len(made)} of {total} choices of the legs' branches were solved")
+        doubts.append(f"only {len(made)} of {total} choices of the legs' branches were solved: all would need about "
+                      f"{total * first.seconds:g} s, and the effort is {effort:g} s")
     if doubts and modes.continuum is None:
         proof = f"{modes.proof}; there may be other branches ({'; '.join(doubts)})"
         modes = replace(modes, complete=False, bound="none", proof=proof)

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 
 from ...batch.reach import reach
+from ...budgets import EFFORT
 from ...constraints.pattern import attached
-from ...errors import BadRequest, MissingExtra, NotConfined, Unsolved
+from ...errors import BadRequest, MissingExtra, NotConfined, TooLarge, Unsolved
 from ...geometry.ranks import range_basis
 from ...geometry.vectors import Array, pose_difference
 from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly
@@ -165,7 +166,7 @@ class AssemblyModes(Result, shown_as="modes"):
 @question()
 def modes(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
           at: PoseLike | ClosedConfiguration | None = None, real: bool = False, as_written: bool = False,
-          seed: int = 0) -> AssemblyModes:
+          effort: float = EFFORT, seed: int = 0) -> AssemblyModes:
     """All poses with the directions that are observed at ``at`` (default: the zero configuration), or with ``real`` the
     motors' coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).
 
@@ -173,6 +174,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
     poses that are turned all the same (another operation mode) are not looked for. ``observe`` and ``camera`` as for
     ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide, and
     solutions nearly at infinity, are taken to be so where that is clearly meant, unless ``as_written`` is true.
+    ``effort``: seconds of one core that a list may need, told by its size before it starts.
 
     Where the tips' paths are none of those known, or the solver that they need gives up or is not installed, the whole
     robot is closed from random starts (:mod:`.search`): modes that are found, of any kind of closing, and nothing says
@@ -204,8 +206,8 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
     try:
         if not as_written and _moves(setting, measured.question, goal):
             return _searched(setting, measured.question, goal, pose, kind, "the pose lies on a self-motion")
-        listed = _listed(setting, measured, goal, wanted, pose, kind, as_written)
-    except (NotConfined, Unsolved, MissingExtra) as error:
+        listed = _listed(setting, measured, goal, wanted, pose, kind, as_written, effort)
+    except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
         return _searched(setting, measured.question, goal, pose, kind, error.reason)
     moving = not listed.found.complete and not as_written and any(
         mode.configuration is not None and _moves(setting, measured.question, mode.configuration)
@@ -245,7 +247,7 @@ def _closed(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal
 
 
 def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfiguration, wanted: Task | None,
-            pose: Pose, kind: str, as_written: bool) -> AssemblyModes:
+            pose: Pose, kind: str, as_written: bool, effort: float) -> AssemblyModes:
     """The modes as the solutions of the system that the tips' curves and surfaces give."""
     confined = tip_loci(setting.anatomy, measured.question, measured.pattern, goal)
     # a curve that was fitted to a leg's moves is not known to hold its exact tip
@@ -253,7 +255,7 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     confined = replace(confined, error=np.inf if fitted else drift(goal, wanted, setting.normal.moved)
                        + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
                        as_written=as_written)
-    made, found = solve_all(confined)
+    made, found = solve_all(confined, effort=effort)
     reader = _ModeReader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)

@@ -15,6 +15,7 @@ from typing import ClassVar
 
 import numpy as np
 
+from ...budgets import ELIMINATION_SECONDS, HOMOTOPY_SECONDS, MSOLVE_SECONDS
 from ...errors import BadRequest
 from ...geometry.vectors import Array, frozen, pose
 from ...results import Value
@@ -59,6 +60,13 @@ class System(Value):
     def forbids(self) -> tuple[int, ...]:
         """How many equations each leg gives."""
         return tuple(self.space - curve.freedoms for curve in self.curves)
+
+    @property
+    def seconds(self) -> float:
+        """How long its list takes on one core, about."""
+        if not self.surfaces:
+            return ELIMINATION_SECONDS
+        return HOMOTOPY_SECONDS if self.rigid else MSOLVE_SECONDS
 
     @property
     def missing(self) -> int:
