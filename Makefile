@@ -14,7 +14,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz adversary bounds endings bench lint types robots readme catalog notebooks docs pictures lock setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long fuzz adversary bounds endings bench lint types robots readme catalog notebooks jupyter docs pictures lock setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -63,6 +63,10 @@ catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS=
 
 notebooks: setup-all  ## write notebooks/*.ipynb from their scripts, without outputs
 	@$(BIN)/python docs/lessons.py
+
+jupyter: setup-all  ## open the notebooks in Jupyter, which is fetched the first time
+	@test -x $(BIN)/jupyter-lab || $(PIP) install jupyterlab
+	@cd notebooks && ../$(BIN)/jupyter-lab
 
 docs: setup-all  ## run the notebooks that changed and build the site in build/site
 	@NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mkdocs build --quiet --strict

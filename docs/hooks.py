@@ -1,19 +1,24 @@
-"""Pages of the site that are made while it is built: the README, the executed notebooks, the reference."""
+"""Pages of the site that are made while it is built: the README, the executed notebooks, the gallery, the reference;
+and formulas, set as drawings that need no network."""
 
 from __future__ import annotations
 
 import ast
 import base64
+import hashlib
 import html
+import io
 import os
 import re
 import sys
 from collections.abc import Iterator
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 sys.path.insert(0, str(Path(__file__).parent))
 import lessons
+import pictures
 
 ROOT = lessons.ROOT
 PACKAGE = ROOT / "src" / "hrsynth"
@@ -37,13 +42,14 @@ def on_files(files: Any, config: Any) -> Any:
 
 def made() -> Iterator[tuple[str, str | bytes]]:
     """Name and content of each page and picture that is made."""
-    for name, source in (("index.md", "README.md"), ("contributing.md", "CONTRIBUTING.md"),
+    for name, source in (("readme.md", "README.md"), ("contributing.md", "CONTRIBUTING.md"),
                          ("changelog.md", "CHANGELOG.md"), ("robots.md", "robots/README.md")):
         yield name, relinked((ROOT / source).read_text(encoding="utf-8"))
     overview = (lessons.FOLDER / "README.md").read_text(encoding="utf-8")
     yield "notebooks/index.md", underlined(overview.replace(".ipynb)", ".md)"))
     for picture in sorted((ROOT / "docs" / "pictures").iterdir()):
         yield f"pictures/{picture.name}", picture.read_bytes()
+    yield "gallery.md", gallery()
     for script in lessons.scripts():
         yield from lesson(script)
     yield "reference/index.md", public()
@@ -53,8 +59,53 @@ def made() -> Iterator[tuple[str, str | bytes]]:
 
 
 def on_page_markdown(markdown: str, page: Any, config: Any, files: Any) -> str:
-    """A page of ``docs/pages`` with its pictures where the site has them."""
-    return markdown.replace("](../pictures/", "](pictures/")
+    """A page of ``docs/pages`` with its pictures where the site has them, and its formulas set."""
+    return typeset(markdown.replace("](../pictures/", "](pictures/"))
+
+
+def typeset(markdown: str) -> str:
+    """Formulas between dollars as drawings, outside of code: ``$$…$$`` on lines of their own, ``$…$`` in a line."""
+    parts = re.split(r"(^ *```.*?^ *```$|`[^`\n]*`|<pre>.*?</pre>)", markdown, flags=re.MULTILINE | re.DOTALL)
+    for place in range(0, len(parts), 2):
+        found = re.sub(r"^\$\$\s*(.+?)\s*\$\$$", lambda m: f'<p class="formula">{drawn(m[1])}</p>', parts[place],
+                       flags=re.MULTILINE | re.DOTALL)
+        parts[place] = re.sub(r"(?<![\\$\w])\$(?! )([^$\n]+?)(?<! )\$(?![\d$])", lambda m: drawn(m[1]), found)
+    return "".join(parts)
+
+
+@cache
+def drawn(formula: str) -> str:
+    """A formula (the part of LaTeX that matplotlib knows) as SVG, on the line of the text around it."""
+    from matplotlib import mathtext, rc_context
+
+    stream = io.StringIO()
+    with rc_context({"mathtext.fontset": "stix", "svg.fonttype": "path", "svg.hashsalt": formula}):
+        depth = mathtext.math_to_image(f"${' '.join(formula.split())}$", stream, format="svg", dpi=72)
+    text = stream.getvalue()
+    text = re.sub(r"<metadata>.*?</metadata>|<!--.*?-->|<style.*?</style>|<path[^>]*fill: #ffffff[^>]*/>", "",
+                  text[text.index("<svg"):], flags=re.DOTALL)
+    prefix = f"f{hashlib.sha256(formula.encode()).hexdigest()[:8]}"
+    text = re.sub(r'(id="|href="#|url\(#)', rf"\1{prefix}", text)
+    width, height = (float(value) / 10 for value in re.findall(r'(?:width|height)="([0-9.]+)pt"', text)[:2])
+    text = re.sub(r'width="[0-9.]+pt"', f'width="{width:.3f}em"', text, count=1)
+    text = re.sub(r'height="[0-9.]+pt"', f'height="{height:.3f}em"', text, count=1)
+    said = html.escape(formula, quote=True)
+    text = text.replace("<svg ", f'<svg class="math" role="img" aria-label="{said}" '
+                                 f'style="vertical-align: {-depth / 10:.3f}em" ', 1)
+    return re.sub(r"\s*\n\s*", " ", text).strip()
+
+
+def gallery() -> str:
+    """Every picture that is kept, with the command that draws it."""
+    head = ("---\nhide: [toc]\n---\n\n# Gallery\n\nEvery picture is drawn by one command, which stands beneath it; "
+            "`make pictures` draws them all again.\n\n<div class=\"gallery\" markdown>\n")
+    cells = []
+    for name in pictures.PICTURES:
+        typed = pictures.command(name)
+        if (pictures.FOLDER / name).exists():
+            cells.append(f"<figure markdown>\n[![{typed}](pictures/{name})](pictures/{name})\n"
+                         f"<figcaption markdown>`{typed}`</figcaption>\n</figure>\n")
+    return "\n".join([head, *cells, "</div>\n"])
 
 
 def relinked(text: str) -> str:
@@ -118,16 +169,40 @@ def folded(parts: list[str]) -> str:
 
 def public() -> str:
     """What ``import hrsynth`` offers, in the order of its table of names."""
-    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
-    table = next(node.value for node in tree.body
-                 if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOME")
-    home: dict[str, str] = ast.literal_eval(table)
     head = "# Public functions\n\n`import hrsynth` offers these names; each is imported when it is first used."
-    return "\n\n".join([head, *(f"::: hrsynth{module}.{name}" for name, module in home.items())])
+    return "\n\n".join([head, *(f"::: hrsynth{module}.{name}" for name, module in homes().items())])
 
 
 def modules(folder: str) -> str:
-    """Every module of a folder of the package."""
+    """Every module of a folder of the package: first what a user calls, then the modules, those first that hold it."""
     names = [".".join(path.relative_to(PACKAGE.parent).with_suffix("").parts) for path in
-             sorted((PACKAGE / folder).rglob("*.py")) if path.name != "__init__.py"]
-    return f"# {folder}\n\n" + "\n\n".join(f"::: {name}\n    options:\n      heading_level: 2" for name in names)
+             (PACKAGE / folder).rglob("*.py") if path.name != "__init__.py"]
+    called: dict[str, list[str]] = {}
+    for name, module in homes().items():
+        if (module.lstrip(".") + ".").startswith(f"{folder}."):
+            called.setdefault(f"hrsynth{module}", []).append(name)
+    order = sorted(names, key=lambda name: (name not in called, name))
+    lines = [f"- [`hrsynth.{name}`](index.md#{module}.{name}): {first_line(module, name)}"
+             for module, each in sorted(called.items()) for name in each]
+    head = "\n".join([f"# {folder}", "", *(["What `import hrsynth` offers of it:", "", *lines, ""] if lines else [])])
+    return head + "\n\n" + "\n\n".join(f"::: {name}\n    options:\n      heading_level: 2" for name in order)
+
+
+@cache
+def homes() -> dict[str, str]:
+    """The module of each public name."""
+    tree = ast.parse((PACKAGE / "__init__.py").read_text(encoding="utf-8"))
+    table = next(node.value for node in tree.body
+                 if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "_HOME")
+    found: dict[str, str] = ast.literal_eval(table)
+    return found
+
+
+def first_line(module: str, name: str) -> str:
+    """The first line of what a public name says of itself."""
+    place = PACKAGE.parent.joinpath(*module.split("."))
+    source = place / "__init__.py" if place.is_dir() else place.with_suffix(".py")
+    for node in ast.parse(source.read_text(encoding="utf-8")).body:
+        if isinstance(node, ast.FunctionDef | ast.ClassDef) and node.name == name:
+            return (ast.get_docstring(node) or "").split("\n\n")[0].replace("\n", " ")
+    return ""

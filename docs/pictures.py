@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import contextlib
 import io
+import os
 import shlex
 import subprocess
 import sys
@@ -35,6 +36,33 @@ class Page:
     inner: str = ""
 
 
+@dataclass(frozen=True)
+class SitePage:
+    """A page of the site that ``make docs`` builds, taken at ``width`` × ``height`` pixels; ``lesson`` is the notebook
+    that must have been run for it."""
+
+    path: str
+    width: int
+    height: int
+    lesson: str | None = None
+
+
+def command(name: str) -> str:
+    """What draws a picture, as it is typed."""
+    what = PICTURES[name]
+    if isinstance(what, SitePage):
+        return "make docs"
+    if isinstance(what, Page):
+        return f"hrsynth {what.command} {what.option} page.html" if not what.inner else (
+            f"hrsynth {what.command} {what.option} pages")
+    if isinstance(what, Family):
+        return f"hrsynth {what.command} {what.robot}.urdf -o {name}"
+    if name.startswith("derivation_"):
+        robot, legs = what.split()
+        return f'hrsynth.draw(hrsynth.derive("{robot}", observe="{legs}"))'
+    return f"hrsynth {what} -o {name}"
+
+
 def report(command: str) -> Page:
     return Page(f"derive {command}", "--report", 1200, 1500)
 
@@ -51,10 +79,11 @@ class Family:
     robot: str
 
 
-PICTURES: dict[str, str | Page | Family] = {
+PICTURES: dict[str, str | Page | SitePage | Family] = {
     "accuracy_quattro.png": "accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7",
     "atlas_six_poses.png": Family("atlas", "six_poses"),
-    "catalog.png": Page("catalog site --group spatial --base-motors --verdict controllable --motion 1T2R", "-o", 1250, 1100, "index.html"),
+    "catalog.png": Page("catalog site --group spatial --base-motors --verdict controllable --motion 1T2R", "-o", 1250,
+                        1100, "index.html"),
     "catalog_page.png": Page("catalog site --group planar --legs '3-R*RR'", "-o", 1250, 1100, "p/96081be379a6.html"),
     "derivation_quattro.svg": "quattro 1,4",
     "modes_3rrr.png": "modes 3rrr_m1",
@@ -64,6 +93,7 @@ PICTURES: dict[str, str | Page | Family] = {
     "modes_hexa.png": "modes hexa --observe 1,3,5",
     "modes_quattro.png": "modes quattro --observe 1,4",
     "modes_rrrrr.png": "modes rrrrr_m1",
+    "notebook.png": SitePage("notebooks/1_the_idea.html", 1250, 1500, "1_the_idea"),
     "report_3rrr_m1.png": report("3rrr_m1"),
     "report_gough_stewart.png": report("gough_stewart"),
     "report_quattro.png": report("quattro --observe 1,4"),
@@ -72,6 +102,7 @@ PICTURES: dict[str, str | Page | Family] = {
     "servo_3rpr.png": "servo 3rpr_m1 --start x=-0.08,y=-0.06,phi=-10deg --goal x=0.034,y=0.23,phi=23deg",
     "servo_quattro.gif": f"servo quattro --observe 1,4 {FAR} --physics --sense pictures",
     "servo_quattro.png": f"servo quattro --observe 1,4 {FAR}",
+    "site.png": SitePage("index.html", 1250, 1250),
     "view_3rrr.png": view("3rrr_m1"),
     "view_gough_stewart.png": view("gough_stewart --observe 1,3,5"),
     "view_quattro.png": view("quattro --observe 1,4"),
@@ -100,8 +131,11 @@ def made(name: str) -> None:
         with tempfile.TemporaryDirectory() as folder:
             page = Path(folder) / ("page.html" if not what.inner else "pages")
             _run(f"{what.command} {what.option} {page}")
-            subprocess.run([sys.executable, str(ROOT / "tests" / "browser.py"), str(page / what.inner), str(file),
-                            str(what.width), str(what.height)], check=True)
+            _take(page / what.inner, file, what)
+    elif isinstance(what, SitePage):
+        with tempfile.TemporaryDirectory() as folder:
+            _build(what, Path(folder))
+            _take(Path(folder) / what.path, file, what)
     elif isinstance(what, Family):
         from hrsynth.families.__main__ import main
 
@@ -113,6 +147,21 @@ def made(name: str) -> None:
         hrsynth.draw(hrsynth.derive(hrsynth.load(robot), legs.split(","))).save(str(file))
     else:
         _run(f"{what} -o {file}")
+
+
+def _take(page: Path, file: Path, what: Page | SitePage) -> None:
+    subprocess.run([sys.executable, str(ROOT / "tests" / "browser.py"), str(page), str(file), str(what.width),
+                    str(what.height)], check=True)
+
+
+def _build(what: SitePage, folder: Path) -> None:
+    """The site, of its notebooks the one that is wanted with outputs."""
+    import lessons
+
+    if what.lesson is not None:
+        lessons.executed(lessons.FOLDER / f"{what.lesson}.py")
+    subprocess.run([sys.executable, "-m", "mkdocs", "build", "--quiet", "--site-dir", str(folder)], check=True,
+                   cwd=ROOT, env={**os.environ, "HRSYNTH_DOCS_QUICK": "1", "NO_MKDOCS_2_WARNING": "1"})
 
 
 def _run(command: str) -> None:

@@ -133,8 +133,12 @@ hrsynth.draw(found)
 # %% [markdown]
 # ## What a controller does
 #
-# The control law compares each direction with the wanted one, eᵢ = uᵢ × u_dᵢ, and commands the velocity with which
-# the errors would decay (MMT 2.3). Started well below the goal, it ends there:
+# The control law compares each direction with the wanted one and commands the velocity with which the errors would
+# decay (MMT 2.3):
+#
+# $$e_i = u_i \times u_{di}, \quad \dot e = L^T t, \quad t = -\lambda L^{T+} e$$
+#
+# Started well below the goal, it ends there:
 
 # %%
 goal = "x=0.02,y=0.3"

@@ -42,8 +42,12 @@ leg
 #
 # The camera sees the direction u of the rod. At each configuration the joint rates that the mechanism allows make
 # certain pairs possible: a velocity t of the platform, together with a rate u̇ of the direction. All these pairs form
-# a linear space ρ, the *relation* between what is controlled and what is seen. Two robots with the same ρ, at the
-# same pose and with the same direction, are the same to a controller that sees u. So ρ is what no rule may change.
+# a linear space, the *relation* between what is controlled and what is seen:
+#
+# $$\rho(q) = \{\, (t, \dot u) : \dot q \in \ker A(q) \,\}$$
+#
+# Two robots with the same ρ, at the same pose and with the same direction, are the same to a controller that sees u. So
+# ρ is what no rule may change.
 #
 # Numbers check it: at random configurations, an orthonormal basis of ρ of the one robot and of the other, and the
 # largest angle between the two spaces. It is zero up to rounding, or it is not. In between there is a wide gap.

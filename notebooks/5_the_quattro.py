@@ -92,8 +92,9 @@ print("printed minus computed:", round(1e3 * (-0.909 - second.pose.z), 1), "mm")
 # %% [markdown]
 # ## Accuracy
 #
-# A camera errs. If each direction may be off by 0.1°, how far may the platform be off? To first order the error is δt
-# = Mᵀ⁺ δu, and the largest one for all δu inside the cones is found exactly for two legs (MMT Appendix A.1). A map
+# A camera errs. If each direction may be off by 0.1°, how far may the platform be off? To first order the error is
+# $\delta t = M^{T+} \delta u$, and the largest one for all $\delta u$ inside the cones is found exactly for two legs
+# (MMT Appendix A.1). A map
 # over the plane z = −0.7 m with φ = 0, as in MMT Figs. 19 and 20:
 
 # %%

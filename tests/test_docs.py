@@ -11,8 +11,10 @@ from pathlib import Path
 import pytest
 
 import hrsynth
+from browser import Tab
 
 ROOT = Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "docs"))
 PAGES = sorted((ROOT / "docs" / "pages").glob("*.md"))
 
 
@@ -30,7 +32,6 @@ def test_the_architecture_page_tells_of_every_folder():
 
 
 def test_every_picture_has_its_command_and_is_shown():
-    sys.path.insert(0, str(ROOT / "docs"))
     import pictures
 
     kept = {path.name for path in (ROOT / "docs" / "pictures").iterdir()}
@@ -39,14 +40,21 @@ def test_every_picture_has_its_command_and_is_shown():
     assert [name for name in kept if f"pictures/{name}" not in shown] == []
 
 
-@pytest.mark.slow
-def test_the_site_is_built_strictly_and_needs_no_network(tmp_path: Path):
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The site, its notebooks without outputs where no executed copy is kept."""
     pytest.importorskip("mkdocs")
-    run = subprocess.run([sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(tmp_path)], cwd=ROOT,
+    folder = tmp_path_factory.mktemp("site")
+    run = subprocess.run([sys.executable, "-m", "mkdocs", "build", "--strict", "--site-dir", str(folder)], cwd=ROOT,
                          capture_output=True, text=True, check=False,
                          env={**os.environ, "HRSYNTH_DOCS_QUICK": "1", "NO_MKDOCS_2_WARNING": "1"})
     assert run.returncode == 0, run.stderr
-    built = {str(path.relative_to(tmp_path)): path.read_text(encoding="utf-8") for path in tmp_path.rglob("*.html")}
+    return folder
+
+
+@pytest.mark.slow
+def test_the_site_is_built_strictly_and_needs_no_network(site: Path):
+    built = {str(path.relative_to(site)): path.read_text(encoding="utf-8") for path in site.rglob("*.html")}
     fetched = r'<(?:script|img|iframe)[^>]+src="https?:|<link[^>]+rel="(?:stylesheet|preload)"[^>]+href="https?:'
     assert [name for name, text in built.items() if re.search(fetched, text)] == []
     for script in sorted((ROOT / "notebooks").glob("[0-9]*.py")):
@@ -54,3 +62,55 @@ def test_the_site_is_built_strictly_and_needs_no_network(tmp_path: Path):
     public = built["reference/index.html"]
     names = [name for name in hrsynth.__all__ if name not in ("__version__", "catalog")]
     assert [name for name in names if f"{name}</span>" not in public] == []
+
+
+@pytest.mark.slow
+def test_it_starts_with_the_moving_robot_and_three_doors_and_shows_every_picture_with_its_command(site: Path):
+    start = (site / "index.html").read_text(encoding="utf-8")
+    assert 'src="pictures/servo_quattro.gif"' in start
+    assert re.findall(r"<h3[^>]*>(For \w+)", start) == ["For students", "For teachers", "For engineers"]
+    gallery = (site / "gallery.html").read_text(encoding="utf-8")
+    kept = [path.name for path in (ROOT / "docs" / "pictures").iterdir()]
+    assert sorted(re.findall(r'<img[^>]*src="pictures/([^"]*)"', gallery)) == sorted(kept)
+    assert gallery.count("<figcaption") == len(kept)
+
+
+@pytest.mark.slow
+def test_a_page_of_the_reference_begins_with_what_a_user_calls(site: Path):
+    for folder, name in (("analysis", "derive"), ("simulation", "servo"), ("selection", "select")):
+        page = (site / "reference" / f"{folder}.html").read_text(encoding="utf-8")
+        assert page.index(f"hrsynth.{name}</code>") < page.index("<h2")
+        assert f'href="index.html#hrsynth.{folder}' in page
+
+
+@pytest.mark.slow
+def test_formulas_are_set_and_code_is_left_alone(site: Path):
+    import hooks
+
+    set_ = hooks.typeset("a $x_1^2$ b `$x$`\n\n$$\n\\frac{a}{b}\n$$\n\n```\n$ hrsynth\n```\n$HOME and 3 $ or 4 $")
+    assert set_.count("<svg") == set_.count("</svg>") == 2
+    assert "<style" not in set_
+    assert 'aria-label="x_1^2"' in set_
+    assert all(each in set_ for each in ("`$x$`", "$ hrsynth", "$HOME and 3 $ or 4 $"))
+    left = [name for name in site.rglob("*.html") if re.search(r"\$\$|\$\\", re.sub(
+        r"<(pre|code|script).*?</\1>", "", name.read_text(encoding="utf-8"), flags=re.DOTALL))]
+    assert left == []
+
+
+@pytest.mark.browser
+def test_search_works_from_disk(site: Path, tab: Tab):
+    for page in ("index.html", "notebooks/1_the_idea.html"):
+        tab.open(site / page)
+        tab.page.locator(".md-search__input").click()
+        tab.page.keyboard.type("singular", delay=20)
+        tab.page.wait_for_function("document.querySelectorAll('.md-search-result__item').length >= 5")
+
+
+@pytest.mark.browser
+def test_tables_fit_their_pages(site: Path, tab: Tab):
+    wide = """[...document.querySelectorAll('.md-content table')].some(each => each.getBoundingClientRect().width
+        > each.closest('.md-content__inner').getBoundingClientRect().width + 1)"""
+    for page in sorted({*site.glob("*.html")} - {site / "404.html"}):
+        tab.open(page)
+        tab.page.wait_for_load_state("networkidle")
+        assert not tab.page.evaluate(wide), page.name
