@@ -104,6 +104,7 @@ def test_search_works_from_disk(site: Path, tab: Tab):
         tab.page.locator(".md-search__input").click()
         tab.page.keyboard.type("singular", delay=20)
         tab.page.wait_for_function("document.querySelectorAll('.md-search-result__item').length >= 5")
+        assert "singular" in tab.page.locator(".md-search-result__item").first.inner_text().lower()
 
 
 @pytest.mark.browser
