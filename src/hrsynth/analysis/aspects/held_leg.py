@@ -84,13 +84,35 @@ def _aside(factor: Any, a: Numbers) -> list[Any]:
 
 
 class _Place(NamedTuple):
-    """What one place gives: what must vanish for the lengths, e₁ and e₂, f, g and (t, ω)."""
+    """What one place gives: what must vanish for the lengths, and e_k, r_k, m_k, n_k of k = 1, 2; w_k of all."""
 
     lengths: list[Any]
+    w: tuple[Numbers, ...]
     rods: list[list[Any]]
-    f: Any
-    g: Any
-    motion: tuple[Any, Any]
+    r: list[list[Any]]
+    m: list[Any]
+    n: list[Any]
+
+    @property
+    def f(self) -> Any:
+        """m₂ n₁ − m₁ n₂."""
+        return self.m[1] * self.n[0] - self.m[0] * self.n[1]
+
+    def motion(self, pick: int) -> tuple[Any, Any]:
+        """(t, ω) = (m_k, −n_k) of a leg ``pick``, 1 or 2."""
+        return self.m[pick - 1], -self.n[pick - 1]
+
+    def rate(self, pick: int) -> Any:
+        """g: the rate of f in that motion, ṙ_k = ω i r_k and ẇ_k = v + ṙ_k."""
+        t, omega = self.motion(pick)
+        v = _aside(t, self.w[0])
+        m, n = [], []
+        for r, w in zip(self.r, self.w[1:], strict=True):
+            turned = _aside(omega, r)
+            moved = [v[0] + turned[0], v[1] + turned[1]]
+            m.append(_times(turned, w) + _times(r, moved))
+            n.append(_times(v, w) + _times(self.w[0], moved))
+        return m[1] * self.n[0] + self.m[1] * n[0] - m[0] * self.n[1] - self.m[0] * n[1]
 
 
 @dataclass(frozen=True, eq=False)
@@ -102,31 +124,21 @@ class HeldLeg:
     held: complex
     number: Callable[[float], Any] = float
 
-    def place(self, x: Numbers, pick: int = 1) -> _Place:
-        """The equations at unknowns (8,); ``pick``: the leg k whose (m_k, −n_k) is the motion (t, ω)."""
+    def place(self, x: Numbers) -> _Place:
+        """What unknowns (8,) give."""
         robot, number = self.robot, self.number
         w, (c, s) = (x[0:2], x[4:6], x[6:8]), x[2:4]
         base = robot.feet[0] + robot.rods[0] * self.held
-        r, e, m, n = [], [], [], []
+        r, e = [], []
         for k in (1, 2):
             b, away = robot.corners[k], base - robot.feet[k]
-            r.append([c * number(b.real) - s * number(b.imag), s * number(b.real) + c * number(b.imag)])
-            e.append([number(away.real) + w[0][0] + r[-1][0] - w[k][0],
-                      number(away.imag) + w[0][1] + r[-1][1] - w[k][1]])
-            m.append(_times(r[-1], w[k]))
-            n.append(_times(w[0], w[k]))
+            turned = [c * number(b.real) - s * number(b.imag), s * number(b.real) + c * number(b.imag)]
+            r.append(turned)
+            e.append([number(away.real) + w[0][0] + turned[0] - w[k][0],
+                      number(away.imag) + w[0][1] + turned[1] - w[k][1]])
         lengths = [_square(x[2:4]) - 1, *(_square(w[k]) - number(robot.cranks[k]) ** 2 for k in range(3)),
                    *(_square(e[k]) - number(robot.rods[k + 1]) ** 2 for k in (0, 1))]
-        t, omega = m[pick - 1], -n[pick - 1]
-        v = _aside(t, w[0])
-        dm, dn = [], []
-        for k in (0, 1):
-            dr = _aside(omega, r[k])
-            dw = [v[0] + dr[0], v[1] + dr[1]]
-            dm.append(_times(dr, w[k + 1]) + _times(r[k], dw))
-            dn.append(_times(v, w[k + 1]) + _times(w[0], dw))
-        g = dm[1] * n[0] + m[1] * dn[0] - dm[0] * n[1] - m[0] * dn[1]
-        return _Place(lengths, e, m[1] * n[0] - m[0] * n[1], g, (t, omega))
+        return _Place(lengths, w, e, r, [_times(r[k], w[k + 1]) for k in (0, 1)], [_times(w[0], w[k]) for k in (1, 2)])
 
     def curve(self, x: Numbers) -> list[Any]:
         """What vanishes on the curve, (7,)."""
@@ -135,8 +147,8 @@ class HeldLeg:
 
     def cusp(self, x: Numbers, pick: int) -> list[Any]:
         """What vanishes at a cusp, (8,)."""
-        at = self.place(x, pick)
-        return [*at.lengths, at.f, at.g]
+        at = self.place(x)
+        return [*at.lengths, at.f, at.rate(pick)]
 
     def node(self, x: Numbers) -> list[Any]:
         """What vanishes at a node, (16,): the second place has the first one's rods, and so their lengths."""
@@ -152,12 +164,16 @@ def section(robot: ThreeCranks, held: complex) -> HeldLegSection:
     traces = list(_traces(leg))
     cusps: list[tuple[Array, SectionPoint]] = []
     for x in (x for trace in traces for x in _changes(leg, trace)):
-        pick = 1 + int(np.linalg.norm(leg.place(x, 2).motion) > np.linalg.norm(leg.place(x, 1).motion))
+        at = leg.place(x)
+        pick = 1 + int(np.argmax([np.linalg.norm(at.motion(k)) for k in (1, 2)]))
         found = _newton(partial(leg.cusp, pick=pick), x)
-        if found is None or any(np.linalg.norm(found - other) < SAME_SPOT for other, _ in cusps):
+        # where (t, ω) vanishes f and g do so too, which says nothing
+        if found is None or np.linalg.norm(leg.place(found).motion(pick)) < SAME_SPOT:
+            continue
+        if any(np.linalg.norm(found - other) < SAME_SPOT for other, _ in cusps):
             continue
         box = krawczyk(_rows(partial(thick.cusp, pick=pick), 8), list(around(found, 0.0)))
-        if box is not None and all(size.contains(0) for size in thick.place(box, pick).motion):
+        if box is not None and all(size.contains(0) for size in thick.place(box).motion(pick)):
             box = None
         cusps.append((found, _point(leg, found, box)))
     nodes: list[tuple[Array, tuple[SectionPoint, SectionPoint]]] = []
@@ -215,7 +231,7 @@ def _traces(leg: HeldLeg) -> Iterator[_Trace]:
         for seed in x[:, 1:, 1:][:, here].T:
             if len(known) and np.min(np.linalg.norm(known - seed, axis=1)) < SECTION_APART:
                 continue
-            start = _newton(leg.curve, seed)
+            start = _newton(leg.curve, seed, FOLLOWED)
             if start is None or (len(known) and np.min(np.linalg.norm(known - start, axis=1)) < SECTION_APART):
                 continue
             unknowns = _followed(leg, start)
@@ -229,7 +245,7 @@ def _followed(leg: HeldLeg, start: Array) -> Array:
     for sense in (1.0, -1.0):
         here, way, tangent = start, [start], sense * np.linalg.svd(_slopes(leg.curve, start))[2][-1]
         while len(way) < SECTION_PLACES:
-            found = _newton(leg.curve, here + SECTION_STEP * tangent)
+            found = _newton(leg.curve, here + SECTION_STEP * tangent, FOLLOWED)
             if found is None or np.linalg.norm(found - here) > 2 * SECTION_STEP:
                 break
             ahead = np.linalg.svd(_slopes(leg.curve, found))[2][-1]
@@ -250,7 +266,7 @@ def _angles(leg: HeldLeg, x: Array) -> list[Array]:
 def _changes(leg: HeldLeg, trace: _Trace) -> Iterator[Array]:
     """Places between which the rate of f in the motion that is left changes its sign."""
     for pick in (1, 2):
-        g = leg.place(trace.unknowns.T, pick).g
+        g = leg.place(trace.unknowns.T).rate(pick)
         yield from trace.unknowns[np.flatnonzero(np.sign(g[1:]) != np.sign(g[:-1]))]
 
 
@@ -270,13 +286,13 @@ def _meetings(traces: Sequence[_Trace]) -> Iterator[Array]:
                 yield np.concatenate([places[i], places[j]])
 
 
-def _newton(system: Callable[[Numbers], list[Any]], x: Array) -> Array | None:
+def _newton(system: Callable[[Numbers], list[Any]], x: Array, enough: float = SOLVED) -> Array | None:
     """A zero near unknowns (n,), the nearest where there are more unknowns than equations; None where there is none."""
     for _ in range(SECTION_ITERATIONS):
         step = np.linalg.lstsq(_slopes(system, x), np.array(system(x), dtype=float))[0]
         x = x - step
         size = np.linalg.norm(step)
-        if size < SOLVED:
+        if size < enough:
             return x
         if not size < 1.0:
             return None
