@@ -16,6 +16,9 @@ CLOSED = 1e-10
 """Residual (characteristic lengths, radians) below which a configuration counts as closed."""
 MOTION_STEP = 0.1
 """Longest step (nv,) along a self-motion (characteristic lengths, radians)."""
+MOTION_NEAR = 0.01
+"""Length of random steps that are closed again to count the ways in which a robot can move: what bends the set of
+closings is small there beside it."""
 MOTION_BEND = 0.3
 """How long the correction of such a step may be, as part of it, and by how much the cosine of the angle between one
 tangent and the next may fall short of one: a step that returns to where it began is no motion."""

@@ -7,6 +7,7 @@ does not, the closing is a singular pose. Samples of a curve prove neither.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
@@ -29,6 +30,7 @@ from ...tolerances import (
     MOTION_BEND,
     MOTION_FREE,
     MOTION_LEAST,
+    MOTION_NEAR,
     MOTION_STEP,
     SAME_RELATION,
     SOLVED,
@@ -53,7 +55,7 @@ class SelfMotion:
     turn: float
     returns: bool
     goal: bool = False
-    met: int = 1
+    met: int = 0
     way: tuple[dict[str, Array], ...] = field(default=(), repr=False)
     """The poses (4, 4) of the platform's bodies on the way."""
 
@@ -103,7 +105,7 @@ def self_motion(at: ClosedConfiguration, question: Measurement, bodies: Sequence
     middle = [walk.places[len(walk.places) // 2] for walk in walks]
     size = min(each for each in [ways.shape[1], *(walker.around(q)[0].shape[1] for q in middle)] if each)
     return SelfMotion(at, size, walker.moved(at.q, places), longest.shift * twin.length, longest.turn, longest.returns,
-                      goal, 1, tuple(map(walker.bodies, places)))
+                      goal, way=tuple(map(walker.bodies, places)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -156,7 +158,7 @@ class _Follower:
         basis, joints = self.tangents(q, MOTION_FREE)
         found, home, rng = [], self.bodies(q), np.random.default_rng(0)
         for c in rng.normal(size=(2 * basis.shape[1], basis.shape[1])):
-            step = shortened(MOTION_STEP * joints @ (c / np.linalg.norm(c)), MOTION_STEP)
+            step = shortened(MOTION_NEAR * joints @ (c / np.linalg.norm(c)), MOTION_NEAR)
             there, residual = solve(self.twin, self.twin.moved(q, step), self.held, tolerance=SOLVED,
                                     iterations=SEARCH_ITERATIONS)
             if residual <= CLOSED:
@@ -165,7 +167,7 @@ class _Follower:
             part for name, X in self.bodies(there).items() for part in self._twist(name, X, home[name])])
             for there in found]).reshape(-1, len(basis))
         _, values, right = np.linalg.svd(twists @ basis, full_matrices=False)
-        return basis @ right[values > MOTION_BEND * MOTION_STEP].T, found
+        return basis @ right[values > MOTION_BEND * max(MOTION_NEAR, values.max(initial=0.0)) / 2].T, found
 
     def _twist(self, name: str, X: Array, home: Array) -> tuple[Array, ...]:
         """The twist that leads a body from one pose to another, in parts, as rows of :meth:`tangents`."""
@@ -192,10 +194,12 @@ class _Follower:
                 places.append(there)
                 shift += float(np.linalg.norm(now[:3, 3] - before[:3, 3])) / self.twin.length
                 turn += float(np.linalg.norm(logarithm(now[:3, :3] @ before[:3, :3].T)))
-                before = now
+                along, before = now[:3, 3] - before[:3, 3], now
                 returns = number > 2 and bodies_apart(self.bodies(there), self.bodies(q), self.question,
                                                       self.twin.length) <= MOTION_STEP / 2
                 if returns:
+                    left = self._platform(q)[:3, 3] - now[:3, 3]
+                    shift += math.copysign(float(np.linalg.norm(left)), float(left @ along)) / self.twin.length
                     break
             if returns:
                 break

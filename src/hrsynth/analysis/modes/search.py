@@ -71,7 +71,7 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
     held = Held.at(twin, goal.q, question.reference, question.observations)
     own = self_motion(goal, question, bodies, goal=True) if leaves_free(goal, question) else None
     found = [FoundMode(goal, _poses(goal, bodies), goal.residual, 1)] if own is None else []
-    motions = [] if own is None else [replace(own, met=0)]
+    motions = [] if own is None else [own]
     starts = closed = loose = quiet = 0
     while starts < SEARCH_STARTS and quiet < SEARCH_QUIET:
         number, starts = starts, starts + 1
@@ -103,7 +103,7 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
                 on = motions.index(motion)
                 motions[on] = replace(motion, met=motion.met + 1)
             else:
-                motions.append(motion)
+                motions.append(replace(motion, met=1))
                 quiet = 0
     return ModeSearch(tuple(found), tuple(motions), starts, closed, loose)
 

@@ -127,7 +127,8 @@ def modes(found: AssemblyModes, file: str | None = None, certificate: str | None
     rows += known("special", count.degenerate)
     for number, motion in enumerate(found.motions, 1):
         place = "the pose itself" if motion.goal else str(found.pose_of(motion))
-        met = f"; {motion.met} starts ended on it, or on one like it" if motion.met else ""
+        starts = f"{motion.met} start{'s' * (motion.met > 1)}"
+        met = f"; {starts} ended on it, or on one like it" if motion.met else ""
         rows += [*GAP, (f"motion {number}", [f"through {place}, found, not proved: a self-motion {motion.words}{met}"])]
     for number, mode in enumerate(found.modes, 1):
         rows += [*GAP, (f"mode {number}", [f"{mode.pose}" + ("   (the pose itself)" if mode.goal else ""),
