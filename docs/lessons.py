@@ -22,7 +22,7 @@ KERNEL = {"display_name": "Python 3 (ipykernel)", "language": "python", "name": 
 
 def scripts() -> list[Path]:
     """The scripts, in their order."""
-    return sorted(FOLDER.glob("[0-9]*.py"))
+    return sorted(FOLDER.glob("[0-9]*.py"), key=lambda path: int(path.stem.split("_")[0]))
 
 
 def notebook(script: Path) -> Any:

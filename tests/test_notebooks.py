@@ -13,7 +13,7 @@ from types import ModuleType
 import pytest
 
 ROOT = Path(__file__).resolve().parent.parent
-SCRIPTS = sorted((ROOT / "notebooks").glob("[0-9]*.py"))
+SCRIPTS = sorted((ROOT / "notebooks").glob("[0-9]*.py"), key=lambda path: int(path.stem.split("_")[0]))
 FIRST = SCRIPTS[0]
 
 
@@ -30,8 +30,8 @@ def cells(script: Path) -> list[str]:
 
 
 def test_every_notebook_has_its_script():
-    assert [path.stem for path in sorted((ROOT / "notebooks").glob("*.ipynb"))] == [path.stem for path in SCRIPTS]
-    assert [path.name[0] for path in SCRIPTS] == [str(number) for number in range(1, len(SCRIPTS) + 1)]
+    assert {path.stem for path in (ROOT / "notebooks").glob("*.ipynb")} == {path.stem for path in SCRIPTS}
+    assert [path.name.split("_")[0] for path in SCRIPTS] == [str(number) for number in range(1, len(SCRIPTS) + 1)]
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)

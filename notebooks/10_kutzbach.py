@@ -1,0 +1,160 @@
+# %% [markdown]
+# # 10. Kutzbach says −2, and it moves
+#
+# Count the links, count the joints, subtract: Kutzbach's formula gives the freedoms of a mechanism in no time. It is
+# wrong for most robots in this book, and for the linkages of this notebook it is wrong in the most beautiful way: they
+# should be stiffer than a frame, and they move.
+
+# %%
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import hrsynth
+from hrsynth.families.linkages import LINKAGES, bennett
+from hrsynth.families.npod import gough_stewart
+from hrsynth.families.planar import BASE, three_rpr
+
+# %% [markdown]
+# ## Bennett, 1903
+#
+# Four links in a ring, four hinges, no two hinge axes parallel, no two meeting. In space a link that is not the base
+# has six freedoms, and a hinge takes five of them: 6 · 3 − 5 · 4 = −2. G. T. Bennett found that it moves all the same
+# if opposite links are equal and sin α / a = sin β / b, where a and b are the lengths of the links (distances between
+# neighbouring axes) and α and β their twists (angles between them).
+
+# %%
+linkage = bennett()
+robot = linkage.mechanism("bennett")
+hrsynth.check(robot)
+
+# %% [markdown]
+# *Mobility 1*. The last line says how that can be: three of the constraints of the loop repeat others, and −2 + 3 = 1.
+# They are counted by the rank of the loop's Jacobian, with its gap, and at twenty configurations, so this is no
+# accident of one pose. The names are those of the file: the loop is cut at that joint.
+#
+# Denavit and Hartenberg's formulas know nothing of the program. They say that the ring closes for every angle of one
+# hinge, and that tan θ₁/2 · tan θ₂/2 stays the same all the way:
+
+# %%
+twists, start = linkage.twists, linkage.regular(np.random.default_rng(0))
+constant = np.sin((twists[0] + twists[1]) / 2) / np.sin((twists[1] - twists[0]) / 2)
+closed = []
+for angle in np.linspace(start[1], start[1] + 2.0, 9):
+    start = linkage.closed(start, angle)
+    closed.append(start)
+products = np.tan(np.array(closed)[:, 0] / 2) * np.tan(np.array(closed)[:, 1] / 2)
+print("tan θ₁/2 · tan θ₂/2 from", products.min().round(9), "to", products.max().round(9))
+print("± sin ½(α + β) / sin ½(β − α) =", constant.round(9))
+
+# %% [markdown]
+# ## Seven of a kind
+#
+# Others followed, most of them by putting Bennett's together. Kutzbach gives n − 6 for a single loop of n hinges; each
+# of these has one freedom, and so 7 − n redundant constraints:
+
+# %%
+folder = Path(tempfile.mkdtemp())
+print(f"{'':26}{'Kutzbach':>9}{'mobility':>10}   redundant")
+for name, make in LINKAGES.items():
+    each = make().mechanism(name)
+    hrsynth.save(each, folder / f"{name}.urdf")
+    found = hrsynth.check(each)
+    redundant = "; ".join(f"{row.rows} of the loop cut at {row.loop}" for row in found.redundant)
+    print(f"{name:26}{len(each.joints) - 6:9}{found.postures[0].mobility.total:10}   {redundant}")
+
+# %% [markdown]
+# The loop above saved them as robot files. `python -m hrsynth.families FOLDER bennett schatz` does so from the shell.
+# Schatz's is at work in every chemist's Turbula mixer.
+#
+# With one hinge driven and held, a ring has a few closings. These are the assembly modes of the real robot; no system
+# of equations is known to the program for such legs, so they are searched for, and the answer says so:
+
+# %%
+print(hrsynth.modes(hrsynth.load(folder / "plane_symmetric_bricard.urdf"), real=True))
+
+# %% [markdown]
+# ## How special is it?
+#
+# Bennett's condition is an equation. Miss it a little, and the ring does not close at all any more: two unknowns too few
+# for its equations. Here is by how much it stays open at best, if one twist is wrong:
+
+# %%
+from scipy.optimize import least_squares
+
+for error in np.radians([0.01, 0.1, 1.0]):
+    wrong = bennett()
+    wrong = type(wrong)(wrong.lengths, wrong.twists + [error, 0, 0, 0], wrong.offsets)
+    best = least_squares(lambda angles, ring=wrong: (ring.frames(angles)[-1] - np.eye(4))[:3].ravel(), start)
+    print(f"a twist wrong by {np.degrees(error):4.2f}°: open by {np.linalg.norm(best.fun):.1e}")
+
+# %% [markdown]
+# No file holds such numbers exactly. Robots written with ten decimals miss the condition by 1e-10, and are still meant
+# to move. That is why no rank is told without its gap: the ratio of the smallest singular value that counts to the
+# largest that does not. Near the limit the program refuses to answer.
+#
+# ## Motors held, and it moves
+#
+# The same thing happens to parallel robots, and there it is dangerous. Hold all motors of this 3-RP̲R: Kutzbach's count
+# says rigid. But its platform is as large as its base and turned as it is, so its legs are parallel and equal. Three
+# equal cranks:
+
+# %%
+robot = three_rpr(motor=2, base=BASE, platform=BASE, home=(0.12, 0.3, 0.0))
+found = hrsynth.modes(robot, real=True)
+found
+
+# %% [markdown]
+# This is a *self-motion*: a curve of assembly modes. The program was led along it by small steps, each closed again,
+# until it came back; its length is the circle's. A self-motion is *found* and never proved, because samples of a curve
+# prove nothing. The other two modes lie on none: there the platform is turned.
+
+# %%
+(motion,) = found.motions
+print(f"length {motion.shift:.4f} m, circle {2 * np.pi * np.hypot(0.12, 0.3):.4f} m")
+places = np.array([each["platform"][:2, 3] for each in motion.way])
+figure, place = plt.subplots(figsize=(4, 4))
+place.plot(*places.T, ".", label="platform, motors held")
+place.plot(*np.array([mode.bodies["platform"][:2, 3] for mode in found.modes]).T, "x", label="modes on no self-motion")
+place.set_aspect("equal")
+place.legend()
+plt.show()
+
+# %% [markdown]
+# A machine with that geometry is no machine at this one pose only. Worse are robots that move like this at *every*
+# pose: M. Husty and A. Karger showed that all Gough-Stewart platforms whose base and platform are similar are like that
+# (*architecturally singular*). Half the angle between neighbouring joints, 20° below and 40° above, makes two such
+# hexagons. Six motors hold it, and the platform is loose, wherever it is:
+
+# %%
+print(hrsynth.modes(gough_stewart(base_half=np.radians(20), platform_half=np.radians(40)), real=True))
+
+# %% [markdown]
+# ## Exercises
+#
+# 1. Sarrus's linkage (1853) was the first to guide along a straight line by hinges alone: `link_2`, between the two
+#    triples of parallel axes, against `link_5`. Show it by samples.
+# 2. Make the platform of the 3-RP̲R one percent smaller than its base. What becomes of the self-motion?
+# 3. A five-bar, both distal links watched: each direction that is held leaves the tip a circle. Where does `singular`
+#    say that the controller loses a freedom, and when is that a self-motion?
+
+# %% [markdown]
+# ## Solutions
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 1. the attitude of one link against the other is the same at all configurations, its places lie on a line
+setting = hrsynth.observe(hrsynth.load(folder / "sarrus.urdf"))
+poses = np.array([np.linalg.inv(at.pose("link_5")) @ at.pose("link_2") for at in setting.configurations])
+print("largest turn", np.abs(poses[:, :3, :3] - poses[0, :3, :3]).max().round(12))
+print("extent along and across the line", np.linalg.svd(poses[:, :3, 3] - poses[:, :3, 3].mean(0))[1].round(12))
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 2. it breaks up into single modes; as the legs' lines meet in a point, far away, the pose itself is a singular one
+smaller = tuple((0.99 * radius, angle) for radius, angle in BASE)
+print(hrsynth.modes(three_rpr(motor=2, base=BASE, platform=smaller, home=(0.12, 0.3, 0.0)), real=True))
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 3. where the proximal links are parallel: there the two circles touch, and if these links are equal too, they are one
+print(hrsynth.singular(hrsynth.load("rrrrr_m1"), points=100).words)
