@@ -17,6 +17,7 @@ import numpy as np
 
 import hrsynth
 
+plt.style.use("hrsynth.present.style")
 robot = hrsynth.load("rrrrr_m1")
 robot
 
@@ -83,7 +84,7 @@ draw_robot(place, poses[0], "tab:orange", "one pose")
 draw_robot(place, poses[1], "tab:green", "another, with the same directions")
 place.plot(*np.array(A).T, "ks", ms=8)
 place.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
-place.legend(frameon=False, loc="upper left")
+place.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 plt.show()
 
 # %% [markdown]

@@ -14,6 +14,7 @@ import numpy as np
 import hrsynth
 from hrsynth.families.planar import three_rrr
 
+plt.style.use("hrsynth.present.style")
 NAMES = ["3rrr_m1", "3rrr_m2", "3rpr_m1", "3rpr_m2", "3prr_m1", "3prr_m2", "3ppr_m1", "3ppr_m2", "3prp", "3rrp"]
 
 
@@ -120,9 +121,9 @@ for i in (1, 2, 3):
     tips.append(tip)
     ends += [tip, shoulder]
     place.plot(*np.array([shoulder, elbow]).T, color="0.45", lw=4)
-    place.plot(*np.array([elbow, tip]).T, color="tab:blue", lw=2.5)
+    place.plot(*np.array([elbow, tip]).T, color="C0", lw=2.5)
     place.axline(tip, slope=normals[-1][1] / normals[-1][0], color="crimson", lw=1, ls="--")
-place.fill(*np.array(tips).T, color="tab:orange", alpha=0.4)
+place.fill(*np.array(tips).T, color="C1", alpha=0.4)
 rows = np.array([[n[1], -n[0]] for n in normals])
 centre, residual, *_ = np.linalg.lstsq(rows, np.array([r @ t for r, t in zip(rows, tips, strict=True)]), rcond=None)
 place.plot(*centre, "o", color="crimson", ms=8)

@@ -15,6 +15,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 import hrsynth
 from hrsynth.errors import HrsynthError
 
+plt.style.use("hrsynth.present.style")
 robot = hrsynth.load("gough_stewart")
 sets = hrsynth.legs(robot)
 for size in range(1, 7):
@@ -175,10 +176,10 @@ for i in range(3):
     place.add_collection3d(Poly3DCollection([ring], alpha=0.15, color=colour))
     place.plot(*np.array([A[i], B[i]]).T, color=colour, lw=3, label=f"leg {(1, 3, 5)[i]} and its plane")
     place.plot(*np.array([B[i], point]).T, color=colour, ls="--", lw=1)
-place.plot(*np.vstack([B, B[:1]]).T, color="tab:orange", lw=3, label="the tips")
+place.plot(*np.vstack([B, B[:1]]).T, color="C1", lw=3, label="the tips")
 place.plot(*point[:, None], "o", color="crimson", ms=9, label="common point")
 place.set(xlabel="x (m)", ylabel="y (m)", zlabel="z (m)", aspect="equal")
-place.legend(loc="upper left", frameon=False)
+place.legend(loc="center left", bbox_to_anchor=(1.05, 0.5))
 plt.show()
 
 # %% [markdown]

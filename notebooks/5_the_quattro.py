@@ -12,6 +12,7 @@ import numpy as np
 
 import hrsynth
 
+plt.style.use("hrsynth.present.style")
 robot = hrsynth.load("quattro")
 START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 print(hrsynth.legs(robot))

@@ -11,6 +11,8 @@ import numpy as np
 
 import hrsynth
 
+plt.style.use("hrsynth.present.style")
+
 # %% [markdown]
 # ## Two rails
 #

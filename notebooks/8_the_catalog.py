@@ -17,6 +17,7 @@ from hrsynth.catalog.drawing import drawing
 from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
 
+plt.style.use("hrsynth.present.style")
 catalog = hrsynth.catalog.load()
 print(len(catalog), "architectures")
 for (group, verdict), count in catalog.count("group", "verdict").items():
@@ -76,7 +77,7 @@ for verdict, colour in colours.items():
     sizes = sorted({fewest for each, fewest in counts if each == verdict})
     place.bar([str(size) for size in sizes], [counts[verdict, size] for size in sizes], color=colour, label=verdict)
 place.set(xlabel="legs of the smallest set", ylabel="architectures")
-place.legend(frameon=False)
+place.legend(loc="center left", bbox_to_anchor=(1.0, 0.5))
 plt.show()
 
 # %% [markdown]

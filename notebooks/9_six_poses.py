@@ -15,6 +15,7 @@ import numpy as np
 import hrsynth
 from hrsynth.families.planar import six_poses
 
+plt.style.use("hrsynth.present.style")
 robot = six_poses()
 hidden = hrsynth.derive(robot)
 print(hidden.architecture, "hides", hidden.hidden_architecture)

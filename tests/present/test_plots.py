@@ -52,6 +52,12 @@ def test_notebooks_can_use_the_style():
     assert cycle == [colour.lstrip("#").upper() for colour in plots.COLOURS]
 
 
+def test_notebooks_that_plot_use_it():
+    for script in (Path(hrsynth.__file__).parents[2] / "notebooks").glob("[0-9]*.py"):
+        text = script.read_text(encoding="utf-8")
+        assert ("pyplot" in text) == (f'plt.style.use("{plots.STYLE}")' in text), script.name
+
+
 def test_what_is_held_is_said_in_metres_and_degrees():
     figure, _ = plots.panels(1, 1, 3, 3)
     plots.heading(figure, "title", Pose(z=-0.7, phi=np.pi / 6))
@@ -74,6 +80,20 @@ def test_a_tilted_plane_of_motion_is_drawn_in_true_scale(seed: int):
     seen = np.array(drawn.spots(at[["xyz".index(name) for name in names]].T))
     np.testing.assert_allclose(np.linalg.norm(seen.T - seen.T[-1], axis=1), np.linalg.norm(moved, axis=0), atol=1e-9)
     assert drawn.labels[0].startswith("along (")
+
+
+def test_beyond_a_tilted_grid_nothing_is_said():
+    """What is not reached is hatched inside of the grid alone: of what lies beside it nothing was asked."""
+    rng = np.random.default_rng(3)
+    motion = ObservedRobot.of(transformed(load("3rpr_m1"), random_rotation(rng), np.zeros(3))).motion
+    drawn = MapPlane.of([("x", np.linspace(0, 1, 5)), ("y", np.linspace(0, 1, 5))], motion, 0.1, 9)
+    figure, (place,) = plots.panels(1, 1, 3, 3)
+    drawn.cells(place, np.full((5, 5), np.nan))
+    (hatched,) = [patch for patch in place.patches if patch.get_hatch()]
+    corners = hatched.get_path().vertices[:4]
+    cells = np.stack(drawn.at(*np.meshgrid([-0.125, 1.125], [-0.125, 1.125], indexing="ij")), axis=-1).reshape(-1, 2)
+    np.testing.assert_allclose(sorted(map(tuple, corners)), sorted(map(tuple, cells)), atol=1e-12)
+    assert not place.patch.get_hatch()
 
 
 def test_a_level_plane_keeps_the_parts_of_its_poses():

@@ -137,11 +137,11 @@ class MapPlane:
         return u, v
 
     def cells(self, place: Any, values: Array, **style: Any) -> None:
-        """Colours, one a cell; hatched grey where a value is not finite."""
-        place.set_facecolor(MISSING["facecolor"])
-        place.patch.set(hatch=MISSING["hatch"], edgecolor=MISSING["edgecolor"])
+        """Colours, one a cell; hatched grey where a value is not finite, white beyond the grid."""
         place.grid(False)
         corners = np.meshgrid(cell_edges(self.x), cell_edges(self.y), indexing="ij")
+        u, v = (each[[0, -1, -1, 0], [0, 0, -1, -1]] for each in self.at(*corners))
+        place.fill(u, v, linewidth=0, zorder=0, **MISSING)
         place.pcolormesh(*self.at(*corners), np.ma.masked_invalid(values), **style)
 
     def contour(self, place: Any, values: Array, level: float, colour: str, width: float, style: str = "solid") -> None:
