@@ -17,6 +17,8 @@ from hrsynth.families.linkages import LINKAGES, bennett
 from hrsynth.families.npod import gough_stewart
 from hrsynth.families.planar import BASE, three_rpr
 
+plt.style.use("hrsynth.present.style")
+
 # %% [markdown]
 # ## Bennett, 1903
 #
@@ -78,8 +80,8 @@ print(hrsynth.modes(hrsynth.load(folder / "plane_symmetric_bricard.urdf"), real=
 # %% [markdown]
 # ## How special is it?
 #
-# Bennett's condition is an equation. Miss it a little, and the ring does not close at all any more: two unknowns too few
-# for its equations. Here is by how much it stays open at best, if one twist is wrong:
+# Bennett's condition is an equation. Miss it a little, and the ring does not close at all any more: two unknowns too
+# few for its equations. Here is by how much it stays open at best, if one twist is wrong:
 
 # %%
 from scipy.optimize import least_squares

@@ -87,7 +87,7 @@ def test_beyond_a_tilted_grid_nothing_is_said():
     rng = np.random.default_rng(3)
     motion = ObservedRobot.of(transformed(load("3rpr_m1"), random_rotation(rng), np.zeros(3))).motion
     drawn = MapPlane.of([("x", np.linspace(0, 1, 5)), ("y", np.linspace(0, 1, 5))], motion, 0.1, 9)
-    figure, (place,) = plots.panels(1, 1, 3, 3)
+    _, (place,) = plots.panels(1, 1, 3, 3)
     drawn.cells(place, np.full((5, 5), np.nan))
     (hatched,) = [patch for patch in place.patches if patch.get_hatch()]
     corners = hatched.get_path().vertices[:4]
