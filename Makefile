@@ -14,7 +14,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz adversary bounds endings bench lint types robots readme catalog notebooks jupyter docs pictures lock setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long fuzz adversary bounds endings bench lint types robots readme catalog notebooks jupyter docs pictures lock release setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -84,6 +84,9 @@ lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the 
 	@$(LOCK) --output-file requirements/main.txt
 	@$(LOCK) --group dev --constraint requirements/main.txt --output-file requirements/dev.txt
 	@$(LOCK) --group dev --group browser --extra all --constraint requirements/dev.txt --output-file requirements/all.txt
+
+release: setup-dev  ## set VERSION=0.3.0, the changelog's date and the citation, build and check dist/, commit, tag; nothing is uploaded
+	@$(BIN)/python docs/release.py $(VERSION)
 
 setup: $(VENV)/main.stamp  ## .venv with what hrsynth needs to run
 	@:

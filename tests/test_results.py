@@ -34,6 +34,7 @@ ASKED = {
     "accuracy": lambda: hrsynth.accuracy(hrsynth.load("quattro"), LEGS, cone="0.1deg", plane="z=-0.7", steps=5),
     "modes": lambda: hrsynth.modes(hrsynth.load("quattro"), LEGS, at=GOAL),
     "modes planar": lambda: hrsynth.modes(hrsynth.load("3rrr_m1")),
+    "atlas": lambda: hrsynth.atlas(hrsynth.load("3rrr_m1")),
     "path": lambda: hrsynth.path(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05"),
     "servo": lambda: hrsynth.servo(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05"),
     "select": lambda: hrsynth.select(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05",

@@ -42,7 +42,6 @@ def executor(workers: int = 1, cluster: str | None = None) -> Executor:
         return lambda task, parts: _clustered(task, parts, cluster)
     if workers == 1:
         return _alone
-    _require("joblib", "more than one worker")
     return lambda task, parts: _together(task, parts, workers)
 
 

@@ -54,6 +54,8 @@ class File:
     """Tells why there is nothing to draw in an answer, or None."""
     installed: tuple[str, str] | None = None
     """An ending, and what raises ``MissingExtra`` where a library for it is missing."""
+    plotted: tuple[str, ...] = (".png", ".svg", ".pdf")
+    """The endings that are drawn with matplotlib."""
 
     def require(self, path: str | None, asked: Asked) -> None:
         """Raise ``BadRequest`` where there is nothing to write, the ending is no format or the folder not there, and
@@ -70,6 +72,8 @@ class File:
             raise BadRequest(f"only {self.words} is written", path, f"--output together with {options}")
         if ending not in self.makers:
             raise BadRequest(f"{self.refusal}: unknown extension", path, self.allowed or tuple(self.makers))
+        if ending in self.plotted:
+            function("plots:library")()
         if self.installed is not None and ending == self.installed[0]:
             function(self.installed[1])()
         require_folder(path)
@@ -148,9 +152,9 @@ OUTPUTS = {
         HiddenFile("cannot write the robot", {}, "Write the hidden robot.", field="hidden_file"),
         File("cannot write the report", dict.fromkeys(HTML, "report.pages:page"),
              "Write a page (.html) with drawings, proof, singularities, assembly modes and accuracy.", "report",
-             "report_file", computed="report.parts:parts"),
+             "report_file", computed="report.parts:parts", plotted=HTML),
         CERTIFICATE,
-        File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None))),
+        File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None, plotted=()))),
     "legs": Outputs("text.robots:legs"),
     "modes": Outputs("text.poses:modes", (
         File("cannot draw the modes", {PNG: "modes:picture"}, "Draw the modes (.png).", nothing="modes:why_undrawn"),
@@ -162,7 +166,7 @@ OUTPUTS = {
         File("cannot draw the run", {PNG: "runs:picture", ".gif": "animations:animation"},
              "Draw the run: curves (.png) or an animation (.gif).",
              allowed=".png (curves) or .gif (camera view)",
-             installed=(".gif", ".simulation.pictures:drawing")),)),
+             installed=(".gif", ".simulation.pictures:drawing"), plotted=(".png", ".svg", ".pdf", ".gif")),)),
     "singular": Outputs("text.poses:singularity", (
         File("cannot draw the locus", {PNG: "maps:locus_map"}, "Draw the locus (.png).", computed="maps:locus",
              takes=("plane", "steps"), record="locus"),)),

@@ -6,10 +6,12 @@ import io
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
+from importlib.util import find_spec
 from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from ..errors import MissingExtra
 from ..geometry.vectors import Array
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.pose import Pose
@@ -32,10 +34,17 @@ MISSING: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "0.6", "hatch": "//
 """How what is not reached is drawn."""
 
 
+def library() -> None:
+    """Raise ``MissingExtra`` where matplotlib is not installed."""
+    if find_spec("matplotlib") is None:
+        raise MissingExtra("drawing", "plots")
+
+
 def styled(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
     """A function that draws, in the style of all plots."""
     @wraps(draw)
     def drawn(*given: Asked.args, **named: Asked.kwargs) -> Given:
+        library()
         import matplotlib.style
 
         with matplotlib.style.context(STYLE):

@@ -18,7 +18,7 @@ from ...errors import PoseNotReached
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import ModeNumber, PoseLike
 from ...progress import tell
-from ...results import Result
+from ...results import Result, Value
 from ...tolerances import FOLLOWED
 from ..asked import at_mode
 from ..modes.modes import AssemblyModes, modes
@@ -33,8 +33,8 @@ if TYPE_CHECKING:
     import networkx as nx
 
 
-@dataclass(frozen=True, eq=False)
-class ModePair:
+@dataclass(frozen=True, eq=False, repr=False)
+class ModePair(Value):
     """What is known of two modes, by their numbers: ``answer`` is that of ``path`` (None where nothing was asked),
     ``via`` the modes over which the verdict follows from those of other pairs."""
 

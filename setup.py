@@ -1,0 +1,27 @@
+"""What pyproject.toml cannot say: the README as long description, its links made to work away from the repository."""
+
+import re
+import tomllib
+from pathlib import Path
+
+from setuptools import setup
+
+ROOT = Path(__file__).parent
+PICTURES = (".png", ".svg", ".gif")
+
+
+def long_description() -> str:
+    """The README; pages lead to the repository at this version's tag, pictures to their raw files."""
+    project = tomllib.loads((ROOT / "pyproject.toml").read_text(encoding="utf-8"))["project"]
+    package = (ROOT / "src" / "hrsynth" / "__init__.py").read_text(encoding="utf-8")
+    version = re.search(r'^__version__ = "(.*)"', package, re.MULTILINE)[1]
+
+    def absolute(link: re.Match[str]) -> str:
+        kind = "raw" if link[1].endswith(PICTURES) else "blob"
+        return f"]({project['urls']['Repository']}/{kind}/v{version}/{link[1]})"
+
+    return re.sub(r"\]\((?!https?://|mailto:|#)([^)\s]+)\)", absolute, (ROOT / "README.md").read_text(encoding="utf-8"))
+
+
+if __name__ == "__main__":
+    setup(long_description=long_description(), long_description_content_type="text/markdown")
