@@ -15,6 +15,7 @@ from ..analysis.aspects.three_cranks import CrankPlace, mode_counts
 from ..errors import BadRequest
 from ..geometry.vectors import Array
 from . import plots
+from .modes import why_undrawn
 from .plots import COLOURS, cell_edges, entry, panels, png, styled
 
 CELLS = {SAME: ("#b9dcb1", "="), SEPARATED: ("#f2c0b0", "|"), UNDECIDED: ("#e3e3e3", "?")}
@@ -43,12 +44,17 @@ def section(found: Atlas, seed: int) -> DrawnSection:
     return DrawnSection(None, made) if isinstance(made, str) else DrawnSection(made, None)
 
 
+def undrawn(found: Atlas) -> str | None:
+    """Why there is no table."""
+    return why_undrawn(found.listed)
+
+
 @styled
 def picture(found: Atlas, drawn: DrawnSection) -> bytes:
     """The picture (PNG); raises ``BadRequest`` where there are no modes."""
-    if not found.places:
-        raise BadRequest(f"{found.listed.setting.robot.name}: there is nothing to draw",
-                         found.listed.found.degenerate or "no mode", "isolated modes")
+    why = why_undrawn(found.listed)
+    if why is not None:
+        raise BadRequest(f"{found.listed.setting.robot.name}: there is nothing to draw: {why}", None, "isolated modes")
     count = 1 if drawn.found is None else 3
     figure, axes = panels(1, count, 5.4 * count, 6.6)
     _table(axes[0], found)

@@ -143,7 +143,7 @@ OUTPUTS = {
     "atlas": Outputs("text.poses:atlas", (
         File("cannot draw the atlas", {PNG: "atlas:picture"},
              "Draw the table and, of three rods on cranks in a plane, the singular curve with the modes (.png).",
-             computed="atlas:section", record="section"),)),
+             computed="atlas:section", record="section", nothing="atlas:undrawn"),)),
     "certificate": Outputs("text.robots:certificate"),
     "check": Outputs("text.poses:check", (
         File("cannot write the grid", {PNG: "maps:distance_map", CSV: "maps:check_table"},

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from functools import cache
 from itertools import combinations
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -17,7 +18,7 @@ from hrsynth.analysis.aspects import atlas as module
 from hrsynth.analysis.aspects.atlas import Atlas, atlas
 from hrsynth.analysis.aspects.path import SAME, SEPARATED, UNDECIDED
 from hrsynth.cli import execute
-from hrsynth.errors import PoseNotReached
+from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.families.planar import six_poses
 from hrsynth.kinematics.configuration import measure
 
@@ -134,14 +135,20 @@ def test_intervals_that_are_used_up_leave_pairs_undecided(monkeypatch: pytest.Mo
     assert any("used up" in pair.reason for pair in found.pairs)
 
 
-def test_a_continuum_has_an_empty_table(capsys: pytest.CaptureFixture[str]):
+def test_a_continuum_has_an_empty_table_and_no_picture(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     found = atlas(hrsynth.load("quattro"), "1")
     assert found.table == []
     assert found.cuspidal is None
     assert "continuum" in str(found)
+    with pytest.raises(BadRequest, match="continuum"):
+        hrsynth.draw(found)
+    picture = tmp_path / "atlas.png"
+    assert execute(["atlas", "quattro", "--observe", "1", "-o", str(picture)]) == 0
+    assert "is not drawn" in capsys.readouterr().err
+    assert not picture.exists()
 
 
-def test_json_is_the_contract(capsys: pytest.CaptureFixture[str], tmp_path):
+def test_json_is_the_contract(capsys: pytest.CaptureFixture[str], tmp_path: Path):
     picture = tmp_path / "atlas.png"
     assert execute(["atlas", "quattro", "--observe", "1,4", "--json", "-o", str(picture)]) == 0
     data = json.loads(capsys.readouterr().out)
