@@ -176,6 +176,9 @@ def _proposed(system: System, near: bool, goal: Array | None,
             if found is None:
                 break
             roots = enclosed(part, found, most, system.balls(part.chart.frame), system.farthest)
+            if found.loose and roots.complex != (most and most.most) and dimension(system):
+                roots = None
+                break
             if roots.apart or not roots.complete or part.chart.study is None:
                 break
         if roots is not None:
@@ -194,7 +197,7 @@ def _undecided(system: System, tried: bool, goal: Array | None) -> SystemModes:
         return SystemModes(len(known), known, False, "nothing proved", degenerate="no choice of legs decides the pose: "
                            "tips on one line, in one point, or at rest", open=True)
     size = dimension(system)
-    if size is None:
+    if not size:
         return SystemModes(len(known), known, False, "nothing proved",
                            degenerate="the equations depend on each other, but no continuum of poses was found",
                            open=True)

@@ -31,12 +31,14 @@ from .systems import System
 @dataclass(frozen=True, eq=False)
 class Proposed:
     """Solutions that a solver proposes, besides ``extraneous`` ones that are no poses; ``lost``: how many more there
-    may be; ``far``: the (e, g) (m, 8) at which paths of a homotopy to infinity were left."""
+    may be, ``loose`` whether those may form a continuum; ``far``: the (e, g) (m, 8) at which paths of a homotopy to
+    infinity were left."""
 
     solutions: tuple[Solution, ...]
     method: str
     extraneous: int = 0
     lost: int = 0
+    loose: bool = False
     far: Array | None = None
 
 
@@ -61,16 +63,15 @@ def proposed(part: PoseSystem, enough: int | None) -> Proposed | None:
     return by_msolve(part) if part.chart.study is None else by_homotopy(part, enough)
 
 
-def by_homotopy(part: PoseSystem, enough: int | None) -> Proposed | None:
-    """All poses of a rigid body, up to rounding, ``enough`` at most; None where there seems to be a continuum."""
+def by_homotopy(part: PoseSystem, enough: int | None) -> Proposed:
+    """All poses of a rigid body, up to rounding, ``enough`` at most."""
     from flint import acb
 
     assert part.chart.study is not None
     found = ends(part.equations(), part.chart.study, _resting(part), enough)
-    if found.loose and (enough is None or len(found.solutions) < enough):
-        return None
     values = [[acb(v.real, v.imag) for v in row] for row in found.solutions.tolist()]
-    return Proposed(tuple(zip(values, found.multiple, strict=True)), "homotopy", found.infinite, found.lost, found.far)
+    return Proposed(tuple(zip(values, found.multiple, strict=True)), "homotopy", found.infinite, found.lost,
+                    found.loose > 0, found.far)
 
 
 def _resting(part: PoseSystem) -> tuple[int, ...]:
