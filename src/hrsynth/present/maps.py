@@ -173,14 +173,15 @@ def locus_map(found: Singularity, drawn: Locus) -> bytes:
     shade = np.log10(np.maximum(drawn.hidden.type2, DARKEST_DISTANCE))
     plane.cells(place, np.where(np.isfinite(drawn.hidden.type2), shade, np.nan), cmap="Greys_r",
                 vmin=np.nanmin(shade), vmax=np.nanmax(shade) + 1.0)
-    _boundary(place, plane, drawn)
+    borders = _boundary(place, plane, drawn)
     entries: list[Any] = []
     for name, field in (("real robot", drawn.real), ("hidden robot", drawn.hidden)):
         if field is not None:
             entries.insert(0, _drawn_locus(place, plane, field, name))
     plane.finish(place, plane.x, plane.y)
-    entries += [entry("Type 1 boundary", linestyle="", marker="o", markersize=4, color="darkorange"),
-                entry("other limit of reach", linestyle="", marker="o", markersize=4, color="black"), missing_entry()]
+    entries += borders
+    if not np.isfinite(drawn.hidden.type2).all():
+        entries.append(missing_entry())
     plots.legend(figure, entries)
     heading(figure, f"{found.setting.robot.name}: Type 2 singularities, legs {', '.join(found.setting.labels)} "
             "observed", drawn.grid.fixed)
@@ -198,8 +199,8 @@ def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) 
                  **shape)
 
 
-def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> None:
-    """The reached poses at the border, those near a Type 1 singularity in orange."""
+def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
+    """The reached poses at the border, those near a Type 1 singularity in orange; what the legend says of them."""
     reached = np.isfinite(drawn.hidden.type2)
     padded = np.pad(reached, 1)
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
@@ -210,9 +211,14 @@ def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> None:
             padded = np.pad(np.where(reached, field.type1, np.inf), 2, constant_values=np.inf)
             around = [padded[i : i + reached.shape[0], j : j + reached.shape[1]] for i in range(5) for j in range(5)]
             near |= np.min(around, axis=0) < NEAR_TYPE_1 * np.nanmedian(field.type1)
-    for cells, colour in ((border & near, "darkorange"), (border & ~near, "black")):
+    entries = []
+    for cells, colour, words in ((border & near, "darkorange", "Type 1 boundary"),
+                                 (border & ~near, "black", "other limit of reach")):
         i, j = np.nonzero(cells)
-        place.scatter(*plane.at(plane.x[i], plane.y[j]), s=9, color=colour, marker="o", linewidth=0)
+        if len(i):
+            place.scatter(*plane.at(plane.x[i], plane.y[j]), s=9, color=colour, marker="o", linewidth=0)
+            entries.append(entry(words, linestyle="", marker="o", markersize=4, color=colour))
+    return entries
 
 
 @styled

@@ -19,6 +19,7 @@ def aliases() -> dict[str, str]:
     return {word: each["names"] for each in tomllib.loads(text)["robot"] for word in each["words"]}
 
 
+@cache
 def alias(word: str) -> str | None:
     """Under which names a word's robot is known."""
     return aliases().get(bare(word))
