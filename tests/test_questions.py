@@ -154,6 +154,19 @@ def test_help_shows_every_option(name):
     assert function.__name__ == name
 
 
+def test_options_have_one_name_in_python_and_on_the_command_line():
+    from hrsynth.cli.questions import QUESTIONS
+    compared = 0
+    for command in QUESTIONS:
+        known = inspect.signature(getattr(hrsynth, command.name)).parameters
+        for option in command.options:
+            if option.name in known and not option.argument:
+                compared += 1
+                flags = option.flags or (f"--{option.name.replace('_', '-')}",)
+                assert f"--{option.name.replace('_', '-')}" in flags, (command.name, option.name)
+    assert compared > 40
+
+
 def test_help_of_the_package_shows_each_function_with_its_options():
     text = pydoc.plain(pydoc.render_doc(hrsynth))
     for name in hrsynth.__all__:
