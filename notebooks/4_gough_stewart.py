@@ -103,15 +103,13 @@ theirs = sorted(tuple(np.sum((tips(mode) - A) * u, axis=1)) for mode in found.mo
 print(len(ours), "solutions; largest difference in a leg's length:", np.abs(np.array(ours) - theirs).max(), "m")
 
 # %% [markdown]
-# The real robot, its six motors held, has up to 40 poses (and here 40 complex ones). The hidden robot is the simpler
-# of the two. To list the 40 an external solver is needed, the extra `solve`:
+# The real robot, its six motors held, has up to 40 poses, complex ones included. This one is symmetric, and twelve of
+# them lie at infinity. The hidden robot is the simpler of the two:
 
 # %%
-try:
-    real = hidden.modes(at=POSE, real=True)
-    print(f"{len(real.modes)} real of {real.found.complex} complex")
-except HrsynthError as error:
-    print(error)
+real = hidden.modes(at=POSE, real=True)
+print(f"{len(real.modes)} real of {real.found.complex} complex")
+print(real.found.proof)
 
 # %% [markdown]
 # What does a controller do with eight poses that look the same? It ends in one of them, and the start decides in

@@ -222,6 +222,32 @@ def test_a_point_at_rest_leaves_few():
             assert among(goal, found) < 1e-9
 
 
+@pytest.mark.parametrize(("kinds", "count"), [("SSSSS", 40), ("CCS", 32)])
+def test_an_angle_that_a_leg_keeps_is_a_condition_as_any_other(kinds: str, count: int):
+    system, goal = with_angles(np.random.default_rng(0), kinds, 1)
+    found = solve(system, near=False)
+    assert (found.complex, found.complete) == (count, True), found.proof
+    assert among(goal, found) < 1e-9
+
+
+@pytest.mark.slow
+def test_three_angles_leave_no_continuum():
+    """They decide the turn, three spheres the place: 16 poses, and infinitely many solutions at infinity."""
+    system, goal = with_angles(np.random.default_rng(0), "SSS", 3)
+    found = solve(system, near=False)
+    assert (found.complex, found.complete, found.continuum) == (16, False, None)
+    assert among(goal, found) < 1e-9
+
+
+def with_angles(rng: Rng, kinds: str, angles: int) -> Draw:
+    """Some vectors of the platform keep their angles with directions of the base."""
+    drawn = spatial(rng, kinds)
+    arrows, hub = rng.normal(size=(angles, 3)), rng.normal(size=3)
+    planes = tuple(Plane(hub + drawn.goal[:3, :3] @ arrow, unit(rng.normal(size=3))) for arrow in arrows)
+    curves, tips = (*drawn.system.curves, *planes), np.vstack([drawn.system.tips, arrows])
+    return Draw(Spatial(curves, tips, angles, hub), drawn.goal)
+
+
 def test_planes_alone_leave_eight_and_double_points_count_none():
     system, _ = spatial(np.random.default_rng(5), "EEEEEE")
     assert all(isinstance(curve, Plane) for curve in system.curves)
