@@ -50,12 +50,12 @@ def animation(found: Servo) -> bytes:
     stage = LegRenderer(setting.mechanism, _camera(found), question.reference,
                         cylinders(setting.mechanism, question.observations))
     wanted = _lit(stage.picture(found.target.pose))
+    paper = np.where(_bare(wanted)[..., None], 1.0, 1.0 - WANTED * (1.0 - wanted))
     sheet = Sheet(found)
     frames = []
     moments = _moments(np.array([at.pose(setting.motion.link)[:3, 3] for at in configurations]), found.errors)
     for number, words in zip(moments, captions(found, moments), strict=True):
         seen = _lit(stage.picture(configurations[number].pose))
-        paper = np.where(_bare(wanted)[..., None], 1.0, 1.0 - WANTED * (1.0 - wanted))
         frame = sheet.at(number, words)
         frame[:, : seen.shape[1]] = 255 * np.where(_bare(seen)[..., None], paper, seen)
         frames.append(Image.fromarray(frame).quantize(SHADES, dither=Image.Dither.NONE))
@@ -147,10 +147,16 @@ def _moments(places: Array, errors: Array) -> list[int]:
 def _lit(picture: Array) -> Array:
     """A picture on black, 0 to 255, as colours between 0 and 1, what is dark grey made lighter."""
     bright = picture / 255.0
-    grey = (np.ptp(bright, axis=2) < 0.05) & (bright.max(axis=2) > 0.5 * GREY)
+    high, low = _brightest(bright), -_brightest(-bright)
+    grey = (high - low < 0.05) & (high > 0.5 * GREY)
     return np.where(grey[..., None], 0.6 + 0.0 * bright, bright)
 
 
 def _bare(colours: Array) -> Array:
     """Where nothing is."""
-    return np.asarray(colours.max(axis=2) < 0.5 * GREY)
+    return np.asarray(_brightest(colours) < 0.5 * GREY)
+
+
+def _brightest(colours: Array) -> Array:
+    """The largest of the three channels, faster than a reduction over a short axis."""
+    return np.maximum(np.maximum(colours[..., 0], colours[..., 1]), colours[..., 2])
