@@ -237,5 +237,7 @@ UNMOVED = 1e-9
 """Metres, radians below which a platform has not moved along an axis, or not turned, in the picture of a run."""
 REST_OF_RUN = 1e-3
 """Part of the largest error below which the rest of a run is not drawn."""
+LARGEST_FIRST_ORDER = 1.0
+"""Error of a pose (characteristic lengths, radians) above which what was computed to first order bounds nothing."""
 SLIDER_ARRIVED = 1e-6
 """Difference (metres, radians) within which the platform has come to where a slider sent it."""

@@ -226,7 +226,7 @@ def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     assert err == ""
     assert execute([*arguments, "--size", "1", "--seconds", "100"]) == 0
     assert "deprecated" in capsys.readouterr().err
-    assert execute(["select", "quattro", "--start", "x=9", "--goal", "x=0"]) == 2
+    assert execute(["select", "quattro", "--start", "x=9", "--goal", "x=0"]) == 3
     assert len(capsys.readouterr().err.splitlines()) == 1
 
 

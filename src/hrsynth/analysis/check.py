@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..batch.reach import sweep
+from ..errors import PlaneNotMet
 from ..mechanism.pose import SCALARS, Grid, PoseLike, asked_poses
 from ..progress import tell
 from ..results import Result, Value
@@ -28,6 +29,8 @@ class GridCheck(Value):
 
     grid: Grid
     postures: tuple[Posture | None, ...]
+    free: tuple[str, ...]
+    """The parts of the pose that are neither varied nor held."""
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -45,8 +48,8 @@ class GridCheck(Value):
         fixed = {name: values[0] for name, values in self.grid.fixed.given.items() if name in SCALARS}
         rpy = {} if self.grid.fixed.rpy is None else {"rpy": list(self.grid.fixed.rpy)}
         return {"axes": list(self.grid.names), **{name: values.tolist() for name, values in self.grid.axes},
-                "fixed": {**fixed, **rpy}, "state": np.array(self.states, dtype=object).reshape(shape).tolist(),
-                **nested}
+                "fixed": {**fixed, **rpy}, "free": list(self.free),
+                "state": np.array(self.states, dtype=object).reshape(shape).tolist(), **nested}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -88,11 +91,11 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
     values are those of random samples. ``observe`` and ``camera`` as for ``derive``.
 
     Raises ``BadRequest`` for names that there are not and for parts of a pose that the platform cannot change,
-    ``PoseNotReached`` for poses out of reach.
+    ``PoseNotReached`` for poses out of reach, ``PlaneNotMet`` for a grid of them.
     """
     poses = asked_poses(at)
     cells = Grid.parse(grid) if isinstance(grid, str) else grid
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed).telling(poses)
     examiner = ConfigurationAnalysis.of(setting)
     start, question, motion = setting.everything.start, setting.everything.question, setting.motion
     configurations = configurations_at(setting, poses) or [start]
@@ -101,5 +104,8 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
     swept = None
     if cells is not None:
         found = sweep(start, question, cells, motion, setting.placer)
-        swept = GridCheck(cells, tuple(None if each is None else examiner.classify(each) for each in found))
+        if not any(found):
+            raise PlaneNotMet(setting.robot.name, f"the grid {cells}", f"none of {len(found)} is")
+        swept = GridCheck(cells, tuple(None if each is None else examiner.classify(each) for each in found),
+                          motion.free({*cells.names, *cells.fixed.given}))
     return Check(setting, postures, listed(examiner.redundant, generic=True), swept)

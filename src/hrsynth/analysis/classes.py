@@ -97,7 +97,7 @@ def interaction_matrix(found: Relation) -> Array | None:
 
 @dataclass(frozen=True)
 class Redundancy:
-    """``rows`` constraints of the loop that is closed at joint ``loop`` repeat what earlier loops say already; at all
+    """``rows`` constraints of the loop that the file calls ``loop`` repeat what earlier loops say already; at all
     configurations where ``generic``."""
 
     loop: str

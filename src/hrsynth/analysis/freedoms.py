@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..geometry.ranks import kernel_basis, range_basis
-from ..geometry.vectors import Array, unit
+from ..geometry.vectors import Array, oriented, unit
 from ..mechanism import JointType
 from ..mechanism.legs import LegDecomposition
 from ..results import Value
@@ -56,7 +56,7 @@ def name_freedoms(twists: Array, anatomy: LegDecomposition, labels: tuple[str, .
             break
         rest = _without(column, found)
         if np.linalg.norm(rest[3:]) > NAMED and not _spanned(rest, found):
-            twist = rest / np.linalg.norm(rest[3:])
+            twist = rest / (rest[3:] @ oriented(unit(rest[3:])))
             origin = anatomy.mechanism.links[anatomy.mechanism.platform].pose[:3, 3] if position is None else position
             found.append(Freedom(twist, _screw(origin, twist)))
     return tuple(found)
@@ -102,7 +102,7 @@ def _nice_directions(basis: Array, anatomy: LegDecomposition) -> list[Array]:
         if len(chosen) < basis.shape[1] and np.linalg.norm(inside - candidate) < NAMED:
             stacked = np.column_stack([*chosen, candidate])
             if np.linalg.matrix_rank(stacked, tol=NAMED) == len(chosen) + 1:
-                chosen.append(unit(candidate))
+                chosen.append(oriented(unit(candidate)))
     return chosen
 
 

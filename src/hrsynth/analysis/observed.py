@@ -25,7 +25,7 @@ from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import LegDecomposition, decompose
 from ..mechanism.normal import NormalForm, normal_form
 from ..mechanism.observation import Direction, labels_of
-from ..mechanism.pose import Pose
+from ..mechanism.pose import RADIANS, ModeNumber, Pose, PoseForm
 from ..mechanism.sensors import default_observation, encoders, observation_of
 from ..progress import tell
 from ..results import Value, content
@@ -62,6 +62,8 @@ class ObservedRobot(Value):
     """Samples for the question of all default segments, and of the observed ones besides."""
     defaults: int
     """How many of the observations of ``everything`` are default segments; they come first."""
+    form: PoseForm = RADIANS
+    """How poses are told."""
 
     @classmethod
     def of(cls, robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *, samples: int = SAMPLES,
@@ -124,7 +126,16 @@ class ObservedRobot(Value):
     @cached_property
     def motion(self) -> PlatformMotion:
         """What the platform generically does."""
-        return PlatformMotion.of(self.configurations, self.everything.question)
+        return replace(PlatformMotion.of(self.configurations, self.everything.question), form=self.form)
+
+    def telling(self, poses: Iterable[Pose | ModeNumber]) -> ObservedRobot:
+        """The same, all that is known of it kept, which tells poses in the manner of these."""
+        form = PoseForm.of(poses)
+        if form == self.form:
+            return self
+        other: ObservedRobot = object.__new__(ObservedRobot)
+        other.__dict__.update(self.__dict__, form=form, motion=replace(self.motion, form=form))
+        return other
 
     @cached_property
     def samples(self) -> Samples:

@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..tolerances import NAMED
+
 Array = NDArray[np.float64]
 Numbers = NDArray[Any]
 """Floats, or objects: whole and rational numbers, balls, duals."""
@@ -27,6 +29,12 @@ def unit(vector: ArrayLike) -> Array:
     if not length > 0 or not np.isfinite(length):
         raise ValueError("a zero or infinite vector has no direction")
     return array / length
+
+
+def oriented(axis: Array) -> Array:
+    """An axis (3,) in the one sense in which axes are told: its largest component positive, of equal ones the first."""
+    sizes = np.abs(axis)
+    return axis if axis[np.argmax(sizes > (1 - NAMED) * sizes.max())] >= 0 else -axis
 
 
 def dot(a: Numbers, b: Numbers, axis: int = -1) -> Numbers:

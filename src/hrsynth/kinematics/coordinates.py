@@ -14,7 +14,7 @@ import numpy as np
 from ..budgets import SLIDER_PART
 from ..geometry.screws import point_velocity
 from ..geometry.so3 import logarithm, logarithm_rate, turn_about, wrap_angle
-from ..geometry.vectors import Array
+from ..geometry.vectors import Array, oriented
 from ..results import Value
 from ..tolerances import NO_SLIDER, SAME_DIRECTION
 from .configuration import ClosedConfiguration
@@ -129,5 +129,4 @@ class Coordinates(Value):
 
 def _axis(motion: PlatformMotion) -> Array:
     """The one axis about which a platform turns, (3,), with the sense of phi where that turns about it."""
-    axis = motion.rotations[:, 0]
-    return axis * np.sign(axis[np.argmax(np.abs(axis))])
+    return oriented(motion.rotations[:, 0])

@@ -8,6 +8,8 @@ welded to the other link.
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import numpy as np
 import pinocchio as pin
 
@@ -35,7 +37,7 @@ class PinocchioModel:
         for joint, parent in tree:
             self._add_tree(joint, parent)
         constraints = [self._loop(joint) for joint in loops]
-        self.loops = tuple(joint.name for joint in loops)
+        self._spanned = [joint for joint, _ in tree], loops
         self._gears = self._gear_rows()
         if self.model.nv > LARGEST_MODEL:
             raise BadRequest(f"{mechanism.name}: joints with {self.model.nv} coordinates", None,
@@ -62,6 +64,32 @@ class PinocchioModel:
     def __reduce__(self) -> tuple[type[PinocchioModel], tuple[Mechanism, float]]:
         """Pickled and copied by its recipe: Pinocchio's own objects are built again."""
         return type(self), (self.mechanism, self.length)
+
+    @cached_property
+    def loops(self) -> tuple[str, ...]:
+        """The names of the loops, as the file has them: each cut that the file has elsewhere is called by a loop of the
+        file in the ring that it closes, no two by the same (the exchange of two spanning trees)."""
+        tree, cuts = self._spanned
+        way: dict[str, frozenset[str]] = {self.mechanism.base: frozenset()}
+        for joint, near, far in graphs.outward(self.mechanism.base, tree):
+            way[far] = way[near] | {joint.name}
+        rings = {joint.name: [name for name in (joint.name, *sorted(way[joint.predecessor] ^ way[joint.successor]))
+                              if not self.mechanism.joints[name].in_tree] for joint in cuts}
+        called: dict[str, str] = {}
+
+        def give(name: str, asked: set[str]) -> bool:
+            for loop in rings[name]:
+                if loop not in asked:
+                    asked.add(loop)
+                    if loop not in called or give(called[loop], asked):
+                        called[loop] = name
+                        return True
+            return False
+
+        for name in rings:
+            give(name, set())
+        names = {name: loop for loop, name in called.items()}
+        return tuple(names.get(joint.name, joint.name) for joint in cuts)
 
     def _seen_from_body(self, link: str) -> Array:
         X = self.mechanism.links[link].pose.copy()

@@ -5,7 +5,7 @@ Lengths in characteristic lengths, so that positions and turns mix; base axes th
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,8 +14,8 @@ from ..errors import BadRequest
 from ..geometry.ranks import range_basis
 from ..geometry.screws import point_velocity
 from ..geometry.so3 import between, exponential, logarithm, turn_about, wrap_angle
-from ..geometry.vectors import Array, transform
-from ..mechanism.pose import Pose
+from ..geometry.vectors import Array, oriented, transform
+from ..mechanism.pose import RADIANS, Pose, PoseForm, written
 from ..results import Value
 from ..tolerances import AS_PRINTED, RANK_CUTOFF
 from .configuration import ClosedConfiguration
@@ -113,6 +113,8 @@ class PlatformMotion(Value):
     twists: Array
     dof: int
     """Freedoms at a generic configuration; ``twists`` spans more where they change from pose to pose."""
+    form: PoseForm = RADIANS
+    """How poses are told."""
 
     @classmethod
     def of(cls, configurations: Iterable[ClosedConfiguration], question: Measurement) -> PlatformMotion:
@@ -138,7 +140,7 @@ class PlatformMotion(Value):
         normal = self.rotations[:, 0]
         if np.linalg.norm(normal @ self.translations) > RANK_CUTOFF:
             return np.array([0.0, 0.0, 1.0])
-        return normal * np.sign(normal[np.argmax(np.abs(normal))])
+        return oriented(normal)
 
     @property
     def planar(self) -> bool:
@@ -153,13 +155,32 @@ class PlatformMotion(Value):
             found.append("phi")
         return (*found, "rpy") if self.rotations.shape[1] else tuple(found)
 
+    def free(self, given: Collection[str]) -> tuple[str, ...]:
+        """What is left of a pose of which these parts are given, in words."""
+        turned = self.rotations.shape[1] if "rpy" in given else int("phi" in given)
+        if sum(name in "xyz" for name in given) + turned >= self.dof:
+            return ()
+        left = [name for name in self.parts if name in "xyz" and name not in given]
+        if not self.rotations.shape[1] or "rpy" in given:
+            return tuple(left)
+        if "phi" not in given:
+            return (*left, "phi" if self.rotations.shape[1] == 1 and "phi" in self.parts else "orientation")
+        return tuple(left) if self.rotations.shape[1] == 1 else (*left, "orientation but phi")
+
     def position(self, X: Array) -> Array:
         """The position of the point at a platform pose X (4, 4), (3,)."""
         return transform(X, self.point)
 
     def pose(self, X: Array) -> Pose:
         """A platform pose X (4, 4) as a user writes it; of a point body the position alone."""
-        return Pose.of(X, None if self.body else self.point)
+        found = Pose.of(X, None if self.body else self.point)
+        if found.rotation is None or self.form == RADIANS:
+            return found
+        parts, turn = found.given, X[:3, :3] @ self.home[:3, :3].T
+        if self.form.phi and np.linalg.norm(turn @ self.normal - self.normal) <= AS_PRINTED:
+            parts["phi"] = (turn_about(self.normal, turn)[0],)
+            del parts["rpy"]
+        return replace(found, shown=written(parts, self.form.degrees))
 
     def goal(self, pose: Pose, robot: str = "the robot") -> Goal:
         """The goal that a pose asks for; raises ``BadRequest`` for parts that the platform cannot change."""
@@ -167,7 +188,7 @@ class PlatformMotion(Value):
         for name in constant:
             if not self._as_at_home(pose, name):
                 raise BadRequest(f"{robot}: the platform cannot change {name}", str(pose), self.parts or "no part")
-        pose = replace(pose, **dict.fromkeys(constant))
+        pose = pose.without(constant)
         normal, phi, rotation = self.normal, pose.phi, pose.rotation
         if rotation is not None and self.rotations.shape[1] == 1:
             turn, normal = rotation @ self.home[:3, :3].T, self.rotations[:, 0]

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from itertools import product
 from typing import Any, Protocol
 
@@ -36,6 +36,8 @@ class Pose:
     z: float | None = None
     phi: float | None = None
     rpy: tuple[float, float, float] | None = None
+    shown: str = field(default="", repr=False, compare=False)
+    """How it was typed, or is told where a pose was typed in that manner."""
 
     def __post_init__(self) -> None:
         if self.phi is not None and self.rpy is not None:
@@ -49,10 +51,10 @@ class Pose:
     @classmethod
     def parse(cls, text: str) -> Pose:
         """The pose that ``x=0.02,y=0.1,z=-0.7,phi=10deg`` says; raises ``BadRequest``."""
-        fields: dict[str, Any] = {}
-        for name, value in _fields(text, "pose"):
-            fields[name] = _triple(value, text) if name == "rpy" else _number(value, name, text)
-        return cls(**fields)
+        parts = _fields(text, "pose")
+        fields: dict[str, Any] = {name: _triple(value, text) if name == "rpy" else _number(value, name, text)
+                                  for name, value in parts}
+        return cls(**fields, shown=",".join(map("=".join, parts)))
 
     @classmethod
     def of(cls, X: Array, point: Array | None = None) -> Pose:
@@ -68,6 +70,11 @@ class Pose:
             name: None if (value := getattr(self, name)) is None else (value,) for name in SCALARS}
         return {name: values for name, values in {**parts, "rpy": self.rpy}.items() if values is not None}
 
+    def without(self, names: Iterable[str]) -> Pose:
+        """The same pose with these parts free."""
+        gone = set(names) & self.given.keys()
+        return Pose(**{name: getattr(self, name) for name in PARTS if name not in gone}) if gone else self
+
     @property
     def rotation(self) -> Array | None:
         """R_BP (3, 3) where rpy is given."""
@@ -80,7 +87,25 @@ class Pose:
         return record if self.phi is None else {**record, "phi": self.phi}
 
     def __str__(self) -> str:
-        return ",".join(f"{name}={'/'.join(map(_written, values))}" for name, values in self.given.items())
+        return self.shown or written(self.given)
+
+
+@dataclass(frozen=True)
+class PoseForm:
+    """How a user writes poses: a turn by ``phi`` where it is one, angles in ``degrees``."""
+
+    phi: bool = False
+    degrees: bool = False
+
+    @classmethod
+    def of(cls, poses: Iterable[Pose | ModeNumber]) -> PoseForm:
+        """The manner of these poses."""
+        typed = [each for each in poses if isinstance(each, Pose)]
+        return cls(any(each.phi is not None or "phi=" in each.shown for each in typed),
+                   any("deg" in each.shown for each in typed))
+
+
+RADIANS = PoseForm()
 
 
 @dataclass(frozen=True)
@@ -246,6 +271,13 @@ def rpy_of(R: Array) -> tuple[float, float, float]:
     return math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1]), pitch, yaw
 
 
+def written(parts: Mapping[str, tuple[float, ...]], degrees: bool = False) -> str:
+    """Parts of a pose in one line, angles in radians or ``degrees``."""
+    return ",".join(f"{name}={'/'.join(_written(round(math.degrees(v), 6)) + 'deg' for v in values)}"
+                    if degrees and name in ("phi", "rpy") else f"{name}={'/'.join(map(_written, values))}"
+                    for name, values in parts.items())
+
+
 def _written(value: float) -> str:
     """Six digits, and six decimals, so that a pose is met again to ``AS_PRINTED`` when it is typed back."""
     return f"{round(value, 6) + 0.0:.15g}" if abs(value) >= 1 else f"{round(value, 9) + 0.0:.6g}"
@@ -254,10 +286,10 @@ def _written(value: float) -> str:
 def _fields(text: str, what: str) -> list[tuple[str, str]]:
     """Name and value of each part, in order, each name once."""
     found: list[tuple[str, str]] = []
-    for field in text.split(","):
-        name, equals, value = (piece.strip() for piece in field.partition("="))
+    for part in text.split(","):
+        name, equals, value = (piece.strip() for piece in part.partition("="))
         if not equals:
-            raise BadRequest(f"{what}: not name=value", field.strip(), EXAMPLE)
+            raise BadRequest(f"{what}: not name=value", part.strip(), EXAMPLE)
         if name not in PARTS:
             raise BadRequest(f"{what}: unknown part", name, PARTS)
         if name in dict(found):

@@ -63,8 +63,7 @@ def distance_map(found: Check) -> bytes:
     grid = found.grid
     assert grid is not None
     if all(value is None for value in grid.values("type2")):
-        what = "no pose of the grid is reached" if set(grid.states) == {UNREACHABLE} else "Mᵀ exists nowhere"
-        raise BadRequest(f"{found.setting.robot.name}: there is nothing to draw: {what}", None,
+        raise BadRequest(f"{found.setting.robot.name}: there is nothing to draw: Mᵀ exists nowhere", None,
                          "another grid, or a table (.csv)")
     numbers = np.array([np.nan if value is None else value for value in grid.values("type2")]).reshape(grid.grid.shape)
     states = np.array(grid.states).reshape(grid.grid.shape)

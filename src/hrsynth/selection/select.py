@@ -21,7 +21,7 @@ from ..analysis.posture import ConfigurationAnalysis, Posture
 from ..analysis.question import question
 from ..analysis.verdict import CONTROLLABLE, verdict_of
 from ..budgets import AXIS_SEEN
-from ..errors import BadRequest, HrsynthError, PoseNotReached
+from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.observation import Direction
@@ -197,18 +197,14 @@ def select(robot: RobotLike, camera: str | None = None, *, start: PoseLike, goal
     simulated run ends elsewhere. Modes and aspects are asked for the ``examine`` most accurate sets, the others are
     neither kept nor discarded. Runs are made from the best set on, until ``runs`` of them ended at the goal.
 
-    Raises ``BadRequest``, ``PoseNotReached`` (exit status 2).
+    Raises ``BadRequest``, ``PoseNotReached``.
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    setting = ObservedRobot.of(robot, None, camera, seed=seed)
+    setting = ObservedRobot.of(robot, None, camera, seed=seed).telling(wanted)
     directions = tuple(o for o in setting.segments if isinstance(o, Direction))
     setting = replace(setting, observed=directions)
     half = half_angles(cone, directions)
-    try:
-        ends = configurations_at(setting, wanted)
-    except PoseNotReached as error:
-        error.exit_status = 2
-        raise
+    ends = configurations_at(setting, wanted)
     work = _Work(setting, ends[0], ends[1], half, _sight(setting, ends, criteria), criteria,
                  np.inf if criteria.seconds is None else time.monotonic() + criteria.seconds, seed)
     sets = [legs for count in range(1, min(criteria.size, len(directions)) + 1)

@@ -14,7 +14,7 @@ from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
 from ..analysis.question import question
 from ..analysis.verdict import verdict_of
 from ..budgets import LONGEST_RUN, RUN_EVALUATIONS
-from ..errors import BadRequest, PoseNotReached, RankUndecided
+from ..errors import BadRequest, RankUndecided
 from ..geometry.so3 import angle_of
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
@@ -117,7 +117,7 @@ def servo(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
     ``gain``, ``sense``, ``noise``, ``bias``, ``lens``, ``physics``, ``duration``, ``time``.
 
     Raises ``BadRequest`` for names that there are not, legs that do not see the platform, singular poses;
-    ``PoseNotReached`` (exit status 2) for poses out of reach; ``MissingExtra``.
+    ``PoseNotReached`` for poses out of reach; ``MissingExtra``.
     """
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     task = ServoTask.of(setting, start=start, goal=goal, conditions=conditions, seed=seed)
@@ -142,18 +142,15 @@ class ServoTask:
            seed: int = 0) -> ServoTask:
         """The task of a request; raises what :func:`servo` raises."""
         wanted = [asked_pose(each) for each in (start, goal)]
+        setting = setting.telling(wanted)
         _require_seen(setting)
         motion = setting.motion
         law = Law(setting.samples.question, setting.dof, conditions.gain)
-        try:
-            ends = configurations_at(setting, wanted)
-            desired: FixedDirections | Trajectory = FixedDirections(directions(ends[1], law.question)[0])
-            if conditions.duration is not None:
-                goal_pose = whole(motion, ends[1].pose(motion.link))
-                desired, ends[1] = straight(ends[0], motion, goal_pose, law.question, conditions.duration)
-        except PoseNotReached as error:
-            error.exit_status = 2
-            raise
+        ends = configurations_at(setting, wanted)
+        desired: FixedDirections | Trajectory = FixedDirections(directions(ends[1], law.question)[0])
+        if conditions.duration is not None:
+            goal_pose = whole(motion, ends[1].pose(motion.link))
+            desired, ends[1] = straight(ends[0], motion, goal_pose, law.question, conditions.duration)
         analysis = ConfigurationAnalysis.of(setting)
         for name, at in zip(("start", "goal"), ends, strict=True):
             _require_regular(analysis, name, at)

@@ -83,7 +83,7 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: str | None = No
         raise BadRequest("number of samples", nonlinear, "none or more")
     held = None if plane is None else as_pose(plane)
     cells = Grid.parse(grid, LARGEST_FIELD) if isinstance(grid, str) else grid
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed).telling(wanted)
     if not all(isinstance(o, Direction) for o in setting.observed):
         raise BadRequest("cones apply to directions only", ", ".join(setting.labels), "directions of legs")
     half = half_angles(cone, setting.observed)

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...batch.error_bounds import bounds_of
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, oriented
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, relation
 from ...mechanism.pose import Pose
@@ -103,8 +103,8 @@ def _extent(J: Array, cones: Array, largest: float, lower: float) -> ErrorEllips
     if not span.shape[1]:
         return ErrorEllipsoid(0.0, None, 0.0, None, None)
     inside = blocks @ span
-    w = span @ _ascended(inside)
-    low = span @ _descended(inside)
+    w = oriented(span @ _ascended(inside))
+    low = oriented(span @ _descended(inside))
     pulls = blocks @ w
     sizes = np.linalg.norm(pulls, axis=1)
     errors = cones[:, None] * pulls / np.where(sizes > 0, sizes, 1.0)[:, None]

@@ -115,7 +115,7 @@ def between(answer: PathAnswer, coordinates: PathCoordinates, ways: Sequence[Pat
             found.append(motion.pose(coordinates.frame(p, R)))
             continue
         here = _led(here, coordinates, p)
-        found.append(Pose.of(here.pose(motion.link), None if answer.setting.anatomy.point is None else motion.point))
+        found.append(motion.pose(here.pose(motion.link)))
     return found
 
 
@@ -267,7 +267,7 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, 
     Raises ``BadRequest`` for names and parts of a pose that there are not, ``PoseNotReached``.
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    aspects = Aspects.of(robot, observe, camera, seed=seed)
+    aspects = Aspects.of(ObservedRobot.of(robot, observe, camera, seed=seed).telling(wanted), seed=seed)
     tell("poses")
     first, last = configurations_at(aspects.setting, wanted, by_modes=True)
     return aspects.join(first, last, seed=seed, budget=budget)

@@ -187,10 +187,11 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
     if real and observe not in (None, "all", ["all"]):
         raise BadRequest("the motors are held instead of directions", f"real with observe {observe}", "one of the two")
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    asked = None if at is None or isinstance(at, ClosedConfiguration) else as_pose(at)
+    setting = setting if asked is None else setting.telling([asked])
     motion, wanted = setting.motion, None
     goal = at if isinstance(at, ClosedConfiguration) else setting.everything.start
-    if at is not None and not isinstance(at, ClosedConfiguration):
-        asked = as_pose(at)
+    if asked is not None:
         wanted = motion.goal(asked, setting.robot.name)
         goal = reach(goal, setting.everything.question, asked, motion)
     measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)

@@ -162,7 +162,7 @@ def _axes(start: ClosedConfiguration, motion: PlatformMotion, plane: Pose | None
     plane = plane or Pose()
     name = start.twin.mechanism.name
     motion.goal(plane, name)
-    plane = replace(plane, **dict.fromkeys(part for part in plane.given if part not in motion.parts))
+    plane = plane.without(part for part in plane.given if part not in motion.parts)
     fixed = set(plane.given)
     turned = bool(fixed & {"phi", "rpy"})
     parts = [part for part in motion.parts if part != "rpy" and not (part == "phi" and turned)]

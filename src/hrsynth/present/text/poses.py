@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import textwrap
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -14,14 +15,14 @@ from ...analysis.aspects.path import UNDECIDED as UNDECIDED_PAIR
 from ...analysis.posture import CONSTRAINT, REGULAR, UNDECIDED
 from ...tolerances import NOISE, RANK_GAP
 from .robots import NO_MATRIX
-from .tables import GAP, Rows, camera, head, known, listing
+from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, known, listing
 
 if TYPE_CHECKING:
     from ...analysis.aspects.atlas import Atlas, ModePair
     from ...analysis.aspects.path import PathAnswer
-    from ...analysis.check import Check
+    from ...analysis.check import Check, GridCheck
     from ...analysis.modes.modes import AssemblyMode, AssemblyModes
-    from ...analysis.posture import Kinds, Posture
+    from ...analysis.posture import Distances, Kinds, Posture
     from ...analysis.singularity.singular import Singularity
 
 _STATES = {REGULAR: "regular", "type1": "Type 1 singularity", "type2": "Type 2 singularity",
@@ -35,26 +36,38 @@ def check(found: Check) -> str:
     rows = [*head(found.setting), *camera(found.setting),
             ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians")]
     for posture in found.postures:
-        rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture)]
-    redundant = [f"the loop cut at {each.loop}: {each.rows} of its constraints" for each in found.redundant]
+        rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture, found.length)]
+    redundant = [f"the loop {each.loop}: {each.rows} of its constraints" for each in found.redundant]
     rows += [*GAP, ("redundant", redundant or "no constraint")]
     if found.grid is not None:
         counts = Counter(found.grid.states)
         axes = zip(found.grid.grid.shape, found.grid.grid.names, strict=True)
         size = " × ".join(f"{count} {name}" for count, name in axes)
-        rows.append(("grid", f"{size}: " + ", ".join(f"{counts[state]} {state}" for state in sorted(counts))))
+        fixed, free = str(found.grid.grid.fixed), ", ".join(_free(found.grid))
+        rows.append(("grid", [
+            f"{size}: " + ", ".join(f"{counts[state]} {state}" for state in sorted(counts)),
+            *([f"held: {fixed}"] if fixed else []),
+            f"free, at each pose nearest to the zero configuration: {free}" if free else "no part is free"]))
     return listing(rows)
 
 
-def _posture(posture: Posture) -> Rows:
+def _free(grid: GridCheck) -> Iterator[str]:
+    """The parts of the pose that a grid leaves free, positions with their range."""
+    poses = [each.pose for each in grid.postures if each is not None]
+    for name in grid.free:
+        values = [value for pose in poses if (value := getattr(pose, name, None)) is not None]
+        low, high = (f"{round(bound(values), 6) + 0.0:.4g}" for bound in (min, max)) if values else ("", "")
+        yield name if not values else f"{name} = {low}" if low == high else f"{name} {low} to {high}"
+
+
+def _posture(posture: Posture, length: float) -> Rows:
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
     rows = [("mobility", f"{mobility.total}, of which {mobility.idle} idle; the platform has "
              + ("one freedom" if dof == 1 else f"{dof} freedoms")),
             *_kinds("hidden robot", f"the directions show {posture.hidden.rank} of {dof}", posture.hidden, "not seen")]
     if far.condition is not None and far.type2 is not None and far.type1 is not None:
         rows += [("", f"singular values of Mᵀ {far.type2:.3g} to {1 / far.type1:.3g}, condition {far.condition:.3g}"),
-                 ("", f"one degree of error in the directions, to first order: {_small(far.millimetres)} mm and "
-                      f"{_small(far.degrees)} degrees along the weakest freedom that they show")]
+                 ("", f"one degree of error in the directions{_moved(far, length)}")]
         if far.condition > 1 / NOISE:
             rows.append(("", f"nearly singular: dimensions known to {NOISE:g} cannot tell it from a singularity"))
     elif far.type2 is None:
@@ -65,7 +78,7 @@ def _posture(posture: Posture) -> Rows:
         rows += _kinds("real robot", f"the motors determine {posture.real.rank} of {dof}", posture.real, "not held")
     if posture.constraint_singular:
         rows.append(("loops", ["lose rank here, the platform has", *(freedom.name for freedom in posture.gained)]))
-    rows += [("redundant here", f"the loop cut at {each.loop}: {each.rows} more of its constraints")
+    rows += [("redundant here", f"the loop {each.loop}: {each.rows} more of its constraints")
              for each in posture.redundant]
     return [*rows, ("loops' margin", f"{far.constraints:.3g} (weakest singular value, as part of the largest)")]
 
@@ -78,8 +91,17 @@ def _kinds(name: str, what: str, kinds: Kinds, lost: str) -> Rows:
     return [(name, [title, f"over the generic values: {counts}"]), *((lost, freedom.name) for freedom in kinds.lost)]
 
 
-def _small(value: float | None) -> str:
-    return "no limit" if value is None else f"{0.0 if value < 1e-9 else value:.3g}"
+def _moved(far: Distances, length: float) -> str:
+    """How far one degree of error moves the platform, where that is a small motion."""
+    if far.millimetres is None or far.degrees is None or not (
+            bounded(far.millimetres / 1e3, length) and bounded(math.radians(far.degrees))):
+        return f": {NOT_BOUNDED}"
+    return (f", to first order: {_small(far.millimetres)} mm and {_small(far.degrees)} degrees along the weakest "
+            "freedom that they show")
+
+
+def _small(value: float) -> str:
+    return f"{0.0 if value < 1e-9 else value:.3g}"
 
 
 def singularity(found: Singularity, file: str | None = None) -> str:

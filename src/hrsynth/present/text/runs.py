@@ -9,11 +9,10 @@ import numpy as np
 
 from ...geometry.vectors import Array
 from ...tolerances import DAMPED
-from .tables import GAP, Rows, camera, head, known, listing, table
+from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, known, listing, table
 
 if TYPE_CHECKING:
     from ...analysis.accuracy.accuracy import Accuracy
-    from ...analysis.accuracy.error_map import ErrorMap
     from ...analysis.accuracy.pose_errors import ErrorEllipsoid, PoseErrors
     from ...analysis.accuracy.sampled import Sampled
     from ...selection.select import Candidate, ModeCount, Selection
@@ -76,25 +75,28 @@ def accuracy(found: Accuracy, file: str | None = None) -> str:
                                          for o, cone in zip(found.setting.observed, found.cones, strict=True))),
             *camera(found.setting),
             ("errors", "largest over all errors of the directions inside their cones, to first order")]
+    length = found.setting.everything.twin.length
     if found.field is not None:
-        rows += [*GAP, *field_rows(found.field)]
+        rows += [*GAP, *field_rows(found)]
     for errors, true in zip(found.poses, found.sampled, strict=True):
-        rows += [*GAP, ("pose", str(errors.pose)), *_extent("position", errors.position, 1e3, "mm"),
+        rows += [*GAP, ("pose", str(errors.pose)), *_extent("position", errors.position, 1e3, "mm", length),
                  *_extent("orientation", errors.orientation, 180 / np.pi, "degrees"),
                  *([] if true is None else _samples(errors, true))]
     return listing([*rows, *(() if file is None else [*GAP, ("written", file)])])
 
 
-def field_rows(field: ErrorMap) -> list[tuple[str, str]]:
+def field_rows(found: Accuracy) -> list[tuple[str, str]]:
     """What a grid holds: its size, what is reached of it, the range of the errors, how they were checked."""
+    field, length = found.field, found.setting.everything.twin.length
+    assert field is not None
     grid = field.grid
     size = " × ".join(f"{count} {name}" for count, name in zip(grid.shape, grid.names, strict=True))
     ranges = ", ".join(f"{name} {values[0]:.4g} to {values[-1]:.4g}" for name, values in grid.axes)
     fixed = str(grid.fixed)
     rows = [("poses", f"{size}: {ranges}" + (f"; {fixed}" if fixed else "")),
             ("reached", f"{np.sum(field.reached)} of {field.reached.size}"),
-            ("position", _range(1e3 * field.position, "mm")),
-            ("orientation", _range(np.degrees(field.orientation), "degrees"))]
+            ("position", _range(field.position, 1e3, "mm", length)),
+            ("orientation", _range(field.orientation, 180 / np.pi, "degrees"))]
     if field.spots is not None and field.spots.count:
         rows.append(("checked", f"against Pinocchio at {field.spots.count} random poses, largest difference "
                                 f"{field.spots.difference:.1e}"))
@@ -103,14 +105,15 @@ def field_rows(field: ErrorMap) -> list[tuple[str, str]]:
     return rows
 
 
-def _range(errors: Array, unit: str) -> str:
-    finite = errors[np.isfinite(errors)]
+def _range(errors: Array, unit: float, word: str, length: float = 1.0) -> str:
     if not np.nanmax(errors, initial=0.0) > 0:
         return "no errors: the platform does not move so"
-    text = (f"{finite.min():.4g} to {finite.max():.4g} {unit}, median {np.median(finite):.4g}" if finite.size
-            else "infinite")
-    lost = int(np.sum(np.isinf(errors)))
-    return text + (f"; infinite at {lost} poses, where a freedom is lost" if lost and finite.size else "")
+    kept, lost = errors[bounded(errors, length)], int(np.sum(np.isinf(errors)))
+    loose = int(np.sum(~np.isnan(errors))) - kept.size - lost
+    text = [f"{unit * kept.min():.4g} to {unit * kept.max():.4g} {word}, median {unit * np.median(kept):.4g}"] if (
+        kept.size) else []
+    text += [f"{NOT_BOUNDED} at {loose} poses"] * (loose > 0)
+    return "; ".join([*text, *[f"infinite at {lost} poses, where a freedom is lost"] * (lost > 0)])
 
 
 def _samples(errors: PoseErrors, true: Sampled) -> Rows:
@@ -129,9 +132,11 @@ def _samples(errors: PoseErrors, true: Sampled) -> Rows:
     return [("samples", lines)]
 
 
-def _extent(name: str, extent: ErrorEllipsoid, unit: float, word: str) -> Rows:
+def _extent(name: str, extent: ErrorEllipsoid, unit: float, word: str, length: float = 1.0) -> Rows:
     if not np.isfinite(extent.largest):
         return [(name, "infinite: a freedom is lost here")]
+    if not bounded(extent.largest, length):
+        return [(name, f"{NOT_BOUNDED}: a singularity is near")]
     if extent.direction is None:
         return [(name, "no error: the platform does not move so")]
     lines = [f"{unit * extent.largest:.4g} {word}, along {_vector(extent.direction)}"]
@@ -152,6 +157,7 @@ def _vector(vector: Array) -> str:
 def selection(found: Selection) -> str:
     """The displacement, the table, the reasons."""
     observed, sight = found.setting.observed, found.sight is not None
+    length = found.setting.everything.twin.length
     cones = dict.fromkeys(f"{np.degrees(cone):.4g}°" for cone in found.cones)
     angle = next(iter(cones)) if len(cones) == 1 else ", ".join(
         f"{o.leg} {np.degrees(cone):.4g}°" for o, cone in zip(observed, found.cones, strict=True))
@@ -165,11 +171,12 @@ def selection(found: Selection) -> str:
     blocks = [listing(rows)]
     if found.kept:
         heads = ["legs", "mm", "degrees", "modes", "aspect", *(["seen"] if sight else []), "run"]
-        blocks.append(table([_row(each, sight) for each in found.kept], heads))
+        blocks.append(table([_row(each, sight, length) for each in found.kept], heads))
         blocks.append("mm, degrees: largest errors at the goal; modes: those of the start / of the goal, in brackets\n"
                       "those that the robot was found to reach; – not computed")
     if found.unexamined:
-        blocks.append(table([_row(each, sight)[:3] for each in found.unexamined], ["not examined", "mm", "degrees"]))
+        blocks.append(table([_row(each, sight, length)[:3] for each in found.unexamined],
+                            ["not examined", "mm", "degrees"]))
     discarded = [each for each in found.candidates if each.discarded is not None]
     if discarded:
         blocks.append(table([(", ".join(each.legs), str(each.discarded)) for each in discarded],
@@ -177,12 +184,14 @@ def selection(found: Selection) -> str:
     return "\n\n".join(blocks)
 
 
-def _row(each: Candidate, sight: bool) -> list[str]:
+def _row(each: Candidate, sight: bool, length: float) -> list[str]:
     errors = each.errors
     assert errors is not None
     seen = [] if not sight else ["–" if each.seen is None else f"{100 * min(each.seen.values()):.0f} %"]
-    return [", ".join(each.legs), f"{1e3 * errors.position.largest:.4g}",
-            f"{np.degrees(errors.orientation.largest):.4g}", f"{_modes(each.start_modes)} / {_modes(each.goal_modes)}",
+    position, orientation = errors.position.largest, errors.orientation.largest
+    return [", ".join(each.legs), f"{1e3 * position:.4g}" if bounded(position, length) else "not bounded",
+            f"{np.degrees(orientation):.4g}" if bounded(orientation) else "not bounded",
+            f"{_modes(each.start_modes)} / {_modes(each.goal_modes)}",
             "–" if each.aspect is None else each.aspect.verdict, *seen,
             "–" if each.run is None else each.run.verdict]
 

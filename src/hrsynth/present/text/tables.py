@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from ...tolerances import LARGEST_FIRST_ORDER
 
 if TYPE_CHECKING:
     from ...analysis.observed import ObservedRobot
 
 Rows = list[tuple[str, str | Sequence[str]]]
 """Names with their values: several stand under each other, none is no row."""
+NOT_BOUNDED = "not bounded to first order"
 GAP: Rows = [("", "")]
 """An empty line."""
 
@@ -37,6 +40,12 @@ def listing(rows: Iterable[tuple[str, str | Sequence[str]]]) -> str:
              for i, value in enumerate([values] if isinstance(values, str) else values)]
     head = max(len(name) for name, _ in lines)
     return "\n".join(f"{name:<{head}}  {value}".rstrip() for name, value in lines)
+
+
+def bounded(error: Any, length: float = 1.0) -> Any:
+    """Whether a displacement (m, with a characteristic ``length``) or a turn (rad) is one of which the first order
+    tells anything."""
+    return error <= LARGEST_FIRST_ORDER * length
 
 
 def known(name: str, value: str | None) -> Rows:

@@ -12,7 +12,7 @@ import numpy as np
 from ...analysis.derive import Derivation, derive
 from ...analysis.observed import LegsLike, ObservedRobot, RobotLike
 from ...analysis.question import question
-from ...geometry.vectors import Array
+from ...geometry.vectors import Array, oriented
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction
@@ -204,4 +204,4 @@ def plane_normal(motion: PlatformMotion) -> Array | None:
     normal = np.cross(*motion.translations.T)
     if motion.rotations.shape[1] > 1 or (motion.rotations.shape[1] and abs(normal @ motion.rotations[:, 0]) < 1 - 1e-6):
         return None
-    return np.asarray(normal * np.sign(normal[np.argmax(np.abs(normal))]))
+    return oriented(normal)

@@ -1,0 +1,142 @@
+"""What answers print: poses as they were typed, loops as the file names them, axes in one sense, numbers with sense."""
+
+from __future__ import annotations
+
+import math
+import re
+from itertools import pairwise
+
+import numpy as np
+import pytest
+
+import hrsynth
+from hrsynth.cli import execute
+from hrsynth.description import shipped
+from hrsynth.geometry.vectors import oriented
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
+from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.pose import Pose
+
+NUMBER = r"-?\d[\d.]*(?:e[-+]\d+)?"
+
+
+@pytest.fixture
+def printed(capsys: pytest.CaptureFixture[str]):
+    def call(text: str) -> str:
+        capsys.readouterr()
+        assert execute(text.split()) == 0, capsys.readouterr().err
+        return capsys.readouterr().out
+
+    return call
+
+
+ASKED = [("check quattro --observe 1,4 --at x=0.02,{}", 1), ("modes 3rrr_m1 --at x=0.01,{}", 3),
+         ("path 3rrr_m1 --start x=0,y=0,{} --goal x=0.02", 3), ("servo 3rrr_m1 --start {} --goal x=0.02", 3),
+         ("accuracy 3rrr_m1 --cone 0.1deg --at x=0.01,{}", 1), ("select 3rrr_m1 --start {} --goal x=0.02 --runs 0", 2)]
+
+
+@pytest.mark.parametrize(("command", "least"), ASKED, ids=lambda each: str(each).partition(" ")[0])
+@pytest.mark.parametrize(("typed", "said"), [("phi=5deg", rf"phi={NUMBER}deg"), ("phi=0.1", rf"phi={NUMBER}(?!\S*deg)"),
+                                             ("rpy=0/0/5deg", rf"rpy={NUMBER}deg/{NUMBER}deg/{NUMBER}deg")])
+def test_poses_print_as_they_were_typed(printed, command: str, least: int, typed: str, said: str):
+    text = printed(command.format(typed))
+    poses = re.findall(r"x=\S+", text)
+    assert len(poses) >= least
+    assert all(re.search(said, pose) for pose in poses), poses
+    assert re.search(rf"\b{re.escape(typed.replace('0/0/5deg', '0deg/0deg/5deg'))}\b", text)
+
+
+def test_a_pose_that_was_not_typed_in_degrees_is_in_radians(printed):
+    assert "rpy=0/0/0" in printed("check quattro --at x=0.02")
+
+
+@pytest.mark.parametrize("typed", ["phi=30deg", "phi=0.4", "rpy=0/0/20deg"])
+def test_what_is_printed_can_be_typed_again(typed: str):
+    first = hrsynth.check("quattro", at=f"x=0.02,y=0.01,z=-0.71,{typed}").postures[0].pose
+    again = hrsynth.check("quattro", at=str(first)).postures[0].pose
+    assert str(again) == str(first)
+    assert np.allclose([again.x, again.y, again.z, *again.rpy], [first.x, first.y, first.z, *first.rpy], atol=1e-6)
+    assert first.to_dict().keys() == {"x", "y", "z", "rpy"}
+
+
+def test_an_error_shows_a_pose_as_it_was_typed(capsys):
+    assert execute(["check", "quattro", "--at", "x=9,phi=30deg"]) == 3
+    assert "the pose x=9,phi=30deg is not reached" in capsys.readouterr().err
+    assert str(Pose.parse(" x = 0.020, phi = 10 deg")) == "x=0.020,phi=10 deg"
+    assert Pose.parse("phi=180deg") == Pose(phi=math.pi)
+
+
+def test_a_turn_that_is_not_phi_is_told_by_rpy():
+    found = hrsynth.check("gough_stewart", at=["phi=5deg", "rpy=10deg/5deg/0"])
+    assert str(found.postures[0].pose).endswith("phi=5deg")
+    assert str(found.postures[1].pose).endswith("rpy=10deg/5deg/0deg")
+
+
+@pytest.mark.parametrize("name", list(shipped()))
+def test_loops_are_named_as_in_the_file(name: str):
+    robot = hrsynth.load(name)
+    written = [joint.name for joint in robot.joints.values() if not joint.in_tree]
+    named = PinocchioModel(robot).loops
+    assert sorted(named) == sorted(written)
+    mechanism = normal_form(robot).mechanism
+    inside = {joint.name for joint in mechanism.joints.values() if not joint.in_tree}
+    assert {*PinocchioModel(mechanism).loops} >= inside & {*written}
+
+
+def test_a_cut_is_called_by_a_loop_of_its_own_ring():
+    """The redundant loop of a five-bar is the file's, not the joint at which the model is cut."""
+    (redundant,) = hrsynth.check("rrrrr_m1").redundant
+    assert (redundant.loop, redundant.rows) == ("end", 3)
+
+
+def test_axes_have_one_sense():
+    rng = np.random.default_rng(1)
+    for axis in rng.normal(size=(200, 3)):
+        assert np.array_equal(oriented(axis), oriented(-axis))
+        assert oriented(axis)[np.argmax(np.abs(axis))] > 0
+    for a, b in pairwise(rng.permuted(np.array([[1, -1, 1e-9]] * 20) / math.sqrt(2), axis=1)):
+        assert [oriented(v)[np.argmax(np.abs(v) > 0.5)] > 0 for v in (a, b, -a, -b)] == [True] * 4
+
+
+@pytest.mark.parametrize("name", ["quattro", "3prp", "uranesx", "3puu", "gough_stewart", "delta", "3rrr_m1"])
+def test_printed_axes_have_that_sense(printed, name: str):
+    text = printed(f"legs {name}")
+    if name != "gough_stewart":
+        text += printed(f"accuracy {name} --cone 0.1deg") if "controllable" in printed(
+            f"derive {name}").split("verdict")[1].split()[:1] else ""
+    vectors = [tuple(map(float, found)) for found in re.findall(
+        rf"along \(?({NUMBER}) ({NUMBER}) ({NUMBER})", text)]
+    assert vectors or "along" not in re.sub("along [xyz]", "", text)
+    for vector in vectors:
+        assert max(vector) >= 0.999 * max(map(abs, vector)), vector
+
+
+@pytest.mark.parametrize(("command", "said"), [
+    ("check rrrrr_m1 --at x=0,y=0.3332", "one degree of error in the directions: not bounded to first order"),
+    ("accuracy rrrrr_m1 --cone 0.1deg --at x=0,y=0.3332", "position     not bounded to first order"),
+    ("accuracy rrrrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0.3331:0.3332:2", "; not bounded to first order at 1 poses"),
+    ("accuracy rrrrr_m1 --cone 0.1deg --grid x=0:0.00001:2,y=0.3332:0.33320001:2",
+     "position     not bounded to first order at 4 poses\n")])
+def test_numbers_beyond_sense_are_not_printed(printed, command: str, said: str):
+    text = printed(command)
+    assert said in text
+    numbers = [float(number) for number in re.findall(rf"({NUMBER}) (?:mm|degrees)", text)]
+    assert all(number < 400 for number in numbers)
+
+
+def test_numbers_with_sense_are_printed(printed):
+    assert re.search(r"to first order: 5\.27 mm and 0\.816 degrees", printed("check rrrrr_m1"))
+
+
+@pytest.mark.parametrize(("robot", "grid", "lines"), [
+    ("quattro", "x=-0.1:0.1:3,y=0:0.1:3", ["free, at each pose nearest to the zero configuration: z = -0.7, phi"]),
+    ("quattro", "x=-0.1:0.1:3,z=-0.7", ["held: z=-0.7", "free, at each pose nearest to the zero configuration: y = 0, "
+                                        "phi"]),
+    ("quattro", "x=-0.1:0.1:3,y=0,z=-0.7,phi=10deg", ["held: y=0,z=-0.7,phi=10deg", "no part is free"]),
+    ("gough_stewart", "x=-0.01:0.01:2,y=0,z=0.3,phi=0", ["held: y=0,z=0.3,phi=0", "free, at each pose nearest to the "
+                                                         "zero configuration: orientation but phi"]),
+    ("rrrrr_m1", "x=0:0.02:2,y=0.2:0.22:2", ["no part is free"])])
+def test_a_grid_says_what_it_held(printed, robot: str, grid: str, lines: list[str]):
+    text = printed(f"check {robot} --grid {grid}")
+    rows = [line.strip() for line in text[text.index("\ngrid "):].splitlines()[2:]]
+    assert rows == lines
