@@ -287,7 +287,7 @@ def test_check_writes_a_picture_or_a_table(run, tmp_path: Path):
     (["--at", "x=9"], 3, ["x=9", "is not reached", "leg ", " mm", "% of the way"]),
     (["--grid", "x=0"], 2, ["number of ranges"]), (["--grid", "phi=0:1:3"], 2, ["cannot change phi"]),
     (["-o", "map.png"], 2, ["--grid"]),
-    (["--grid", "x=0:1:3", "-o", "map.pdf"], 2, ["unknown extension", ".png, .csv"]),
+    (["--grid", "x=0:1:3", "-o", "map.gif"], 2, ["unknown extension", ".png, .pdf, .svg, .csv"]),
     (["--grid", "x=5:6:2", "-o", "map.png"], 3, ["no pose of the grid x=5:6:2 is reached"]),
     (["--observe", "9"], 2, ["legs 1, 2, 3"]), (["--camera", "moon"], 2, ["'moon'"]),
 ])
@@ -541,7 +541,7 @@ def test_modes_text_numbers_them_and_says_what_is_proved(run):
     (["3rrr_m1", "--at", "x=9"], 3, ["x=9", "is not reached"]),
     (["3rrr_m1", "--at", "w=9"], 2, ["unknown part", "'w'"]),
     (["3rrr_m1", "--observe", "7"], 2, ["no leg or link", "'7'"]),
-    (["3rrr_m1", "-o", "modes.svg"], 2, ["modes.svg", ".png"]),
+    (["3rrr_m1", "-o", "modes.txt"], 2, ["modes.txt", ".png"]),
     (["3rrr_m1", "--real", "--observe", "1"], 2, ["motors are held", "one of the two"])])
 def test_modes_refuses_what_does_not_fit(run, arguments: list[str], status: int, words: list[str]):
     (line,) = run("modes", *arguments).refused(status)
@@ -584,7 +584,7 @@ def test_servo_text_names_the_mode_and_how_far_it_is(run):
     (["--goal", "x=0.1", "--sense", "touch"], ["touch", "exact, edges, pictures"]),
     (["--goal", "x=0.1", "--gain", "0"], ["gain", "positive"]),
     (["--goal", "x=0.1", "--time", "nan"], ["time", "positive"]),
-    (["--goal", "x=0.1", "-o", "run.svg"], ["run.svg", ".png"])])
+    (["--goal", "x=0.1", "-o", "run.txt"], ["run.txt", ".png"])])
 def test_servo_refuses_what_does_not_fit(run, arguments: list[str], words: list[str]):
     (line,) = run("servo", "delta", "--start", "x=0,y=0", *arguments).refused(2)
     assert all(word in line for word in words)

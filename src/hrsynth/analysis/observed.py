@@ -94,7 +94,7 @@ class ObservedRobot(Value):
 
     def _said(self) -> tuple[Any, ...]:
         at = [each.q for each in (self.everything.start, *self.configurations)]
-        return self.robot, content(self.observed), content(at)
+        return self.robot, self.form, content(self.observed), content(at)
 
     def headline(self) -> str:
         """The robot and the observed legs."""

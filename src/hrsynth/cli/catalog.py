@@ -101,13 +101,14 @@ def show(word: str, output: str | None, kept: str | None, json: bool) -> None:
     architecture = parse(word)
     if output is not None:
         targets(output)
-    record, note = _known(str(architecture), kept)
+    with Progress():
+        record, note = _known(str(architecture), kept)
     if output is not None:
         for warning in save(mechanism(architecture, record.get("attempt", 0)), output):
             warn(str(warning))
     drawn = drawing(architecture)
     _say("show", {"entry": dict(record), "drawing": drawn.splitlines(), "note": note or None, "file": output},
-         entry(record, drawn, note, output), json)
+         entry(record, drawn, note) + ("" if output is None else f"\n\nThe robot is written to {output}."), json)
 
 
 def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **asked: Any) -> None:

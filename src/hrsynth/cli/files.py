@@ -8,6 +8,7 @@ import typer
 
 from .commands import add_command
 from .options import JSON, NEEDED, SOURCE, Option, flag, robot_of, warn
+from .progress import Progress
 
 
 def robots(examples: bool, json: bool) -> None:
@@ -44,17 +45,18 @@ def convert(target: str, to: str | None, json: bool, **source: Any) -> None:
     from ..present.show import record
 
     files, name = [str(file) for file in targets(target, to)], source["robot"]
-    mechanism = robot_of(source)
-    for file in files:
-        require_other(file, name, mechanism.file)
-    lost = [str(warning) for warning in save(mechanism, target, to)]
+    with Progress():
+        mechanism = robot_of(source)
+        for file in files:
+            require_other(file, name, mechanism.file)
+        lost = [str(warning) for warning in save(mechanism, target, to)]
     for warning in lost:
         warn(warning)
     fields = {"file": target, "files": files, "links": len(mechanism.links), "joints": len(mechanism.joints),
               "warnings": lost}
     typer.echo(record("convert", mechanism.name, fields) if json
-               else f"{mechanism.name}: {fields['links']} links, {fields['joints']} joints, "
-                    f"written to {' and '.join(files)}")
+               else f"{mechanism.name} with {fields['links']} links and {fields['joints']} joints is written to "
+                    f"{' and '.join(files)}.")
 
 
 def verify(certificate: str, robot: str | None, json: bool) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import sys
+import threading
 import time
 from types import TracebackType
 from typing import Any, Self
@@ -12,23 +13,32 @@ SPEED_OVER = 600.0
 
 
 class Progress:
-    """A bar that appears when a command takes long: what it is at and its steps, whose number nobody knows, or
-    (``counted``) the parts of a build that are there of all, with the time left."""
+    """A bar that appears when a command takes long, whether or not that tells anything: what it is at and its steps,
+    whose number nobody knows, or (``counted``) the parts of a build that are there of all, with the time left."""
 
     def __init__(self, wait: float = 1.0, *, counted: bool = False) -> None:
         self._start = time.monotonic() + wait
         self._counted = counted
+        self._timer = threading.Timer(max(0.0, wait), self._begin)
+        self._timer.daemon = True
+        self._lock = threading.Lock()
+        self._what = "working"
         self._bar: Any = None
         self._steps = 0
         self._parts: dict[str, tuple[int, int]] = {}
 
     def __enter__(self) -> Self:
+        if sys.stderr.isatty() and not self._counted:
+            self._timer.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        if self._bar is not None:
-            self._bar.stop()
+        self._timer.cancel()
+        with self._lock:
+            self._start = float("inf")
+            if self._bar is not None:
+                self._bar.stop()
 
     def tell(self, what: str) -> None:
         """One more step done."""
@@ -42,12 +52,20 @@ class Progress:
         self._show(part, there, every)
 
     def _show(self, what: str, done: int, total: int | None = None) -> None:
-        if self._bar is None and time.monotonic() > self._start and sys.stderr.isatty():
-            self._bar = self._made()
-            self._bar.start()
-            self._bar.add_task("", total=None, completed=done)
+        self._what = what
+        if self._bar is None and self._counted:
+            self._begin()
         if self._bar is not None:
             self._bar.update(self._bar.task_ids[0], description=what, completed=done, total=total)
+
+    def _begin(self) -> None:
+        """Show the bar, once its time has come."""
+        with self._lock:
+            if self._bar is None and time.monotonic() >= self._start and sys.stderr.isatty():
+                bar = self._made()
+                bar.add_task(self._what, total=None, completed=self._steps)
+                bar.start()
+                self._bar = bar
 
     def _made(self) -> Any:
         """A bar of rich, which is imported here."""

@@ -49,7 +49,8 @@ class Question:
 
     def add(self, app: typer.Typer) -> None:
         """Make it a command."""
-        add_command(app, self.name, self.help, (SOURCE[0], *self.options, SEED, JSON, *SOURCE[1:]), self.answer,
+        drawn = FIGURE if any(each.drawn for each in OUTPUTS[self.name].files) else ()
+        add_command(app, self.name, self.help, (SOURCE[0], *self.options, SEED, *drawn, JSON, *SOURCE[1:]), self.answer,
                     self.examples)
 
     def answer(self, *, json: bool, **values: Any) -> None:
@@ -64,10 +65,11 @@ class Question:
         files = {each: values.pop(each.option) for each in OUTPUTS[self.name].files if each.option is not None}
         for each, path in files.items():
             each.require(path, values)
-        source, mechanism = values["robot"], robot_of(values)
+        source = values["robot"]
         more = {each.record: None for each in files if each.record is not None}
         writers = []
         with Progress() as progress, following(progress.tell):
+            mechanism = robot_of(values)
             found = self._ask(getattr(hrsynth, self.name), mechanism, values)
             for each, path in files.items():
                 if path is None:
@@ -89,7 +91,10 @@ class Question:
         elif self.shows is not None and not any(written.values()):
             self.shows(found, **values)
         else:
-            typer.echo(painted(text(found, *written.values())))
+            typer.echo(painted(text(found)))
+            for each, path in files.items():
+                if path is not None:
+                    typer.echo(each.told(path))
         if self.after is not None:
             self.after(found, **values)
 
@@ -130,7 +135,7 @@ def _served(found: Any, port: int, open_: bool, **_: Any) -> None:
     from ..present.view.server import serve
 
     def ready(server: object, address: str) -> None:
-        typer.echo(f"{text(found, address)}   (Ctrl-C ends it)")
+        typer.echo(f"{text(found)}\nThe view is served at {address} (Ctrl-C ends it).")
         sys.stdout.flush()
         if open_:
             import threading
@@ -151,6 +156,10 @@ def _goal(help: str) -> Option:
     return Option("goal", help, "POSE", default=NEEDED, old=("--to",))
 
 
+FIGURE = (
+    Option("width", "Width of a figure, as 88mm or 3.5in.", "LENGTH", group=OUTPUT),
+    Option("font", "Font of a figure, its size, or both: serif, 8pt, 'DejaVu Sans 8pt'.", group=OUTPUT),
+)
 POSES = "or mode:2, of the list that modes gives; again for more (default: the zero configuration)."
 BEGIN = Option("at", "Start there instead of at the zero configuration, in another operation mode if need be; or "
                "mode:2.", "POSE")

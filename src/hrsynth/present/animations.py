@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..geometry.vectors import Array, inverse
+from ..progress import tell
 from ..simulation.camera import Camera, Cylinder, cylinders, facing, seen
 from ..simulation.mockup import rods as rods_of
 from ..simulation.pictures import COLOURS, GREY, LegRenderer
@@ -55,6 +56,7 @@ def animation(found: Servo) -> bytes:
     frames = []
     moments = _moments(np.array([at.pose(setting.motion.link)[:3, 3] for at in configurations]), found.errors)
     for number, words in zip(moments, captions(found, moments), strict=True):
+        tell("frames")
         seen = _lit(stage.picture(configurations[number].pose))
         frame = sheet.at(number, words)
         frame[:, : seen.shape[1]] = 255 * np.where(_bare(seen)[..., None], paper, seen)

@@ -16,7 +16,7 @@ from ..errors import BadRequest
 from ..geometry.vectors import Array
 from . import plots
 from .modes import why_undrawn
-from .plots import COLOURS, cell_edges, entry, panels, png, styled
+from .plots import COLOURS, PNG, Paper, cell_edges, entry, panels, printed, styled
 
 CELLS = {SAME: ("#b9dcb1", "="), SEPARATED: ("#f2c0b0", "|"), UNDECIDED: ("#e3e3e3", "?")}
 CURVE, CUSP, NODE = "black", COLOURS[1], COLOURS[2]
@@ -50,7 +50,7 @@ def undrawn(found: Atlas) -> str | None:
 
 
 @styled
-def picture(found: Atlas, drawn: DrawnSection) -> bytes:
+def picture(found: Atlas, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
     """The picture (PNG); raises ``BadRequest`` where there are no modes."""
     why = why_undrawn(found.listed)
     if why is not None:
@@ -68,7 +68,7 @@ def picture(found: Atlas, drawn: DrawnSection) -> bytes:
     told = ", cuspidal" if found.cuspidal else ""
     figure.suptitle(f"{found.listed.setting.robot.name}, legs {seen} watched\n{found.listed.count}, "
                     f"aspects: {found.aspects_met}{told}")
-    return png(figure)
+    return printed(figure, paper)
 
 
 def _colour(found: Atlas, number: int) -> str:

@@ -20,14 +20,16 @@ from ..mechanism.pose import PARTS
 from ..tolerances import DARKEST_DISTANCE, DISTANCE_FLOOR
 from . import plots
 from .plots import (
+    PNG,
     MapPlane,
+    Paper,
     along,
     cell_edges,
     entry,
     heading,
     missing_entry,
     panels,
-    png,
+    printed,
     round_ticks,
     styled,
     tick_values,
@@ -38,10 +40,11 @@ if TYPE_CHECKING:
     from ..analysis.accuracy.accuracy import Accuracy
     from ..analysis.accuracy.error_map import ErrorMap as ErrorField
     from ..analysis.check import Check, GridCheck
+    from ..analysis.observed import ObservedRobot
     from ..analysis.singularity.locus import Locus, SingularityMap
     from ..analysis.singularity.singular import Singularity
     from ..kinematics.platform_motion import PlatformMotion
-    from ..mechanism.pose import Pose
+    from ..mechanism.pose import Grid, Pose
 
 MARKS = {"type1": ("^", "Type 1"), "type2": ("o", "Type 2"), "type3": ("D", "Type 3"),
          CONSTRAINT: ("s", "constraint singularity"), UNDECIDED: ("X", "not decided")}
@@ -57,7 +60,7 @@ HIGHEST = 30.0
 
 
 @styled
-def distance_map(found: Check) -> bytes:
+def distance_map(found: Check, paper: Paper = PNG) -> bytes:
     """The distance to Type 2 singularities over a grid: a curve for a line of poses, a colour map for a plane, one map
     for each value of the third part for a box. Raises ``BadRequest`` where Mᵀ exists nowhere."""
     grid = found.grid
@@ -70,12 +73,19 @@ def distance_map(found: Check) -> bytes:
     figure = (_distance_curve(grid, numbers, states) if grid.grid.ndim == 1
               else _distance_maps(grid, numbers, states, found.setting.motion))
     entries = [missing_entry()] if UNREACHABLE in grid.states else []
+    entries += _robot(figure, grid.grid, found.setting)
     entries += [entry(label, linestyle="", marker=mark, color="red", markeredgecolor="white")
                 for state, (mark, label) in MARKS.items() if state in grid.states]
     plots.legend(figure, entries)
     heading(figure, f"{found.setting.robot.name}: distance to Type 2 singularities, legs "
             f"{', '.join(found.setting.labels)} observed", grid.grid.fixed)
-    return png(figure)
+    return printed(figure, paper)
+
+
+def _robot(figure: Any, grid: Grid, setting: ObservedRobot) -> list[Any]:
+    """Draw the robot in the maps of a grid; its entry in the legend."""
+    return [] if grid.ndim == 1 else MapPlane.of(grid.axes, setting.motion, 0.3, 2.0).robot(
+        figure, setting.everything.start)
 
 
 def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion) -> Any:
@@ -165,7 +175,7 @@ def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -
 
 
 @styled
-def locus_map(found: Singularity, drawn: Locus) -> bytes:
+def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
     """Type 2 loci of the hidden and the real robot over a plane, the Type 1 boundary and what is not reached (PNG)."""
     plane = MapPlane.of(drawn.grid.axes, found.setting.motion, 0.4, 1.6)
     figure, (place,) = panels(1, 1, 7.2, 6.0 * plane.tall + 1.6)
@@ -181,10 +191,11 @@ def locus_map(found: Singularity, drawn: Locus) -> bytes:
     entries += borders
     if not np.isfinite(drawn.hidden.type2).all():
         entries.append(missing_entry())
+    entries += plane.robot(figure, found.setting.everything.start)
     plots.legend(figure, entries)
     heading(figure, f"{found.setting.robot.name}: Type 2 singularities, legs {', '.join(found.setting.labels)} "
             "observed", drawn.grid.fixed)
-    return png(figure)
+    return printed(figure, paper)
 
 
 def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) -> Any:
@@ -221,7 +232,7 @@ def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
 
 
 @styled
-def error_map(found: Accuracy) -> bytes:
+def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     """Position and orientation errors (the latter where there are any): maps with the singular locus and the border of
     what is reached drawn over for a plane, a row of maps for a box, curves for a line (PNG)."""
     field = found.field
@@ -233,11 +244,11 @@ def error_map(found: Accuracy) -> bytes:
         raise BadRequest("there is nothing to draw", str(field.grid.fixed), "a robot whose platform has errors")
     figure, locus = (_error_curves(field, shown) if field.grid.ndim == 1
                      else _error_maps(field, shown, found.setting.motion))
-    plots.legend(figure, _error_entries(field, locus))
+    plots.legend(figure, _error_entries(field, locus) + _robot(figure, field.grid, found.setting))
     legs = ", ".join(f"{o.leg} within {np.degrees(cone):.3g}°"
                      for o, cone in zip(found.setting.observed, found.cones, strict=True))
     heading(figure, f"{found.setting.robot.name}: largest errors\nobserved legs: {legs}", field.grid.fixed, "; ")
-    return png(figure)
+    return printed(figure, paper)
 
 
 def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: PlatformMotion) -> tuple[Any, bool]:

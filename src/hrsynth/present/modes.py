@@ -12,7 +12,7 @@ import numpy as np
 from ..analysis.modes.modes import AssemblyModes
 from ..errors import BadRequest
 from ..geometry.vectors import Array
-from .plots import empty_figure, entry, styled
+from .plots import PNG, Paper, empty_figure, entry, printed, styled
 from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, ModesScene, Placed, scene
 from .sketch import Box, Sketch
 
@@ -34,13 +34,17 @@ WIDEST, SIGN = 112, 6
 """Letters of a legend in one row at most, and what the sign of an entry takes of them."""
 
 
-def picture(found: AssemblyModes) -> bytes:
-    """The modes as PNG; its text ``Description`` holds :func:`description` as JSON."""
+def picture(found: AssemblyModes, paper: Paper = PNG) -> bytes:
+    """The modes as a figure on ``paper``; of a PNG the text ``Description`` holds :func:`description` as JSON."""
     from PIL import Image
     from PIL.PngImagePlugin import PngInfo
 
     drawn = drawable(found)
-    canvas = figure(found, drawn).canvas
+    whole = figure(found, drawn)
+    if paper.ending != ".png":
+        return printed(whole, paper)
+    paper.fit(whole)
+    canvas = whole.canvas
     canvas.draw()
     texts, stream = PngInfo(), io.BytesIO()
     texts.add_text("Description", json.dumps(description(found, drawn)))

@@ -7,6 +7,8 @@ when it is wanted.
 
 from __future__ import annotations
 
+import difflib
+import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -19,6 +21,11 @@ from ..errors import BadRequest
 Content = bytes | Iterable[bytes]
 Asked = Mapping[str, Any]
 """Options by name."""
+PNG, CSV, HTML = ".png", ".csv", (".html", ".htm")
+FIGURES = (PNG, ".pdf", ".svg")
+MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4}
+WIDTHS, TEXTS = (1.0, 40.0), (4.0, 40.0)
+"""The least and the largest width of a figure (inches) and size of its text (points)."""
 
 
 def function(name: str) -> Callable[..., Any]:
@@ -40,6 +47,8 @@ class File:
 
     refusal: str
     makers: Mapping[str, str]
+    holds: str = ""
+    """What it holds: the subject of the sentence that tells where it is written."""
     help: str = ""
     option: str | None = "output"
     field: str | None = "file"
@@ -52,6 +61,8 @@ class File:
     record: str | None = None
     nothing: str | None = None
     """Tells why there is nothing to draw in an answer, or None."""
+    drawn: bool = False
+    """Whether it is a figure, of which width and font can be asked for."""
     installed: tuple[str, str] | None = None
     """An ending, and what raises ``MissingExtra`` where a library for it is missing."""
     plotted: tuple[str, ...] = (".png", ".svg", ".pdf")
@@ -62,6 +73,11 @@ class File:
         ``MissingExtra``: before long work, not after it."""
         from ..description.files import require_folder
 
+        for name in ("width", "font") if self.drawn else ():
+            if asked.get(name) is not None and (path is None or Path(path).suffix.lower() not in FIGURES):
+                raise BadRequest(f"--{name} is of a figure", asked[name], f"--output with {', '.join(FIGURES)}")
+            if asked.get(name) is not None:
+                paper(asked, PNG)
         if path is None:
             if asked.get("plane") is not None and "plane" in self.takes:
                 raise BadRequest("a plane of poses is drawn", asked["plane"], "--plane together with --output FILE.png")
@@ -78,6 +94,10 @@ class File:
             function(self.installed[1])()
         require_folder(path)
 
+    def told(self, path: str) -> str:
+        """The sentence that tells where it was written."""
+        return f"{self.holds} is written to {path}."
+
     def unwritten(self, found: Any, path: str) -> str | None:
         """What is to be said where there is nothing to write."""
         why = None if self.nothing is None else function(self.nothing)(found)
@@ -86,6 +106,8 @@ class File:
     def content(self, found: Any, ending: str, asked: Asked) -> tuple[Content, dict[str, Any]]:
         """The file's content and what the JSON says more; raises ``BadRequest`` where there is nothing to draw."""
         maker = function(self.makers[ending])
+        if ending in FIGURES and self.drawn:
+            maker = partial(maker, paper=paper(asked, ending))
         if self.computed is None:
             return maker(found), {}
         value = function(self.computed)(found, **{name: asked[name] for name in (*self.takes, "seed")})
@@ -99,6 +121,37 @@ class File:
         return partial(write_whole, path, content), more
 
 
+def paper(asked: Asked, ending: str) -> Any:
+    """What a figure is printed on: ``width`` as 88mm, 8.8cm or 3.5in, ``font`` as a name, a size (8pt) or both
+    (Times 8pt). Raises ``BadRequest``."""
+    from .plots import Paper
+
+    width, font, inches, size = asked.get("width"), asked.get("font"), None, None
+    if width is not None:
+        found = re.fullmatch(r"(\d+\.?\d*) *(mm|cm|in)", width.strip())
+        inches = 0.0 if found is None else float(found[1]) * MILLIMETRES[found[2]] / MILLIMETRES["in"]
+        if not WIDTHS[0] <= inches <= WIDTHS[1]:
+            raise BadRequest("width of a figure", width, f"{WIDTHS[0]:g}in to {WIDTHS[1]:g}in, as 88mm, 8.8cm or 3.5in")
+    if font is not None:
+        name, points = re.fullmatch(r"(.*?)(?:(?:^| +)(\d+\.?\d*) *pt)?", font.strip()).groups()  # type: ignore[union-attr]
+        size = None if points is None else float(points)
+        if size is not None and not TEXTS[0] <= size <= TEXTS[1]:
+            raise BadRequest("font of a figure", font, f"a name, a size of {TEXTS[0]:g}pt to {TEXTS[1]:g}pt, or both")
+        font = require_font(name)
+    return Paper(ending, inches, size, font)
+
+
+def require_font(name: str) -> str | None:
+    """A font that is installed, None for no name; raises ``BadRequest``."""
+    from matplotlib import font_manager
+
+    known = {each.name for each in font_manager.fontManager.ttflist}
+    if name and name not in known and name not in ("serif", "sans-serif", "monospace"):
+        close = difflib.get_close_matches(name, known, 3, 0.4)
+        raise BadRequest("font of a figure", name, ", ".join(["an installed font", *close, "serif, sans-serif"]))
+    return name or None
+
+
 class HiddenFile(File):
     """The hidden robot in any dialect."""
 
@@ -108,6 +161,12 @@ class HiddenFile(File):
 
         if path is not None:
             targets(path)
+
+    def told(self, path: str) -> str:
+        """The sentence that names all files of a dialect."""
+        from ..description import targets
+
+        return super().told(" and ".join(map(str, targets(path))))
 
     def unwritten(self, found: Any, path: str) -> str | None:
         """What is to be said where there is no hidden robot."""
@@ -120,59 +179,65 @@ class HiddenFile(File):
         return partial(save, found.hidden, path), {}
 
 
+def figures(maker: str) -> dict[str, str]:
+    """One maker for all endings of a figure."""
+    return dict.fromkeys(FIGURES, maker)
+
+
 @dataclass(frozen=True)
 class Outputs:
-    """What there is of one kind of answer: ``text`` is called with it and the names of the files written, ``inline``
-    makes HTML for a notebook, where that is more than the text."""
+    """What there is of one kind of answer: ``text`` is called with it, ``inline`` makes HTML for a notebook, where that
+    is more than the text."""
 
     text: str
     files: tuple[File, ...] = ()
     inline: str | None = None
 
 
-CERTIFICATE = File("cannot write the certificate", {".json": ".certificates:written"},
+CERTIFICATE = File("cannot write the certificate", {".json": ".certificates:written"}, "The certificate",
                    "Write a certificate (.json) that the command verify, or one file of plain Python, checks.",
                    "certificate", "certificate_file")
-PNG, CSV, HTML = ".png", ".csv", (".html", ".htm")
 OUTPUTS = {
     "accuracy": Outputs("text.runs:accuracy", (
-        File("cannot write the errors", {PNG: "maps:error_map", CSV: "maps:error_table"},
-             "Write the plane or grid: map.png, map.csv.", part="field", needs=("plane", "grid"),
-             words="a plane or a grid"),)),
+        File("cannot write the errors", {**figures("maps:error_map"), CSV: "maps:error_table"}, "The map of errors",
+             "Write the plane or grid: map.png, .pdf, .svg, or a table, map.csv.", part="field",
+             needs=("plane", "grid"), words="a plane or a grid", drawn=True),)),
     "advise": Outputs("text.robots:advice"),
     "atlas": Outputs("text.poses:atlas", (
-        File("cannot draw the atlas", {PNG: "atlas:picture"},
-             "Draw the table and, of three rods on cranks in a plane, the singular curve with the modes (.png).",
-             computed="atlas:section", record="section", nothing="atlas:undrawn"),)),
+        File("cannot draw the atlas", figures("atlas:picture"), "The picture of the atlas",
+             "Draw the table and, of three rods on cranks in a plane, the singular curve with the modes: atlas.png, "
+             ".pdf, .svg.", computed="atlas:section", record="section", nothing="atlas:undrawn", drawn=True),)),
     "certificate": Outputs("text.robots:certificate"),
     "check": Outputs("text.poses:check", (
-        File("cannot write the grid", {PNG: "maps:distance_map", CSV: "maps:check_table"},
-             "Write the grid: map.png, map.csv.", field=None, part="grid", needs=("grid",), words="a grid of poses"),)),
+        File("cannot write the grid", {**figures("maps:distance_map"), CSV: "maps:check_table"}, "The grid",
+             "Write the grid: map.png, .pdf, .svg, or a table, map.csv.", part="grid", needs=("grid",),
+             words="a grid of poses", drawn=True),)),
     "derive": Outputs("text.robots:derivation", (
-        HiddenFile("cannot write the robot", {}, "Write the hidden robot.", field="hidden_file"),
-        File("cannot write the report", dict.fromkeys(HTML, "report.pages:page"),
+        HiddenFile("cannot write the robot", {}, "The hidden robot", "Write the hidden robot.", field="hidden_file"),
+        File("cannot write the report", dict.fromkeys(HTML, "report.pages:page"), "The report",
              "Write a page (.html) with drawings, proof, singularities, assembly modes and accuracy.", "report",
              "report_file", computed="report.parts:parts", plotted=HTML),
         CERTIFICATE,
         File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None, plotted=()))),
     "legs": Outputs("text.robots:legs"),
     "modes": Outputs("text.poses:modes", (
-        File("cannot draw the modes", {PNG: "modes:picture"}, "Draw the modes (.png).", nothing="modes:why_undrawn"),
+        File("cannot draw the modes", figures("modes:picture"), "The picture of the modes",
+             "Draw the modes: modes.png, .pdf, .svg.", nothing="modes:why_undrawn", drawn=True),
         CERTIFICATE)),
     "path": Outputs("text.poses:path"),
     "robot": Outputs("text.robots:robot"),
     "select": Outputs("text.runs:selection"),
     "servo": Outputs("text.runs:servo", (
-        File("cannot draw the run", {PNG: "runs:picture", ".gif": "animations:animation"},
-             "Draw the run: curves (.png) or an animation (.gif).",
-             allowed=".png (curves) or .gif (camera view)",
-             installed=(".gif", ".simulation.pictures:drawing"), plotted=(".png", ".svg", ".pdf", ".gif")),)),
+        File("cannot draw the run", {**figures("runs:picture"), ".gif": "animations:animation"},
+             "The picture of the run", "Draw the run: curves (run.png, .pdf, .svg) or an animation (run.gif).",
+             allowed=".png, .pdf, .svg (curves) or .gif (camera view)", drawn=True,
+             installed=(".gif", ".simulation.pictures:drawing"), plotted=(*FIGURES, ".gif")),)),
     "singular": Outputs("text.poses:singularity", (
-        File("cannot draw the locus", {PNG: "maps:locus_map"}, "Draw the locus (.png).", computed="maps:locus",
-             takes=("plane", "steps"), record="locus"),)),
+        File("cannot draw the locus", figures("maps:locus_map"), "The locus", "Draw the locus: locus.png, .pdf, .svg.",
+             computed="maps:locus", takes=("plane", "steps"), record="locus", drawn=True),)),
     "verdict": Outputs("text.robots:verdict"),
     "view": Outputs("text.robots:view", (
-        File("cannot write the view", dict.fromkeys(HTML, "view.page:static"),
+        File("cannot write the view", dict.fromkeys(HTML, "view.page:static"), "The view",
              "Write a page that needs no server (.html).", "static", allowed=".html"),), inline="view.page:inline"),
 }
 """The outputs by the name under which a result is shown (:attr:`hrsynth.results.Result.shown_as`): that of its

@@ -11,10 +11,12 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from ..errors import MissingExtra
+from ..errors import BadRequest, MissingExtra
 from ..geometry.vectors import Array
+from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.pose import Pose
+from .skeleton import legs_of, outline
 from .sketch import Sketch, axis_label
 from .view.view import plane_normal
 
@@ -25,6 +27,8 @@ COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 BESIDE = 2.3
 """Room for a legend beside the axes (inches)."""
 FEWEST_TICKS = 3
+LARGEST_TEXT = 1.25
+"""Multiple of its part of the width up to which text is made larger: above, it would run into what is beside it."""
 PLACES = 6
 """Decimals of metres and degrees in words."""
 Asked = ParamSpec("Asked")
@@ -32,6 +36,8 @@ Given = TypeVar("Given")
 
 MISSING: dict[str, Any] = {"facecolor": "0.85", "edgecolor": "0.6", "hatch": "///"}
 """How what is not reached is drawn."""
+ROBOT: dict[str, Any] = {"color": "black", "alpha": 0.3, "linewidth": 1.2}
+"""How a robot is drawn in a map of its poses."""
 
 
 def library() -> None:
@@ -53,11 +59,64 @@ def styled(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
     return drawn
 
 
-def png(figure: Any) -> bytes:
-    """The bytes of a matplotlib figure as PNG; ``savefig`` would draw it twice."""
+@dataclass(frozen=True)
+class Paper:
+    """How a figure is printed: the ending of its file, its width (inches), the size (points) of its text and its font;
+    None: as it was made, text of the same part of the width."""
+
+    ending: str = ".png"
+    width: float | None = None
+    size: float | None = None
+    font: str | None = None
+
+    def fit(self, figure: Any) -> None:
+        """Give a figure this width, with all strokes, and this font; raises ``BadRequest`` for text that is too large
+        for its place."""
+        from matplotlib.text import Text
+
+        scale = 1.0 if self.width is None else self.width / figure.get_figwidth()
+        if (scale, self.size, self.font) == (1.0, None, None):
+            return
+        figure.draw_without_rendering()
+        every: list[Any] = list({id(each): each for each in figure.findobj()}.values())
+        texts: list[Any] = [each for each in every if isinstance(each, Text) and each.get_text()]
+        usual = float(np.median([each.get_fontsize() for each in texts]))
+        size = scale if self.size is None else self.size / usual
+        if size > LARGEST_TEXT * scale:
+            raise BadRequest(f"text does not fit a figure {25.4 * scale * figure.get_figwidth():.0f} mm wide",
+                             f"{self.size:g}pt", f"up to {LARGEST_TEXT * scale * usual:.2g}pt, or a width of "
+                             f"{25.4 * size / LARGEST_TEXT * figure.get_figwidth():.0f}mm and more")
+        for each in texts:
+            each.set(fontsize=size * each.get_fontsize(), fontfamily=self.font or each.get_fontfamily())
+        for axis in (axis for place in figure.axes for axis in (place.xaxis, place.yaxis)):
+            for label in axis.get_ticklabels()[:1]:
+                axis.set_tick_params(labelsize=label.get_fontsize(), labelfontfamily=label.get_fontfamily())
+        for each in every:
+            if hasattr(each, "set_linewidth"):
+                each.set_linewidth(np.multiply(scale, each.get_linewidth()))
+            if hasattr(each, "set_markersize"):
+                each.set_markersize(scale * each.get_markersize())
+            if hasattr(each, "set_sizes"):
+                each.set_sizes(scale**2 * each.get_sizes())
+        figure.set_size_inches(scale * figure.get_size_inches())
+
+
+PNG = Paper()
+
+
+def printed(figure: Any, paper: Paper) -> bytes:
+    """The bytes of a matplotlib figure; of a PNG without ``savefig``, which would draw it twice."""
+    import matplotlib
+
     stream = io.BytesIO()
-    figure.set_dpi(150)
-    figure.canvas.print_png(stream, pil_kwargs={"compress_level": 3})
+    paper.fit(figure)
+    if paper.ending == ".png":
+        figure.set_dpi(150)
+        figure.canvas.print_png(stream, pil_kwargs={"compress_level": 3})
+    else:
+        known = {"CreationDate": None} if paper.ending == ".pdf" else {"Date": None}
+        with matplotlib.rc_context({"pdf.fonttype": 42, "svg.hashsalt": "hrsynth"}):
+            figure.savefig(stream, format=paper.ending[1:], metadata=known, dpi=150)
     return stream.getvalue()
 
 
@@ -124,6 +183,8 @@ class MapPlane:
     labels: tuple[str, str]
     shear: Array
     offset: Array
+    across: Array
+    """The base directions (2, 3) that its axes show, where both parts are lengths."""
 
     @classmethod
     def of(cls, axes: Sequence[tuple[str, Array]], motion: PlatformMotion, least: float, most: float) -> MapPlane:
@@ -153,6 +214,20 @@ class MapPlane:
         place.fill(u, v, linewidth=0, zorder=0, **MISSING)
         place.pcolormesh(*self.at(*corners), np.ma.masked_invalid(values), **style)
 
+    def robot(self, figure: Any, at: ClosedConfiguration) -> list[Any]:
+        """Draw the robot to scale, faintly, in all maps of a figure of lengths; its entry in the legend."""
+        from matplotlib.collections import LineCollection
+
+        if not set(self.names) <= set("xyz"):
+            return []
+        platform = at.twin.mechanism.platform
+        strokes = [*legs_of(at, (platform,)), outline(at.twin.mechanism, platform, at.pose(platform))]
+        for place in figure.axes:
+            if place.get_visible() and place.get_label() != "<colorbar>":
+                drawn = LineCollection([stroke @ self.across.T for stroke in strokes], zorder=1.5, **ROBOT)
+                place.add_collection(drawn, autolim=False)
+        return [entry("robot at its zero pose", **ROBOT)]
+
     def contour(self, place: Any, values: Array, level: float, colour: str, width: float, style: str = "solid") -> None:
         """Draw where values are at a level."""
         place.contour(*self.at(*np.meshgrid(self.x, self.y, indexing="ij")), np.ma.masked_invalid(values),
@@ -175,19 +250,19 @@ class MapPlane:
             place.set_aspect("equal")
 
 
-def _own_axes(names: tuple[str, str], motion: PlatformMotion) -> tuple[tuple[str, str], Array, Array]:
+def _own_axes(names: tuple[str, str], motion: PlatformMotion) -> tuple[tuple[str, str], Array, Array, Array]:
     """The names of the axes along which a pose is drawn, and how it lies along them: the parts themselves, but for a
     plane of motion that is no coordinate plane."""
     normal = plane_normal(motion) if set(names) <= set("xyz") else None
     sketch = None if normal is None else Sketch.of(normal, np.zeros((1, 3)), ())
     if sketch is None or set(sketch.names) <= set("xyz"):
-        return names, np.eye(2), np.zeros(2)
+        return names, np.eye(2), np.zeros(2), np.eye(3)[["xyz".find(name) for name in names]]
     chosen = np.eye(3)["xyz".index(names[0])], np.eye(3)["xyz".index(names[1])]
     home = motion.position(motion.home)
     moved = motion.translations @ np.linalg.inv(np.array(chosen) @ motion.translations)
     shear = sketch.axes @ moved
     first, second = sketch.names
-    return (first, second), shear, sketch.axes @ (home - moved @ np.array(chosen) @ home)
+    return (first, second), shear, sketch.axes @ (home - moved @ np.array(chosen) @ home), sketch.axes
 
 
 def layer_title(place: Any, name: str, value: float) -> None:
@@ -240,4 +315,4 @@ def legend(figure: Any, entries: Sequence[Any]) -> None:
     """The legend beside the axes, where there is something to explain."""
     if entries:
         figure.set_figwidth(figure.get_figwidth() + BESIDE)
-        figure.legend(handles=entries, loc="outside right upper", labelspacing=0.8)
+        figure.legend(handles=entries, loc="outside right center", labelspacing=0.8)

@@ -13,7 +13,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..simulation.result import Servo
 from ..simulation.track import TYPE_2
 from ..tolerances import REST_OF_RUN, UNMOVED
-from .plots import COLOURS, empty_figure, entry, png, pose_words, styled
+from .plots import COLOURS, PNG, Paper, empty_figure, entry, pose_words, printed, styled
 from .skeleton import legs_of, outline
 from .sketch import Sketch
 from .view.view import plane_normal
@@ -34,8 +34,8 @@ ENDS = {"goal": "the goal", "mode": "another assembly mode", "antipodal": "an an
 
 
 @styled
-def picture(found: Servo) -> bytes:
-    """The run as PNG."""
+def picture(found: Servo, paper: Paper = PNG) -> bytes:
+    """The run as a figure on ``paper``."""
     figure = empty_figure(*SIZE)
     _robots(figure, found)
     panels = list(_panels(found))
@@ -56,7 +56,7 @@ def picture(found: Servo) -> bytes:
     legs = ", ".join(found.setting.labels)
     figure.suptitle(f"{found.setting.robot.name}, legs {legs} observed: ended at {ENDS[found.ended]}\n"
                     f"from {pose_words(found.start)} to {pose_words(found.goal)}")
-    return png(figure)
+    return printed(figure, paper)
 
 
 Curve = tuple[str, Array, str, str]

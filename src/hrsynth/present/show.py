@@ -45,10 +45,10 @@ class Picture:
         write_whole(file, self.content)
 
 
-def text(result: Result, *files: str | None) -> str:
-    """The text that the command line prints of a result, with the names of the ``files`` that it was written to."""
-    written: str = function(OUTPUTS[result.shown_as].text)(result, *files)
-    return written
+def text(result: Result) -> str:
+    """The text that the command line prints of a result."""
+    shown: str = function(OUTPUTS[result.shown_as].text)(result)
+    return shown
 
 
 def record(command: str, robot: str | None, fields: dict[str, Any]) -> str:

@@ -21,6 +21,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezero
 from ..kinematics.relation import relation
 from ..mechanism import Mechanism
+from ..progress import tell
 from ..tolerances import BENCH_SETTLED, BENCH_STEADY
 from .law import Command, Poses
 from .mockup import STEP, coordinates, mockup
@@ -86,6 +87,7 @@ class Bench:
         times: list[float] = []
         states: list[tuple[ClosedConfiguration, Command]] = []
         while time < horizon:
+            tell("run of the mock-up")
             at_now = encoded(self.start, at, driven, data.qpos[places] / scale)
             if at_now is None:
                 stopped = OPEN

@@ -20,6 +20,7 @@ from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.limits import margins
 from ..kinematics.relation import Measurement
+from ..progress import tell
 from ..results import Value
 from ..tolerances import (
     ARRIVED,
@@ -157,6 +158,7 @@ class _Stretch:
             solver = (LSODA(self.rate, start, y, until, max_step=longest, **tolerances) if loop.smooth
                       else RK23(self.rate, start, y, until, max_step=min(PERIOD, longest), **tolerances))
             while solver.status == "running":
+                tell("run")
                 solver.step()
                 if solver.status == "failed":
                     return times, states, LOST

@@ -20,6 +20,7 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...mechanism import Mechanism
 from ...mechanism.pose import Grid, Pose, as_pose
+from ...progress import tell
 from ...results import Value
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from ..measured import MeasuredRobot
@@ -110,6 +111,7 @@ def _locus(hidden: MeasuredRobot, real: MeasuredRobot | None, plane: Pose | None
         raise PlaneNotMet(start.twin.mechanism.name, f"the plane {grid.fixed}", "none of its poses is reached")
 
     def field(measured: MeasuredRobot) -> SingularityMap:
+        tell("locus")
         condition = measured.condition
         reached = [(i, at) for i, at in enumerate(configurations) if at is not None]
         places, here = [i for i, _ in reached], [at for _, at in reached]

@@ -19,11 +19,10 @@ def entries(records: Sequence[Record], total: int) -> str:
     return f"{table([_row(record) for record in records], HEADS)}\n\n{count}" if records else count
 
 
-def entry(record: Record, drawn: str, note: str = "", file: str | None = None) -> str:
+def entry(record: Record, drawn: str, note: str = "") -> str:
     """One entry: its legs drawn, then what is known of it."""
     head = f"{record['word']}   {record.get('notation', '')}".rstrip()
-    more = [note, "" if file is None else f"written to {file}"]
-    return "\n\n".join([head, f"{drawn}\n{LEGEND}", listing(_all(record)), *filter(None, more)])
+    return "\n\n".join([head, f"{drawn}\n{LEGEND}", listing(_all(record)), *filter(None, [note])])
 
 
 def built(groups: Iterable[Mapping[str, Any]]) -> str:

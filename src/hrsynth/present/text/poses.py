@@ -104,7 +104,7 @@ def _small(value: float) -> str:
     return f"{0.0 if value < 1e-9 else value:.3g}"
 
 
-def singularity(found: Singularity, file: str | None = None) -> str:
+def singularity(found: Singularity) -> str:
     """The condition in words and as an expression, what was checked, and singular poses."""
     condition, checked = found.condition, found.checked
     name, seen = head(found.setting)
@@ -131,10 +131,10 @@ def singularity(found: Singularity, file: str | None = None) -> str:
     rows.append(("singular at", [line for each in found.examples for line in (
         str(each.pose), f"  singular value {each.sigma:.1e}, a centimetre away up to {each.nearby:.1e}; lost: "
         + "; ".join(freedom.name for freedom in each.lost))]))
-    return listing([*rows, *known("drawn in", file)])
+    return listing(rows)
 
 
-def modes(found: AssemblyModes, file: str | None = None, certificate: str | None = None) -> str:
+def modes(found: AssemblyModes) -> str:
     """The pose whose measurements are held, the count with its proof, a block for each mode."""
     count = found.found
     name, seen = head(found.setting)
@@ -159,8 +159,7 @@ def modes(found: AssemblyModes, file: str | None = None, certificate: str | None
     for number, mode in enumerate(found.near, 1):
         rows += [*GAP, (f"near {number}", [f"{mode.pose}   residual {mode.residual:.2e}: almost a mode"
                  + (", and none" if count.complete else ""), *at_mode(mode, found.kind)])]
-    told = [*known("picture", file), *known("certificate", certificate)]
-    return listing([*rows, *([*GAP, *told] if told else [])])
+    return listing(rows)
 
 
 def all_of(found: AssemblyModes) -> str:
@@ -234,7 +233,7 @@ def path(found: PathAnswer) -> str:
 _SIGNS = {SAME: "=", SEPARATED: "|", UNDECIDED_PAIR: "?"}
 
 
-def atlas(found: Atlas, file: str | None = None) -> str:
+def atlas(found: Atlas) -> str:
     """The modes, how many aspects hold them, the table mode by mode, and what was asked of which pairs."""
     listed = found.listed
     rows = [*head(listed.setting), ("held", f"{_SINCE[listed.kind]} at {listed.pose}")]
@@ -257,7 +256,7 @@ def atlas(found: Atlas, file: str | None = None) -> str:
             told.setdefault(_told(pair), []).append("{}, {}".format(*pair.numbers))
     rows += [(first, [words, *textwrap.wrap("; ".join(rest), initial_indent="so are modes ")])
              for words, (first, *rest) in told.items()]
-    return listing([*rows, *known("drawn in", file)])
+    return listing(rows)
 
 
 def _cuspidal(found: Atlas) -> list[str]:

@@ -49,8 +49,7 @@ def robot(found: Mechanism) -> str:
     return listing([*rows, ("note", [str(note) for note in found.notes])])
 
 
-def derivation(found: Derivation, hidden_file: str | None = None, report: str | None = None,
-               certified: str | None = None) -> str:
+def derivation(found: Derivation) -> str:
     """The hidden robot first, the proof next, the trace last."""
     mobility, hidden, paper, observed = found.mobility, found.hidden_architecture, found.paper, found.setting
     dof = [f"{found.dof} (mobility {mobility.total}, of which {mobility.idle} idle)"]
@@ -73,9 +72,7 @@ def derivation(found: Derivation, hidden_file: str | None = None, report: str | 
                                       *(f"loses {freedom.name}" for freedom in paper.loses)]))
     steps = [(step.rule, step.leg or "all", "yes" if step.accepted else "no",
               "" if step.largest_angle is None else f"{step.largest_angle:.1e}", step.reason) for step in found.steps]
-    return "\n".join([listing([*rows, *known("written to", hidden_file), *known("report", report),
-                               *known("ranks", certified)]), "",
-                      table(steps, ("rule", "leg", "taken", "angle", "why"))])
+    return "\n".join([listing(rows), "", table(steps, ("rule", "leg", "taken", "angle", "why"))])
 
 
 def _modes(observed: ObservedRobot) -> list[str]:
@@ -191,7 +188,7 @@ def _ways(kinds: tuple[str, ...], found: Sequence[tuple[FurtherMeasurement, ...]
     return [f"{title}:", f"  {shown}{more}"]
 
 
-def view(found: View, file: str | None = None) -> str:
+def view(found: View) -> str:
     """What is drawn, how far the sliders go, and the page."""
     sliders = []
     for slider in found.sliders:
@@ -203,4 +200,4 @@ def view(found: View, file: str | None = None) -> str:
         ("observed", ", ".join(f"{arrow.leg} ({arrow.link})" for arrow in found.arrows) or "nothing"),
         *(("hidden robot", machine.words) for machine in found.machines[1:]), ("sliders", sliders),
         ("other modes", ", ".join(outline.label for outline in found.mode_outlines) or []),
-        *(("note", note) for note in found.notes), *known("page", file)])
+        *(("note", note) for note in found.notes)])

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...geometry.vectors import Array
 from ...tolerances import DAMPED
-from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, known, listing, table
+from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, listing, table
 
 if TYPE_CHECKING:
     from ...analysis.accuracy.accuracy import Accuracy
@@ -24,7 +24,7 @@ NEAR_SINGULARITY = 0.1
 """Part of its value at the pose below which a smallest singular value is said to be near zero."""
 
 
-def servo(found: Servo, file: str | None = None) -> str:
+def servo(found: Servo) -> str:
     """What was asked, where the run ended and why, what it passed, and how far noise kept it away."""
     from ...simulation.track import CONSTRAINT, LIMIT, TYPE_1, TYPE_2
 
@@ -61,14 +61,14 @@ def servo(found: Servo, file: str | None = None) -> str:
         met = least["smallest"] is not None and least["smallest"] < DAMPED
         rows.append(("", "a Type 2 singularity met and left again on the same side" if met
                      else "no singularity crossed"))
-    return listing([*rows, *known("picture", file)])
+    return listing(rows)
 
 
 def _degrees(angle: float) -> str:
     return f"{round(math.degrees(angle), 6):.2g}"
 
 
-def accuracy(found: Accuracy, file: str | None = None) -> str:
+def accuracy(found: Accuracy) -> str:
     """The cones, the range of errors over a grid, a block for each single pose."""
     name, _ = head(found.setting)
     rows = [name, ("observed", ", ".join(f"{o.leg} ({o.link}) within {np.degrees(cone):.4g}°"
@@ -82,7 +82,7 @@ def accuracy(found: Accuracy, file: str | None = None) -> str:
         rows += [*GAP, ("pose", str(errors.pose)), *_extent("position", errors.position, 1e3, "mm", length),
                  *_extent("orientation", errors.orientation, 180 / np.pi, "degrees"),
                  *([] if true is None else _samples(errors, true))]
-    return listing([*rows, *(() if file is None else [*GAP, ("written", file)])])
+    return listing(rows)
 
 
 def field_rows(found: Accuracy) -> list[tuple[str, str]]:
