@@ -52,6 +52,7 @@ def made() -> Iterator[tuple[str, str | bytes]]:
     yield "gallery.md", gallery()
     for script in lessons.scripts():
         yield from lesson(script)
+    yield "json.md", records()
     yield "reference/index.md", public()
     for folder in FOLDERS:
         if (PACKAGE / folder).is_dir():
@@ -171,6 +172,13 @@ def public() -> str:
     """What ``import hrsynth`` offers, in the order of its table of names."""
     head = "# Public functions\n\n`import hrsynth` offers these names; each is imported when it is first used."
     return "\n\n".join([head, *(f"::: hrsynth{module}.{name}" for name, module in homes().items())])
+
+
+def records() -> str:
+    """The JSON schemas of all commands."""
+    from hrsynth.cli.schema import page
+
+    return page()
 
 
 def modules(folder: str) -> str:

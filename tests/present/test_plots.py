@@ -108,12 +108,12 @@ def test_legends_stand_beside_the_axes():
 
     drawn: list[matplotlib.figure.Figure] = []
 
-    def kept(figure: matplotlib.figure.Figure) -> bytes:
+    def kept(figure: matplotlib.figure.Figure, _: plots.Paper) -> bytes:
         drawn.append(figure)
         return b""
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(maps, "png", kept)
+        patch.setattr(maps, "printed", kept)
         found = hrsynth.check(load("3rrr_m1"), grid="x=-0.2:0.2:9,y=-0.2:0.2:9,phi=0")
         maps.distance_map(found)
     (figure,) = drawn

@@ -9,7 +9,7 @@ from typing import Annotated
 
 import typer
 
-from . import completion, files
+from . import completion, files, schema
 from .catalog import catalog
 from .commands import HELP, WholeGroup
 from .questions import QUESTIONS
@@ -22,6 +22,7 @@ for question in QUESTIONS:
     question.add(app)
 files.add(app)
 app.add_typer(catalog)
+schema.add(app)
 completion.add(app)
 
 

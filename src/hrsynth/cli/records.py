@@ -1,0 +1,893 @@
+"""What every command prints with `--json`: one object, whose type is here. `hrsynth schema COMMAND` prints the JSON
+schema that is made of it, and this page shows all of them.
+
+Lengths are metres and angles radians unless a name says otherwise (`_mm`, `_deg`). `null` stands for what is not
+there or not decided. Arrays over a grid are nested in the order of its `axes`.
+"""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, NotRequired, TypedDict
+
+Word = Literal["controllable", "partially controllable", "uncontrollable"]
+Number = float | None
+Array = list[Any]
+Twist = Annotated[list[float], "vx, vy, vz, wx, wy, wz at the platform frame's origin, base axes (m, rad)"]
+Angle = Annotated[float, "the largest principal angle between two relations (rad)"]
+Gap = Annotated[float, "the smallest ratio of a singular value that counts to one that does not"]
+
+
+class Head(TypedDict):
+    """What every object begins with."""
+
+    command: str
+    version: str
+
+
+class OfRobot(Head):
+    """What the answer about a robot begins with."""
+
+    robot: str
+
+
+class Written(TypedDict):
+    """The file that was asked for with -o."""
+
+    file: str | None
+
+
+class PoseRecord(TypedDict):
+    """A pose of the platform frame in the base frame; null where a part is free. `phi` is there where it was given."""
+
+    x: Number
+    y: Number
+    z: Number
+    rpy: Annotated[list[float] | None, "roll, pitch, yaw about fixed axes"]
+    phi: NotRequired[float]
+
+
+class Watched(TypedDict):
+    """A watched segment."""
+
+    leg: str
+    link: str
+
+
+class FreedomRecord(TypedDict):
+    """A freedom of the platform."""
+
+    twist: Twist
+    name: str
+
+
+class MobilityRecord(TypedDict):
+    """Freedoms of the normal form; `idle` ones move neither the platform nor a segment."""
+
+    total: int
+    idle: int
+
+
+class MobilityWritten(MobilityRecord):
+    """The same, and of the file as it is written."""
+
+    as_written: MobilityRecord
+
+
+class MarginRecord(TypedDict):
+    """The smallest singular value that counts, the largest that does not, and where the cut is."""
+
+    counted: float
+    dropped: float
+    cutoff: float
+
+
+class RelationsRecord(TypedDict):
+    """The relations of lengths and angles that the exact verdict stands on."""
+
+    carried: int
+    kept: int
+    observed: list[str]
+    largest_defect_held: Number
+    smallest_defect_not_held: Number
+
+
+class ArchitectureRecord(TypedDict):
+    """What generic geometry of the architecture sees, in exact arithmetic."""
+
+    verdict: Word | None
+    exact: bool
+    rank: int | None
+    instances: int
+    reason: str
+    proved: bool
+    chance: float
+    relations: RelationsRecord | None
+
+
+class NotationRecord(TypedDict):
+    """The architectures; those of the hidden robot are null where every leg is blind."""
+
+    real: str
+    hidden: str | None
+    real_ascii: str
+    hidden_ascii: str | None
+    hidden_latex: str | None
+
+
+class PaperRecord(TypedDict):
+    """The form that the paper's rules alone give."""
+
+    hidden_ascii: str
+    equivalent: bool
+    largest_angle: Angle
+    gains: list[FreedomRecord]
+    loses: list[FreedomRecord]
+    reason: str
+
+
+class StepRecord(TypedDict):
+    """A rule that was tried."""
+
+    rule: str
+    leg: str | None
+    accepted: bool
+    reason: str
+    largest_angle: Angle | None
+
+
+class CertificateRecord(TypedDict):
+    """The comparison of the hidden robot with the real one."""
+
+    samples: int
+    discarded: int
+    largest_angle: Angle
+    smallest_gap: Gap | None
+    residual: float
+    passed: bool
+    reason: str
+
+
+class OperationMode(TypedDict):
+    """What the platform does in an operation mode."""
+
+    dof: int
+    motion: str
+    mobility: int
+
+
+class OtherMode(OperationMode):
+    """Another operation mode that was met, and a pose in it."""
+
+    words: str
+    pose: PoseRecord
+
+
+class Modes(TypedDict):
+    """The operation mode of the zero configuration, and others that were met."""
+
+    operation_mode: OperationMode
+    other_modes: list[OtherMode]
+
+
+class Derive(OfRobot, Modes):
+    """The hidden robot, the trace of rules, the certificate, the verdict."""
+
+    observed: list[Watched]
+    camera: str
+    notation: NotationRecord
+    form: Literal["simplified", "general"]
+    dof: int
+    mobility: MobilityWritten
+    verdict: Word
+    lost: list[FreedomRecord]
+    rank: int
+    margin: MarginRecord
+    point_platform: bool
+    has_interaction_matrix: bool
+    interaction_matrix: bool
+    architecture: ArchitectureRecord
+    paper_form: PaperRecord | None
+    steps: list[StepRecord]
+    certificate: CertificateRecord
+    hidden_file: str | None
+    report_file: str | None
+    certificate_file: str | None
+
+
+class LegSet(TypedDict):
+    """A set of watched legs."""
+
+    legs: list[str]
+    verdict: Word
+    rank: int
+    lost: list[FreedomRecord]
+    gap: Gap
+    has_interaction_matrix: bool
+    interaction_matrix: bool
+    margin: MarginRecord
+    exact: bool
+    architecture: ArchitectureRecord
+
+
+class Legs(OfRobot, Modes):
+    """Every set of watched legs; `minimal` are the smallest sets of the best rank."""
+
+    architecture_ascii: str
+    dof: int
+    sets: list[LegSet]
+    complete: bool
+    minimal: list[list[str]]
+
+
+class ClassCounts(TypedDict):
+    """Zlatanov's six counts over their generic values."""
+
+    RI: int
+    RO: int
+    II: int
+    IO: int
+    RPM: int
+    IIM: int
+
+
+class KindsRecord(TypedDict):
+    """What one relation says at a configuration; null where a rank is not decided."""
+
+    gap: Gap
+    type1: bool | None
+    type2: bool | None
+    type3: bool | None
+    classes: ClassCounts | None
+    lost: list[FreedomRecord]
+
+
+class RealKinds(KindsRecord):
+    """What the motors determine."""
+
+    rank: int
+
+
+class ConstraintRecord(TypedDict):
+    """Whether the loops lose rank, and the freedoms that the platform has only here."""
+
+    singular: bool | None
+    rank_lost: int | None
+    gained: list[FreedomRecord]
+
+
+class RedundantRecord(TypedDict):
+    """Redundant constraints of a loop, which is named as in the file; at all configurations where `generic`."""
+
+    loop: str
+    rows: int
+    generic: bool
+
+
+class DistancesRecord(TypedDict):
+    """How far a configuration is from each kind of singularity (0: there), in characteristic lengths."""
+
+    type2: Number
+    type1: Number
+    constraints: float
+    condition: Number
+    mm_per_degree: Number
+    degrees_per_degree: Number
+
+
+class PostureRecord(KindsRecord):
+    """All that is said of one configuration."""
+
+    pose: PoseRecord
+    mobility: MobilityRecord
+    dof: int
+    rank_M: int
+    condition: Number
+    real: RealKinds | None
+    constraint: ConstraintRecord
+    redundant: list[RedundantRecord]
+    distances: DistancesRecord
+
+
+class GridAxes(TypedDict):
+    """The parts of the pose that vary, in order, and their values."""
+
+    axes: list[str]
+    x: NotRequired[list[float]]
+    y: NotRequired[list[float]]
+    z: NotRequired[list[float]]
+    phi: NotRequired[list[float]]
+
+
+class FixedParts(TypedDict, total=False):
+    """The parts of the pose that a grid holds."""
+
+    x: float
+    y: float
+    z: float
+    phi: float
+    rpy: list[float]
+
+
+class GridRecord(GridAxes):
+    """The grid: what it held, what it left free, the kind of singularity and the distances at each pose."""
+
+    fixed: FixedParts
+    free: list[str]
+    state: Array
+    type2: Array
+    type1: Array
+    constraints: Array
+    condition: Array
+    mm_per_degree: Array
+    degrees_per_degree: Array
+
+
+class Check(OfRobot, Written):
+    """Mobility, ranks, singularities and redundant constraints at poses and over a grid."""
+
+    characteristic_length: float
+    observed: list[Watched]
+    camera: str
+    configurations: list[PostureRecord]
+    redundant: list[RedundantRecord]
+    grid: GridRecord | None
+
+
+class MeasuredRecord(TypedDict):
+    """What is measured, and of what."""
+
+    kind: Literal["directions", "motors"]
+    of: list[str]
+
+
+class CheckedRecord(TypedDict):
+    """How words, expression and rank were compared; the rest is there where they were."""
+
+    points: int
+    disagreements: int
+    largest_angle: NotRequired[float]
+    smallest_singular_value: NotRequired[Number]
+    positive: NotRequired[int]
+    negative: NotRequired[int]
+    on_locus: NotRequired[int]
+    searches: NotRequired[int]
+
+
+class ExampleRecord(TypedDict):
+    """A singular pose: what is lost there, and the singular value a centimetre away."""
+
+    pose: PoseRecord
+    lost: list[FreedomRecord]
+    singular_value: float
+    singular_value_nearby: float
+
+
+class LocusField(TypedDict):
+    """Tables over the plane (null: not reached), and singular poses where the condition has no sign."""
+
+    expression: list[list[Number]]
+    type2: list[list[Number]]
+    type1: list[list[Number]]
+    poses: list[list[float]]
+
+
+class LocusRecord(TypedDict):
+    """Where a freedom is lost over a plane of poses."""
+
+    axes: dict[str, list[float]]
+    fixed: PoseRecord
+    reached: int
+    hidden: LocusField
+    real: LocusField | None
+
+
+class Singular(OfRobot, Written):
+    """The Type 2 condition in words and as an expression, and singular poses."""
+
+    measured: MeasuredRecord
+    dof: int
+    verdict: Word
+    lost: list[FreedomRecord]
+    always: bool
+    never: bool
+    words: str
+    expression: str
+    where: dict[str, str]
+    factors: list[str]
+    characteristic_length: float
+    checked: CheckedRecord
+    examples: list[ExampleRecord]
+    locus: LocusRecord | None
+
+
+class FurtherRecord(TypedDict):
+    """A measurement that could be added; an encoder has `axis` and `actuated`, others have `link`."""
+
+    kind: Literal["leg", "direction", "line", "encoder"]
+    of: str
+    leg: str
+    link: NotRequired[str]
+    axis: NotRequired[Any]
+    actuated: NotRequired[bool]
+
+
+class CureRecord(TypedDict):
+    """A smallest set of further measurements, and what is seen with it."""
+
+    measurements: list[FurtherRecord]
+    verdict: Word
+    rank: int
+    gap: Gap
+
+
+class Advise(OfRobot):
+    """What is missing."""
+
+    observed: list[Watched]
+    camera: str
+    verdict: Word
+    rank: int
+    dof: int
+    lost: list[FreedomRecord]
+    nothing_missing: bool
+    sets: list[CureRecord]
+    size: int
+    tried: int
+    complete: bool
+    undecided: int
+
+
+class MissRecord(TypedDict):
+    """Why a leg of the real robot does not reach a mode, and by how much."""
+
+    leg: str
+    reason: str
+    by: Number
+    unit: str
+
+
+class ModeRecord(TypedDict):
+    """An assembly mode; its radius is null where it is not known, `fits` where its place is decided by all legs."""
+
+    pose: PoseRecord
+    radius: Number
+    radius_m: Number
+    radius_rad: Number
+    bodies: list[str]
+    residual: float
+    goal: bool
+    reachable: bool | None
+    assembly: Literal["yes", "beyond limits", "no", "not found"]
+    open: list[str]
+    beyond: list[str]
+    reasons: list[MissRecord]
+    type2_distance: Number
+    multiplicity: int
+    proved: bool
+    rounded: bool
+    fits: Number
+
+
+class MeantRecord(TypedDict):
+    """Legs whose joint centres are taken to coincide."""
+
+    where: str
+    legs: list[str]
+    defect_m: float
+
+
+class SelfMotionRecord(TypedDict):
+    """A motion with the measurements at rest, as far as it was followed from a pose."""
+
+    pose: PoseRecord
+    dimension: int
+    links: list[str]
+    followed_m: float
+    followed_rad: float
+    returns: bool
+    goal: bool
+    met: int
+
+
+class ListedModes(OfRobot, Written):
+    """All assembly modes; `complex` is null where no count is proved."""
+
+    kind: Literal["hidden", "real"]
+    at: PoseRecord
+    within: str | None
+    observed: list[Watched]
+    complex: int | None
+    complete: bool
+    bound: str
+    proof: str
+    modes: list[ModeRecord]
+    motions: list[SelfMotionRecord]
+    near: list[ModeRecord]
+    degenerate: str | None
+    continuum: int | None
+    meant: list[MeantRecord]
+
+
+class AssemblyModesRecord(ListedModes):
+    """All assembly modes, and the certificate that was asked for."""
+
+    certificate_file: str | None
+
+
+class PathEndRecord(TypedDict):
+    """An end of a path, and the condition's value there."""
+
+    pose: PoseRecord
+    value: float
+
+
+class CrossingRecord(TypedDict):
+    """A leg that changes its working mode, and at which pose of the path."""
+
+    leg: str
+    at: int
+
+
+class PathRecord(TypedDict):
+    """Whether a path without Type 2 singularity joins two poses."""
+
+    observed: list[Watched]
+    verdict: Literal["same aspect", "separated", "undecided"]
+    certified: bool
+    path: list[PoseRecord]
+    crossings: list[CrossingRecord]
+    point: list[float] | None
+    margin: Number
+    boxes: int
+    value: Literal["expression", "smallest singular value"]
+    start: PathEndRecord
+    goal: PathEndRecord
+    reason: str
+    limits: list[str]
+    not_considered: str
+
+
+class Path(OfRobot, PathRecord):
+    """The same of a robot."""
+
+
+class PairRecord(TypedDict):
+    """Two modes; `path` is null where the verdict follows from others (`via`)."""
+
+    modes: list[int]
+    verdict: str
+    certified: bool
+    reason: str
+    via: list[int]
+    path: PathRecord | None
+
+
+class AspectsRecord(TypedDict):
+    """How many aspects hold the modes at least and at most, and which modes are together."""
+
+    least: int
+    most: int
+    modes: list[list[int]]
+
+
+class Atlas(ListedModes):
+    """Which modes can be led to each other; `table` is by their numbers."""
+
+    table: list[list[str]]
+    pairs: list[PairRecord]
+    aspects: AspectsRecord
+    cuspidal: bool | None
+    section: dict[str, Any] | None
+
+
+class PassedRecord(TypedDict):
+    """A singularity or limit that was passed, and when (s)."""
+
+    kind: str
+    time: float
+
+
+class TrackRecord(TypedDict):
+    """The smallest singular value on the way, when (s) it was met, and what was passed."""
+
+    smallest: Number
+    at: Number
+    crossings: list[PassedRecord] | None
+
+
+class SpreadRecord(TypedDict):
+    """How far noise kept the run from where it would have ended."""
+
+    position_mm: float
+    orientation_deg: float
+    rms_position_mm: float
+    rms_orientation_deg: float
+    offset_mm: float
+    mean: list[float]
+
+
+Servo = TypedDict("Servo", {
+    "command": str, "version": str, "robot": str, "file": str | None, "observed": list[Watched], "camera": str,
+    "from": PoseRecord, "to": PoseRecord, "gain": float, "sense": Literal["exact", "edges", "pictures"],
+    "noise": str | None, "ended": str, "reason": str, "pose": PoseRecord, "matched_mode": int | None,
+    "modes": list[ModeRecord] | None, "type2": TrackRecord, "notes": list[str], "spread": SpreadRecord | None,
+    "times": list[float], "error": list[list[float]], "poses": list[PoseRecord]})
+Servo.__doc__ = "A servo run: where it ended, and at each time (s) the pose and the error of each direction."
+
+
+class ConeRecord(TypedDict):
+    """A watched direction, and the half-angle of the cone about it."""
+
+    leg: str
+    link: str
+    cone_deg: float
+
+
+class ErrorRecord(TypedDict):
+    """The largest error with its direction, and the least; null where a freedom is lost."""
+
+    largest: Number
+    direction: list[float] | None
+    least: Number
+    least_direction: list[float] | None
+    anisotropy: Number
+
+
+class SampledRecord(TypedDict):
+    """True errors that were tried."""
+
+    samples: int
+    position_mm: float
+    orientation_deg: float
+    ended_at: list[float]
+    not_found: int
+    smallest_singular_value: Number
+    singular_value_at_pose: Number
+
+
+class ErrorsRecord(TypedDict):
+    """The errors at a pose."""
+
+    pose: PoseRecord
+    position_mm: ErrorRecord
+    orientation_deg: ErrorRecord
+    sampled: SampledRecord | None
+
+
+class SpotCheck(TypedDict):
+    """Random poses of the grid computed in another way, and the largest difference."""
+
+    poses: int
+    difference: float
+
+
+class Accuracy(OfRobot, Written):
+    """The largest errors at poses; of a plane or grid also its axes and a table of each error."""
+
+    observed: list[Watched]
+    camera: str
+    cones: list[ConeRecord]
+    poses: list[ErrorsRecord]
+    axes: NotRequired[list[str]]
+    x: NotRequired[list[float]]
+    y: NotRequired[list[float]]
+    z: NotRequired[list[float]]
+    phi: NotRequired[list[float]]
+    fixed: NotRequired[FixedParts]
+    reached: NotRequired[Array]
+    position_mm: NotRequired[Array]
+    orientation_deg: NotRequired[Array]
+    gap: NotRequired[float]
+    checked: NotRequired[SpotCheck | None]
+
+
+class CountRecord(TypedDict):
+    """How many modes there are, and how many the robot was found to reach."""
+
+    count: int | None
+    reachable: int | None
+    complete: bool
+    reason: str | None
+
+
+class EndCounts(TypedDict):
+    """The modes of the two ends; null where they were not asked."""
+
+    start: CountRecord | None
+    goal: CountRecord | None
+
+
+class DecisionRecord(TypedDict):
+    """A verdict and why."""
+
+    verdict: str
+    reason: str
+
+
+class CandidateRecord(TypedDict):
+    """A set of legs; null what was not asked."""
+
+    legs: list[str]
+    verdict: Word
+    discarded: str | None
+    examined: bool
+    position_mm: Number
+    orientation_deg: Number
+    seen: dict[str, float] | None
+    modes: EndCounts
+    aspect: DecisionRecord | None
+    run: DecisionRecord | None
+
+
+class UnexaminedRecord(TypedDict):
+    """How many sets were not examined, and why."""
+
+    count: int
+    reason: str | None
+
+
+Select = TypedDict("Select", {
+    "command": str, "version": str, "robot": str, "from": PoseRecord, "to": PoseRecord, "camera": str,
+    "cones": dict[str, float], "sight": dict[str, Any] | None, "best": list[str] | None,
+    "not_examined": UnexaminedRecord, "sets": list[CandidateRecord]})
+Select.__doc__ = "The sets of legs for a displacement, ranked; the cones by leg in degrees."
+
+
+class SliderRecord(TypedDict):
+    """A slider: its values, the one at zero, and the distance to a singularity at each."""
+
+    name: str
+    unit: str
+    values: list[float]
+    home: int
+    distances: list[Number]
+
+
+class ShownMode(TypedDict):
+    """An assembly mode that is drawn."""
+
+    label: str
+    pose: PoseRecord
+    reachable: bool | None
+
+
+class View(OfRobot, Written):
+    """What a 3D view shows."""
+
+    observed: list[Watched]
+    camera: str
+    dof: int
+    shown: dict[str, str]
+    distance: Number
+    largest_distance: Number
+    sliders: list[SliderRecord]
+    modes: list[ShownMode]
+    notes: list[str]
+
+
+class ShippedRobot(TypedDict):
+    """A robot; of one that is shipped what it is, where it is told and with which dimensions."""
+
+    name: str
+    file: str
+    architecture_ascii: NotRequired[str]
+    dof: NotRequired[int]
+    section: NotRequired[str]
+    dimensions: NotRequired[str]
+
+
+class Robots(Head):
+    """The robots that come with the package."""
+
+    robots: list[ShippedRobot]
+
+
+class Convert(OfRobot):
+    """A robot that was written in another dialect, and what was lost."""
+
+    file: str
+    files: list[str]
+    links: int
+    joints: int
+    warnings: list[str]
+
+
+class Verify(Head):
+    """A certificate that was accepted, and what it proves."""
+
+    robot: NotRequired[str]
+    file: str
+    accepted: bool
+    proved: str
+
+
+class Entry(TypedDict, total=False):
+    """An architecture of the catalog; of one that is refused only its word, its group, its notation and why."""
+
+    word: str
+    group: str
+    notation: str
+    refused: str
+    base_motors: bool
+    condition: str
+    confirmed: int
+    cure: str
+    dof: int
+    driven: bool
+    exact: bool
+    fewest: int
+    hidden: str
+    idle: int
+    instances: int
+    legs: int
+    lost: list[str]
+    minimal: list[list[str]]
+    mobility: int
+    modes_bound: int
+    modes_legs: list[str]
+    modes_seen: int
+    motion: str
+    motor_rank: int
+    motors: int
+    rank: int
+    steps: list[str]
+    verdict: Word
+    attempt: int | None
+
+
+class CatalogList(Head):
+    """The architectures that fit."""
+
+    total: int
+    entries: list[Entry]
+
+
+class CatalogShow(Head, Written):
+    """One architecture, drawn and in full."""
+
+    entry: Entry
+    drawing: list[str]
+    note: str | None
+
+
+class BuiltGroup(TypedDict):
+    """A group: how many words it has, how many were made now and before; its file is null while it is not complete."""
+
+    group: str
+    words: int
+    now: int
+    before: int
+    file: str | None
+
+
+class CatalogBuild(Head):
+    """What a build made, or with --check what is stale."""
+
+    groups: NotRequired[list[BuiltGroup]]
+    stale: NotRequired[list[str]]
+
+
+class Differing(TypedDict):
+    """A derivation that does not end in what the catalog says."""
+
+    word: str
+    derived: str
+
+
+class CatalogSite(Head):
+    """What a site holds, and where it starts."""
+
+    index: str
+    architectures: int
+    pages: int
+    now: int
+    differ: list[Differing]
+
+
+RECORDS: dict[str, Any] = {
+    "derive": Derive, "legs": Legs, "check": Check, "singular": Singular, "advise": Advise,
+    "modes": AssemblyModesRecord, "atlas": Atlas, "path": Path, "servo": Servo, "accuracy": Accuracy,
+    "select": Select, "view": View, "verify": Verify, "robots": Robots, "convert": Convert,
+    "catalog build": CatalogBuild, "catalog list": CatalogList, "catalog show": CatalogShow,
+    "catalog site": CatalogSite}
+"""The type of each command's record."""

@@ -1,0 +1,113 @@
+"""The JSON of every command is what its type says: schemas are made of types, real answers held against them."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from copy import deepcopy
+from pathlib import Path
+
+import pytest
+import typer
+from jsonschema import Draft202012Validator
+
+import hrsynth
+from hrsynth.cli import app, execute
+from hrsynth.cli.records import RECORDS
+from hrsynth.cli.schema import page, schema
+
+QUICK = {
+    "derive": ["quattro --observe 1,4", "3ppr_m1", "uranesx --observe 1,2 --form general",
+               "quattro --observe 1,4 -o hidden.urdf"],
+    "legs": ["3rrr_m1", "uranesx"],
+    "check": ["delta --at x=0.02,y=0.1,z=-0.62", "gough_stewart --grid x=0:0.01:2,rpy=0/0/0", "i4l",
+              "rrrrr_m1 --at x=0,y=0.3332050807568877 --grid x=-0.4:0.4:3,y=0.25:0.41:3 -o map.csv"],
+    "singular": ["rrrrr_m1 --points 30", "uranesx --points 5", "hexaglide --points 5"],
+    "advise": ["uranesx", "quattro --observe 1,4", "gough_stewart --observe 1"],
+    "modes": ["3rrr_m1", "delta --observe 1", "3rps", "quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7,phi=10deg",
+              "3rrr_m1 --real --at x=0.02,phi=5deg"],
+    "atlas": ["3rrr_m1 --observe 2,1,3"],
+    "path": ["quattro --observe 1,4 --start x=0.05 --goal x=-0.05,phi=20deg", "3rps --start z=0.5 --goal z=0.51"],
+    "servo": ["rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22",
+              "rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22 --noise 0.1deg --time 3"],
+    "accuracy": ["delta --cone 0.1deg --at x=0.1", "rrrrr_m1 --cone 0.1deg --at x=0,y=0.3332050807568877",
+                 "rrrrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0.2:0.22:2 --nonlinear 4"],
+    "select": ["rrrrr_m1 --start x=0.05 --goal x=-0.01,y=0.03 --runs 1 --sight auto"],
+    "view": ["rrrrr_m1 --static view.html"],
+    "verify": ["c.json"],
+    "robots": ["", "--examples"],
+    "convert": ["delta d.yaml", "3rrr_m1 r.sdf"],
+    "catalog build": ["--check --sample 1 planar"],
+    "catalog list": ["--legs 3 --dof 2", "--text refused"],
+    "catalog show": ["'3(Rz*-Rz-Rz)'"],
+    "catalog site": ["-o site --text '3(Rz*-Rz-Rz)'"],
+}
+"""Commands whose answers have every part of the records in them, quick ones."""
+
+
+@pytest.fixture
+def here(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def answered(capsys: pytest.CaptureFixture[str], text: str) -> dict:
+    capsys.readouterr()
+    assert execute([*shlex.split(text), "--json"]) == 0, capsys.readouterr().err
+    return json.loads(capsys.readouterr().out)
+
+
+def wrong(command: str, record: dict) -> list[str]:
+    found = Draft202012Validator(schema(command)).iter_errors(record)
+    return [f"{'/'.join(map(str, each.absolute_path))}: {each.message[:200]}" for each in found]
+
+
+@pytest.mark.parametrize("command", RECORDS)
+def test_every_answer_is_what_its_schema_says(here: Path, capsys, command: str):
+    if command == "view":
+        pytest.importorskip("meshcat")
+    if command == "verify":
+        assert execute(["modes", "3rrr_m1", "--certificate", "c.json"]) == 0
+    for arguments in QUICK[command]:
+        record = answered(capsys, f"{command} {arguments}")
+        assert (record["command"], record["version"]) == (command, hrsynth.__version__)
+        assert wrong(command, record) == [], arguments
+
+
+def test_every_command_with_json_has_a_record():
+    root = typer.main.get_command(app)
+    found = [name for name, each in root.commands.items() if not hasattr(each, "commands")]
+    found += [f"{name} {inner}" for name, each in root.commands.items() for inner in getattr(each, "commands", {})]
+    leaves = {name: (root.commands[name] if " " not in name else
+                     root.commands[name.split()[0]].commands[name.split()[1]]) for name in found}
+    assert {name for name, each in leaves.items() if any(o.name == "json" for o in each.options)} == {
+        *RECORDS} == {*QUICK}
+
+
+def test_a_schema_refuses_what_is_wrong(here: Path, capsys):
+    good = answered(capsys, "check rrrrr_m1")
+    for path in (["robot"], ["configurations", 0, "pose", "x"], ["configurations", 0, "classes", "RI"]):
+        less, odd, more = (deepcopy(good) for _ in range(3))
+        for record in (less, odd, more):
+            inner = record
+            for part in path[:-1]:
+                inner = inner[part]
+            if record is less:
+                del inner[path[-1]]
+            elif record is odd:
+                inner[path[-1]] = ["odd"]
+            else:
+                inner["more"] = 1
+        assert [bool(wrong("check", each)) for each in (good, less, odd, more)] == [False, True, True, True]
+
+
+def test_schemas_are_sound_printed_and_on_their_page(capsys):
+    shown = page()
+    for command in RECORDS:
+        Draft202012Validator.check_schema(schema(command))
+        capsys.readouterr()
+        assert execute(["schema", *command.split()]) == 0
+        assert json.loads(capsys.readouterr().out) == schema(command)
+        assert f'??? abstract "{command}"' in shown
+    assert execute(["schema", "nothing"]) == 2
+    assert "catalog list" in capsys.readouterr().err
