@@ -160,3 +160,9 @@ def test_short_work_has_no_bar(monkeypatch: pytest.MonkeyPatch, capsys):
         bar.tell("nothing")
     time.sleep(0.7)
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize("text", ["x=1_0", "x=１", "x=0x1", "x=1e", "x=", "phi=1_0deg", "x=١"])
+def test_only_plain_numbers_are_numbers(capsys, text: str):
+    assert execute(["check", "3rrr_m1", "--at", text]) == 2
+    assert "is not a number" in capsys.readouterr().err

@@ -30,7 +30,7 @@ class OfRobot(Head):
     robot: str
 
 
-class Written(TypedDict):
+class WrittenTo(TypedDict):
     """The file that was asked for with -o."""
 
     file: str | None
@@ -147,7 +147,7 @@ class CertificateRecord(TypedDict):
     reason: str
 
 
-class OperationMode(TypedDict):
+class OperationModeRecord(TypedDict):
     """What the platform does in an operation mode."""
 
     dof: int
@@ -155,7 +155,7 @@ class OperationMode(TypedDict):
     mobility: int
 
 
-class OtherMode(OperationMode):
+class OtherMode(OperationModeRecord):
     """Another operation mode that was met, and a pose in it."""
 
     words: str
@@ -165,7 +165,7 @@ class OtherMode(OperationMode):
 class Modes(TypedDict):
     """The operation mode of the zero configuration, and others that were met."""
 
-    operation_mode: OperationMode
+    operation_mode: OperationModeRecord
     other_modes: list[OtherMode]
 
 
@@ -209,7 +209,7 @@ class LegSet(TypedDict):
     architecture: ArchitectureRecord
 
 
-class Legs(OfRobot, Modes):
+class LegsAnswer(OfRobot, Modes):
     """Every set of watched legs; `minimal` are the smallest sets of the best rank."""
 
     architecture_ascii: str
@@ -322,7 +322,7 @@ class GridRecord(GridAxes):
     degrees_per_degree: Array
 
 
-class Check(OfRobot, Written):
+class CheckAnswer(OfRobot, WrittenTo):
     """Mobility, ranks, singularities and redundant constraints at poses and over a grid."""
 
     characteristic_length: float
@@ -381,7 +381,7 @@ class LocusRecord(TypedDict):
     real: LocusField | None
 
 
-class Singular(OfRobot, Written):
+class Singular(OfRobot, WrittenTo):
     """The Type 2 condition in words and as an expression, and singular poses."""
 
     measured: MeasuredRecord
@@ -489,7 +489,7 @@ class SelfMotionRecord(TypedDict):
     met: int
 
 
-class ListedModes(OfRobot, Written):
+class ListedModes(OfRobot, WrittenTo):
     """All assembly modes; `complex` is null where no count is proved."""
 
     kind: Literal["hidden", "real"]
@@ -570,7 +570,7 @@ class AspectsRecord(TypedDict):
     modes: list[list[int]]
 
 
-class Atlas(ListedModes):
+class AtlasAnswer(ListedModes):
     """Which modes can be led to each other; `table` is by their numbers."""
 
     table: list[list[str]]
@@ -661,7 +661,7 @@ class SpotCheck(TypedDict):
     difference: float
 
 
-class Accuracy(OfRobot, Written):
+class AccuracyAnswer(OfRobot, WrittenTo):
     """The largest errors at poses; of a plane or grid also its axes and a table of each error."""
 
     observed: list[Watched]
@@ -751,7 +751,7 @@ class ShownMode(TypedDict):
     reachable: bool | None
 
 
-class View(OfRobot, Written):
+class ViewAnswer(OfRobot, WrittenTo):
     """What a 3D view shows."""
 
     observed: list[Watched]
@@ -842,7 +842,7 @@ class CatalogList(Head):
     entries: list[Entry]
 
 
-class CatalogShow(Head, Written):
+class CatalogShow(Head, WrittenTo):
     """One architecture, drawn and in full."""
 
     entry: Entry
@@ -885,9 +885,9 @@ class CatalogSite(Head):
 
 
 RECORDS: dict[str, Any] = {
-    "derive": Derive, "legs": Legs, "check": Check, "singular": Singular, "advise": Advise,
-    "modes": AssemblyModesRecord, "atlas": Atlas, "path": Path, "servo": Servo, "accuracy": Accuracy,
-    "select": Select, "view": View, "verify": Verify, "robots": Robots, "convert": Convert,
+    "derive": Derive, "legs": LegsAnswer, "check": CheckAnswer, "singular": Singular, "advise": Advise,
+    "modes": AssemblyModesRecord, "atlas": AtlasAnswer, "path": Path, "servo": Servo, "accuracy": AccuracyAnswer,
+    "select": Select, "view": ViewAnswer, "verify": Verify, "robots": Robots, "convert": Convert,
     "catalog build": CatalogBuild, "catalog list": CatalogList, "catalog show": CatalogShow,
     "catalog site": CatalogSite}
 """The type of each command's record."""

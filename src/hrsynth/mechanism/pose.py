@@ -301,6 +301,8 @@ def _fields(text: str, what: str) -> list[tuple[str, str]]:
 def _number(value: str, name: str, text: str) -> float:
     digits = value.removesuffix("deg").strip() if name in ("phi", "rpy") else value
     try:
+        if not digits.isascii() or "_" in digits:
+            raise ValueError
         number = float(digits)
     except ValueError:
         unit = "a number of radians, or of degrees with deg" if name in ("phi", "rpy") else "a number of metres"

@@ -7,8 +7,6 @@ when it is wanted.
 
 from __future__ import annotations
 
-import difflib
-import re
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from functools import partial
@@ -23,9 +21,6 @@ Asked = Mapping[str, Any]
 """Options by name."""
 PNG, CSV, HTML = ".png", ".csv", (".html", ".htm")
 FIGURES = (PNG, ".pdf", ".svg")
-MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4}
-WIDTHS, TEXTS = (1.0, 40.0), (4.0, 40.0)
-"""The least and the largest width of a figure (inches) and size of its text (points)."""
 
 
 def function(name: str) -> Callable[..., Any]:
@@ -77,7 +72,7 @@ class File:
             if asked.get(name) is not None and (path is None or Path(path).suffix.lower() not in FIGURES):
                 raise BadRequest(f"--{name} is of a figure", asked[name], f"--output with {', '.join(FIGURES)}")
             if asked.get(name) is not None:
-                paper(asked, PNG)
+                function("plots:paper")(PNG, asked.get("width"), asked.get("font"))
         if path is None:
             if asked.get("plane") is not None and "plane" in self.takes:
                 raise BadRequest("a plane of poses is drawn", asked["plane"], "--plane together with --output FILE.png")
@@ -107,7 +102,7 @@ class File:
         """The file's content and what the JSON says more; raises ``BadRequest`` where there is nothing to draw."""
         maker = function(self.makers[ending])
         if ending in FIGURES and self.drawn:
-            maker = partial(maker, paper=paper(asked, ending))
+            maker = partial(maker, paper=function("plots:paper")(ending, asked.get("width"), asked.get("font")))
         if self.computed is None:
             return maker(found), {}
         value = function(self.computed)(found, **{name: asked[name] for name in (*self.takes, "seed")})
@@ -119,37 +114,6 @@ class File:
 
         content, more = self.content(found, Path(path).suffix.lower(), asked)
         return partial(write_whole, path, content), more
-
-
-def paper(asked: Asked, ending: str) -> Any:
-    """What a figure is printed on: ``width`` as 88mm, 8.8cm or 3.5in, ``font`` as a name, a size (8pt) or both
-    (Times 8pt). Raises ``BadRequest``."""
-    from .plots import Paper
-
-    width, font, inches, size = asked.get("width"), asked.get("font"), None, None
-    if width is not None:
-        found = re.fullmatch(r"(\d+\.?\d*) *(mm|cm|in)", width.strip())
-        inches = 0.0 if found is None else float(found[1]) * MILLIMETRES[found[2]] / MILLIMETRES["in"]
-        if not WIDTHS[0] <= inches <= WIDTHS[1]:
-            raise BadRequest("width of a figure", width, f"{WIDTHS[0]:g}in to {WIDTHS[1]:g}in, as 88mm, 8.8cm or 3.5in")
-    if font is not None:
-        name, points = re.fullmatch(r"(.*?)(?:(?:^| +)(\d+\.?\d*) *pt)?", font.strip()).groups()  # type: ignore[union-attr]
-        size = None if points is None else float(points)
-        if size is not None and not TEXTS[0] <= size <= TEXTS[1]:
-            raise BadRequest("font of a figure", font, f"a name, a size of {TEXTS[0]:g}pt to {TEXTS[1]:g}pt, or both")
-        font = require_font(name)
-    return Paper(ending, inches, size, font)
-
-
-def require_font(name: str) -> str | None:
-    """A font that is installed, None for no name; raises ``BadRequest``."""
-    from matplotlib import font_manager
-
-    known = {each.name for each in font_manager.fontManager.ttflist}
-    if name and name not in known and name not in ("serif", "sans-serif", "monospace"):
-        close = difflib.get_close_matches(name, known, 3, 0.4)
-        raise BadRequest("font of a figure", name, ", ".join(["an installed font", *close, "serif, sans-serif"]))
-    return name or None
 
 
 class HiddenFile(File):

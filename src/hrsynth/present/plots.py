@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import difflib
 import io
+import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
@@ -29,6 +31,9 @@ BESIDE = 2.3
 FEWEST_TICKS = 3
 LARGEST_TEXT = 1.25
 """Multiple of its part of the width up to which text is made larger: above, it would run into what is beside it."""
+MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4}
+WIDTHS, TEXTS = (1.0, 40.0), (4.0, 40.0)
+"""The least and the largest width of a figure (inches) and size of its text (points)."""
 PLACES = 6
 """Decimals of metres and degrees in words."""
 Asked = ParamSpec("Asked")
@@ -102,6 +107,35 @@ class Paper:
 
 
 PNG = Paper()
+
+
+def paper(ending: str, width: str | None, font: str | None) -> Paper:
+    """What a figure is printed on: ``width`` as 88mm, 8.8cm or 3.5in, ``font`` as a name, a size (8pt) or both
+    (Times 8pt). Raises ``BadRequest``."""
+    inches = size = None
+    if width is not None:
+        found = re.fullmatch(r"(\d+\.?\d*) *(mm|cm|in)", width.strip())
+        inches = 0.0 if found is None else float(found[1]) * MILLIMETRES[found[2]] / MILLIMETRES["in"]
+        if not WIDTHS[0] <= inches <= WIDTHS[1]:
+            raise BadRequest("width of a figure", width, f"{WIDTHS[0]:g}in to {WIDTHS[1]:g}in, as 88mm, 8.8cm or 3.5in")
+    if font is not None:
+        name, points = re.fullmatch(r"(.*?)(?:(?:^| +)(\d+\.?\d*) *pt)?", font.strip()).groups()  # type: ignore[union-attr]
+        size = None if points is None else float(points)
+        if size is not None and not TEXTS[0] <= size <= TEXTS[1]:
+            raise BadRequest("font of a figure", font, f"a name, a size of {TEXTS[0]:g}pt to {TEXTS[1]:g}pt, or both")
+        font = require_font(name)
+    return Paper(ending, inches, size, font)
+
+
+def require_font(name: str) -> str | None:
+    """A font that is installed, None for no name; raises ``BadRequest``."""
+    from matplotlib import font_manager
+
+    known = {each.name for each in font_manager.fontManager.ttflist}
+    if name and name not in known and name not in ("serif", "sans-serif", "monospace"):
+        close = difflib.get_close_matches(name, known, 3, 0.4)
+        raise BadRequest("font of a figure", name, ", ".join(["an installed font", *close, "serif, sans-serif"]))
+    return name or None
 
 
 def printed(figure: Any, paper: Paper) -> bytes:
