@@ -38,6 +38,16 @@ def double_box(record: Record, rng: random.Random) -> None:
     system["boxes"].append(copy.deepcopy(box))
 
 
+def repeat_box(record: Record, rng: random.Random) -> None:
+    """One box told in the place of another."""
+    system, box = a_box(record, rng)
+    k = rng.randrange(len(system["boxes"]))
+    if system["boxes"][k] is box:
+        return wrong_count(record, rng)
+    system["boxes"][k] = copy.deepcopy(box)
+    return None
+
+
 def move_box(record: Record, rng: random.Random) -> None:
     _, box = a_box(record, rng)
     part = rng.choice(box["middle"])
@@ -51,8 +61,10 @@ def turn_complex(record: Record, rng: random.Random) -> None:
 
 
 def wrong_radius(record: Record, rng: random.Random) -> None:
+    """No radius, too large, or too small to hold the solution, where that is not the middle itself."""
     _, box = a_box(record, rng)
-    box["radius"] = rng.choice(["0", "-1/1208925819614629174706176", "1000", f"1/{2 ** 600}"])
+    exact = all(Fraction(x).denominator == 1 for part in box["middle"] for x in part)
+    box["radius"] = rng.choice(["0", "-1/1208925819614629174706176", "1000", "1000" if exact else f"1/{2 ** 600}"])
 
 
 def wrong_inverse(record: Record, rng: random.Random) -> None:
@@ -128,8 +140,8 @@ def wrong_type(record: Record, rng: random.Random) -> None:
 
 
 FALSE: tuple[Callable[[Record, random.Random], None], ...] = (
-    drop_box, double_box, move_box, turn_complex, wrong_radius, wrong_inverse, wrong_count, wrong_pose, forget_pose,
-    wrong_caps, other_geometry, missing_key, wrong_type)
+    drop_box, double_box, repeat_box, move_box, turn_complex, wrong_radius, wrong_inverse, wrong_count, wrong_pose,
+    forget_pose, wrong_caps, other_geometry, missing_key, wrong_type)
 
 
 def false(record: Record, rng: random.Random) -> tuple[str, Record]:

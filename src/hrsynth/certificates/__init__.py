@@ -14,7 +14,7 @@ from ..errors import BadRequest, CertificateRefused
 from ..mechanism import Mechanism
 from ..tolerances import SAME_RELATION
 from . import modes, ranks
-from .verify_certificate import NotAccepted
+from .verify_certificate import NotAccepted, once
 from .verify_certificate import verify as _verify
 
 
@@ -43,7 +43,9 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | None = Non
     else:
         name = str(source)
         try:
-            record = json.loads(Path(source).read_text(encoding="utf-8"))
+            record = json.loads(Path(source).read_text(encoding="utf-8"), object_pairs_hook=once)
+        except NotAccepted as reason:
+            raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
             raise BadRequest("a certificate that cannot be read", name, f"a file of JSON ({error})") from None
     try:
@@ -51,7 +53,10 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | None = Non
     except NotAccepted as reason:
         raise CertificateRefused(name, str(reason)) from None
     if robot is not None:
-        own = (modes if record["claim"] == "modes" else ranks).again(record, robot)
+        try:
+            own = (modes if record["claim"] == "modes" else ranks).again(record, robot)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise CertificateRefused(name, f"it does not say which legs and pose it is about ({error!r})") from None
         if not _same(record, own):
             raise CertificateRefused(name, f"it is not about {robot.name}: other geometry, legs or pose")
     return proved
@@ -66,6 +71,6 @@ def _same(one: Any, other: Any) -> bool:
     if isinstance(one, list) and isinstance(other, list):
         return len(one) == len(other) and all(map(_same, one, other))
     try:
-        return one == other or abs(float(Fraction(one) - Fraction(other))) < SAME_RELATION
-    except (TypeError, ValueError):
+        return one == other or abs(Fraction(one) - Fraction(other)) < SAME_RELATION
+    except (TypeError, ValueError, ArithmeticError):
         return False

@@ -112,15 +112,16 @@ def _system(solved: Solved) -> dict[str, Any]:
     record, starts, placed = _written(solved)
     equations, halves, points, legs = KINDS[record["kind"]](record, rational(record["tips"]))
     equations = [integral(p) for p in equations]
-    starts += [(each, False) for each in _no_poses(equations, halves)]
     real = iter(zip(placed, solved.kept, strict=True))
     record["boxes"] = []
-    for start, is_real_ in starts:
-        middle, inverse = _refined(equations, start, is_real_)
+    for start, is_real_ in [*starts, *((each, None) for each in _no_poses(equations, halves))]:
+        middle, inverse = _refined(equations, start, bool(is_real_))
         box = {"middle": _strings(middle), "radius": str(RADIUS), "inverse": _strings(inverse)}
-        if is_real_:
-            pose, kept = next(real)
-            box |= _pose(record, box, points, pose) if kept else {"misses": _missed(legs, middle)}
+        pose, kept = next(real) if is_real_ else (np.empty(0), False)
+        if kept:
+            box |= _pose(record, box, points, pose)
+        elif is_real_ or (legs and is_real_ is not None):
+            box["misses"] = _missed(legs, middle)
         record["boxes"].append(box)
     record["bound"] = _bound(record, equations, halves)
     return record
@@ -181,7 +182,7 @@ def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], 
         bodies = [0] * len(system.paths) if isinstance(system, Translating) else system.bodies
         paths = [shifted(each, frame.origin - origin) for each in system.paths]
         record["reaches"] = [*record["reaches"], *(_reach(each, frame, 0.0) for each in paths)]
-        record["bodies"] = [*record.get("bodies", [0] * record["square"]), *bodies]
+        record["bodies"] = [*record["bodies"], *bodies]
     record["tips"] = [["0"] * 3] * len(record["reaches"])
     placed = [np.column_stack([np.eye(3), frame.vector(mode.pose[:3, 3] - origin)]) for mode in solved.modes]
     return record, list(zip(starts, real, strict=True)), placed
@@ -225,7 +226,7 @@ def _translating(system: Translating, part: SquareSystem, frame: WorkingFrame, t
     if len(chosen) == 2:
         chosen = [curve, _met(curve, next(each for each in chosen if each is not curve), system.size)]
     starts = [list(frame.point(_at(curve, frame, turns[0], t[0]))) for t in values]
-    return {"reaches": [_reach(each, frame, turns[0]) for each in chosen]}, starts
+    return {"reaches": [_reach(each, frame, turns[0]) for each in chosen], "bodies": [0] * len(chosen)}, starts
 
 
 def _articulated(system: Articulated, part: SquareSystem, frame: WorkingFrame, turns: Sequence[float],

@@ -4,18 +4,17 @@
 
 * At least: Krawczyk. Each solution has a complex box |x_k - m_k| <= r. With any matrix Y, the derivatives J at m and
   H what they change by in the box, |Y F(m)| + (|1 - Y J| + |Y| H) r < r makes x - Y F(x) a contraction of the box: it
-  holds one solution and no other. Where m is real the box is its own conjugate, and so is the solution. Others are off
-  the real numbers in some unknown. No two boxes touch.
+  holds one solution and no other. Where m is real the box is its own conjugate, and so is the solution.
 * At most, *rank*: columns are the monomials up to the caps, B those below, S the others; rows all multiples of the
   equations within the caps. If the columns S have full rank, each monomial is a sum of those in B modulo the equations:
-  at most |B| + |S| - rank zeros. A rank modulo a prime is at most that over the rationals. The tangent of half an angle
-  has its own cap: a zero at infinity, which is a pose, would be a vector on S that all rows annul.
+  at most |B| + |S| - rank zeros. Modulo a prime ranks are no larger. The tangent of half an angle has its own cap: a
+  zero at infinity, which is a pose, would be a vector on S that all rows annul.
 * At most, *poses*: conditions *on a sphere*, *on a plane* on points of a rigid body are linear in 17 coordinates in
   which poses have dimension 6 and degree 40 (Gallet, Nawratil, Schicho, J. Geom. 106, 2015): of six at most 40 zeros,
   and no curve besides 40. With a tip at rest, or on six planes, three quadrics of the quaternion remain: 8; three rods
   in one ball put it in two places: 16.
-* A real pose puts each tip where its box does, to the distance told. With more legs than needed, the other real
-  solutions miss one, and poses fit to 1e-9.
+* A real pose puts each tip where its box does, to the distance told. With more legs than needed, the other solutions
+  miss one, and poses fit to 1e-9. Systems (branches of legs) are counted one by one.
 
 *ranks*: of stacks of integer matrices, by a minor that is not zero modulo a prime and vectors that the stack annuls.
 """
@@ -28,6 +27,7 @@ from fractions import Fraction
 from itertools import combinations, product
 
 PRIME = 2147483647
+FIT, WITHIN = Fraction(1, 10 ** 9), Fraction(1, 10 ** 6)
 
 class NotAccepted(Exception):
     """Why a certificate is not accepted."""
@@ -36,8 +36,7 @@ def need(true, why):
     if not true:
         raise NotAccepted(why)
 
-def add(*terms):
-    """A sum of polynomials {exponents: coefficient}."""
+def add(*terms):  # a sum of polynomials {exponents: coefficient}
     total = {}
     for p in terms:
         for e, c in p.items():
@@ -53,8 +52,7 @@ def times(c, p):
 def minus(p, q):
     return add(p, times(-1, q))
 
-def term(c, n, k=None):
-    """c, or c x_k."""
+def term(c, n, k=None):  # c, or c x_k
     return {tuple(int(i == k) for i in range(n)): Fraction(c)} if c else {}
 
 def inner(u, v):
@@ -63,12 +61,10 @@ def inner(u, v):
 def slope(p, k):
     return {(*e[:k], e[k] - 1, *e[k + 1:]): c * e[k] for e, c in p.items() if e[k]}
 
-def formal(p, w):
-    """An equation times w, with all monomials of w too: those set its degree in half-angle tangents."""
+def formal(p, w):  # an equation times w, with all monomials of w: those set its degree in half-angle tangents
     return dict.fromkeys(w, Fraction(0)) | p
 
-def integral(p):
-    """The polynomial with integer coefficients that have no common divisor."""
+def integral(p):  # with integer coefficients that have no common divisor
     need(any(p.values()), "an equation vanishes")
     below = math.lcm(*(c.denominator for c in p.values()))
     common = math.gcd(*(int(c * below) for c in p.values()))
@@ -86,21 +82,19 @@ def cross(u, v, mul=lambda a, b: a * b, minus=lambda a, b: a - b):
 def rational(value):
     if isinstance(value, list):
         return list(map(rational, value))
-    need(isinstance(value, str) and len(value) < 5000 and not set(value) - set("0123456789/.-"), "a number in words")
+    need(isinstance(value, str) and len(value) < 300 and not set(value) - set("0123456789/.-"), "a number in words")
     return Fraction(value)
 
-def reach_of(record, size=3):
-    """What a tip can reach, and its vectors: centre; direction, normal, spokes of a circle, squared radius."""
+def reach_of(record, size=3):  # a kind, its centre; direction, normal, spokes of a circle, squared radius
     (kind, values), = record.items()
-    lengths = {"point": [size], "line": [size] * 2, "circle": [size] * 3, "plane": [size] * 2, "sphere": [size, 1]}
+    lengths = {"point": [size], "line": [size] * 2, "circle": [size] * 3, "plane": [3] * 2, "sphere": [3, 1]}
     _, *rest = vectors = rational(values)
-    need(kind in lengths and [len(v) for v in vectors] == lengths[kind], f"{kind} is no curve or surface")
+    need(kind in lengths and [len(v) for v in vectors] == lengths[kind], f"{kind!r} is no curve or surface")
     need(kind != "circle" or dot(*rest) == 0 == dot(rest[0], rest[0]) - dot(rest[1], rest[1]), "the spokes of a circle")
     need(kind == "point" or (any(rest[0]) and (kind != "sphere" or rest[0][0] > 0)), f"a {kind} without extent")
     return kind, vectors
 
-def running(reach, k, n):
-    """N / w, a curve's point, Q / w its square, at x_k: t of c + t d on a line, a half-angle tangent on a circle."""
+def running(reach, k, n):  # N / w, a curve's point, Q / w its square, at x_k: t of c + t d, or a half-angle tangent
     kind, (c, *rest) = reach
     one, t = term(1, n), term(1, n, k)
     if kind == "circle":
@@ -111,8 +105,7 @@ def running(reach, k, n):
     N = [add(term(x, n), times(d, t)) for x, d in zip(c, rest[0] if rest else [0] * len(c))]
     return N, inner(N, N), one
 
-def apart(one, other, squared):
-    """|P1 - P2|^2 = squared."""
+def apart(one, other, squared):  # |P1 - P2|^2 = squared
     (N, Q, w), (M, P, v) = one, other
     return add(mul(Q, v), mul(P, w), times(-2, inner(N, M)), times(-squared, mul(w, v)))
 
@@ -124,22 +117,23 @@ def on_sphere(point, centre, squared):
     N, Q, w = point
     return add(Q, *(times(-2 * c, p) for c, p in zip(centre, N)), times(dot(centre, centre) - squared, w))
 
-def conditions(point, reach):
-    """The planes and spheres that keep a point to its reach: (equation, normal of the plane)."""
+def conditions(point, reach):  # planes and spheres that a point is on: (equation, normal or squared radius)
     kind, (c, *rest) = reach
     axes = [[Fraction(int(i == k)) for i in range(3)] for k in range(3)]
     if kind == "sphere":
-        return [(on_sphere(point, c, rest[0][0]), None)]
+        return [(on_sphere(point, c, rest[0][0]), rest[0])]
     if kind == "circle":
         n = cross(*rest)
-        return [(on_plane(point, n, c), n), (on_sphere(point, c, dot(rest[0], rest[0])), None)]
+        return [(on_plane(point, n, c), n), (on_sphere(point, c, dot(rest[0], rest[0])), [dot(rest[0], rest[0])])]
     if kind == "line":
         first = cross(rest[0], min(axes, key=lambda axis: abs(dot(rest[0], axis))))
         rest = [first, cross(rest[0], first)]
     return [(on_plane(point, n, c), n) for n in rest or axes]
 
-def tips_on(reaches):
-    """Points of curves, each with its own unknown; for each unknown whether it is a half-angle tangent."""
+def misfits(equations):  # by how much lengths miss: over a plane's normal, over the squared radius of small spheres
+    return [times(1 / (max(map(abs, n)) if len(n) > 1 else min(n[0], 1)), p) for p, n in equations]
+
+def tips_on(reaches):  # points of curves, each with an unknown; for each unknown whether it is a half-angle tangent
     need({kind for kind, _ in reaches} <= {"point", "line", "circle"}, "tips on surfaces need another kind")
     moving = [k for k, (kind, _) in enumerate(reaches) if kind != "point"]
     points = [running(reach, moving.index(k) if k in moving else None, len(moving)) for k, reach in enumerate(reaches)]
@@ -151,14 +145,9 @@ def spatial(system, tips):
     u, v = sub(tips[1], tips[0]), sub(tips[2], tips[0])
     up = cross(u, v)
     need(system["square"] == 3 <= len(tips) == len(reaches) and any(up), "three tips that are not on one line")
-    (points, halves), found, legs = tips_on(reaches[:3]), [], []
-    for i, j in ((0, 1), (1, 2), (2, 0)):
-        arm = sub(tips[i], tips[j])
-        if reaches[i][0] == reaches[j][0] == "point":
-            rest = sub(reaches[i][1][0], reaches[j][1][0])
-            need(abs(dot(rest, rest) - dot(arm, arm)) * 10 ** 12 < dot(arm, arm), "tips at rest are not that far apart")
-        else:
-            found.append(formal(apart(points[i], points[j], dot(arm, arm)), mul(points[i][2], points[j][2])))
+    (points, halves), legs = tips_on(reaches[:3]), []
+    found = [formal(apart(points[i], points[j], dot(arm, arm)), mul(points[i][2], points[j][2]))
+             for i, j, arm in ((0, 1, u), (1, 2, sub(v, u)), (2, 0, v))]
     (N, _, w), (M, _, x), (L, _, y) = points
     U, V = ([minus(mul(b, w), mul(a, z)) for a, b in zip(N, other)] for other, z in ((M, x), (L, y)))
     W, wxy = cross(U, V, mul, minus), mul(mul(w, w), mul(x, y))
@@ -167,7 +156,7 @@ def spatial(system, tips):
         i, j, k = (dot(b, each) / dot(up, up) for each in (cross(v, up), cross(up, u), up))
         P = [add(mul(a, mul(w, mul(x, y))), times(i, mul(c, mul(w, y))), times(j, mul(d, mul(w, x))), times(k, e))
              for a, c, d, e in zip(N, U, V, W)]
-        legs.append([p for p, _ in conditions(([mul(p, wxy) for p in P], inner(P, P), mul(wxy, wxy)), reach)])
+        legs.append(misfits(conditions(([mul(p, wxy) for p in P], inner(P, P), mul(wxy, wxy)), reach)))
     return found, halves, points, legs
 
 def planar(system, tips):
@@ -179,15 +168,15 @@ def planar(system, tips):
     found = [apart(*points, dot(arm, arm))]
     (N, Q, w), (M, P, v) = points
     for tip, (kind, (c, *rest)) in zip(tips[2:], reaches[2:]):
-        T, U, V = ([[a, -b], [b, a]] for a, b in (sub(tips[1], tip), sub(tip, tips[0]), arm))
+        x, y = (dot(sub(tip, tips[0]), each) / dot(arm, arm) for each in (arm, [-arm[1], arm[0]]))
+        T, U = [[1 - x, y], [-y, 1 - x]], [[x, -y], [y, x]]
         A, B = ([add(*(times(x, p) for x, p in zip(row, at))) for row in turn] for turn, at in ((T, N), (U, M)))
         point = ([add(mul(a, v), mul(b, w)) for a, b in zip(A, B)],
                  add(times(dot(T[0], T[0]), mul(Q, v)), times(dot(U[0], U[0]), mul(P, w)), times(2, inner(A, B))),
                  mul(w, v))
-        c, *rest = ([dot(row, each) for row in V] for each in (c, *rest))
         normals = [[1, 0], [0, 1]] if kind == "point" else [[-rest[0][1], rest[0][0]]]
-        legs.append([on_sphere(point, c, dot(rest[0], rest[0]))] if kind == "circle" else
-                    [on_plane(point, n, c) for n in normals])
+        legs.append(misfits([(on_sphere(point, c, dot(rest[0], rest[0])), [dot(rest[0], rest[0])])]
+                            if kind == "circle" else [(on_plane(point, n, c), n) for n in normals]))
     need(system["square"] == 2 or len(legs[0]) == 1, "the third tip is at rest")
     found += legs[0] if system["square"] == 3 else []
     return [formal(p, mul(w, v)) for p in found], halves, points, legs[system["square"] - 2:]
@@ -196,7 +185,7 @@ def shifting(system, tips):
     """Bodies that translate: x, y, z of the first, the second on the circle ``slide`` about it. Of spheres, and of
     parallel planes, all but the first are replaced by their difference from it."""
     slide = reach_of(system["slide"]) if "slide" in system else None
-    bodies, n = system.get("bodies", [0] * len(tips)), 4 if slide else 3
+    bodies, n = system["bodies"], 4 if slide else 3
     need(set(bodies) <= ({0, 1} if slide and slide[0] == "circle" else {0}), "the bodies of the tips")
     S, SS, v = running(slide, 3, n) if slide else ([], {}, {})
     one, points, found, kept, all_ = term(1, n), [], [], [], []
@@ -204,23 +193,24 @@ def shifting(system, tips):
         p, w = [add(term(1, n, k), term(b[k], n)) for k in range(3)], v if body else one
         N = [add(mul(x, w), S[k] if body else {}) for k, x in enumerate(p)]
         points.append((N, add(mul(inner(p, p), w), *((times(2, inner(p, S)), SS) if body else ())), w))
-        all_.append([equation for equation, _ in conditions(points[-1], reach)])
+        all_.append(misfits(conditions(points[-1], reach)))
         for equation, normal in conditions(points[-1], reach) if len(points) <= system["square"] else ():
-            first, n1, w1 = next((each for each in kept if normal == each[1] or (
-                normal and each[1] and not any(cross(normal, each[1])))), ({}, None, one))
+            first, n1, w1 = next((each for each in kept if len(normal) == len(each[1]) and (
+                len(normal) == 1 or not any(cross(normal, each[1])))), ({}, normal, one))
             kept += [] if first else [(equation, normal, w)]
             mine, other = (one, one) if w == w1 else (w1, w)
-            equation = minus(mul(equation, mine), times(dot(normal, n1) / dot(n1, n1) if n1 else 1, mul(first, other)))
-            found.append(formal(equation, mul(w, mine)))
+            ratio = dot(normal, n1) / dot(n1, n1) if len(n1) > 1 else 1
+            found.append(formal(minus(mul(equation, mine), times(ratio, mul(first, other))), mul(w, mine)))
     return found, [False] * 3 + [True] * (n - 3), points, all_[system["square"]:]
 
 def pose(system, tips):
     """Study's coordinates: a quaternion e, linear in (1, x1, x2, x3), and g = (x4 .. x7), e.g = 0; |e|^2 tip =
     2 vec(g e*) + |e|^2 R b. The last ``arrows`` of the tips only turn, about ``hub``."""
-    n, E, arrows = 7, rational(system["chart"]), system["arrows"]
-    need(modular([[int(c) % PRIME for c in row] for row in E], 4)[0] == 4, "a chart with four independent rows")
+    n, E, arrows = 7, [[int(c) for c in row] for row in system["chart"]], system["arrows"]
+    need([*map(len, E)] == [4] * 4 and modular([[c % PRIME for c in row] for row in E], 4)[1] == 4, "dependent rows")
     x = [term(1, n), *(term(1, n, k) for k in range(n))]
     e, g, hub = [add(*map(times, row, x)) for row in E], x[4:], rational(system["hub"])
+    need(len(hub) == 3 and arrows in range(len(tips)), "a hub, and tips that are no arrows")
     w, s = inner(e, e), [[mul(a, b) for b in e] for a in e]
     R = [[add(s[0][0], times(2, s[i][i]), *(times(-1, s[k][k]) for k in (1, 2, 3))) if i == j else
           times(2, add(s[i][j], times(1 if (i - j) % 3 == 1 else -1, s[0][6 - i - j]))) for j in (1, 2, 3)]
@@ -241,15 +231,14 @@ def pose(system, tips):
     return found, [False] * n, points, []
 
 KINDS = {"spatial": spatial, "planar": planar, "shifting": shifting, "pose": pose}
+OWN = {"spatial": "square", "planar": "square", "shifting": "square bodies slide", "pose": "chart arrows hub"}
 
-def value(p, x):
-    """A polynomial at complex numbers, pairs of fractions."""
+def value(p, x):  # at complex numbers, pairs of fractions
     total = [Fraction(0), Fraction(0)]
     for e, c in p.items():
         a, b = Fraction(c), Fraction(0)
-        for (u, v), k in zip(x, e):
-            for _ in range(k):
-                a, b = a * u - b * v, a * v + b * u
+        for u, v in (z for z, k in zip(x, e) for _ in range(k)):
+            a, b = a * u - b * v, a * v + b * u
         total = [total[0] + a, total[1] + b]
     return total
 
@@ -259,17 +248,19 @@ def size(z):
 def most(p, far):  # of |p| where |x_k| <= far_k
     return sum(abs(c) * math.prod(a ** k for a, k in zip(far, e)) for e, c in p.items())
 
-def least(p, m, r):  # of |p| in a box
+def change(p, m, r):  # of p in a box at most
     far = [size(z) + r for z in m]
-    return size(value(p, m)) / 2 - r * sum(most(slope(p, k), far) for k in range(len(m)))
+    return r * sum(most(slope(p, k), far) for k in range(len(m)))
 
-def enclosed(equations, m, r, Y):
-    """Krawczyk's condition; see above."""
-    n, far = len(m), [size(z) + r for z in m]
+def least(p, m, r):  # of |p| in a box
+    return size(value(p, m)) / 2 - change(p, m, r)
+
+def enclosed(equations, m, r, Y):  # Krawczyk's condition; see above
+    n = len(m)
     need(r > 0 and len(Y) == n and all(len(row) == n for row in Y), "a box without radius or inverse")
     slopes = [[slope(p, k) for k in range(n)] for p in equations]
     F, J = [value(p, m) for p in equations], [[value(d, m) for d in row] for row in slopes]
-    H = [r * sum(most(slope(d, k), far) for d in row for k in range(n)) for row in slopes]
+    H = [sum(change(d, m, r) for d in row) for row in slopes]
     for i, y in enumerate(Y):
         wide = sum(size(sub(along(y, [J[k][j] for k in range(n)]), [int(i == j), 0])) for j in range(n))
         wide += sum(size(z) * h for z, h in zip(y, H))
@@ -281,10 +272,11 @@ def along(y, z):
 def rank(equations, halves, system, ranks_of=None):
     n, groups = len(halves), system["bound"]["groups"]
     need(n <= 4 and sorted(k for group, _ in groups for k in group) == list(range(n)), "each unknown is in one group")
-    need(all(cap in range(1, 13) and (len(group) == 1 or not any(halves[k] for k in group)) for group, cap in groups),
-         "caps from 1 to 12, and one for each half-angle tangent")
+    need(all(cap in range(1, 13) and (len(group) == 1 or (group and not any(halves[k] for k in group)))
+             for group, cap in groups), "caps from 1 to 12, and one for each half-angle tangent")
     below = {e: min(cap - sum(e[k] for k in group) for group, cap in groups) for e in product(range(13), repeat=n)}
     columns = sorted((e for e in below if below[e] >= 0), key=lambda e: below[e] > 0)
+    need(len(columns) <= 300, "more than 300 monomials")
     edge = sum(below[e] == 0 for e in columns)
     moved = [{tuple(map(sum, zip(e, shift))): c % PRIME for e, c in p.items()} for p in equations for shift in columns]
     rows = [[row.get(e, 0) for e in columns] for row in moved if all(below.get(e, -1) >= 0 for e in row)]
@@ -292,21 +284,17 @@ def rank(equations, halves, system, ranks_of=None):
     need(sharp == edge, "monomials at the caps are not those of lower ones")
     return len(columns) - whole
 
-def modular(rows, first):
-    """The ranks modulo the prime of the first columns and of all."""
-    done, ranks = 0, [0]
-    for k in range(len(rows[0]) if rows else 0):
-        pivot = next((i for i in range(done, len(rows)) if rows[i][k]), None)
-        if pivot is not None:
-            rows[done], rows[pivot] = rows[pivot], rows[done]
-            over = pow(rows[done][k], -1, PRIME)
-            top = rows[done] = [c * over % PRIME for c in rows[done]]
-            done += 1
-            for i in range(done, len(rows)):
-                if c := rows[i][k]:
-                    rows[i] = [(a - c * b) % PRIME for a, b in zip(rows[i], top)]
-        ranks.append(done)
-    return ranks[min(first, len(ranks) - 1)], done
+def modular(rows, first):  # the ranks modulo the prime of the first columns and of all: where echelons begin
+    echelon = {}
+    for row in rows:
+        for k in range(len(row)):
+            if row[k] and k not in echelon:
+                over = pow(row[k], -1, PRIME)
+                echelon[k] = [c * over % PRIME for c in row]
+                break
+            if c := row[k]:
+                row = [(a - c * b) % PRIME for a, b in zip(row, echelon[k])]
+    return sum(k < first for k in echelon), len(echelon)
 
 def poses(equations, halves, system):
     need(system["kind"] == "pose" and len(equations) == 7, "six conditions on a pose")
@@ -315,62 +303,71 @@ def poses(equations, halves, system):
     together = max(each.count(b) for each in (tips, [v[0] for _, v in reaches]) for b in each)
     return 8 if "point" in kinds or kinds <= {"line", "plane"} else 16 if kinds == {"sphere"} and together > 2 else 40
 
-BOUNDS = {"rank": rank, "poses": poses}
-
 def modes(record):
-    real = complex_ = 0
+    seen, real, complex_ = [], 0, 0
     for system in record["systems"]:
         tips = rational(system["tips"])
+        fair(system, tips, 2 if system["kind"] == "planar" else 3)
         equations, halves, points, legs = KINDS[system["kind"]](system, tips)
         equations = [integral(p) for p in equations]
+        need((equations, legs) not in seen, "a system that is told twice")
+        seen.append((equations, legs))
         flat = [times(Fraction(1, 2 ** max(map(abs, p.values())).bit_length()), p) for p in equations]
         need(len(equations) == len(halves), f"{len(equations)} equations in {len(halves)} unknowns")
-        boxes, none = [], 0
+        bound, boxes = {"rank": rank, "poses": poses}[system["bound"]["kind"]](equations, halves, system), []
+        need(len(system["boxes"]) == bound, f"{len(system['boxes'])} boxes, but there may be {bound} solutions")
         for each in system["boxes"]:
             m, r = rational(each["middle"]), rational(each["radius"])
             need(len(m) == len(halves) and all(len(z) == 2 for z in m), "a box without its unknowns")
             enclosed(flat, m, r, rational(each["inverse"]))
             boxes.append((m, r))
             finite = all(least(w, m, r) > 0 for _, _, w in points)
-            none += not finite
             if "pose" in each:
-                need(all(size(value(p, m)) < Fraction(1, 10 ** 9) for leg in legs for p in leg), "a leg that misses")
+                need(all(size(value(p, m)) + change(p, m, r) < FIT for leg in legs for p in leg), "a leg that misses")
                 need(finite and all(v == 0 for _, v in m), "a real pose with a complex box")
                 told(system, each, points, tips, m, r)
-                real += 1
             elif "misses" in each:
                 need(any(least(p, m, r) > 0 for p in legs[each["misses"]]), "a leg that may not miss")
             else:
                 need(any(abs(v) > r for _, v in m), "a box that may be real has no pose")
+                need(not legs if finite else not any(map(any, (value(p, m) for p in equations))) and not all(
+                    any(value(w, m)) for _, _, w in points), "a box that may be a pose, or none")
+            real, complex_ = real + ("pose" in each), complex_ + (finite and "misses" not in each)
         for (m, r), (k, s) in combinations(boxes, 2):
             need(any(max(abs(a - c), abs(b - d)) > r + s for (a, b), (c, d) in zip(m, k)), "two boxes touch")
-        bound = BOUNDS[system["bound"]["kind"]](equations, halves, system)
-        need(len(boxes) == bound, f"{len(boxes)} boxes, but there may be {bound} solutions")
-        complex_ += sum("pose" in each for each in system["boxes"]) if legs else len(boxes) - none
-    need(record["real"] == real and record["complex"] == complex_, f"{real} real of {complex_} are proved")
-    return f"{real} real of {complex_} complex poses, and no other" + " (more legs than needed fit)" * bool(legs)
+    need(seen and record["real"] == real and record["complex"] == complex_, f"{real} real of {complex_} are proved")
+    more = " (more legs than needed fit)" * any(legs for _, legs in seen) + f" ({len(seen)} systems)" * (len(seen) > 1)
+    return f"{real} real of {complex_} complex poses, and no other{more}"
+
+def fair(system, tips, d):  # has what belongs to its kind, and lengths in units of about its size
+    need(system.keys() <= {*f"kind reaches tips boxes bound {OWN[system['kind']]}".split()}, "what is not of its kind")
+    need(len(tips) < 50 and all(len(b) == d for b in tips), "tips of another dimension, or too many")
+    reaches = [reach_of(each, d) for each in system["reaches"]]
+    spans = [sub(b, places[0]) for places in (tips, [v[0] for _, v in reaches]) for b in places]
+    spans += [v[1] for kind, v in reaches if kind in ("circle", "sphere")]
+    need(max(abs(x) for span in spans for x in span) > Fraction(1, 1000), "lengths in other units than its size")
 
 def told(system, each, points, tips, m, r):  # whether the pose puts the tips where the box does
-    far, lefts = [size(z) + r for z in m], [least(w, m, r) for _, _, w in points]
-    P, within = rational(each["pose"]), rational(each["within"])
-    d = len(P)
+    P, within, d = rational(each["pose"]), rational(each["within"]), len(points[0][0])
     turn = [row[:d] for row in P]
-    need(all(abs(dot(turn[i], turn[j]) - int(i == j)) < Fraction(1, 10 ** 9) for i in range(d) for j in range(d))
-         and (dot(cross(*turn[:2]), turn[2]) if d == 3 else turn[0][0] * turn[1][1] - turn[0][1] * turn[1][0]) > 0,
-         "a pose that does not turn rigidly")
+    need(len(P) == d and all(len(row) == d + 1 for row in P) and within <= WITHIN, "a pose of another form, or vague")
+    need(all(abs(dot(turn[i], turn[j]) - int(i == j)) < FIT for i in range(d) for j in range(d))
+         and (dot(cross(*turn[:2]), turn[2]) if d == 3 else cross(*([*row, 0] for row in turn))[2]) > 0, "no turn")
     need(system["kind"] != "shifting" or all(turn[i][i] == 1 for i in range(d)), "a platform that only translates")
     arrows, bodies = system.get("arrows", 0), system.get("bodies", [0] * len(tips))
-    for k, (b, (N, _, w), left, body) in enumerate(zip(tips, points, lefts, bodies)):
+    for k, (b, (N, _, w), body) in enumerate(zip(tips, points, bodies)):
         start = rational(system["hub"]) if k >= len(tips) - arrows else [row[d] for row in P]
         for i in range(0 if body else d):
             at = value(N[i], m)[0] / value(w, m)[0]
-            wide = r * sum(most(slope(minus(N[i], times(at, w)), j), far) for j in range(len(m))) / left
+            wide = change(minus(N[i], times(at, w)), m, r) / least(w, m, r)
             need(abs(at - start[i] - dot(turn[i], b)) + wide <= within, "a tip that is not where its box is")
 
 def ranks(record):
+    need(record["stacks"] and record["matrices"].keys() <= {"A", "X", "Y"}, "no stack, or a matrix of another name")
     for each in record["stacks"]:
         rows, kernel = [row for name in each["of"] for row in record["matrices"][name]], each["kernel"]
-        need(rows and all(type(c) is int for row in rows + kernel for c in row), "a matrix of integers")
+        need(rows and all(type(c) is int for row in [*rows, *kernel, [each["rank"]]] for c in row)
+             and len(set(each["of"])) == len(each["of"]), "matrices of integers, each once")
         minor = [[rows[i][j] % PRIME for j in each["columns"]] for i in each["rows"]]
         need(len(set(each["columns"])) == len(minor) == modular(minor, 0)[1] == each["rank"], "a minor that is zero")
         need(all(sum(map(int.__mul__, row, v)) == 0 for row in rows for v in kernel), "a vector that is not annulled")
@@ -382,8 +379,11 @@ def digest(record):
     rest = {key: each for key, each in record.items() if key != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
 
-def verify(record):
-    """What a certificate proves, in words; raises ``NotAccepted``."""
+def once(pairs):  # an object of JSON; of two keys a reader may see one, Python the other
+    need(len(dict(pairs)) == len(pairs), "a key that is told twice")
+    return dict(pairs)
+
+def verify(record):  # what a certificate proves, in words; raises NotAccepted
     try:
         need(record["format"] == "hrsynth-certificate-1", "another format")
         need(record["sha256"] == digest(record), "the file was changed: another digest")
@@ -394,7 +394,7 @@ def verify(record):
 if __name__ == "__main__":
     try:
         with open(sys.argv[1], encoding="utf-8") as file:
-            print("accepted:", verify(json.load(file)))
-    except (NotAccepted, OSError, ValueError, IndexError) as error:
+            print("accepted:", verify(json.load(file, object_pairs_hook=once)))
+    except (NotAccepted, OSError, ValueError, IndexError, RecursionError) as error:
         print("refused:", error)
         sys.exit(3)
