@@ -59,6 +59,7 @@ def test_a_defect_in_a_worker_is_told_with_what_was_asked():
 def test_any_function_is_asked_and_any_question():
     robots = ["3rrr_m1", "3rpr_m1"]
     assert hrsynth.map(lambda robot, observe: observe, robots, legs=[1, [2, 3]], jobs=2) == 2 * [("1",), ("2", "3")]
+    assert hrsynth.map(lambda robot, observe: observe, robots[0], legs="1,3", jobs=1) == [("1", "3")]
     found = hrsynth.map("path", robots[:1], poses=[[0.01, 0, 0]], start="x=0,y=0,phi=0", jobs=1)
     assert found == [hrsynth.path("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.01,y=0,z=0")]
     assert hrsynth.map("derive", "3rrr_m1", form="general", jobs=1) == [hrsynth.derive("3rrr_m1", form="general")]

@@ -85,6 +85,7 @@ class Result(Compared):
     """An answer: its ``repr`` is one line, its ``str`` the text of the command line, in a notebook the same as HTML.
 
     Two are equal where they say the same of the same robot.
+
     ``shown_as`` names its outputs in the table of ``present/outputs.py``. What shows them stands above all questions:
     the package sets ``public``, which gives its public functions ``text`` and ``html`` and loads them when something is
     shown.

@@ -34,10 +34,10 @@ def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLi
     ``poses``: in this order, poses fastest, whoever is done first.
 
     ``question`` is a public function or its name, or a function of your own with the same parameters: a pose is given
-    to it as ``at``, or as ``goal`` where it has no ``at``, legs as ``observe``; ``options`` are the same for all. There
-    are ``jobs`` processes, by default as many as cores; with 1 all is done in this one. A robot's samples are drawn
-    once in each process that is asked about it. ``errors`` is ``raise``, or ``keep``: what a question raised (an
-    ``HrsynthError``) then stands in the place of its answer. The error says what was asked.
+    to it as ``at``, or as ``goal`` where it has no ``at``, a set of legs as ``observe``; ``options`` are the same for
+    all. There are ``jobs`` processes, by default as many as cores; with 1 all is done in this one. A robot's samples
+    are drawn once in each process that is asked about it. ``errors`` is ``raise``, or ``keep``: what a question raised
+    (an ``HrsynthError``) then stands in the place of its answer. The error says what was asked.
 
     Raises ``BadRequest``, and what the question raises.
     """
@@ -48,7 +48,8 @@ def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLi
         raise BadRequest("number of processes", jobs, "1 or more")
     several: Any = [robots] if isinstance(robots, str | os.PathLike) or not isinstance(robots, Iterable) else robots
     every = [as_robot(each) for each in several]
-    watched: list[Given] = [{}] if legs is None else [{"observe": as_names(each)} for each in legs]
+    sets = [legs] if isinstance(legs, str) else legs
+    watched: list[Given] = [{}] if sets is None else [{"observe": as_names(each)} for each in sets]
     asked: list[Given] = [{}] if poses is None else [{_place(function): each} for each in asked_poses(poses)]
     groups = [{"robot": robot, **seen, **options} for robot, seen in product(every, watched)]
     workers = jobs or os.cpu_count() or 1
