@@ -10,6 +10,7 @@ import pytest
 import hrsynth
 from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.motions import SelfMotion
+from hrsynth.description import load, shipped
 from hrsynth.geometry.vectors import Array, rotation_about, unit
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
@@ -179,3 +180,14 @@ def test_a_singular_pose_is_no_self_motion():
     assert found.found.continuum is None
     assert "singular pose" in str(found.found.degenerate)
     assert sum(mode.goal for mode in found.modes) == 1
+
+
+@pytest.mark.parametrize(("name", "observe"), [
+    ("i4l", "1"), ("3rrp", "1"), ("hexaglide", "1"), ("quattro", "1"), ("prrrp_parallel_point", None), ("3prp", None)])
+def test_freedoms_that_are_never_seen_are_moved(name: str, observe: str | None):
+    """As many ways to move as the rank at other configurations leaves."""
+    found = hrsynth.modes(load(shipped()[name]), observe)
+    (motion,) = found.motions
+    assert motion.dimension == found.found.continuum
+    assert motion.goal
+    assert "a continuum" in found.count

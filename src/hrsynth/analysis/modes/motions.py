@@ -156,18 +156,19 @@ class _Follower:
         """The ways in which closings lie about one: an orthonormal basis of the bodies' twists that lead to them
         (rows, d), fewer than :meth:`tangents` where a freedom is one to first order only; and the closings."""
         basis, joints = self.tangents(q, MOTION_FREE)
-        found, home, rng = [], self.bodies(q), np.random.default_rng(0)
-        for c in rng.normal(size=(2 * basis.shape[1], basis.shape[1])):
-            step = shortened(MOTION_NEAR * joints @ (c / np.linalg.norm(c)), MOTION_NEAR)
-            there, residual = solve(self.twin, self.twin.moved(q, step), self.held, tolerance=SOLVED,
+        found, came, home, rng = [], [], self.bodies(q), np.random.default_rng(0)
+        size = basis.shape[1]
+        for c in np.vstack([np.eye(size), rng.normal(size=(size, size))]):
+            step = joints @ (c / np.linalg.norm(c))
+            part = MOTION_NEAR / max(1.0, float(np.abs(step).max()))  # of a unit twist of the bodies
+            there, residual = solve(self.twin, self.twin.moved(q, part * step), self.held, tolerance=SOLVED,
                                     iterations=SEARCH_ITERATIONS)
             if residual <= CLOSED:
                 found.append(there)
-        twists = np.array([np.concatenate([
-            part for name, X in self.bodies(there).items() for part in self._twist(name, X, home[name])])
-            for there in found]).reshape(-1, len(basis))
-        _, values, right = np.linalg.svd(twists @ basis, full_matrices=False)
-        return basis @ right[values > MOTION_BEND * max(MOTION_NEAR, values.max(initial=0.0)) / 2].T, found
+                came.append(np.concatenate([twist for name, X in self.bodies(there).items()
+                                            for twist in self._twist(name, X, home[name])]) @ basis / part)
+        _, values, right = np.linalg.svd(np.reshape(came, (-1, size)), full_matrices=False)
+        return basis @ right[values > MOTION_BEND].T, found
 
     def _twist(self, name: str, X: Array, home: Array) -> tuple[Array, ...]:
         """The twist that leads a body from one pose to another, in parts, as rows of :meth:`tangents`."""

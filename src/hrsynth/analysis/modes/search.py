@@ -18,7 +18,7 @@ from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement, relation
 from ...kinematics.tasks import Held, solve
 from ...progress import tell
-from ...tolerances import CLOSED, SAME_RELATION, SOLVED
+from ...tolerances import CLOSED, SAME_RELATION, SOLVED, SURELY_SOMETHING
 from .motions import SelfMotion, bodies_apart, self_motion
 
 
@@ -109,9 +109,10 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
 
 
 def leaves_free(at: ClosedConfiguration, question: Measurement) -> bool:
-    """Whether the measurements leave the platform a freedom, to first order."""
+    """Whether the measurements leave the platform a freedom, to first order or nearly: then closings to rounding lie
+    about one that are none."""
     there = relation(at, question)
-    return there.rank < there.dof.value
+    return there.rank < there.dof.value or there.seen.weakest < SURELY_SOMETHING
 
 
 def _poses(at: ClosedConfiguration, bodies: Sequence[str]) -> dict[str, Array]:
