@@ -215,7 +215,8 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
         for mode in listed.modes)
     if not moving and not listed.found.open:
         return listed
-    why = "some of the solutions lie on a self-motion" if moving else str(listed.found.degenerate)
+    why = ("some of the solutions lie on a self-motion" if moving else "the equations depend on each other"
+           if listed.found.continuum is not None else str(listed.found.degenerate))
     found = _searched(setting, measured.question, goal, pose, kind, why)
     return found if moving or not any(mode.proved for mode in listed.modes) else replace(listed, motions=found.motions)
 
