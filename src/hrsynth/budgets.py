@@ -142,6 +142,10 @@ EFFORT = 120.0
 """Seconds of one core that a list of modes may need, by its size (the answer does not depend on the machine)."""
 ELIMINATION_SECONDS, HOMOTOPY_SECONDS, MSOLVE_SECONDS = 0.02, 0.4, 2.0
 """What one system of equations needs, about: by an exact resultant, by forty paths, by an external program."""
+LARGEST_FORMS = 700
+"""Forms of a degree above which all poses of conditions are not looked for by linear algebra."""
+MOST_INFINITE = 4
+"""Powers of q · q that are tried to leave out what are no poses."""
 FINEST_BOX = 2.0 ** -100
 """Radius of the smallest box that is tried around a solution, relative to 1 plus the unknown."""
 LARGEST_RANDOM = 10**9

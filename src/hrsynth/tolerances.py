@@ -140,6 +140,18 @@ MEANT = 1e-5
 FARTHEST = 1e7
 """Distance (sizes of the mechanism) beyond which a solution is at infinity but for rounding, where the next nearer one
 is ``RANK_GAP`` times as near at least."""
+INDEPENDENT_PLANES = 1e-3
+"""Least sine between a plane's normal and the span of others that give the position of the platform with it."""
+INDEPENDENT_RATES = 1e-6
+"""Least singular value of the rates of conditions, of length one each, that count as independent at the goal."""
+RANK_OF_FORMS = 1e-11
+"""Pivots, of the largest, that count in the rank of a matrix of multiples of conditions."""
+NUMBER_ROUNDING = 2.0 ** -48
+"""How far the numbers of conditions are from the exact ones, of their size: some ten roundings."""
+NEARLY_REAL_POSE = 1e-9
+"""Imaginary parts of a proposed pose below which a real one is looked for there."""
+NO_POSE = 1e-5
+"""|q · q| of a quaternion of length one below which it is that of no pose, to what rounding makes of a double one."""
 NEARLY_DOUBLE = 1e-6
 """Distance between two solutions, in their parameters, below which the pose counts as singular."""
 CHAIN_ROUNDING = 16 * 2.0 ** -52

@@ -41,8 +41,9 @@ WHY = {
     REFUSED: "The verdict at samples is the same. The exact one rests on relations between centres of different legs "
              "that are seen at samples and not derived from the file, so that it is not called proved.",
     AGAIN: "Another reason is given: samples beyond a singular zero configuration are no longer taken.",
-    LISTED: "The curve of a held leg's end was fitted to some moves, and the end left it, or no name was known for it "
-            "or for the pattern of the legs. It is read from the leg's joints now.",
+    LISTED: "No equations were known for what some leg asks of the platform: an end on a cone, a point of the base "
+            "that is held in the platform's frame, a U-P-U leg that is not watched, rods of a platform that turns. Its "
+            "joints give conditions on the pose now.",
     SEEN: "The most real modes at five configurations, which are others now. The bound is the same.",
     HIDDEN: "Rules were chosen at other samples. The verdict is the same.",
     NEVER: "The condition named axes and tangents that must be parallel, which constant axes forbid: it is never met.",

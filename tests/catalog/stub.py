@@ -51,7 +51,8 @@ def entry(word: str) -> dict[str, Any]:
             "legs": legs, "dof": dof, "motion": f"{dof}T" if dof < 4 else f"3T{dof - 3}R", "mobility": dof, "idle": 0,
             "verdict": verdict, "rank": rank, "exact": True, "instances": 1 if rank == dof else 5,
             "base_motors": draw.random() < 0.5, "motors": legs, "fewest": min(rank, legs), "minimal": [["1"]],
-            "lost": ["rotation"] if rank < dof else [], "condition": "the lines σ meet", "modes_bound": None}
+            "lost": ["rotation"] if rank < dof else [], "condition": "the lines σ meet",
+            "modes_bound": 2 * rank or None, "modes_seen": rank or None}
 
 
 def died(word: str) -> dict[str, Any]:

@@ -24,6 +24,7 @@ ASKED = st.fixed_dictionaries({}, optional={
     "verdict": st.sampled_from([*VERDICTS, VERDICTS[:2], "none"]),
     "base_motors": st.sampled_from([None, True, False]),
     "fewest": st.integers(0, 6),
+    "modes": st.integers(1, 9),
     "legs": st.one_of(st.integers(1, 7), st.sampled_from(["3", "?-R*", "*S", "6-UPS", "UPS", "R?R", "(c0?*)", "R-{*"]),
                       st.sampled_from([f"4-{chain}" for chain in CHAINS])),
     "text": st.sampled_from(["ROTATION", "σ", "two lines", "(d", "nowhere"])})
@@ -48,6 +49,8 @@ def plainly(record: dict[str, Any], asked: dict[str, Any]) -> bool:
             met = any(each.lower() in held for each in values)
         elif name == "legs":
             met = any(plain_legs(record, str(each)) for each in values)
+        elif name == "modes":
+            met = record.get("modes_bound") in values
         else:
             met = name in record and record[name] in values
         if not met:

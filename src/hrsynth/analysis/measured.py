@@ -7,7 +7,8 @@ from functools import cached_property, lru_cache
 
 from ..budgets import REMEMBERED
 from ..constraints.condition import Condition, condition
-from ..constraints.pattern import ConstraintPattern, recognise
+from ..constraints.pattern import ConstraintPattern, moving, recognise
+from ..geometry.vectors import Array
 from ..kinematics.relation import Measurement
 from ..kinematics.sampling import Samples
 from ..mechanism.observation import labels_of
@@ -54,6 +55,11 @@ class MeasuredRobot(Value):
     def pattern(self) -> ConstraintPattern:
         """The pattern of the legs with their measurements held."""
         return recognise(self.setting.anatomy, self.question, self.setting.configurations)
+
+    @cached_property
+    def moving(self) -> tuple[str, Array | None]:
+        """How the platform, one body, moves with nothing held, and the normal where that is in a plane."""
+        return moving(self.setting.anatomy, self.question, self.setting.configurations)
 
     @cached_property
     def condition(self) -> Condition:

@@ -14,11 +14,13 @@ from ..analysis.asked import observe
 from ..analysis.derive import derive
 from ..analysis.exact import ExactArchitecture, architecture
 from ..analysis.measured import MeasuredRobot
-from ..analysis.modes.modes import counted
+from ..analysis.modes.modes import counted, expected
+from ..analysis.modes.solve import SystemModes
 from ..analysis.observed import ObservedRobot, restricted, selected
 from ..analysis.verdict import CONTROLLABLE, Verdict, verdict_of
-from ..errors import BadRequest, HrsynthError, NotConfined, NotConfirmed, Unsolved
+from ..errors import BadRequest, HrsynthError, MissingExtra, NotConfined, NotConfirmed, Unsolved
 from ..geometry.ranks import range_basis
+from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Relation
 from ..kinematics.sampling import Samples
 from ..mechanism.legs import decompose
@@ -36,6 +38,12 @@ ATTEMPTS = 3
 """Choices of dimensions, of which the first that can be studied is taken."""
 INSTANCES = 5
 """Configurations at which assembly modes are listed."""
+FEWER = 2
+"""Configurations at which modes are listed that no resultant gives."""
+LISTED_ONCE = 8
+"""Modes, complex ones too, above which those are listed at one configuration."""
+OTHERS = 3
+"""Smallest sets, besides the first, of which modes are looked for."""
 
 
 def entry(text: str) -> dict[str, Any]:
@@ -118,9 +126,10 @@ def _study(word: RobotWord, attempt: int) -> _Study:
         "instances": derivation.exact.instances, "confirmed": len(setting.configurations),
         "lost": [_general(freedom.name) for freedom in derivation.verdict.lost],
         "minimal": [list(each) for each in fewest], "fewest": len(fewest[0]) if fewest else 0,
-        "condition": None, "modes_legs": None, "modes_bound": None, "modes_seen": None, "cure": None}
+        "condition": None, "modes_legs": None, "modes_bound": None, "modes_seen": None, "modes_proof": None,
+        "cure": None}
     if derivation.verdict.verdict == CONTROLLABLE:
-        facts.update(_singular(setting), **_modes(setting, fewest[0]))
+        facts.update(_singular(setting), **_modes(setting, fewest))
     else:
         facts["cure"] = _cure(advise(setting, most=1))
     return _Study(facts, attempt, *_encoders(setting))
@@ -196,21 +205,37 @@ def _singular(setting: ObservedRobot) -> dict[str, Any]:
     return {"condition": MeasuredRobot.watched(setting).condition.words}
 
 
-def _modes(setting: ObservedRobot, legs: Sequence[str]) -> dict[str, Any]:
-    """Complex assembly modes of a smallest set of legs, and the most real ones of some configurations."""
-    measured = MeasuredRobot.watched(replace(setting, observed=tuple(o for o in setting.segments if o.leg in legs)))
-    bounds, seen = [], []
-    try:
-        for at in setting.configurations[:INSTANCES]:
+def _modes(setting: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[str, Any]:
+    """Complex assembly modes of a smallest set of legs, by what there are no more if not by a resultant, and the most
+    real ones of some configurations: of the first set, or else of that of which fewest can be expected."""
+    robots = [MeasuredRobot.watched(replace(setting, observed=tuple(o for o in setting.segments if o.leg in legs)))
+              for legs in fewest]
+    at = setting.configurations[0]
+    others = sorted(range(1, len(fewest)), key=lambda k: expected(robots[k], at))
+    for k in (0, *others[:OTHERS]):
+        found = [each for each in _lists(robots[k], setting.configurations) if each.complete and not each.continuum]
+        bounds = [each.complex for each in found if each.complex is not None]
+        if bounds:
+            return {"modes_legs": list(fewest[k]), "modes_bound": max(bounds),
+                    "modes_seen": max(sum(mode.multiplicity for mode in each.modes) for each in found),
+                    "modes_proof": next((each.bound for each in found if each.bound != "resultant"), None)}
+    return {}
+
+
+def _lists(measured: MeasuredRobot, configurations: Sequence[ClosedConfiguration]) -> Iterator[SystemModes]:
+    """The modes at some configurations, at fewer where they are more than a resultant lists; none from where there is
+    no list on."""
+    count = INSTANCES
+    for k, at in enumerate(configurations[:INSTANCES]):
+        if k >= count:
+            return
+        try:
             found = counted(measured, at)
-            if found.complete and found.complex is not None and not found.continuum:
-                bounds.append(found.complex)
-                seen.append(sum(mode.multiplicity for mode in found.modes))
-    except (NotConfined, Unsolved, BadRequest):
-        bounds = []
-    if not bounds:
-        return {}
-    return {"modes_legs": list(legs), "modes_bound": max(bounds), "modes_seen": max(seen)}
+        except (NotConfined, Unsolved, MissingExtra, BadRequest):
+            return
+        yield found
+        if found.bound != "resultant":
+            count = 1 if found.bound == "rank" or (found.complex or 0) > LISTED_ONCE else FEWER
 
 
 def _cure(found: Advice) -> str:

@@ -20,7 +20,7 @@ from .words import parse
 
 EXACT = ("group", "dof", "motion", "verdict", "base_motors", "fewest")
 """Fields that have to be equal to what is asked for."""
-ASKED = (*EXACT, "legs", "text")
+ASKED = (*EXACT, "modes", "legs", "text")
 """What can be asked for."""
 
 
@@ -50,10 +50,10 @@ class Catalog(Value):
     def where(self, **asked: Any) -> Catalog:
         """The records that fit all that is asked for and not None; raises ``BadRequest`` for what cannot be asked.
 
-        ``group``, ``dof``, ``motion`` ("3T", "2T1R"), ``verdict``, ``base_motors`` and ``fewest`` (legs of the smallest
-        set that sees all that can be seen) have to be equal. ``legs`` is their number, or a pattern of ``*`` and ``?``
-        for the notation or for the chain of one leg, with or without the marks of motors. ``text`` has to occur in
-        some field. Several values in a tuple: one of them.
+        ``group``, ``dof``, ``motion`` ("3T", "2T1R"), ``verdict``, ``base_motors``, ``fewest`` (legs of the smallest
+        set that sees all that can be seen) and ``modes`` (complex ones of such a set) have to be equal. ``legs`` is
+        their number, or a pattern of ``*`` and ``?`` for the notation or for the chain of one leg, with or without the
+        marks of motors. ``text`` has to occur in some field. Several values in a tuple: one of them.
         """
         require_askable(asked)
         return Catalog(tuple(each for each in self.records if fits(each, asked)))
@@ -113,6 +113,8 @@ def _one(record: Record, name: str, value: Any) -> bool:
     match name:
         case "legs":
             return _legs(record, value)
+        case "modes":
+            return bool(record.get("modes_bound") == value)
         case "text":
             return any(str(value).casefold() in str(each).casefold() for each in record.values())
         case _:

@@ -31,6 +31,7 @@ FILTER = (
     Option("group", "planar, pods, deltas, spatial.", words=("planar", "pods", "deltas", "spatial")),
     Option("base_motors", "All motors on the base, or not.", kind=bool, flags=("--base-motors/--moving-motors",)),
     Option("fewest", "Number of legs that must be watched.", kind=int),
+    Option("modes", "Number of assembly modes, complex ones too.", kind=int),
     Option("text", "Text that occurs in any field."),
 )
 """Which architectures are asked for."""

@@ -825,6 +825,7 @@ class Entry(TypedDict, total=False):
     mobility: int
     modes_bound: int
     modes_legs: list[str]
+    modes_proof: str
     modes_seen: int
     motion: str
     motor_rank: int

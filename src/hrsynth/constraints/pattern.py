@@ -230,6 +230,17 @@ def _motions(anatomy: LegDecomposition, question: Measurement, samples: Sequence
     return np.array([basis for basis in bases if basis.shape[1] == most])
 
 
+def moving(anatomy: LegDecomposition, question: Measurement, samples: Sequence[ClosedConfiguration]
+           ) -> tuple[str, Array | None]:
+    """How a platform of one body moves with nothing held: ``translations``, ``planar`` with the normal, or
+    ``spatial``."""
+    motions = _motions(anatomy, question, samples)
+    if _vanishes(motions[:, 3:]):
+        return "translations", None
+    normal = _plane_of(motions)
+    return ("spatial", None) if normal is None else ("planar", normal)
+
+
 def _common_plane(mechanism: Mechanism, legs: Sequence[LockedLeg], samples: Sequence[ClosedConfiguration]
                   ) -> NamedVector | None:
     """The constant direction about which all legs turn and across which all tips move."""

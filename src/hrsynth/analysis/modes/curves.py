@@ -27,7 +27,7 @@ class _Checked(Value):
         for name, value in list(vars(self).items()):
             if name == "radius":
                 object.__setattr__(self, name, _radius(type(self).__name__.lower(), value))
-            elif name != "start":
+            elif name not in ("start", "profile"):
                 object.__setattr__(self, name, _vector(value) if name == "centre" else _unit(value))
 
 
@@ -128,6 +128,25 @@ class Plane(_Checked):
     def miss(self, tip: Array) -> Array:
         """From the nearest point of the plane to ``tip``; shape (3,), metres."""
         return self.normal * float(self.normal @ (tip - self.centre))
+
+
+@dataclass(frozen=True, eq=False)
+class Revolution(_Checked):
+    """The tip is at ``centre`` + y with |y|² − z² = f₀ + f₁ z + f₂ z², z = y · ``axis``: what a slide sweeps that is
+    oblique to the axis about which it turns, a cone or a hyperboloid."""
+
+    centre: Array
+    axis: Array
+    profile: tuple[float, float, float]
+    freedoms = 2
+
+    @classmethod
+    def swept(cls, centre: Array, axis: Array, arm: Array, slide: Array) -> Revolution:
+        """By ``arm`` + s ``slide``, which turns about an axis through the centre."""
+        w, v = float(axis @ arm), float(axis @ slide)
+        across, along = arm - w * axis, (slide - v * axis) / v
+        f2, mixed = float(along @ along), 2.0 * float(across @ along)
+        return cls(centre, axis, (float(across @ across) - mixed * w + f2 * w * w, mixed - 2.0 * f2 * w, f2))
 
 
 Curve = Point | Line | Circle

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import sys
+from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -29,6 +32,7 @@ from ..question import question
 from ..singularity.agreement import weakest
 from .branches import Model, solve_all
 from .motions import SelfMotion, self_motion
+from .posed import PosedPlatform, most_posed, solve_posed
 from .search import FoundMode, leaves_free, search
 from .solve import SystemMode, SystemModes, continuum
 from .tips import TipLoci, tip_loci
@@ -125,7 +129,10 @@ class AssemblyModes(Result, shown_as="modes"):
     @property
     def within(self) -> str | None:
         """Among which poses the modes are all."""
-        return None if self.confined is None else WITHIN[self.confined.motion]
+        if self.confined is not None:
+            return WITHIN[self.confined.motion]
+        system = None if self.model is None else self.model.system
+        return WITHIN[system.poses.motion] if isinstance(system, PosedPlatform) else None
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -250,14 +257,23 @@ def _closed(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal
 
 def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfiguration, wanted: Task | None,
             pose: Pose, kind: str, as_written: bool, effort: float) -> AssemblyModes:
-    """The modes as the solutions of the system that the tips' curves and surfaces give."""
-    confined = tip_loci(setting.anatomy, measured.question, measured.pattern, goal)
-    # a curve that was fitted to a leg's moves is not known to hold its exact tip
-    fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
-    confined = replace(confined, error=np.inf if fitted else drift(goal, wanted, setting.normal.moved)
-                       + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
-                       as_written=as_written)
-    made, found = solve_all(confined, effort=effort)
+    """The modes as the solutions of the system that the tips' curves and surfaces give, or else of the conditions that
+    the legs' joints give."""
+    reasons = list[NotConfined | Unsolved | TooLarge | MissingExtra]()
+    answers = list[tuple[TipLoci | None, Model, SystemModes]]()
+    exact = drift(goal, wanted, setting.normal.moved)
+    for listed in (partial(_of_tips, as_written=as_written, effort=effort), _of_conditions):
+        try:
+            answers.append(listed(measured, goal, exact))
+        except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
+            reasons.append(error)
+        else:
+            if answers[-1][2].complete:
+                break
+    if not answers:
+        raise reasons[0]
+    # what is measured leaves no freedom: a continuum is that of legs which tips alone do not show
+    confined, made, found = max(answers, key=lambda each: (each[2].complete, each[2].continuum is None))
     reader = _ModeReader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
@@ -266,14 +282,46 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
                          tuple(reader.read(mode, False) for mode in found.near), confined, made)
 
 
+def _of_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool,
+             effort: float) -> tuple[TipLoci, Model, SystemModes]:
+    confined = tip_loci(measured.setting.anatomy, measured.question, measured.pattern, goal)
+    # a curve that was fitted to a leg's moves is not known to hold its exact tip
+    fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
+    confined = replace(confined, error=np.inf if fitted else exact
+                       + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
+                       as_written=as_written)
+    return confined, *solve_all(confined, effort=effort)
+
+
+def _of_conditions(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
+    return None, *solve_posed(measured, goal, exact)
+
+
+def expected(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
+    """How many modes, complex ones too, the degrees of the legs' conditions allow; the largest number where these are
+    not known."""
+    try:
+        return most_posed(measured, at)
+    except (NotConfined, Unsolved):
+        return sys.maxsize
+
+
 def counted(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
     """The modes with the measurements at a configuration, without near ones, and not read as poses of the robot's legs:
-    as :func:`modes`, for many configurations of one robot that sees all its freedoms; ``NotConfined`` also where legs
-    keep the platform from some turns, which only an external solver counts."""
-    if measured.pattern.motion == "oriented":
-        raise NotConfined(measured.setting.robot.name, "its legs keep the platform from some turns")
-    confined = tip_loci(measured.setting.anatomy, measured.question, measured.pattern, at)
-    return solve_all(confined, near=False)[1]
+    as :func:`modes`, for many configurations of one robot that sees all its freedoms."""
+    found = None
+    if measured.pattern.motion != "oriented":
+        with suppress(NotConfined, Unsolved, TooLarge, MissingExtra):
+            confined = tip_loci(measured.setting.anatomy, measured.question, measured.pattern, at)
+            found = solve_all(confined, near=False)[1]
+    if found is not None and found.complete:
+        return found
+    try:
+        return solve_posed(measured, at)[1]
+    except (NotConfined, Unsolved):
+        if found is None:
+            raise
+        return found
 
 
 class _ModeReader:

@@ -16,7 +16,7 @@ from ...geometry import lines
 from ...geometry.vectors import Array
 from ...tolerances import CHAIN_ROUNDING, MOVED, RANK_GAP, SAME_POINT
 from .chain import Chain, ChainBody, Underived
-from .curves import Circle, Line, Plane, Point, Reach, Sphere
+from .curves import Circle, Line, Plane, Point, Reach, Revolution, Sphere
 from .turns import Known, groups, orientations, ways
 
 
@@ -30,7 +30,9 @@ def reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
     found: list[tuple[Reach, float]] = []
     moved = 0.0
     for known, gain in orientations(chain):
-        reach, radii = _sum(chain, known)
+        reach, radii = place(chain, known)
+        if isinstance(reach, Revolution):
+            raise Underived("a slide that turns about an axis oblique to it")
         moved = max(moved, radii)
         gap = min((apart(reach, other, chain.length) for other, _ in found), default=np.inf)
         if gap > SAME_POINT:
@@ -52,6 +54,8 @@ class _Sum:
     circles: list[tuple[Array, Array]] = field(default_factory=list)
     lines: list[Array] = field(default_factory=list)
     spheres: list[float] = field(default_factory=list)
+    sweeps: list[tuple[Array, Array, Array]] = field(default_factory=list)
+    """Slides oblique to the axes about which they turn: axis, what turns besides, slide."""
     moved: float = 0.0
     """Radii of circles and spheres that count as points, all together (m)."""
     tilt: float = 0.0
@@ -77,8 +81,12 @@ class _Sum:
             self.centre = self.centre + vector
             self.moved += radius
 
-    def reach(self) -> Reach:
+    def reach(self) -> Reach | Revolution:
         """Its name. Raises :class:`Underived` where it has none."""
+        if self.sweeps:
+            if len(self.sweeps) > 1 or self.spheres or self.circles or self.lines:
+                raise Underived("a slide that turns about an axis oblique to it, and another part that moves")
+            return Revolution.swept(self.centre, *self.sweeps[0])
         if self.spheres and (len(self.spheres) > 1 or self.circles or self.lines):
             raise Underived("a part that turns freely and another that moves")
         if self.spheres:
@@ -104,7 +112,7 @@ def _normal(directions: Sequence[Array]) -> Array:
     return np.asarray(crossed / np.linalg.norm(crossed))
 
 
-def _sum(chain: Chain, known: Known) -> tuple[Reach, float]:
+def place(chain: Chain, known: Known) -> tuple[Reach | Revolution, float]:
     """The reach in one branch of orientations, and how far radii were moved (m)."""
     total = _Sum(SAME_POINT * chain.length, chain.bodies[0].point)
     for k, body in enumerate(chain.bodies):
@@ -153,6 +161,10 @@ def _crank(total: _Sum, Q: Array, axis: Array, vector: Array, watched: Sequence[
 def _turns(total: _Sum, body: ChainBody, Q: Array, a: Array) -> None:
     """A body that turns about the fixed direction Q a, counted from the orientation Q."""
     axis = Q @ a
+    if len(body.slides) == 1 and not body.cranks and not any(test(body.slides[0], a) for test in (
+            lines.parallel, lines.perpendicular)):
+        total.sweeps.append((axis, Q @ body.shift, Q @ body.slides[0]))
+        return
     total.turn(axis, Q @ body.shift)
     for slide in body.slides:
         if lines.parallel(slide, a):

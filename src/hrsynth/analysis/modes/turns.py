@@ -106,16 +106,17 @@ def kept_angle(chain: Chain) -> tuple[Array, Array]:
 
     Raises :class:`Underived` where other axes turn it too, or where a differs between branches.
     """
-    found = [_two_axes(chain, known) for known, _ in orientations(chain)]
+    found = [two_axes(chain, known) for known, _ in orientations(chain)]
     first = found[0]
-    if any(not _same(a, first[0]) for a, _ in found):
+    if any(not _same(a, first[0]) for a, *_ in found):
         raise Underived("the axis with which its end keeps an angle differs between branches")
-    return first
+    return first[:2]
 
 
-def _two_axes(chain: Chain, known: Known) -> tuple[Array, Array]:
+def two_axes(chain: Chain, known: Known) -> tuple[Array, Array, Array]:
     """The two directions about which the last body turns against what is known, or against a direction that is held in
-    a body that spins about it."""
+    a body that spins about it: the first as it is fixed in the base, the second at the goal; and the first at the
+    goal."""
     axes, base = list[Array](), np.eye(3)
     for body, Q in zip(chain.bodies[::-1], known[::-1], strict=True):
         if Q is not None:
@@ -129,7 +130,7 @@ def _two_axes(chain: Chain, known: Known) -> tuple[Array, Array]:
     parts = groups([(0, axis) for axis in axes[::-1]])
     if len(parts) != 2:
         raise Underived(f"{len(parts)} axes turn its end")
-    return base @ parts[0][0][1], parts[1][0][1]
+    return base @ parts[0][0][1], parts[1][0][1], parts[0][0][1]
 
 
 def _driven(chain: Chain, known: Known) -> Iterator[_Found]:

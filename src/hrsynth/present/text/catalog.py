@@ -9,6 +9,8 @@ from .tables import listing, table
 
 HEADS = ("word", "robot", "dof", "motion", "hidden robot", "verdict", "rank", "legs needed")
 LEGEND = "* a motor   ══ the watched link"
+PROOFS = {"class": "no more by the degrees of their equations", "rank": "no more by ranks modulo a prime"}
+"""By what there are no more modes, where that is no resultant."""
 
 Record = Mapping[str, Any]
 
@@ -71,7 +73,10 @@ def facts(record: Record) -> Iterable[tuple[str, str]]:
         yield "Type 2", str(record["condition"])
     if record.get("modes_bound") is not None:
         legs = f" with legs {', '.join(record['modes_legs'])} watched" if record.get("modes_legs") else ""
-        yield "modes", f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}"
+        proof = f", {PROOFS[record['modes_proof']]}" if record.get("modes_proof") else ""
+        yield "modes", f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}{proof}"
+    elif record["rank"] < record["dof"]:
+        yield "modes", f"a continuum of dimension {record['dof'] - record['rank']} with all legs watched"
     if record.get("cure"):
         yield "cure", str(record["cure"])
 

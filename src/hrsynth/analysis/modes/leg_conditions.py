@@ -1,0 +1,296 @@
+"""The conditions of a leg on a rigid platform, from its joints: one list a branch."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import partial
+
+import numpy as np
+
+from ...errors import NotConfined
+from ...geometry import lines
+from ...geometry.ranks import range_basis
+from ...geometry.vectors import Array
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.locked import carry_joint, leg_twists
+from ...kinematics.relation import Measurement
+from ...mechanism import Observation
+from ...mechanism.composites import WordEdge
+from ...mechanism.legs import Leg, LegDecomposition
+from ...mechanism.notation import Rods
+from ...mechanism.observation import Direction
+from ...tolerances import CHAIN_ROUNDING, SAME_RELATION
+from .chain import Chain, ChainBody, Underived, chain
+from .conditions import (
+    AtAngle,
+    Coplanar,
+    OnMovingPlane,
+    OnMovingRevolution,
+    OnPlane,
+    OnRevolution,
+    PoseCondition,
+)
+from .curves import Circle, Line, Plane, Point, Reach, Revolution, Sphere
+from .reaches import apart, place
+from .turns import Known, groups, orientations, two_axes
+
+Branches = list[list[PoseCondition]]
+_Read = tuple[Branches, float]
+"""Branches, and how far radii were moved that count as zero (m)."""
+_Reading = Callable[..., _Read]
+
+
+@dataclass(frozen=True, eq=False)
+class Middle:
+    """Where lengths are counted from (m), and in which unit (m)."""
+
+    origin: Array
+    size: float
+
+    def point(self, at: Array) -> Array:
+        """A point in these units."""
+        return np.asarray((at - self.origin) / self.size)
+
+
+def leg_conditions(anatomy: LegDecomposition, leg: Leg, question: Measurement, goal: ClosedConfiguration,
+                   middle: Middle, plane: Array | None = None, kept: bool = False) -> tuple[Branches, float]:
+    """All branches of what a leg, with its measurements held, asks of the platform, the goal's own first; and how far
+    its geometry was moved (m). ``plane``: the normal of a motion in a plane; ``kept``: whether the platform does not
+    turn. Raises ``NotConfined``."""
+    own = [o for o in question.observations if o.leg == leg.label]
+    twists = leg_twists(goal, leg, own, question.reference)
+    count = (6 if plane is None else 3) - twists.shape[1]
+    if kept:
+        count = 3 - twists.shape[1] + range_basis(twists[3:], 1.0)[1].value
+    if count <= 0:
+        return [[]], 0.0
+    path = anatomy.path(leg)
+    rods = _Rods.of(anatomy, path[-1], own, goal)
+    tip = rods.tip if rods is not None else carry_joint(
+        anatomy.mechanism, anatomy.mechanism.joints[path[-1].joints[-1]], goal.pose)[0]
+    reasons = []
+    try:
+        found = chain(anatomy, leg, own, goal, tip, "free")
+        ways: list[tuple[_Reading, Chain]] = [(partial(_of_tip, rods=rods), found), (_of_foot, found),
+                                              (_in_plane, found)]
+        if kept:
+            ways = [(_of_tip, replace(found, kept=True))]
+        elif plane is not None:
+            bodies = (*found.bodies, ChainBody(plane, tip))
+            ways = [(_of_tip, replace(found, bodies=bodies, kept=True)), (_of_foot, found)]
+        for read, each in ways:
+            try:
+                branches, radii = read(leg.label, each, count, tip, middle, plane)
+                return branches, found.moved + (radii if radii > CHAIN_ROUNDING * found.extent else 0.0)
+            except Underived as error:
+                reasons.append(str(error))
+    except Underived as error:
+        reasons.append(str(error))
+    raise NotConfined(anatomy.mechanism.name, f"what leg {leg.label} asks of the platform is not known: "
+                                              f"{'; '.join(dict.fromkeys(reasons))}")
+
+
+@dataclass(frozen=True, eq=False)
+class _Rods:
+    """Equal rods at the end of a leg: the ``tip`` of the one that is watched, the vector ``along`` it, and those
+    ``across`` to the others, where they start and where they end (m)."""
+
+    tip: Array
+    along: Array
+    across: tuple[tuple[Array, Array], ...]
+
+    @classmethod
+    def of(cls, anatomy: LegDecomposition, edge: WordEdge, own: Sequence[Observation], goal: ClosedConfiguration
+           ) -> _Rods | None:
+        """Those of the last part of a leg, where it is such rods."""
+        if not isinstance(edge.word.items[0], Rods) or len(edge.joints) < 4:
+            return None
+        watched = {each.link for each in own if isinstance(each, Direction)}
+        number = next((k for k, link in enumerate(edge.inside) if link in watched), 0)
+        ends = [[carry_joint(anatomy.mechanism, anatomy.mechanism.joints[name], goal.pose)[0]
+                 for name in edge.joints[k : k + 2]] for k in range(0, len(edge.joints), 2)]
+        ends = [pair if edge.joints and edge.head in anatomy.platform else pair[::-1] for pair in ends]
+        near, far = ends[number]
+        others = [pair for k, pair in enumerate(ends) if k != number]
+        return cls(far, far - near, tuple((start - near, end - far) for start, end in others))
+
+    def turns(self, found: Chain, known: Known) -> list[tuple[Array, Array, float]]:
+        """With v along a rod, e and f across to another where they start and end, |v + R f - e| = |v| and |e| = |f|:
+        (v - e) · R f = v · e - e · e, where what carries the rods keeps e."""
+        carrier = len(found.bodies) - 3
+        Q, axis = known[carrier], found.bodies[carrier].axis
+        if Q is None and (axis is None or known[carrier - 1] is None):
+            raise Underived("what carries its rods turns")
+        if (Q is not None and np.abs(Q - np.eye(3)).max() > SAME_RELATION) or any(
+                Q is None and axis is not None and not lines.parallel(e / np.linalg.norm(e), axis)
+                for e, _ in self.across):
+            raise Underived("what carries its rods turns them")
+        if any(abs(float(e @ e - f @ f)) > SAME_RELATION * found.length ** 2 for e, f in self.across):
+            raise Underived("its rods are not those of a parallelogram")
+        return [((self.along - e) / found.length, f / found.length, float((self.along - e) @ e) / found.length ** 2)
+                for e, f in self.across]
+
+
+def _of_tip(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plane: Array | None,
+            rods: _Rods | None = None) -> _Read:
+    """A tip that is confined, and angles that are kept."""
+    seen: list[tuple[Reach | Revolution, list[tuple[Array, Array, float]]]] = []
+    moved = 0.0
+    for known, _ in orientations(found):
+        reach, radii = place(found, known)
+        moved = max(moved, radii)
+        turns: list[tuple[Array, Array, float]] = []
+        missing = count - ((3 if plane is None else 2) - reach.freedoms)
+        if rods is not None and missing == len(rods.across):
+            turns = rods.turns(found, known)
+        elif missing == 1:
+            turns = [_angle(reach, *two_axes(found, known))]
+        elif missing:
+            raise Underived(f"{missing} conditions on how the platform turns")
+        if not any(_alike(reach, other, found.length) and _same_turns(turns, others) for other, others in seen):
+            seen.append((reach, turns))
+    b = middle.point(tip)
+    return [[*_reached(leg, reach, tip, middle, plane), *(AtAngle(leg, b, c, a, h) for a, c, h in turns)]
+            for reach, turns in seen], moved
+
+
+def _alike(one: Reach | Revolution, other: Reach | Revolution, length: float) -> bool:
+    if isinstance(one, Revolution) or isinstance(other, Revolution):
+        return bool(isinstance(one, Revolution) and isinstance(other, Revolution)
+                and np.linalg.norm(one.centre - other.centre) <= SAME_RELATION * length
+                and lines.parallel(one.axis, other.axis)
+                and np.abs(np.subtract(one.profile, other.profile)).max() <= SAME_RELATION)
+    return apart(one, other, length) <= SAME_RELATION
+
+
+def _angle(reach: Reach | Revolution, a: Array, c: Array, own: Array) -> tuple[Array, Array, float]:
+    """a · R c = h, h that of the leg's own axes; a is exactly the direction of the tip's line where along that."""
+    if isinstance(reach, Line) and lines.parallel(a, reach.direction):
+        a = reach.direction * np.sign(a @ reach.direction)
+    return a, c, float(own @ c)
+
+
+def _same_turns(one: list[tuple[Array, Array, float]], other: list[tuple[Array, Array, float]]) -> bool:
+    return all(any(bool(np.abs(s * a - b).max() <= SAME_RELATION and np.abs(c - d).max() <= SAME_RELATION)
+                   and abs(s * h - k) <= SAME_RELATION for s in (1, -1))
+               for (a, c, h), (b, d, k) in zip(one, other, strict=True))
+
+
+def _reached(leg: str, reach: Reach | Revolution, tip: Array, middle: Middle, plane: Array | None
+             ) -> list[PoseCondition]:
+    """The conditions that a tip is within its reach."""
+    b, none, o = middle.point(tip), np.zeros(3), middle.point(reach.centre)
+    if plane is not None:
+        return _in_motion(leg, reach, b, o, plane, middle)
+    flat: list[Array] = []
+    if isinstance(reach, Point):
+        flat = list(np.eye(3))
+    elif isinstance(reach, Line):
+        flat = _across(reach.direction)
+    elif isinstance(reach, Plane):
+        flat = [reach.normal]
+    elif isinstance(reach, Circle):
+        flat = [reach.axis]
+    found: list[PoseCondition] = [OnPlane(leg, b, none, n, float(n @ o)) for n in flat]
+    if isinstance(reach, Circle | Sphere):
+        found.append(OnRevolution(leg, b, none, o, np.array([0.0, 0.0, 1.0]),
+                                  np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])))
+    if isinstance(reach, Revolution):
+        found.append(OnRevolution(leg, b, none, o, reach.axis, _profile(reach, middle)))
+    return found
+
+
+def _across(d: Array) -> list[Array]:
+    """Two vectors normal to d, exactly."""
+    skip = int(np.argmax(np.abs(d)))
+    return [np.cross(d, e) for k, e in enumerate(np.eye(3)) if k != skip]
+
+
+def _in_motion(leg: str, reach: Reach | Revolution, b: Array, o: Array, n: Array, middle: Middle
+               ) -> list[PoseCondition]:
+    """The same in a plane with the normal n, whatever the heights above it."""
+    none = np.zeros(3)
+    if isinstance(reach, Point):
+        return [OnPlane(leg, b, none, v, float(v @ o)) for v in _across(n)]
+    if isinstance(reach, Line):
+        v = np.cross(n, reach.direction)
+        return [OnPlane(leg, b, none, v, float(v @ o))]
+    if isinstance(reach, Circle):
+        return [OnRevolution(leg, b, none, o, n, np.array([(reach.radius / middle.size) ** 2, 0.0, 0.0]))]
+    raise Underived(f"a {type(reach).__name__.lower()} in a plane")
+
+
+def _profile(reach: Revolution, middle: Middle) -> Array:
+    return np.array(reach.profile) / [middle.size ** 2, middle.size, 1.0]
+
+
+def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plane: Array | None) -> _Read:
+    """A point of the base that is confined in the platform's frame, by what follows the last body at rest."""
+    seen: list[tuple[Reach | Revolution, Array]] = []
+    moved = 0.0
+    for known, _ in orientations(found):
+        foot, rest = turned_round(found, known)
+        for own, _ in orientations(rest):
+            reach, radii = place(rest, own)
+            moved = max(moved, radii)
+            if (3 if plane is None else 2) - reach.freedoms != count:
+                raise Underived("its foot and how it turns the platform")
+            if not any(_alike(reach, other, found.length) and np.linalg.norm(foot - at) <= SAME_RELATION * found.length
+                       for other, at in seen):
+                seen.append((reach, foot))
+    return [_holds(leg, reach, foot, middle, plane) for reach, foot in seen], moved
+
+
+def _holds(leg: str, reach: Reach | Revolution, foot: Array, middle: Middle, plane: Array | None
+           ) -> list[PoseCondition]:
+    o, b = middle.point(foot), middle.point(reach.centre)
+    if isinstance(reach, Revolution):
+        return [OnMovingRevolution(leg, b, reach.axis, o, _profile(reach, middle))]
+    if isinstance(reach, Plane):
+        return [OnMovingPlane(leg, b, reach.normal, o, 0.0)]
+    if isinstance(reach, Line):
+        across = _across(reach.direction) if plane is None else [np.cross(plane, reach.direction)]
+        return [OnMovingPlane(leg, b, n, o, 0.0) for n in across]
+    raise Underived(f"a {type(reach).__name__.lower()} of the platform that holds its foot")
+
+
+def turned_round(found: Chain, known: Known) -> tuple[Array, Chain]:
+    """The foot (m), the place of what follows the last body of known orientation, and the chain from the platform to
+    it. Raises :class:`Underived` where it holds a measurement."""
+    last = max(k for k, Q in enumerate(known) if Q is not None)
+    bodies = found.bodies[last:]
+    if any(body.cranks or body.watched or body.angles for body in bodies[1:]) or len(bodies) < 2 or any(
+            body.slides or body.cranks for body in found.bodies[:last + 1]):
+        raise Underived("what is measured or carried does not let it be read from the platform")
+    foot = found.bodies[0].point + sum((Q @ body.shift for Q, body in zip(known[:last + 1], found.bodies, strict=False)
+                                        if Q is not None), np.zeros(3))
+    if any(Q is None for Q in known[:last]):
+        raise Underived("a body that turns before its foot")
+    end = bodies[-1]
+    new = [ChainBody(None, end.point + end.shift, -end.shift, end.slides)]
+    for before, after in zip(bodies[-2::-1], bodies[:0:-1], strict=True):
+        new.append(ChainBody(after.axis, after.point, -before.shift, before.slides))
+    new[-1] = ChainBody(new[-1].axis, new[-1].point, np.zeros(3))
+    return foot, Chain(tuple(new), False, found.length, found.off)
+
+
+def _in_plane(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plane: Array | None) -> _Read:
+    """An axis t through the foot, axes n normal to it between which all lies in a plane, and an axis c through the tip
+    normal to those: t, foot to tip and c lie in one plane."""
+    bodies = found.bodies
+    if (count != 1 or any(body.watched or body.angles or body.cranks for body in bodies) or bodies[0].slides
+            or any(body.axis is None for body in bodies[1:])):
+        raise Underived("another chain of axes")
+    parts = groups([(k, body.axis) for k, body in enumerate(found.bodies) if body.axis is not None])
+    if [len(part) for part in parts] != [1, 2, 1]:
+        raise Underived("another chain of axes")
+    (_, t), n, (_, c) = parts[0][0], parts[1][0][1], parts[2][0]
+    first, *inner, last = found.bodies[1:]
+    flat = [first.shift, *(v for body in (first, *inner) for v in body.slides), *(body.shift for body in inner)]
+    small = SAME_RELATION * found.length
+    if (not lines.perpendicular(n, t) or not lines.perpendicular(n, c) or any(abs(float(n @ v)) > small for v in flat)
+            or np.linalg.norm(first.shift) > small or first.slides or last.slides or np.linalg.norm(last.shift) > small
+            or sum(len(body.slides) for body in inner) != 1):
+        raise Underived("axes that are not normal to each other")
+    return [[Coplanar(leg, middle.point(tip), c, middle.point(first.point), t)]], 0.0

@@ -1,0 +1,210 @@
+"""Poses that meet conditions, enclosed: proposed in floats, each proved in balls.
+
+The unknowns are the coordinates y of a unit quaternion and those of the position z: in space seven, with q · q = 1 and
+six conditions. Each pose that is proposed is enclosed (Krawczyk), complex ones too, for all input within its error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from ...geometry.vectors import Array
+from ...tolerances import BOXES_APART, NEARLY_REAL_POSE, NUMBER_ROUNDING
+from .conditions import PoseCondition
+from .polynomials import Polynomial, krawczyk
+from .pose_forms import ROTATION, Poses, SquareForms
+
+PRECISION = 128
+"""Bits of the enclosures."""
+NEWTON = 4
+"""Steps that make a proposal as good as floats allow."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Zero:
+    """The equation of a condition in (q, p), with numbers in balls."""
+
+    condition: PoseCondition
+    poses: Poses
+    slack: float
+    """How far a number can be from the exact one (sizes)."""
+
+    @cached_property
+    def _tensors(self) -> tuple[Any, Any]:
+        """M with x = p + y M y, and that of d; shape (3, a, a)."""
+        E = self.poses.turns
+        T = np.einsum("ikab,ac,bd->ikcd", ROTATION, E, E) if E.shape[1] < 4 else ROTATION.astype(int)
+        T = self.of(T) if E.shape[1] < 4 else T.astype(object)
+        return tuple(np.einsum("ikab,k->iab", T, self.of(v)) for v in (self.condition.b, self.condition.c))
+
+    @cached_property
+    def _moves(self) -> Any:
+        """The position of its coordinates; shape (3, k)."""
+        return self.of(self.poses.moves) if self.poses.moves.shape[1] < 3 else np.eye(3, dtype=int).astype(object)
+
+    def of(self, values: Array) -> Any:
+        """Numbers as balls."""
+        from flint import arb
+
+        flat = np.array([arb(float(v), self.slack + NUMBER_ROUNDING * (1.0 + abs(float(v)))) for v in np.ravel(values)],
+                        dtype=object)
+        return flat.reshape(np.shape(values)) if np.shape(values) else flat[0]
+
+    @cached_property
+    def _profile(self) -> float:
+        """How much worse the numbers of a profile are known than others."""
+        f = getattr(self.condition, "f", None)
+        return 1.0 if f is None else (1.0 + float(np.abs(f).sum())) ** 1.5
+
+    def _at(self, x: Sequence[Any]) -> tuple[Any, Any, Any, Any]:
+        turned = self.poses.turns.shape[1]
+        y, p = np.array(x[:turned], dtype=object), self._moves @ np.array(x[turned:], dtype=object)
+        by = [M @ y for M in self._tensors]
+        return p + by[0] @ y, by[1] @ y, by[0], by[1]
+
+    def value(self, x: Sequence[Any]) -> Any:
+        """The value at x."""
+        point, arrow, *_ = self._at(x)
+        return self.condition.value(point, arrow, self._of)
+
+    def slopes(self, x: Sequence[Any]) -> Any:
+        """The derivative by each unknown at x."""
+        point, arrow, by_x, by_d = self._at(x)
+        along, turned = self.condition.slopes(point, arrow, self._of)
+        return [*(2 * (along @ by_x + turned @ by_d)), *(along @ self._moves)]
+
+    def _of(self, values: Array) -> Any:
+        if values is getattr(self.condition, "f", None):
+            from flint import arb
+
+            return np.array([arb(float(v), (self.slack + NUMBER_ROUNDING) * self._profile) for v in values],
+                            dtype=object)
+        return self.of(values)
+
+
+@dataclass(frozen=True, eq=False)
+class _Unit:
+    """q · q = 1."""
+
+    turned: int
+    """How many coordinates the quaternion has."""
+
+    def value(self, x: Sequence[Any]) -> Any:
+        """The value at x."""
+        return sum(v * v for v in x[:self.turned]) - 1
+
+    def slopes(self, x: Sequence[Any]) -> Any:
+        """The derivative by each unknown at x."""
+        return [*(2 * v for v in x[:self.turned]), *(0 for _ in x[self.turned:])]
+
+
+@dataclass(frozen=True, eq=False)
+class PoseBox:
+    """A pose enclosed: the middle of (y, z), complex where it is not ``real``, and the radii; ``turned`` of the
+    coordinates are those of the quaternion."""
+
+    middle: Array
+    radii: Array
+    real: bool
+    box: tuple[Any, ...]
+    turned: int
+
+    @property
+    def _signs(self) -> Iterator[Array]:
+        """q and -q are one pose."""
+        return (np.r_[np.full(self.turned, s), np.ones(len(self.middle) - self.turned)] for s in (1.0, -1.0))
+
+    def pose(self, poses: Poses) -> tuple[Array, Array]:
+        """The quaternion (4,) and the position (3,) at the middle of a real box."""
+        x = self.middle.real
+        return poses.turns @ x[:self.turned], poses.moves @ x[self.turned:]
+
+    def holds(self, x: Array) -> bool:
+        """Whether a pose is in it."""
+        return any(bool(np.all(np.abs(self.middle - s * x) <= self.radii)) for s in self._signs)
+
+    def near(self, x: Array) -> bool:
+        """Whether a pose is its middle to rounding."""
+        return any(bool(np.all(np.abs(x - s * self.middle) <= NEARLY_REAL_POSE * (1.0 + np.abs(x))))
+                   for s in self._signs)
+
+    def apart(self, other: PoseBox) -> bool:
+        """Whether no pose is in both."""
+        radii = self.radii + other.radii
+        return all(bool(np.any(np.abs(self.middle - s * other.middle) > radii)) for s in self._signs)
+
+
+def refined(forms: SquareForms, y: Array, p: Array) -> Array:
+    """Newton's method on proposals (n, a) and (n, 3), all at once; (n, a + k)."""
+    conditions, poses = (*forms.planes, *forms.others), forms.poses
+    E, moves = poses.turns, poses.moves
+    M = [[np.einsum("ikab,k,ac,bd->icd", ROTATION, v, E, E) for v in (c.b, c.c)] for c in conditions]
+    x, turned = np.hstack([y, p @ moves]), E.shape[1]
+    for _ in range(NEWTON):
+        y, p = x[:, :turned], x[:, turned:] @ moves.T
+        F, J = [np.sum(y * y, axis=1) - 1.0], [np.hstack([2.0 * y, 0.0 * x[:, turned:]])]
+        for c, (b, a) in zip(conditions, M, strict=True):
+            by_x, by_d = (np.einsum("iab,nb->nia", each, y) for each in (b, a))
+            at, d = p + np.einsum("nia,na->ni", by_x, y), np.einsum("nia,na->ni", by_d, y)
+            along, across = c.slopes(at, d, np.asarray)
+            F.append(c.value(at, d, np.asarray))
+            J.append(np.hstack([2.0 * (np.einsum("ni,nia->na", along, by_x) + np.einsum("ni,nia->na", across, by_d)),
+                                along @ moves]))
+        try:
+            x = x - np.linalg.solve(np.stack(J, axis=1), np.stack(F, axis=1)[:, :, None])[:, :, 0]
+        except np.linalg.LinAlgError:
+            break
+    return x
+
+
+def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) -> tuple[list[PoseBox], int]:
+    """Boxes of poses, each with one for all input within the slack (sizes), no two with the same; and how many
+    proposals had none."""
+    from flint import acb, arb, ctx
+
+    turned = forms.poses.turns.shape[1]
+    conditions = (*forms.planes, *forms.others)
+    equations: list[Polynomial] = [_Unit(turned), *(_Zero(c, forms.poses, slack) for c in conditions)]
+    found: list[PoseBox] = []
+    lost = 0
+    with ctx.workprec(PRECISION):
+        for x in refined(forms, *proposed):
+            real = bool(np.abs(x.imag).max() < NEARLY_REAL_POSE)
+            twin = None if real else next((box for box in found if not box.real and box.near(x.conj())), None)
+            if twin is not None:
+                each: PoseBox | None = replace(twin, middle=twin.middle.conj())
+            elif np.all(np.isfinite(x)):
+                start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
+                each = _box(krawczyk(equations, start), real, turned)
+            else:
+                each = None
+            if each is None:
+                lost += 1
+            elif all(each.apart(other) for other in found):
+                found.append(each)
+    return found, lost
+
+
+def _box(box: Sequence[Any] | None, real: bool, turned: int) -> PoseBox | None:
+    """A box with its radii made a little larger; None where there is none, or a complex one may hold a real pose."""
+    if box is None:
+        return None
+    middle = np.array([complex(v.mid()) for v in box])
+    radii = np.array([float(v.rad()) if real else float(v.real.rad()) + float(v.imag.rad()) for v in box])
+    radii = radii * (1.0 + BOXES_APART) + BOXES_APART * np.abs(middle)
+    if not real and np.all(np.abs(middle.imag) <= radii):
+        return None
+    return PoseBox(middle, radii, real, tuple(box), turned)
+
+
+def excluded_by(conditions: Sequence[PoseCondition], poses: Poses, box: PoseBox, slack: float) -> bool:
+    """Whether one of the conditions is met nowhere in a box, for all input within the slack."""
+    from flint import ctx
+
+    with ctx.workprec(PRECISION):
+        return any(not _Zero(c, poses, slack).value(box.box).contains(0) for c in conditions)

@@ -1,0 +1,171 @@
+"""All modes of a rigid platform from the conditions of its legs (docs/pages/theory.md, section 8).
+
+At least so many as boxes are apart from each other, complex ones too; at most as the degrees allow.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import product
+from math import prod
+
+import numpy as np
+
+from ...budgets import BRANCH_CHOICES, LARGEST_FORMS
+from ...constraints.pattern import attached
+from ...errors import NotConfined, Unsolved
+from ...geometry.so3 import exponential, logarithm, rotation_of
+from ...geometry.vectors import Array, frozen, inverse, pose
+from ...kinematics.configuration import ClosedConfiguration
+from ...tolerances import MOVED, SAME_RELATION, VANISHES
+from ..measured import MeasuredRobot
+from .branches import Model
+from .conditions import PoseCondition
+from .fits import words
+from .leg_conditions import Branches, Middle, leg_conditions
+from .pose_bound import bound
+from .pose_boxes import PoseBox, enclosed, excluded_by
+from .pose_forms import Poses, SquareForms, proposals
+from .solve import SystemMode, SystemModes
+from .systems import System
+
+
+@dataclass(frozen=True, eq=False)
+class PosedPlatform(System):
+    """A rigid platform on ``conditions``: q is the position of its origin (m), which is at ``middle.origin`` at the
+    goal, and the rotation vector of its turn from there."""
+
+    conditions: tuple[PoseCondition, ...]
+    middle: Middle
+    poses: Poses
+
+    freedoms = 6
+
+    @property
+    def size(self) -> float:
+        """The unit of lengths (m)."""
+        return self.middle.size
+
+    @property
+    def home(self) -> Array:
+        """The goal."""
+        return np.array([*self.middle.origin, 0.0, 0.0, 0.0])
+
+    def pose(self, q: Array) -> Array:
+        """The platform's frame in the base frame; shape (4, 4)."""
+        return pose(q[:3], exponential(q[3:]))
+
+    def place(self, box: PoseBox) -> Array:
+        """q at the middle of a real box."""
+        turn, p = box.pose(self.poses)
+        return np.array([*(self.middle.origin + self.size * p), *logarithm(rotation_of(turn))])
+
+    def miss(self, box: PoseBox) -> float:
+        """The largest distance from a condition (sizes) at the middle of a real box."""
+        turn, p = box.pose(self.poses)
+        R, found = rotation_of(turn), [0.0]
+        for c in self.conditions:
+            point, arrow = p + R @ c.b, R @ c.c
+            slope = np.hstack(c.slopes(point, arrow, np.asarray))
+            found.append(abs(float(c.value(point, arrow, np.asarray))) / max(1.0, float(np.linalg.norm(slope))))
+        return max(found)
+
+
+def posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[PosedPlatform]:
+    """The platform with the measurements at a configuration, one for each choice of the legs' branches, the goal's own
+    first. Raises ``NotConfined`` where a leg's conditions are not known."""
+    anatomy, name = measured.setting.anatomy, measured.setting.robot.name
+    bodies = attached(anatomy)
+    if len(bodies) != 1 or anatomy.point is not None or anatomy.mechanism.couplings:
+        raise NotConfined(name, "its platform is not one rigid body whose pose the legs decide")
+    middle = Middle(goal.pose(bodies[0])[:3, 3], goal.twin.length)
+    motion, normal = measured.moving
+    found = [leg_conditions(anatomy, leg, measured.question, goal, middle, normal, motion == "translations")
+             for leg in anatomy.legs]
+    legs: list[Branches] = [branches for branches, _ in found]
+    if prod(map(len, legs)) > BRANCH_CHOICES:
+        raise NotConfined(name, f"its legs have {prod(map(len, legs))} choices of branches")
+    if any(abs(float(c.value(c.b, c.c, np.asarray))) > SAME_RELATION * (1.0 + float(np.abs(getattr(c, "f", 0.0)).max()))
+           for branches in legs for c in branches[0]):
+        raise NotConfined(name, "the conditions of its legs are not met at the pose itself")
+    moved = MOVED * sum(each for _, each in found)
+    poses = (Poses.translating() if motion == "translations" else
+             Poses.spatial() if normal is None else Poses.planar(normal))
+    return [PosedPlatform((), np.zeros((0, 3)), tuple(c for branch in chosen for c in branch), middle, poses,
+                          error=moved) for chosen in product(*legs)]
+
+
+def most_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
+    """How many modes there are at most, complex ones too. Raises ``NotConfined``."""
+    return sum(_forms(measured, each).most for each in posed(measured, goal))
+
+
+def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
+    """All modes, with the goal known to ``error`` (m). Raises ``NotConfined``, and ``Unsolved`` where not all poses are
+    enclosed that there may be."""
+    systems = [replace(each, error=each.error + error) for each in posed(measured, goal)]
+    if len(systems) > 1:
+        raise NotConfined(measured.setting.robot.name, f"its legs have {len(systems)} choices of branches")
+    if not np.isfinite(error):
+        raise NotConfined(measured.setting.robot.name, "no distance bounds how far it is from where its loops close")
+    (body,) = attached(measured.setting.anatomy)
+    first = systems[0]
+    X, back = goal.pose(body), inverse(pose(first.middle.origin))
+    made = Model(first, lambda q: {body: first.pose(q) @ back @ X}, first.home)
+    found = _judged(first, _forms(measured, first))
+    if not found.complete:
+        raise Unsolved("the conditions on the pose", found.proof)
+    return made, found
+
+
+def _forms(measured: MeasuredRobot, system: PosedPlatform) -> SquareForms:
+    """As many of its conditions as freedoms. Raises ``NotConfined``, ``Unsolved``."""
+    forms = SquareForms.of(system.conditions, system.poses)
+    if forms is None:
+        raise NotConfined(measured.setting.robot.name, "the conditions of its legs do not decide its pose one by one")
+    if forms.size > LARGEST_FORMS:
+        raise Unsolved("conditions on the pose", f"{forms.most} solutions at most, among {forms.size} forms of degree "
+                                                 f"{forms.degree}: too many (at most {LARGEST_FORMS})")
+    return forms
+
+
+def _judged(system: PosedPlatform, forms: SquareForms) -> SystemModes:
+    """The modes: as many as the degrees allow, or else as the ranks of all multiples of the conditions do."""
+    slack = system.error / system.size
+    product_ = (f"the product of degrees {' · '.join(map(str, forms.degrees))}"
+                f"{f' / {2 ** forms.shape[1]}' if forms.shape[1] else ''} (Bézout)")
+    most, why, named = forms.most, product_, "class"
+    proposed = proposals(forms, forms.degree, forms.most, 0)
+    boxes, lost = ([], 1) if proposed is None else enclosed(forms, slack, proposed)
+    if len(boxes) < most and (found := bound(forms)) is not None:
+        most, why, named = found[0], f"ranks modulo a prime of 62 bits, in degree {found[1]}", "rank"
+        if len(boxes) < most or lost:
+            proposed = proposals(forms, found[1], most, found[2])
+            boxes, lost = ([], 1) if proposed is None else enclosed(forms, slack, proposed)
+    at_goal = [box for box in boxes if box.real and box.holds(np.eye(len(box.middle))[0])]
+    goal = at_goal[0] if len(at_goal) == 1 else None
+    complete = len(boxes) == most and goal is not None
+    real = [box for box in boxes if box.real]
+    proof = (f"at most {most} poses by {why}, {len(boxes)} enclosed apart from each other, complex ones too, "
+             f"{len(real)} real")
+    left = [c for c in system.conditions if c not in forms.planes and c not in forms.others]
+    kept = [box for box in real if box is goal or not excluded_by(left, forms.poses, box, slack)]
+    fitting = [box for box in kept if not left or box is goal or system.miss(box) <= VANISHES]
+    modes = tuple(_mode(system, box, not left or box is goal) for box in fitting)
+    open_ = len(kept) - len(fitting)
+    if left:
+        others = [mode.residual for mode in modes if not mode.proved]
+        proof = (f"from {len(system.conditions) - len(left)} of {len(system.conditions)} conditions: {proof}; of these "
+                 + words(goal is not None, False, others, len(real) - len(kept), open_))
+    return SystemModes(len(modes) if left else len(boxes), modes, complete and not open_, proof,
+                       bound=named if complete else "none", enclosed=complete)
+
+
+def _mode(system: PosedPlatform, box: PoseBox, proved: bool) -> SystemMode:
+    """A real box as a mode."""
+    shift = system.size * float(np.linalg.norm(box.radii[box.turned:]))
+    # two unit quaternions at the distance δ are turned against each other by at most 4 asin(δ / 2) ≤ π δ
+    turn = np.pi * float(np.linalg.norm(box.radii[:box.turned]))
+    q = system.place(box)
+    return SystemMode((), max(shift / system.size, turn), shift, turn, system.miss(box), frozen(system.pose(q)),
+                      frozen(q), proved=proved, fits=not proved)
