@@ -102,6 +102,11 @@ def test_sound_certificates_are_accepted():
     assert checker.verify(certificate(3, 3, led(), sound())).endswith("(more legs than needed fit) (2 systems)")
 
 
+def test_lines_through_one_point_need_no_size():
+    record = hrsynth.certificate(hrsynth.modes(hrsynth.load("prrrp_m1"), ["1", "2"]))
+    assert (record["real"], record["complex"]) == (1, 1)
+
+
 def ignored_tips() -> Record:
     """Tips of a second body were not where they are told, and no other body is in the plane."""
     return certificate(2, 2, posed(sound(), 1.0, 2.0) | {"bodies": [1, 1]})

@@ -339,12 +339,12 @@ def modes(record):
     more = " (more legs than needed fit)" * any(legs for _, legs in seen) + f" ({len(seen)} systems)" * (len(seen) > 1)
     return f"{real} real of {complex_} complex poses, and no other{more}"
 
-def fair(system, tips, d):  # has what belongs to its kind, and lengths in units of about its size
+def fair(system, tips, d):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
     need(system.keys() <= {*f"kind reaches tips boxes bound {OWN[system['kind']]}".split()}, "what is not of its kind")
     need(len(tips) < 50 and all(len(b) == d for b in tips), "tips of another dimension, or too many")
     reaches = [reach_of(each, d) for each in system["reaches"]]
-    spans = [sub(b, places[0]) for places in (tips, [v[0] for _, v in reaches]) for b in places]
-    spans += [v[1] for kind, v in reaches if kind in ("circle", "sphere")]
+    spans = [v[1] for kind, v in reaches if kind in ("circle", "sphere")] or [[int(system["kind"] == "shifting")]]
+    spans += [sub(b, places[0]) for places in (tips, [v[0] for _, v in reaches]) for b in places]
     need(max(abs(x) for span in spans for x in span) > Fraction(1, 1000), "lengths in other units than its size")
 
 def told(system, each, points, tips, m, r):  # whether the pose puts the tips where the box does
