@@ -26,9 +26,8 @@ NEEDED = ("Makefile", "CHANGELOG.md", "CITATION.cff", "CONTRIBUTING.md", "LICENS
           "requirements/main.txt", "robots/quattro.urdf", "catalog/planar.jsonl", "notebooks/1_the_idea.ipynb",
           "docs/pages/theory.md", "tests/oracle.py", "benchmarks/table.py", "src/hrsynth/claims.toml")
 """What a source archive must hold, of each kind of file something."""
-PACKAGED = ("hrsynth/py.typed", "hrsynth/robots/quattro.urdf", "hrsynth/catalog/shipped/planar.jsonl",
-            "hrsynth/claims.toml", "hrsynth/present/report/page.html.j2", "hrsynth/present/view/page.js")
-"""What a wheel must hold besides modules."""
+PACKAGED = ("hrsynth/robots/quattro.urdf", "hrsynth/catalog/shipped/planar.jsonl")
+"""What a wheel must hold besides all files of the package itself: where its links lead."""
 
 
 class Refused(Exception):
@@ -128,7 +127,10 @@ def wheel_complaints(wheel: Path, version: str) -> Iterator[str]:
         held = set(file.namelist())
         (name,) = (each for each in held if each.endswith(".dist-info/METADATA"))
         told = message_from_bytes(file.read(name))
-    yield from (f"{wheel.name} lacks {name}" for name in PACKAGED if name not in held)
+    source = ROOT / "src"
+    own = [path.relative_to(source).as_posix() for path in sorted((source / "hrsynth").rglob("*"))
+           if path.is_file() and "__pycache__" not in path.parts]
+    yield from (f"{wheel.name} lacks {name}" for name in (*PACKAGED, *own) if name not in held)
     yield from (f"{wheel.name} holds {name}" for name in sorted(held) if name.startswith("tests/"))
     text = str(told.get_payload())
     for field in ("Name", "Summary", "Author-email", "License-Expression", "Requires-Python", "Project-URL"):
