@@ -206,7 +206,7 @@ def test_a_pose_at_infinity_is_never_lost(sign):
 def test_command_line(tmp_path, capsys):
     path = tmp_path / "c.json"
     assert execute(["modes", "3rpr_m1", "--certificate", str(path)]) == 0
-    assert f"certificate  {path}" in capsys.readouterr().out
+    assert f"The certificate is written to {path}." in capsys.readouterr().out
     assert execute(["verify", str(path)]) == 0
     assert capsys.readouterr().out == "accepted: 2 real of 2 complex poses, and no other\n"
     assert execute(["verify", str(path), "--robot", "3rpr_m1", "--json"]) == 0
