@@ -166,3 +166,14 @@ def test_short_work_has_no_bar(monkeypatch: pytest.MonkeyPatch, capsys):
 def test_only_plain_numbers_are_numbers(capsys, text: str):
     assert execute(["check", "3rrr_m1", "--at", text]) == 2
     assert "is not a number" in capsys.readouterr().err
+
+
+def test_an_output_that_takes_nothing_is_told_in_one_line():
+    program = [sys.executable, "-m", "hrsynth", "robots"]
+    if Path("/dev/full").exists():
+        with open("/dev/full", "w") as full:
+            done = subprocess.run(program, stdout=full, stderr=subprocess.PIPE, text=True)
+        assert (done.returncode, done.stderr) == (
+            2, "hrsynth: cannot write to standard output: No space left on device\n")
+    closed = subprocess.run(["sh", "-c", 'exec "$@" >&-', "sh", *program], stderr=subprocess.PIPE, text=True)
+    assert (closed.returncode, closed.stderr) == (0, "")

@@ -383,7 +383,7 @@ def test_a_robot_may_see_less_than_its_architecture() -> None:
     assert record["verdict"] == PARTIAL
     assert record["architecture"]["verdict"] == CONTROLLABLE
     assert record["architecture"]["exact"] is True
-    (line,) = [line for line in text.derivation(found, None).splitlines() if line.startswith("architecture")]
+    (line,) = [line for line in text.derivation(found).splitlines() if line.startswith("architecture")]
     assert "generic geometry sees 6 of 6" in line
     assert "this robot 5" in line
 
@@ -403,7 +403,7 @@ def test_the_architecture_in_a_derivation(robot: str, observe: None, verdict: st
     assert basis["observed"] == []
     assert record == {"verdict": verdict, "exact": True, "rank": found.verdict.rank, "proved": verdict == CONTROLLABLE,
                       "instances": 1 if verdict == CONTROLLABLE else 5, "reason": words.split(", ", 1)[1]}
-    (line,) = [line for line in text.derivation(found, None).splitlines() if line.startswith("architecture")]
+    (line,) = [line for line in text.derivation(found).splitlines() if line.startswith("architecture")]
     assert line.split(maxsplit=1)[1] == words
 
 
@@ -434,7 +434,7 @@ def test_what_is_not_decided_is_said(monkeypatch: pytest.MonkeyPatch) -> None:
     printed = text.legs(found)
     assert printed.count("not decided") == 4
     assert "not decided in exact arithmetic: crowded" in printed
-    line = next(line for line in text.derivation(derive(prepare_robot("rrrrr_m1")), None).splitlines()
+    line = next(line for line in text.derivation(derive(prepare_robot("rrrrr_m1"))).splitlines()
                 if line.startswith("architecture"))
     assert line.endswith("not decided: crowded")
 
