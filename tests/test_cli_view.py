@@ -32,7 +32,7 @@ def test_a_page_is_written_and_told(capfd: pytest.CaptureFixture[str], tmp_path:
     status, out, err = ask(capfd, "rrrrr_m1", "--hidden", "--static", str(file))
     assert (status, err) == (0, "")
     assert "ΠR̲RR̲Π" in out
-    assert f"page          {file}" in out
+    assert f"The view is written to {file}.\n" in out
     assert file.read_text().startswith("<!DOCTYPE html>")
     assert list(tmp_path.iterdir()) == [file]
 

@@ -237,7 +237,7 @@ def test_cameras_that_are_none(options: dict[str, object], word: str):
         select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0,z=-0.6", size=1, **options)
 
 
-def test_unreachable_ends_are_bad_input():
+def test_unreachable_ends_are_told():
     with pytest.raises(PoseNotReached) as caught:
         select(load("delta"), start="x=9", goal="x=0")
-    assert caught.value.exit_status == 2
+    assert caught.value.exit_status == 3
