@@ -12,6 +12,7 @@ import time
 import xml.etree.ElementTree as Xml
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from hrsynth.cli import execute
@@ -103,7 +104,8 @@ def test_maps_show_the_robot_to_scale(here: Path):
     place = figure.subplots()
     (entry,) = plane.robot(figure, start)
     (strokes,) = place.collections
-    points = {(round(float(x), 6), round(float(y), 6)) for path in strokes.get_paths() for x, y in path.vertices}
+    points = {(round(float(x), 6), round(float(y), 6)) for path in strokes.get_paths()
+              for x, y in np.asarray(path.vertices)}
     mechanism = start.twin.mechanism
     centres = {(round(float(p[0]), 6), round(float(p[1]), 6)) for p in (j.point for j in mechanism.joints.values())}
     assert points == centres

@@ -6,6 +6,7 @@ import json
 import shlex
 from copy import deepcopy
 from pathlib import Path
+from typing import Any
 
 import pytest
 import typer
@@ -75,7 +76,7 @@ def test_every_answer_is_what_its_schema_says(here: Path, capsys, command: str):
 
 
 def test_every_command_with_json_has_a_record():
-    root = typer.main.get_command(app)
+    root: Any = typer.main.get_command(app)
     found = [name for name, each in root.commands.items() if not hasattr(each, "commands")]
     found += [f"{name} {inner}" for name, each in root.commands.items() for inner in getattr(each, "commands", {})]
     leaves = {name: (root.commands[name] if " " not in name else

@@ -130,7 +130,8 @@ def test_the_section_holds_all_modes_of_the_goal():
     drawn, places = made
     goal = places[1]
     assert sorted(places) == [1, 2, 3, 4, 5, 6]
-    assert mode_counts(drawn.robot, drawn.held, *np.angle(goal.rods[1:])[:, None], 4000) == [[6]]
+    first, second = np.angle(goal.rods[1:])[:, None]
+    assert mode_counts(drawn.robot, drawn.held, first, second, 4000) == [[6]]
     for place in places.values():
         assert np.max(np.abs(place.rods - goal.rods)) < 1e-9
         assert np.abs(place.cranks) == pytest.approx(drawn.robot.cranks, abs=1e-9)
