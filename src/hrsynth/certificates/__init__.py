@@ -47,7 +47,9 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | None = Non
         except NotAccepted as reason:
             raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
-            raise BadRequest("a certificate that cannot be read", name, f"a file of JSON ({error})") from None
+            reason = getattr(error, "strerror", None) or "it is no JSON"
+            raise BadRequest(f"the certificate cannot be read: {reason}", name,
+                             "a file that modes or derive wrote with --certificate") from None
     try:
         proved = _verify(record)
     except NotAccepted as reason:

@@ -385,7 +385,7 @@ def once(pairs):  # an object of JSON; of two keys a reader may see one, Python 
 
 def verify(record):  # what a certificate proves, in words; raises NotAccepted
     try:
-        need(record["format"] == "hrsynth-certificate-1", "another format")
+        need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
         need(record["sha256"] == digest(record), "the file was changed: another digest")
         return {"modes": modes, "ranks": ranks}[record["claim"]](record)
     except Exception as error:
