@@ -27,7 +27,7 @@ def test_a_mode_by_its_number_is_the_robot_assembled_there(name: str, legs: str 
     wanted = np.concatenate(measure(first.twin, first.q, question.reference, question.observations)[2])
     for k, at in zip(numbers, found, strict=True):
         assert at.twin is first.twin
-        assert str(setting.motion.pose(at.pose(setting.motion.link))) == str(listed.modes[k - 1].pose)
+        assert str(listed.setting.motion.pose(at.pose(setting.motion.link))) == str(listed.modes[k - 1].pose)
         got = np.concatenate(measure(at.twin, at.q, question.reference, question.observations)[2])
         assert np.abs(got - wanted).max() < 1e-9
 

@@ -268,7 +268,7 @@ def test_an_index_is_not_read_as_a_letter_of_a_name():
 def test_the_command_writes_a_page_and_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
     page = tmp_path / "report.html"
     assert execute(["derive", "3prp", "--report", str(page)]) == 0
-    assert f"report        {page}" in capsys.readouterr().out
+    assert f"The report is written to {page}." in capsys.readouterr().out
     assert read(page.read_text(encoding="utf-8")).xpath("//tr[@data-step]")
     assert [file.name for file in tmp_path.iterdir()] == ["report.html"]
 

@@ -233,7 +233,7 @@ def test_scales_are_equal(name: str, observe: str | None):
 # ---- files
 
 
-@pytest.mark.parametrize("path", ["x.pdf", "x", "nowhere/x.png"])
+@pytest.mark.parametrize("path", ["x.tiff", "x", "nowhere/x.png"])
 def test_bad_files_are_refused_before_any_work(path: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
                                                capsys: pytest.CaptureFixture[str]):
     monkeypatch.chdir(tmp_path)
