@@ -47,8 +47,8 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | None = Non
         except NotAccepted as reason:
             raise CertificateRefused(name, str(reason)) from None
         except (OSError, ValueError, RecursionError) as error:
-            reason = getattr(error, "strerror", None) or "it is no JSON"
-            raise BadRequest(f"the certificate cannot be read: {reason}", name,
+            why = getattr(error, "strerror", None) or "it is no JSON"
+            raise BadRequest(f"the certificate cannot be read: {why}", name,
                              "a file that modes or derive wrote with --certificate") from None
     try:
         proved = _verify(record)

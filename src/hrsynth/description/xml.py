@@ -73,10 +73,12 @@ def document(text: bytes | str, file: str) -> Element:
     try:
         return etree.fromstring(data, _parser())
     except etree.XMLSyntaxError as error:
-        what = (error.msg or "syntax error").split(", line ")[0]
-        raise refusal(file, "malformed XML", value=what, line=error.lineno or 1) from None
+        what, at = (error.msg or "syntax error").split(", line ")[0], error.lineno or 1
     except (ValueError, LookupError) as error:
-        raise refusal(file, "malformed XML", value=str(error), line=1) from None
+        what, at = str(error), 1
+    # raised here, not above: libraries that send errors between processes take their context along, and the parser's
+    # own error cannot be sent
+    raise refusal(file, "malformed XML", value=what, line=at)
 
 
 class SourceLine(int):
