@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import re
 import subprocess
 import sys
+from importlib import metadata
 from pathlib import Path
 
 import pytest
+from packaging.requirements import Requirement
+from packaging.utils import canonicalize_name
 
 import hrsynth
 from hrsynth.analysis import controllability
@@ -24,6 +28,23 @@ def test_no_folder_hides_a_public_function():
     """A folder that is imported becomes an attribute of the package, whatever the function of its name."""
     below = {path.stem for path in Path(hrsynth.__file__).parent.iterdir() if path.suffix == ".py" or path.is_dir()}
     assert below & set(hrsynth.__all__) == {"catalog"}
+
+
+@pytest.mark.parametrize("name", ["main", "dev", "all"])
+def test_a_lock_holds_all_that_its_packages_need(name: str):
+    """With hashes pip installs nothing that is not listed: one package left out, and no set-up works."""
+    text = (Path(__file__).parent.parent / "requirements" / f"{name}.txt").read_text(encoding="utf-8")
+    pinned = {canonicalize_name(each) for each in re.findall(r"^([\w.-]+)==", text, re.MULTILINE)}
+    missing = set()
+    for package in pinned:
+        try:
+            needs = [Requirement(each) for each in metadata.requires(package) or ()]
+        except metadata.PackageNotFoundError:
+            continue
+        missing |= {f"{package}: {each}" for each in needs if canonicalize_name(each.name) not in pinned
+                    and (each.marker is None or each.marker.evaluate({"extra": ""}))}
+    assert len(pinned) > 30
+    assert missing == set()
 
 
 def test_an_unknown_name_is_an_attribute_error():
