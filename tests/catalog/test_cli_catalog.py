@@ -179,3 +179,14 @@ def test_the_meter_tells_the_time_left_on_a_terminal(monkeypatch: pytest.MonkeyP
     with Progress(counted=True) as meter:
         meter.count("c", 2, 10)
     assert capsys.readouterr().err == ""
+
+
+@pytest.mark.parametrize(("option", "value", "allowed"), [("--verdict", "contrlable", "uncontrollable"),
+                                                          ("--group", "foo", "planar")])
+def test_what_no_architecture_has_is_refused(option: str, value: str, allowed: str,
+                                             capsys: pytest.CaptureFixture[str]):
+    assert execute(["catalog", "list", option, value]) == 2
+    said = capsys.readouterr()
+    assert said.out == ""
+    assert value in said.err
+    assert allowed in said.err

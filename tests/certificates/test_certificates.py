@@ -119,6 +119,7 @@ def test_ranks_are_those_of_an_independent_elimination(legs):
     lost = seen["A", "Y", "X"] - seen["A", "Y"]
     derived = hrsynth.derive(hrsynth.load("quattro"), legs.split(","))
     assert derived.dof - lost == derived.exact.rank
+    assert hrsynth.verify(record).endswith(f": the legs see {derived.exact.rank} of 4 freedoms at this instance")
 
 
 def attacked(text: str, count: int, seed: int) -> Counter[str]:

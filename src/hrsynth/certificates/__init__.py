@@ -61,7 +61,7 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | None = Non
             raise CertificateRefused(name, f"it does not say which legs and pose it is about ({error!r})") from None
         if not _same(record, own):
             raise CertificateRefused(name, f"it is not about {robot.name}: other geometry, legs or pose")
-    return proved
+    return f"{proved}{ranks.seen(record)}" if record["claim"] == "ranks" else proved
 
 
 def _same(one: Any, other: Any) -> bool:

@@ -40,6 +40,15 @@ def certificate(found: Derivation) -> dict[str, Any]:
     return record
 
 
+def seen(record: dict[str, Any]) -> str:
+    """What ranks that were proved say of the legs; empty where they are not all there."""
+    found = {"".join(sorted(each["of"])): int(each["rank"]) for each in record["stacks"]}
+    if not {"AX", "AXY", "AY"} <= found.keys():
+        return ""
+    freedoms = found["AX"] - found.get("A", 0)
+    return f": the legs see {freedoms - found['AXY'] + found['AY']} of {freedoms} freedoms at this instance"
+
+
 def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     """The certificate of the same question about a robot."""
     return certificate(derive(robot, [link for _, link in record["observed"]]))

@@ -20,6 +20,7 @@ from .progress import Progress
 
 catalog = typer.Typer(name="catalog", cls=WholeGroup, invoke_without_command=True, rich_markup_mode=None,
                       help="The catalog of architectures: what can be controlled by watching legs.")
+VERDICTS = ("controllable", "partially controllable", "uncontrollable")
 KEPT = Option("kept", "A folder or SQLite file (default: what is shipped).", "PATH", flags=("--catalog",))
 WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
 ANEW = flag("anew", "Discard the results of an interrupted build.")
@@ -27,7 +28,8 @@ FILTER = (
     Option("legs", "Number of legs, or a pattern of the notation or of one leg's chain: 3-R*, PUS.", "LEGS"),
     Option("dof", "Freedoms of the platform.", kind=int),
     Option("motion", "Its translations and rotations, as 3T or 2T1R."),
-    Option("verdict", "controllable, partially controllable, uncontrollable."),
+    Option("verdict", "controllable, partially controllable, uncontrollable.",
+           words=VERDICTS),
     Option("group", "planar, pods, deltas, spatial.", words=("planar", "pods", "deltas", "spatial")),
     Option("base_motors", "All motors on the base, or not.", kind=bool, flags=("--base-motors/--moving-motors",)),
     Option("fewest", "Number of legs that must be watched.", kind=int),
@@ -83,9 +85,13 @@ def build(groups: list[str] | None, output: str | None, workers: int, cluster: s
 def entries(kept: str | None, json: bool, **asked: Any) -> None:
     """List the architectures that fit."""
     from ..catalog import load
+    from ..errors import BadRequest
     from ..present.text.catalog import entries as written
 
     every = load(kept)
+    for name, known in (("group", {str(each) for each, in every.count("group")}), ("verdict", VERDICTS)):
+        if asked[name] not in (None, *known):
+            raise BadRequest(f"no {name} of the catalog", asked[name], sorted(known))
     found = every.where(**asked)
     _say("list", {"total": len(every), "entries": [dict(each) for each in found]}, written(found.records, len(every)),
          json)

@@ -15,6 +15,7 @@ from ...mechanism.observation import Direction
 from ...mechanism.pose import Grid, ModeNumber, Pose, PoseLike, as_pose, asked_poses
 from ...progress import tell
 from ...results import Result
+from ...tolerances import LARGEST_FIRST_ORDER
 from ..asked import configurations_at
 from ..observed import LegsLike, ObservedRobot, RobotLike
 from ..question import question
@@ -44,7 +45,9 @@ class Accuracy(Result, shown_as="accuracy"):
 
     def headline(self) -> str:
         """The robot, and the largest errors at each pose or of the grid."""
-        worst = [f"{1e3 * each.position.largest:.3g} mm at {each.pose}" for each in self.poses]
+        limit = LARGEST_FIRST_ORDER * self.setting.everything.twin.length
+        worst = [(f"{1e3 * each.position.largest:.3g} mm" if each.position.largest <= limit else
+                  "not bounded to first order") + f" at {each.pose}" for each in self.poses]
         grid = [] if self.field is None else [f"{self.field.reached.sum()} poses of a grid"]
         return f"{self.setting.headline()}: {'; '.join(worst + grid)}"
 

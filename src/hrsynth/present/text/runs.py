@@ -136,7 +136,7 @@ def _extent(name: str, extent: ErrorEllipsoid, unit: float, word: str, length: f
     if not np.isfinite(extent.largest):
         return [(name, "infinite: a freedom is lost here")]
     if not bounded(extent.largest, length):
-        return [(name, f"{NOT_BOUNDED}: a singularity is near")]
+        return [(name, f"{NOT_BOUNDED}: the cones are too large for that here, or a singularity is near")]
     if extent.direction is None:
         return [(name, "no error: the platform does not move so")]
     lines = [f"{unit * extent.largest:.4g} {word}, along {_vector(extent.direction)}"]
