@@ -88,6 +88,8 @@ def test_examples_are_commands(arguments: tuple[str, ...]):
                                        and not any(part.endswith(".urdf") for part in each[1:2])], ids=" ".join)
 def test_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, arguments: tuple[str, ...]):
     monkeypatch.chdir(tmp_path)
+    if "c.json" in arguments and arguments[0] == "verify":  # the file that the example of modes writes
+        assert execute(["modes", "quattro", "--observe", "1,4", "--certificate", "c.json"]) == 0
     assert execute(list(arguments)) == 0, capsys.readouterr().err
     assert capsys.readouterr().err == ""
 
