@@ -20,12 +20,13 @@ from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sp
 from ..analysis.modes.modes import AssemblyModes, modes
 from ..analysis.modes.quadrics import UNIT, PoseSystem, Rounded, WorkingFrame, direction, spokes
 from ..analysis.modes.rigid import Planar, Spatial
-from ..analysis.modes.roots import is_real
+from ..analysis.modes.roots import Roots, is_real
 from ..analysis.modes.solve import Solved, SystemModes
 from ..analysis.modes.squares import TURNS, SquareSystem
 from ..analysis.modes.translating import Articulated, Translating, coplanar, met_normal
 from ..analysis.observed import ObservedRobot
 from ..errors import NoCertificate
+from ..geometry.so3 import quaternions
 from ..geometry.vectors import Array, cross, unit
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
@@ -159,8 +160,7 @@ def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], 
     if not part.unknowns or part.frame is None:
         raise NotAccepted("tips at rest leave one pose: there is nothing to enclose")
     frame, turns = part.frame, part.turns(roots.turn)
-    values = [[complex(v) for v in each] for each in roots.values]
-    real = [is_real(each) for each in roots.values]
+    values, real = _starts(roots)
     if isinstance(system, Spatial | Planar):
         legs = [*part.legs, *(k for k in range(len(system.curves)) if k not in part.legs)]
         d = system.space
@@ -170,9 +170,7 @@ def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], 
                   "reaches": [_reach(each, frame, 0.0 if isinstance(each, Point | Surface) else
                                                          next(origins, 0.0)) for each in curves],
                   "tips": _strings(_rounded(system.tips[legs] / frame.size)), "square": len(part.legs)}
-        placed = [np.column_stack([frame.R @ mode.pose[:3, :d] if d == 3 else frame.R @ mode.pose[:3, :2],
-                                   frame.point(mode.pose[:3, 3])]) for mode in solved.modes]
-        return record, list(zip(values, real, strict=True)), placed
+        return record, list(zip(values, real, strict=True)), [_placed(mode.pose, frame, d) for mode in solved.modes]
     assert isinstance(system, Translating | Articulated)
     if isinstance(system, Translating):
         record, starts = _translating(system, part, frame, turns, values)
@@ -186,8 +184,22 @@ def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], 
         record["reaches"] = [*record["reaches"], *(_reach(each, frame, 0.0) for each in paths)]
         record["bodies"] = [*record["bodies"], *bodies]
     record["tips"] = [["0"] * 3] * len(record["reaches"])
-    placed = [np.column_stack([np.eye(3), frame.vector(mode.pose[:3, 3] - origin)]) for mode in solved.modes]
-    return record, list(zip(starts, real, strict=True)), placed
+    return record, list(zip(starts, real, strict=True)), [_shifted(mode.pose, frame, origin) for mode in solved.modes]
+
+
+def _starts(roots: Roots) -> tuple[list[list[complex]], list[bool]]:
+    """About where the solutions are, and which of them are real."""
+    return [[complex(v) for v in each] for each in roots.values], [is_real(each) for each in roots.values]
+
+
+def _placed(X: Array, frame: WorkingFrame, d: int) -> Array:
+    """A pose in working coordinates, (d, d + 1); d = 2 in a plane."""
+    return np.column_stack([frame.R @ X[:3, :d], frame.point(X[:3, 3])])
+
+
+def _shifted(X: Array, frame: WorkingFrame, origin: Array) -> Array:
+    """The pose of a body that does not turn, counted from an origin, in working coordinates (3, 4)."""
+    return np.column_stack([np.eye(3), frame.vector(X[:3, 3] - origin)])
 
 
 def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool]], list[Array]]:
@@ -196,17 +208,14 @@ def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[comple
     assert isinstance(part, PoseSystem)
     if not part.whole or sum(system.forbids[k] for k in part.legs) != system.freedoms:
         raise NotAccepted("tips on surfaces, more than needed")
-    frame, values = part.chart.frame, [[complex(v) for v in each] for each in solved.roots.values]
-    real = [is_real(each) for each in solved.roots.values]
+    frame, (values, real) = part.chart.frame, _starts(solved.roots)
     if isinstance(system, Spatial) and part.chart.study is not None:
         record = {"kind": "pose", "reaches": [_reach(system.curves[k], frame, 0.0) for k in part.legs],
                   "tips": _strings(_rounded(system.tips[list(part.legs)] / frame.size)),
                   "arrows": sum(k >= len(system.points) for k in part.legs),
                   "hub": _strings(_rounded(frame.point(system.hub))),
                   "chart": [[str(round(x)) for x in row] for row in part.chart.study[:4, :4]]}
-        placed = [np.column_stack([frame.R @ mode.pose[:3, :3], frame.point(mode.pose[:3, 3])])
-                  for mode in solved.modes]
-        return record, list(zip(values, real, strict=True)), placed
+        return record, list(zip(values, real, strict=True)), [_placed(mode.pose, frame, 3) for mode in solved.modes]
     if not isinstance(system, Articulated):
         raise NotAccepted("tips on surfaces of another platform than the checker knows")
     turn = TURNS[0]
@@ -216,8 +225,8 @@ def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[comple
               "tips": [["0"] * 3] * len(part.legs)}
     c, s = math.cos(turn), math.sin(turn)
     starts = [[*x[:3], (x[4] * c - x[3] * s) / (1.0 + x[3] * c + x[4] * s)] for x in values]
-    placed = [np.column_stack([np.eye(3), frame.point(mode.pose[:3, 3])]) for mode in solved.modes]
-    return record, list(zip(starts, real, strict=True)), placed
+    return (record, list(zip(starts, real, strict=True)),
+            [_shifted(mode.pose, frame, frame.origin) for mode in solved.modes])
 
 
 def _translating(system: Translating, part: SquareSystem, frame: WorkingFrame, turns: Sequence[float],
@@ -284,20 +293,11 @@ def _spokes(circle: Circle, frame: WorkingFrame, turn: float) -> list[list[Fract
     if len(a) == 2 or dot(a, b) == 0 == dot(a, a) - dot(b, b):
         return [a, b]
     first, second = unit(given[0].astype(float)), unit(given[1].astype(float))
-    w, x, y, z = (Fraction(round(float(c) * UNIT)) for c in _quaternion(np.column_stack(
+    w, x, y, z = (Fraction(round(float(c) * UNIT)) for c in quaternions(np.column_stack(
         [first, second, cross(first, second)])))
     s = _rounded(circle.radius / frame.size) / (w * w + x * x + y * y + z * z)
     return [[s * (w * w + x * x - y * y - z * z), 2 * s * (x * y + w * z), 2 * s * (x * z - w * y)],
             [2 * s * (x * y - w * z), s * (w * w - x * x + y * y - z * z), 2 * s * (y * z + w * x)]]
-
-
-def _quaternion(R: Array) -> Array:
-    """The unit quaternion (w, x, y, z) of a rotation: the eigenvector of Bar-Itzhack's matrix (2000)."""
-    K = np.array([[R[0, 0] - R[1, 1] - R[2, 2], 0, 0, 0], [R[0, 1] + R[1, 0], R[1, 1] - R[0, 0] - R[2, 2], 0, 0],
-                  [R[0, 2] + R[2, 0], R[1, 2] + R[2, 1], R[2, 2] - R[0, 0] - R[1, 1], 0],
-                  [R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1], np.trace(R)]])
-    x, y, z, w = np.linalg.eigh(K)[1][:, -1]
-    return np.array([w, x, y, z])
 
 
 def _refined(equations: Sequence[Polynomial], start: Sequence[complex], real: bool) -> tuple[Any, Any]:
