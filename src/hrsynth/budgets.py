@@ -40,6 +40,8 @@ FIRMER_BY = 2.0
 """Factor by which another pose must be firmer to take the place of a nearly singular one."""
 MOST_RELATED_ON_LINK = 40
 """Joints of one link above which relations among them are not looked for."""
+MOST_CANDIDATES = 12
+"""Pairs of frames that are told as possible closures."""
 LARGEST_YAML = 1_000_000
 """Bytes of a YAML file above which it is not read."""
 LARGEST_GUESSED = 150

@@ -89,6 +89,9 @@ TURNING_ARM = 1e-3
 NOISE = 1e-4
 """Deviation (characteristic lengths, radians) up to which a relation in a foreign file (axes parallel or perpendicular,
 points that coincide, equal rods) counts as meant and is made exact: printed digits and CAD stay below."""
+MAY_MEET = 2e-2
+"""Distance (characteristic lengths) up to which two frames of a foreign file are told as ones that a closure may hold
+together."""
 EXACT = 1e-11
 """Deviation (characteristic lengths, radians) below which such a relation holds as well as numbers allow."""
 FAINT = 1e-3

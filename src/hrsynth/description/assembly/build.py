@@ -14,6 +14,7 @@ from ..jointgraph import JointGraph, JointSpec, comma_list
 from ..overrides import Overrides
 from ..tree import spanning
 from . import closures, guess
+from .candidates import without_loop
 from .coordinates import with_weighed_motors, without_coordinates
 from .loops import LoopAssembly, LoopSolution, Values, regular_values, solve
 from .relations import as_meant
@@ -37,6 +38,8 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     for role, link in (("base", overrides.base), ("platform", overrides.platform)):
         if link is not None and link not in graph.links:
             raise BadRequest(f"{graph.file}: no such {role} link", link, comma_list(graph.links))
+    if open_chain := without_loop(graph, base):
+        graph.note("open", open_chain)
     platform = overrides.platform or graph.platform or guess.platform(graph, overrides.base or base)
     if platform == base and overrides.base is None:
         raise BadRequest(f"{graph.file}: the platform is the base", platform, "another link")

@@ -32,7 +32,8 @@ def platform(graph: JointGraph, base: str) -> str:
     body, why, rivals = bodies.platform()
     if body is None:
         names = [bodies.title(each) for each in rivals]
-        raise BadRequest(f"{graph.file}: the file does not say which link is the platform, and several could be",
+        chain = "".join(f"; {note.text}" for note in graph.notes if note.kind == "open")
+        raise BadRequest(f"{graph.file}: the file does not say which link is the platform, and several could be{chain}",
                          None, "--platform LINK, such as " + ", ".join(names[:12]) + (" …" if names[12:] else ""))
     link = bodies.title(body)
     graph.note("guess", f"the platform is link {link!r}, {why} (--platform LINK to change it)")

@@ -1,0 +1,91 @@
+"""Frames that could be held together: where a file that closes no loop, or not all, may mean one."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...budgets import MOST_CANDIDATES
+from ...geometry.vectors import Array
+from ...mechanism import graphs
+from ...mechanism.model import JointType
+from ...tolerances import MAY_MEET, NOISE
+from ..jointgraph import JointGraph, comma_list
+from ..jointmotion import step_along, zero
+from .loops import LoopAssembly
+
+
+@dataclass(frozen=True)
+class ClosureCandidate:
+    """Two links of different bodies whose frames (almost) coincide while all joints are at zero, and do not when they
+    move: their distance (m), and whether it is no more than rounding."""
+
+    links: tuple[str, str]
+    distance: float
+    coincides: bool
+
+    @property
+    def wish(self) -> str:
+        """What ``--close`` takes: the frames meet in a point."""
+        return ":".join(self.links)
+
+    def __str__(self) -> str:
+        return f"{self.wish} ({1000 * self.distance:.3g} mm apart)"
+
+
+def closure_candidates(graph: JointGraph, base: str) -> tuple[ClosureCandidate, ...]:
+    """Pairs of frames on what hangs on ``base`` that a closure could hold together, the nearest first; of frames of the
+    same two bodies at the same place the one that a file would give for it (a frame on a fixed joint)."""
+    joints = [joint for joint in graph.joints.values() if joint.in_tree]
+    assembly = LoopAssembly(base, joints)
+    at_zero = assembly.poses(assembly.zero())
+    links = list(at_zero)
+    if len(links) < 2:
+        return ()
+    bonds = graphs.adjacency(links, (j.links for j in joints if j.type is JointType.FIXED and j.links[0] in at_zero))
+    body = {link: number for number, group in enumerate(graphs.components(bonds)) for link in group}
+    joined = {frozenset(body[x] for x in j.links) for j in graph.joints.values() if set(j.links) <= set(at_zero)}
+    points, moved = (_points(assembly, links, values) for values in (assembly.zero(), _moved(assembly)))
+    apart = np.linalg.norm(points[:, None] - points, axis=2) / assembly.length
+    apart_moved = np.linalg.norm(moved[:, None] - moved, axis=2) / assembly.length
+    # near at zero, and farther apart elsewhere: joints that turn about the place itself do not separate frames there
+    near = np.argwhere(np.triu((apart <= MAY_MEET) & (apart_moved > apart + MAY_MEET / 2), 1))
+    busy = {link: sum(link in j.links for j in joints) for link in links}
+    ranked = sorted(near.tolist(), key=lambda pair: (apart[*pair] > NOISE, sum(busy[links[i]] > 1 for i in pair),
+                                                     apart[*pair], *pair))
+    found: list[ClosureCandidate] = []
+    taken: list[tuple[frozenset[int], Array]] = []
+    for i, j in ranked:
+        bodies = frozenset((body[links[i]], body[links[j]]))
+        if bodies in joined or any(own == bodies and np.linalg.norm(points[i] - p) <= MAY_MEET * assembly.length
+                                   for own, p in taken):
+            continue
+        taken.append((bodies, points[i]))
+        found.append(ClosureCandidate((links[i], links[j]), float(apart[i, j] * assembly.length),
+                                      bool(apart[i, j] <= NOISE)))
+    return tuple(found[:MOST_CANDIDATES])
+
+
+def without_loop(graph: JointGraph, base: str) -> str | None:
+    """What is told of a graph that hangs on ``base`` as an open chain: that it does, and where it could be closed."""
+    if graph.gears or len(graph.joints) >= len(graph.links):
+        return None
+    text = "nothing in the file closes a loop: it is read as an open chain"
+    if found := closure_candidates(graph, base):
+        text += (f"; frames that lie near to each other: {comma_list(map(str, found), MOST_CANDIDATES)} (--close "
+                 f"{found[0].wish} lets two of them meet in a point)")
+    return text
+
+
+def _points(assembly: LoopAssembly, links: list[str], values: dict[str, Array]) -> Array:
+    """The origins of the links' frames, (count, 3), in metres."""
+    poses = assembly.poses(values)
+    return np.array([poses[link][:3, 3] for link in links])
+
+
+def _moved(assembly: LoopAssembly, seed: int = 0) -> dict[str, Array]:
+    """All joints somewhere else."""
+    rng = np.random.default_rng(seed)
+    return {joint.name: step_along(joint, zero(joint), rng.uniform(0.4, 1.0, joint.kind.freedoms), np.eye(3))
+            for joint, _, _ in assembly.tree}
