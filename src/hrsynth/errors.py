@@ -142,6 +142,13 @@ class MeaningUndecided(Unanswered):
                          "numbers as they are")
 
 
+class NoMotorMap(HrsynthError):
+    """A robot whose motors do not determine its platform."""
+
+    def __init__(self, robot: str, reason: str) -> None:
+        super().__init__(f"{robot}: the motors do not determine the platform: {reason}")
+
+
 class PoseNotReached(Unanswered):
     """A pose that the robot does not reach from ``origin``: the leg that misses it most and by how much
     (mm, degrees), or None where each leg alone reaches it; how far the robot came (0 to 1), and to which pose; the

@@ -242,6 +242,11 @@ SQUARE_AXES = 1e-9
 """Cosine of the angle between two axes of a U below which they are at right angles, where a catalog's robot is
 built."""
 
+# Motors to joints
+
+ROUNDED_AXIS = 1e-15
+"""Component of a unit vector below which it is zero but for rounding."""
+
 # Pictures and views
 
 DISTANCE_FLOOR = 1e-3

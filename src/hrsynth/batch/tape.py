@@ -13,7 +13,7 @@ from typing import Any
 LANES = 16
 """Poses that run through compiled code side by side; constant strides let the compiler use vector instructions."""
 UFUNCS = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "<": "less", "<=": "less_equal",
-          "&": "logical_and", "sqrt": "sqrt", "abs": "absolute"}
+          "&": "logical_and", "sqrt": "sqrt", "abs": "absolute", "sin": "sin", "cos": "cos"}
 LOGICAL = ("<", "<=", "&")
 """Operations whose result is a condition."""
 Store = tuple[int, Any]
@@ -75,6 +75,14 @@ class Symbol:
     def sqrt(self) -> Any:
         """Its square root."""
         return self.tape.make("sqrt", self)
+
+    def sin(self) -> Any:
+        """Its sine."""
+        return self.tape.make("sin", self)
+
+    def cos(self) -> Any:
+        """Its cosine."""
+        return self.tape.make("cos", self)
 
     def select(self, yes: Any, no: Any) -> Any:
         """``yes`` where this condition holds, ``no`` elsewhere."""

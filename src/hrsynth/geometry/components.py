@@ -19,6 +19,16 @@ def sqrt(x: Any) -> Any:
     return x.sqrt() if hasattr(x, "sqrt") else np.sqrt(x)
 
 
+def sine(x: Any) -> Any:
+    """sin x."""
+    return x.sin() if hasattr(x, "sin") else np.sin(x)
+
+
+def cosine(x: Any) -> Any:
+    """cos x."""
+    return x.cos() if hasattr(x, "cos") else np.cos(x)
+
+
 def where(condition: Any, yes: Any, no: Any) -> Any:
     """``yes`` where a condition holds, ``no`` elsewhere."""
     return condition.select(yes, no) if hasattr(condition, "select") else np.where(condition, yes, no)
