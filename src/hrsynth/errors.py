@@ -105,6 +105,17 @@ class LoopsNotClosed(Unanswered):
         )
 
 
+class MotorsNotEnough(Unanswered):
+    """At zero the platform can move while all motors rest: too few motors, or a singular zero configuration; the joints
+    that move then."""
+
+    def __init__(self, robot: str, joints: Sequence[str]) -> None:
+        self.robot, self.joints = robot, tuple(joints)
+        super().__init__(f"{robot}: at the zero configuration the platform can move while all motors rest, by "
+                         f"{shortened(', '.join(joints))}: no function of the motors; more motors, or another zero "
+                         "configuration")
+
+
 class RankUndecided(Unanswered):
     """A rank whose gap is too small for a verdict."""
 

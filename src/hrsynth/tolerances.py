@@ -182,6 +182,9 @@ it, as part of the largest, is left out on the way there."""
 BALL_ZERO = 2.0 ** -256
 """Radius of a ball that holds zero at which the number in it counts as zero."""
 
+THINNEST_TUBE = 1e-13
+"""Radius of a tube about a branch (characteristic lengths, radians) below which none is tried: rounding decides."""
+
 # Accuracy
 
 NARROWEST_CONE = 1e-15

@@ -1,0 +1,136 @@
+"""What is proved of a robot's branch: cells of motor coordinates with affine tubes, how they meet, where they end."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...geometry.vectors import Array
+from ...mechanism import Mechanism
+from ...results import Value
+from .loops import LoopSystem
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BranchCell(Value):
+    """A cell low ≤ q ≤ high (n,) of a part's motors, and the tube |x − centre − slopes (q − middle)| ≤ radius (p,) of
+    its passive coordinates that holds exactly one closure for every q of the cell (m, rad).
+
+    ``weakest`` is a lower bound over the tube of the smallest singular value of D_xG (characteristic lengths, radians;
+    of each of its triangular blocks the smallest); ``neighbours`` are the numbers of the cells with a common face in
+    which the closure is proved to be the same."""
+
+    low: Array
+    high: Array
+    centre: Array
+    slopes: Array
+    radius: Array
+    weakest: float
+    neighbours: tuple[int, ...] = ()
+
+    @property
+    def middle(self) -> Array:
+        """The cell's middle (n,)."""
+        return np.asarray((self.low + self.high) / 2)
+
+    def holds(self, q: Array) -> bool:
+        """Whether motor coordinates (n,) lie in the cell."""
+        return bool(np.all(self.low <= q) and np.all(q <= self.high))
+
+    def at(self, q: Array) -> Array:
+        """The middle of the tube (p,) for motor coordinates (n,): within ``radius`` of the closure."""
+        return np.asarray(self.centre + self.slopes @ (q - self.middle))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"low": self.low.tolist(), "high": self.high.tolist(), "centre": self.centre.tolist(),
+                "slopes": self.slopes.tolist(), "radius": self.radius.tolist(), "weakest": self.weakest,
+                "neighbours": list(self.neighbours)}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Toggle(Value):
+    """A place where the proof ends, found in floating point: motors ``q`` (n,) of a part at which, as far as numbers
+    tell, the ``joints`` can move while all motors rest (a determinant vanishes); ``loops`` are those that they close.
+    Without joints: no such place was found, the proof was given up for its ``reason``."""
+
+    q: Array
+    joints: tuple[str, ...]
+    loops: tuple[str, ...]
+    reason: str
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"motors": self.q.tolist(), "joints": list(self.joints), "loops": list(self.loops),
+                "reason": self.reason}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BranchPart(Value):
+    """Motors and the passive coordinates that follow from them alone, with the cells in which that is proved; ``cells``
+    are connected to the zero configuration, the first holds it. ``asked``, ``proved``: boxes, low and high (n,) each;
+    ``share``: volume of all cells, as part of the box that was asked for; ``box_share`` that of ``proved``, the largest
+    box about the zero configuration that was found in their union. ``turns``: for each motor whose box is a whole turn
+    proved from end to end, whether the closure at the end is that of the beginning."""
+
+    motors: tuple[str, ...]
+    passive: tuple[str, ...]
+    q0: Array
+    x0: Array
+    asked: tuple[Array, Array]
+    proved: tuple[Array, Array]
+    share: float
+    box_share: float
+    cells: tuple[BranchCell, ...]
+    toggles: tuple[Toggle, ...]
+    turns: tuple[tuple[str, bool], ...]
+    closed_to: float
+    """Bound of the equations that were left out, over all tubes; 0 where they are proved to hold."""
+    redundant: str
+    """Why the equations that were left out hold; empty where none was."""
+
+    def find(self, q: Sequence[float] | Array) -> BranchCell | None:
+        """The cell that motor coordinates (n,), in the order of ``motors``, lie in; None outside of what is proved."""
+        at = np.asarray(q, dtype=float)
+        return next((cell for cell in self.cells if cell.holds(at)), None)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"motors": list(self.motors), "passive": list(self.passive), "q0": self.q0.tolist(),
+                "x0": self.x0.tolist(), "asked": [each.tolist() for each in self.asked],
+                "proved": [each.tolist() for each in self.proved], "share": self.share, "box_share": self.box_share,
+                "cells": [each.to_dict() for each in self.cells], "toggles": [each.to_dict() for each in self.toggles],
+                "turns": dict(self.turns), "closed_to": self.closed_to, "redundant": self.redundant}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BranchProof(Value):
+    """The branch of the zero configuration: q ↦ x from motors to passive coordinates, part by part.
+
+    ``system`` has the coordinates (name, axis, point, parent: the tree in order) and the loops' equations; lengths in
+    it are in ``system.length`` m, those of the parts in m. ``held`` are idle coordinates, which stay zero."""
+
+    robot: Mechanism
+    system: LoopSystem
+    motors: tuple[str, ...]
+    passive: tuple[str, ...]
+    held: tuple[str, ...]
+    parts: tuple[BranchPart, ...]
+    box: str
+    """Where the box comes from: the file's limits, the caller, a default."""
+    tried: int
+    """Cells that were tried."""
+
+    def headline(self) -> str:
+        """The robot, and how much of the box is proved."""
+        return f"{self.robot.name}, {len(self.motors)} motors, {len(self.passive)} passive coordinates: " + "; ".join(
+            f"{', '.join(each.motors)}: {100 * each.share:.3g} % of the box, {len(each.cells)} cells"
+            for each in self.parts)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line, without the command's own fields."""
+        return {"motors": list(self.motors), "passive": list(self.passive), "held": list(self.held), "box": self.box,
+                "tried": self.tried, "parts": [each.to_dict() for each in self.parts]}

@@ -1,0 +1,134 @@
+"""The branch of the zero configuration as a function of the motors, proved cell by cell."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ...budgets import BRANCH_CELLS, BRANCH_DEPTH
+from ...errors import BadRequest, LoopsNotClosed
+from ...geometry.vectors import Array
+from ...mechanism import Mechanism
+from ...tolerances import CLOSED
+from ..observed import RobotLike, as_robot
+from ..question import question
+from .answer import BranchCell, BranchPart, BranchProof, Toggle
+from .growth import BranchEnd, CellGrid, Growth, largest_box
+from .loops import LoopSystem, loop_system
+from .part import LoopPart, parts_of, whole
+
+BoxLike = Mapping[str, Sequence[float]] | str
+
+
+@question()
+def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH_CELLS) -> BranchProof:
+    """Where the passive coordinates are proved to be one continuous function of the motors, on the branch of the zero
+    configuration (docs/pages/theory.md, branches).
+
+    ``box`` gives motors their intervals (m, rad), as a mapping or as text ``hip=-1:1,slide=0:0.2``; by default those of
+    the file's limits, and where it has none a whole turn, or a characteristic length either way. ``effort`` is the
+    number of cells that are tried at most, for each part of the loops.
+
+    Raises ``MotorsNotEnough`` where the motors do not determine the platform at the zero configuration, ``BadRequest``
+    for motors that there are not, ``LoopsNotClosed``.
+    """
+    given = as_robot(robot)
+    mechanism = given if isinstance(given, Mechanism) else given.robot
+    motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
+    if not motors:
+        raise BadRequest(f"{mechanism.name}: motors", 0, "one or more: --motors names them")
+    system = loop_system(mechanism, motors)
+    errors, _ = whole(system, system.loops, system.gears, np.zeros(len(system.coordinates)))
+    if len(errors) and np.linalg.norm(errors) > CLOSED:
+        raise LoopsNotClosed(mechanism.name, float(np.linalg.norm(errors)), CLOSED, system.loops[0].name)
+    parts, held = parts_of(system)
+    intervals, source = _box(system, box)
+    found = []
+    tried = 0
+    for part in parts:
+        own = [intervals[i] for i in part.driven]
+        grid = CellGrid(np.array([low for low, _ in own]), np.array([high for _, high in own]))
+        n = len(own)
+        growth = Growth(part, grid, np.zeros(n), np.zeros(len(part.unknowns)), BRANCH_DEPTH, effort).run()
+        tried += growth.tried
+        found.append(_answer(part, growth))
+    names = system.names
+    passive = tuple(names[i] for part in parts for i in part.unknowns)
+    return BranchProof(mechanism, system, tuple(names[i] for i in system.driven), passive,
+                       tuple(names[i] for i in held), tuple(found), source, tried)
+
+
+def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float, float]], str]:
+    """The interval of each driven coordinate, in the system's units, and where they come from."""
+    given = _parsed(box)
+    limits = system.mechanism.limited
+    found, sources = {}, set()
+    for i in system.driven:
+        each = system.coordinates[i]
+        unit = system.length if each.slides else 1.0
+        wanted = given.pop(each.name, None)
+        low, high = (-np.inf, np.inf) if wanted is not None else limits.get(each.joint, (-np.inf, np.inf))
+        if wanted is not None:
+            low, high = wanted
+            sources.add("as asked")
+        elif np.isfinite(low) and np.isfinite(high):
+            sources.add("limits of the file")
+        else:
+            reach = system.length if each.slides else np.pi
+            low, high = max(low, -reach), min(high, reach)
+            sources.add("a characteristic length either way" if each.slides else "a whole turn")
+        if not low <= 0 <= high or not low < high:
+            raise BadRequest(f"interval of motor {each.name!r}", (low, high), "low < high, with the zero configuration "
+                             "in it")
+        found[i] = low / unit, high / unit
+    if given:
+        raise BadRequest("motors of the box", sorted(given), [system.names[i] for i in system.driven])
+    return found, ", ".join(sorted(sources))
+
+
+def _parsed(box: BoxLike | None) -> dict[str, tuple[float, float]]:
+    """The intervals that are asked for, by motor."""
+    if box is None:
+        return {}
+    pairs = box.items() if isinstance(box, Mapping) else [each.partition("=")[::2] for each in box.split(",")]
+    found = {}
+    for name, interval in pairs:
+        try:
+            low, high = (float(v) for v in (interval.split(":") if isinstance(interval, str) else interval))
+        except (TypeError, ValueError):
+            raise BadRequest(f"interval of motor {name!r}", interval, "low:high, such as hip=-1:1") from None
+        found[str(name).strip()] = (low, high)
+    return found
+
+
+def _answer(part: LoopPart, growth: Growth) -> BranchPart:
+    """What was grown, in metres and radians."""
+    system = part.system
+    unit_q, unit_x = system.units[list(part.driven)], system.units[list(part.unknowns)]
+    cells = []
+    for leaf in growth.proved:
+        tube = leaf.tube
+        assert tube is not None
+        low, high = growth.grid.point(leaf.low), growth.grid.point(leaf.high)
+        middle = (low + high) / 2
+        cells.append(BranchCell(low * unit_q, high * unit_q, tube.at(middle) * unit_x,
+                                tube.slopes * unit_x[:, None] / unit_q, tube.radius * unit_x, tube.weakest,
+                                tuple(sorted(leaf.neighbours))))
+    low, high = growth.grid.low, growth.grid.high
+    box: tuple[Array, Array] = growth.q0, growth.q0
+    if growth.proved:
+        corners = largest_box(growth)
+        box = growth.grid.point(corners[0]), growth.grid.point(corners[1])
+    names = system.names
+    return BranchPart(
+        tuple(names[i] for i in part.driven), tuple(names[i] for i in part.unknowns), growth.q0 * unit_q,
+        growth.x0 * unit_x, (low * unit_q, high * unit_q), (box[0] * unit_q, box[1] * unit_q),
+        sum(leaf.volume for leaf in growth.proved), float(np.prod((box[1] - box[0]) / (high - low))), tuple(cells),
+        tuple(_toggle(part, each) for each in growth.endings[:1]), (), 0.0, "")
+
+
+def _toggle(part: LoopPart, ending: BranchEnd) -> Toggle:
+    """Where and why the proof ends."""
+    unit: Array = part.system.units[list(part.driven)]
+    return Toggle(ending.q * unit, (), tuple(loop.name for loop in part.loops), "the cells would have to be smaller")
