@@ -23,11 +23,17 @@ MOST_ELEMENTS = 100_000
 MOST_LINKS = 1000
 """Links above which a foreign file is refused."""
 MOST_INCLUDES = 50
-"""Files that an MJCF model may include."""
+"""Files that an MJCF model may include, layers of a USD stage."""
 MOST_NESTED_MODELS = 20
 """Models in models above which an SDFormat file is refused."""
 XACRO_SECONDS = 4
 """Seconds after which expanding a xacro file is given up."""
+USD_SECONDS = 30
+"""Seconds after which opening a USD stage is given up."""
+MOST_MESHES = 2000
+"""Files of meshes that are copied with a robot."""
+LARGEST_MESHES = 2_000_000_000
+"""Bytes that they may have together."""
 MOST_LOOP_COORDINATES = 240
 """Coordinates of joints in loops above which the loops of a foreign file are not solved."""
 LOOP_STRIDE = 0.4

@@ -92,6 +92,9 @@ points that coincide, equal rods) counts as meant and is made exact: printed dig
 MAY_MEET = 2e-2
 """Distance (characteristic lengths) up to which two frames of a foreign file are told as ones that a closure may hold
 together."""
+SINGLE = 1e-6
+"""Difference (relative, of numbers above one) up to which a number of single precision is one of double precision that
+stands beside it, and shapes are stretched alike."""
 EXACT = 1e-11
 """Deviation (characteristic lengths, radians) below which such a relation holds as well as numbers allow."""
 FAINT = 1e-3

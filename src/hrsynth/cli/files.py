@@ -82,9 +82,9 @@ def add(app: typer.Typer) -> None:
                 (flag("examples", "The robots of the package example-robot-data instead: legged robots, arms, hands."),
                  JSON), robots, ("", "--examples"))
     add_command(app, "convert", "Read a robot in any dialect and write it in another: .urdf native, .yaml Gepetto, "
-                ".xml MJCF, .sdf SDFormat.",
+                ".xml MJCF, .sdf SDFormat, .usda, .usd or .usdc USD.",
                 (*SOURCE, Option("target", "The file to write; its extension says the dialect.", "OUT", default=NEEDED,
                                  argument=True),
-                 Option("to", "native, gepetto, mjcf or sdf, whatever the ending.", "DIALECT",
-                                       words=("native", "gepetto", "mjcf", "sdf")), JSON), convert,
+                 Option("to", "native, gepetto, mjcf, sdf or usd, whatever the ending.", "DIALECT",
+                                       words=("native", "gepetto", "mjcf", "sdf", "usd")), JSON), convert,
                 ("quattro quattro.xml", "leg.urdf robot.yaml --to gepetto"))

@@ -89,9 +89,9 @@ def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | Non
     """Write a robot file, whole or not at all, of a mechanism or of a robot by its file or name; what the dialect
     cannot say is returned as warnings.
 
-    ``dialect`` is ``native``, ``gepetto``, ``mjcf`` or ``sdf``; without it the file's ending decides: ``.urdf`` the
-    native dialect, ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.yaml`` Gepetto (with a ``.urdf`` of the same name
-    beside it). A file beside the one named is not replaced by other content.
+    ``dialect`` is ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``; without it the file's ending decides:
+    ``.urdf`` native, ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.usda``, ``.usd`` and ``.usdc`` USD, ``.yaml``
+    Gepetto (with a ``.urdf`` of the same name beside it). A file beside the one named is not replaced by other content.
 
     Raises
     ------
@@ -100,7 +100,8 @@ def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | Non
     """
     chosen, mechanism = _dialect(Path(path), dialect), load(mechanism)
     written = formats.writer(chosen.name)(mechanism)
-    contents = dict(zip(chosen.files(Path(path)), (text.encode() for text in written.texts), strict=True))
+    files = chosen.files(Path(path))
+    contents = {file: chosen.packed(text, file) for file, text in zip(files, written.texts, strict=True)}
     for file, content in contents.items():
         if file != Path(path):
             require_same(file, content)

@@ -14,12 +14,13 @@ from .jointgraph import JointGraph
 
 @dataclass(frozen=True, eq=False)
 class RobotFile:
-    """A file that was opened: its place, its document (None where it is no XML), and whether what it says of itself
-    stands, as nothing was given that changes it."""
+    """A file that was opened: its place, its document (None where it is no XML), whether what it says of itself stands,
+    as nothing was given that changes it, and what it begins with."""
 
     path: Path
     root: xml.Element | None
     strict: bool = True
+    start: bytes = b""
 
     @property
     def document(self) -> xml.Element:
@@ -56,6 +57,11 @@ class Write(Protocol):
     def __call__(self, mechanism: Mechanism) -> Written: ...
 
 
+def as_text(text: str, path: Path) -> bytes:
+    """The bytes of a dialect whose files are text."""
+    return text.encode()
+
+
 def one_file(path: Path) -> tuple[Path, ...]:
     """The files of a dialect that writes one."""
     return (path,)
@@ -64,7 +70,9 @@ def one_file(path: Path) -> tuple[Path, ...]:
 @dataclass(frozen=True)
 class Dialect:
     """A dialect's name (that of its folder), how its files are known by their content, and the endings of those that it
-    writes: none where it is only read. ``files`` are all that are written where one is named, the robot first.
+    writes: none where it is only read. ``files`` are all that are written where one is named, the robot first;
+    ``packed`` makes the bytes of a file of its text. ``begins`` is what its files begin with where they are no XML,
+    ``meshes`` the endings of the meshes that it can name, None where any.
 
     A file is of the first dialect that knows it, in the order of ``rank``.
     """
@@ -74,3 +82,6 @@ class Dialect:
     endings: tuple[str, ...] = ()
     files: Callable[[Path], tuple[Path, ...]] = one_file
     rank: int = 0
+    begins: tuple[bytes, ...] = ()
+    packed: Callable[[str, Path], bytes] = as_text
+    meshes: tuple[str, ...] | None = None

@@ -40,6 +40,8 @@ def robot_file(path: Path, *, strict: bool = True) -> RobotFile:
     if os.path.isdir(path):
         path = _in_folder(path)
     data = xml.content(path)
+    if data.startswith(tuple(each for dialect in formats.dialects().values() for each in dialect.begins)):
+        return RobotFile(path, None, strict, data[:8])
     if path.suffix.lower() in (".yaml", ".yml") and not data.lstrip().startswith(b"<"):
         return RobotFile(path, None, strict)
     root = xml.document(data, str(path))
@@ -59,7 +61,8 @@ def _require_few(path: Path, root: xml.Element) -> None:
 def _in_folder(path: Path) -> Path:
     if (path / "robot.urdf").is_file():
         return path / "robot.urdf"
-    files = sorted(each for pattern in ("*.urdf", "*.sdf", "*.xml", "*.mjcf", "*.xacro") for each in path.glob(pattern)
+    files = sorted(each for pattern in ("*.urdf", "*.sdf", "*.xml", "*.mjcf", "*.xacro", "*.usd", "*.usda", "*.usdc")
+                   for each in path.glob(pattern)
                    if each.name not in ("package.xml", "model.config"))
     if len(files) != 1:
         raise xml.refusal(path, "a folder of " + (f"{len(files)} robot files" if files else "no robot file"),

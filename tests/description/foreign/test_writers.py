@@ -74,7 +74,7 @@ def test_gears_are_written_where_the_dialect_has_them(tmp_path: Path):
 
 def test_an_unknown_dialect_is_refused_and_the_given_one_counts(tmp_path: Path):
     with pytest.raises(BadRequest, match="native, gepetto, mjcf, sdf"):
-        save(load("3rps"), tmp_path / "a.urdf", "usd")
+        save(load("3rps"), tmp_path / "a.urdf", "step")
     save(load("3rps"), tmp_path / "a.txt", "sdf")
     assert load(tmp_path / "a.txt").differences(load("3rps")) == []
 

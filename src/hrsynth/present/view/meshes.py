@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis.observed import ObservedRobot
+from ...description.meshes import located
 from ...geometry.vectors import Array
 from .shapes import BASE, LEG, PLATFORM, Shape
 
@@ -65,24 +66,11 @@ def _solid(geometry: Any, folder: Path) -> Any:
         return trimesh.creation.icosphere(subdivisions=2, radius=geometry.sphere.radius)
     if geometry.mesh is None:
         raise ValueError("no geometry")
-    path = _local(geometry.mesh.filename, folder)
+    path = located(geometry.mesh.filename, folder)
+    if path is None:
+        raise OSError(f"no local file {geometry.mesh.filename}")
     solid: Any = trimesh.load(path, force="mesh")
     if not len(solid.faces):
         raise ValueError(f"no triangles in {path.name}")
     solid.apply_scale(1.0 if geometry.mesh.scale is None else geometry.mesh.scale)
     return solid
-
-
-def _local(name: str, folder: Path) -> Path:
-    """The file that a mesh's address names: beside the robot file, or of a package in a folder above it."""
-    scheme, _, rest = name.partition("://")
-    if not rest:
-        return folder / name
-    if scheme == "file":
-        return Path(rest)
-    if scheme in ("package", "model") and (rest := rest.lstrip("/")):
-        for parent in (folder, *folder.resolve().parents):
-            for path in (parent / rest, parent / Path(*Path(rest).parts[1:])):
-                if path.is_file():
-                    return path
-    raise OSError(f"no local file {name}")

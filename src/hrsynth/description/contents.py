@@ -1,0 +1,212 @@
+"""What links hold beside their kinematics: masses, inertias and shapes, told between dialects.
+
+A mechanism keeps them as the child elements of URDF's ``<link>``; other dialects read them into these elements and
+write what :func:`content_of` finds in them. Metres, kilograms, radians; all poses are in the link's frame.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..geometry.vectors import Array, frozen, unit
+from ..mechanism.model import Link, Mechanism, Note
+from . import numerals, xml
+from .jointgraph import ORIGIN, comma_list
+
+SIZES = {"box": ("size",), "sphere": ("radius",), "cylinder": ("radius", "length"), "capsule": ("radius", "length"),
+         "mesh": ()}
+"""The attributes of each kind of shape; cylinders and capsules lie along z, a capsule's length is without its caps."""
+SHAPES = ("visual", "collision")
+_INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+
+
+@dataclass(frozen=True, eq=False)
+class Inertial:
+    """A mass, the pose of its centre (4, 4), and its inertia (3, 3) in that frame; None where it has none."""
+
+    mass: float
+    X: Array = field(default_factory=lambda: ORIGIN)
+    inertia: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """A shape: its kind with its sizes, or the file of a mesh with its scale; ``role`` is visual or collision."""
+
+    kind: str
+    sizes: tuple[float, ...] = ()
+    X: Array = field(default_factory=lambda: ORIGIN)
+    role: str = "visual"
+    name: str | None = None
+    colour: tuple[float, ...] | None = None
+    file: str | None = None
+    scale: tuple[float, ...] = (1.0, 1.0, 1.0)
+
+
+@dataclass(frozen=True)
+class Content:
+    """All of it; ``rest`` are the elements that say something else."""
+
+    inertial: Inertial | None = None
+    solids: tuple[Solid, ...] = ()
+    rest: tuple[str, ...] = ()
+
+
+def content_of(link: Link, robot: Mechanism) -> Content:
+    """What a link of a robot holds; a colour may be named by a ``<material>`` of the robot."""
+    if not link.xml:
+        return Content()
+    colours = {name: colour for fragment in robot.xml if fragment.startswith("<material")
+               for name, colour in [_material(xml.parse_fragment(fragment), {})] if name and colour}
+    inertial, solids, rest = None, [], []
+    for fragment in link.xml:
+        element = None if fragment.startswith("@") else xml.parse_fragment(fragment)
+        try:
+            if element is None:
+                rest.append(fragment)
+            elif element.tag == "inertial" and inertial is None:
+                inertial = _inertial(element)
+            elif element.tag in SHAPES:
+                solids.append(_solid(element, colours))
+            else:
+                rest.append(fragment)
+        except ValueError:
+            rest.append(fragment)
+    return Content(inertial, tuple(solids), tuple(rest))
+
+
+def _numbers(element: xml.Element | None, name: str, default: tuple[float, ...]) -> Array:
+    text = None if element is None else element.get(name)
+    return np.array(default, dtype=float) if text is None else numerals.parse(text, len(default))
+
+
+def _pose(element: xml.Element) -> Array:
+    origin = element.find("origin")
+    return frozen(numerals.from_origin(_numbers(origin, "xyz", (0, 0, 0)), _numbers(origin, "rpy", (0, 0, 0))))
+
+
+def _inertial(element: xml.Element) -> Inertial:
+    (mass,) = _numbers(element.find("mass"), "value", (0,))
+    tensor = element.find("inertia")
+    if tensor is None:
+        return Inertial(float(mass), _pose(element))
+    xx, yy, zz, xy, xz, yz = (float(_numbers(tensor, key, (0,))[0]) for key in _INERTIA)
+    return Inertial(float(mass), _pose(element), frozen([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
+
+
+def _material(element: xml.Element | None, known: Mapping[str, tuple[float, ...]]
+              ) -> tuple[str, tuple[float, ...] | None]:
+    if element is None:
+        return "", None
+    name, colour = element.get("name", ""), element.find("color")
+    if colour is None:
+        return name, known.get(name)
+    return name, tuple(float(v) for v in _numbers(colour, "rgba", (1, 1, 1, 1)))
+
+
+def _solid(element: xml.Element, colours: Mapping[str, tuple[float, ...]]) -> Solid:
+    shapes = [child for each in element.findall("geometry") for child in xml.children(each) if child.tag in SIZES]
+    if len(shapes) != 1:
+        raise ValueError("one shape")
+    (shape,) = shapes
+    kind, place, role = str(shape.tag), _pose(element), str(element.tag)
+    colour = _material(element.find("material"), colours)[1]
+    if kind == "mesh":
+        scale = tuple(float(v) for v in _numbers(shape, "scale", (1, 1, 1)))
+        if not shape.get("filename"):
+            raise ValueError("a file name")
+        return Solid(kind, (), place, role, element.get("name"), colour, shape.get("filename"), scale)
+    count = 3 if kind == "box" else 1
+    sizes = tuple(float(v) for key in SIZES[kind] for v in _numbers(shape, key, (0,) * count))
+    if not all(size > 0 for size in sizes):
+        raise ValueError("sizes above zero")
+    return Solid(kind, sizes, place, role, element.get("name"), colour)
+
+
+def fragments(content: Content) -> tuple[str, ...]:
+    """The same as child elements of URDF's ``<link>``, each as text."""
+    found = []
+    if content.inertial is not None:
+        mass, tensor = content.inertial.mass, content.inertial.inertia
+        element = xml.new("inertial", *_origin(content.inertial.X), xml.new("mass", value=numerals.exact(mass)))
+        if tensor is not None:
+            entries = zip(_INERTIA, (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]), strict=True)
+            element.append(xml.new("inertia", **{key: numerals.exact(value) for key, value in entries}))
+        found.append(xml.canonical(element))
+    for solid in content.solids:
+        if solid.file is not None:
+            shape = xml.new("mesh", filename=solid.file)
+            if solid.scale != (1.0, 1.0, 1.0):
+                shape.set("scale", numerals.exact_vector(solid.scale))
+        elif solid.kind == "box":
+            shape = xml.new("box", size=numerals.exact_vector(solid.sizes))
+        else:
+            sizes = zip(SIZES[solid.kind], solid.sizes, strict=True)
+            shape = xml.new(solid.kind, **{key: numerals.exact(value) for key, value in sizes})
+        element = xml.new(solid.role, *_origin(solid.X), xml.new("geometry", shape))
+        if solid.name:
+            element.set("name", solid.name)
+        if solid.colour is not None and solid.role == "visual":
+            colour = xml.new("color", rgba=numerals.exact_vector(solid.colour))
+            element.append(xml.new("material", colour, name=""))
+        found.append(xml.canonical(element))
+    return (*found, *content.rest)
+
+
+def _origin(X: Array) -> list[xml.Element]:
+    attributes = {}
+    if np.any(X[:3, 3]):
+        attributes["xyz"] = numerals.exact_vector(X[:3, 3])
+    angles = numerals.rpy(X[:3, :3])
+    if any(angles):
+        attributes["rpy"] = numerals.exact_vector(angles)
+    return [xml.new("origin", **attributes)] if attributes else []
+
+
+def principal(inertia: Array) -> tuple[Array, Array]:
+    """The principal moments (3,) of an inertia and the rotation (3, 3) of their frame, the least turned one."""
+    if not np.any(inertia - np.diag(np.diag(inertia))):
+        return np.diag(inertia), np.eye(3)
+    moments, R = np.linalg.eigh(inertia)
+    order = np.argmax(np.abs(R), axis=0)
+    if len(set(order.tolist())) == 3:
+        back = np.argsort(order)
+        moments, R = moments[back], R[:, back] * np.sign(np.diag(R[:, back]))
+    if np.linalg.det(R) < 0:
+        R[:, 2] = -R[:, 2]
+    return moments, R
+
+
+def along_z(direction: Array) -> Array:
+    """A rotation (3, 3) that takes z to a direction."""
+    z = unit(direction)
+    x = unit(np.cross([0.0, 1.0, 0.0] if abs(z[1]) < 0.9 else [1.0, 0.0, 0.0], z))
+    return np.column_stack((x, np.cross(z, x), z))
+
+
+def unsaid(robot: Mechanism, kinds: Iterable[str], *, dialect: str) -> list[Note]:
+    """A note for each sort of content that a dialect has no words for; ``kinds`` are the shapes that it has."""
+    found = []
+    contents = {name: content_of(link, robot) for name, link in robot.links.items()}
+    other = sorted({_tag(each) for content in contents.values() for each in content.rest})
+    if other:
+        found.append(f"{', '.join(other)} of links")
+    joints = sorted({_tag(each) for joint in robot.joints.values() for each in joint.xml})
+    if joints:
+        found.append(f"{', '.join(joints)} of joints")
+    whole = sorted({_tag(each) for each in robot.xml} - {"<material>"})
+    if whole:
+        found.append(f"{', '.join(whole)} of the robot")
+    for kind in (each for each in SIZES if each not in kinds):
+        links = [name for name, content in contents.items() if any(solid.kind == kind for solid in content.solids)]
+        if links:
+            found.append(f"the {kind} shapes of {comma_list(links)}")
+    return [Note("warning", f"{dialect} has no place for these, which are not written: {'; '.join(found)}")] if found \
+        else []
+
+
+def _tag(fragment: str) -> str:
+    return fragment.partition("=")[0] if fragment.startswith("@") else f"<{xml.parse_fragment(fragment).tag}>"

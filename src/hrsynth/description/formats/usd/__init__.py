@@ -1,0 +1,22 @@
+"""USD with the schemas of UsdPhysics: bodies, joints and drives, as simulators on GPUs use them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from ...dialect import Dialect
+
+_TEXT, _BINARY = (b"#usda", b"#sdf"), (b"PXR-USDC", b"PK\x03\x04")
+
+
+def _packed(text: str, path: Path) -> bytes:
+    """A text as its file holds it: ``.usdc`` is binary."""
+    if path.suffix.lower() != ".usdc":
+        return text.encode()
+    from .stage import binary
+
+    return binary(text)
+
+
+DIALECT = Dialect("usd", lambda file: file.start.startswith((*_TEXT, *_BINARY)), (".usda", ".usd", ".usdc"), rank=-2,
+                  begins=(*_TEXT, *_BINARY), packed=_packed, meshes=None)

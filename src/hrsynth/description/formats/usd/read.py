@@ -1,0 +1,518 @@
+"""USD: rigid bodies, the joints of UsdPhysics between them, drives as motors; units and the up axis of the stage."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ....budgets import LARGEST_NUMBER
+from ....errors import BadRobotFile, Defect
+from ....geometry.so3 import rotation_of, turn_about
+from ....geometry.vectors import Array, frozen, inverse, pose, rotation_about, unit
+from ....mechanism.model import JointType, Limits, Link, Motor
+from ....tolerances import EXACT, NOISE, SINGLE, WITHOUT_DIRECTION
+from ... import xml
+from ...annotations import PREFIX, drop_world, read_annotation
+from ...chains import part
+from ...contents import Content, Inertial, Solid, along_z, fragments
+from ...dialect import RobotFile
+from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec, comma_list
+from ...jointmotion import residual
+from .stage import prims
+
+AXES = {"X": np.eye(3)[0], "Y": np.eye(3)[1], "Z": np.eye(3)[2]}
+_KINDS = {"PhysicsRevoluteJoint": JointType.REVOLUTE, "PhysicsPrismaticJoint": JointType.PRISMATIC,
+          "PhysicsSphericalJoint": JointType.SPHERICAL, "PhysicsFixedJoint": JointType.FIXED}
+FREEDOMS = ("transX", "transY", "transZ", "rotX", "rotY", "rotZ")
+_SWINGS = "D6 joints with two swings (Y, Z) are universal joints, first Y, then Z"
+_MIMIC = re.compile(r"physxMimicJoint:(\w+):gearing")
+
+
+def read(file: RobotFile) -> JointGraph:
+    """The joint graph of a USD stage; raises ``BadRobotFile`` with all its defects, ``MissingExtra`` without the
+    package of OpenUSD."""
+    if file.start.startswith(b"PK"):
+        raise xml.refusal(file.path, "a package of USD files, which is not read", "the .usd file in it (unzip)")
+    told = prims(file.path)
+    return _StageReader(str(file.path), told).graph()
+
+
+@dataclass(eq=False)
+class _Prim:
+    """A prim: its values and relationships, its pose (4, 4) without scale in the z-up world in metres, its scale."""
+
+    path: str
+    kind: str
+    apis: tuple[str, ...]
+    values: Mapping[str, Any]
+    relations: Mapping[str, list[str]]
+    name: str
+    told: Mapping[str, Any]
+    X: Array = field(default_factory=lambda: ORIGIN)
+    M: Array = field(default_factory=lambda: np.eye(3))
+    """What turns and stretches its coordinates (3, 3), in metres."""
+
+    def has(self, api: str) -> bool:
+        return any(each == api or each.startswith(api + ":") for each in self.apis)
+
+
+@dataclass
+class _StageReader:
+    file: str
+    told: Mapping[str, Any]
+    defects: list[Defect] = field(default_factory=list)
+    bodies: dict[str, str] = field(default_factory=dict)
+    """The link of each rigid body, by the path of its prim."""
+
+    def defect(self, path: str, what: str, value: object = None, allowed: str | None = None) -> None:
+        found = None if value is None else str(value)
+        self.defects.append(Defect(self.file, None, f"<{path}>: {what}", found, allowed))
+
+    def require_sound(self) -> None:
+        if self.defects:
+            raise BadRobotFile(self.defects)
+
+    def graph(self) -> JointGraph:
+        """Bodies, joints, drives, and what our writer adds."""
+        told = self.told
+        self.metres = self._positive("metersPerUnit", told["metres"])
+        self.kilograms = self._positive("kilogramsPerUnit", told["kilograms"])
+        self.up = pose(rotation=rotation_about((1, 0, 0), math.pi / 2)) if told["up"] == "Y" else np.eye(4)
+        self.require_sound()
+        self.prims = {each["path"]: self._prim(each) for each in told["prims"]}
+        own = [each for each in self.prims.values() if f"{PREFIX}:says" in each.values]
+        name = own[0].values.get(f"{PREFIX}:name") if own else None
+        graph = self.result = JointGraph(str(name or told["name"] or "robot"), self.file, "USD")
+        if not told["metres_told"]:
+            graph.note("guess", "lengths are in centimetres, as USD has it where no metersPerUnit stands")
+        for prim in self.prims.values():
+            if prim.has("PhysicsRigidBodyAPI"):
+                self._body(prim)
+        joints = [prim for prim in self.prims.values() if prim.told["joint"]]
+        if not self.bodies:
+            self.defect("/", "no rigid bodies", None, "prims with PhysicsRigidBodyAPI")
+        self.require_sound()
+        self.world = graph.fresh("world")
+        self.poses = {link: self.prims[path].X for path, link in self.bodies.items()}
+        self.poses[self.world] = ORIGIN
+        self._contents()
+        for prim in joints:
+            self._joint(prim)
+        self._held()
+        graph.note_assumed()
+        self.require_sound()
+        self._mimics(joints)
+        if any(self.world in joint.links for joint in graph.joints.values()):
+            graph.links = {self.world: Link(self.world), **graph.links}
+            graph.base = self.world
+        else:
+            graph.base = next((self.bodies[path] for path, prim in self.prims.items()
+                               if path in self.bodies and prim.has("PhysicsArticulationRootAPI")), None)
+        self._stand(graph)
+        if own:
+            self._says(own[0])
+        else:
+            self._drives(joints)
+        self.require_sound()
+        return drop_world(graph)
+
+    def _positive(self, what: str, value: float) -> float:
+        if not 0 < value <= LARGEST_NUMBER:
+            self.defect("/", what, value, "a number above zero")
+        return float(value)
+
+    def _prim(self, told: Mapping[str, Any]) -> _Prim:
+        """A prim where it stands: USD's matrices act on rows, and its lengths are in units of the stage."""
+        values, label = told["values"], told["values"].get(f"{PREFIX}:name")
+        name = label if isinstance(label, str) and label else told["name"]
+        found = _Prim(told["path"], told["type"], tuple(told["apis"]), values, told["relations"], name, told)
+        if told["X"] is None:
+            return found
+        W = np.array(told["X"], dtype=float).T
+        if not np.all(np.abs(W) <= LARGEST_NUMBER):
+            self.defect(found.path, "a transform that is not finite or too large")
+            return found
+        found.M = self.metres * (self.up[:3, :3] @ W[:3, :3])
+        U, sizes, V = np.linalg.svd(W[:3, :3])
+        if not sizes[-1] > WITHOUT_DIRECTION * max(1.0, sizes[0]):
+            if told["shape"] or found.has("PhysicsRigidBodyAPI"):
+                self.defect(found.path, "a transform that leaves no volume")
+            return found
+        R = W[:3, :3] if np.max(np.abs(W[:3, :3].T @ W[:3, :3] - np.eye(3))) < EXACT else U @ V
+        R = -R if np.linalg.det(R) < 0 else R
+        found.X = frozen(pose(self.metres * (self.up[:3, :3] @ W[:3, 3]), self.up[:3, :3] @ R))
+        return found
+
+    def _body(self, prim: _Prim) -> None:
+        graph, name = self.result, prim.name
+        if name in graph.links:
+            parent = prim.path.split("/")[-2]
+            name = graph.fresh(f"{parent}_{name}" if parent else name)
+        graph.links[name] = Link(name)
+        self.bodies[prim.path] = name
+
+    def _carrier(self, path: str) -> str | None:
+        """The body that a prim belongs to: itself or the nearest one above it; None for the world."""
+        while path and path != "/":
+            if path in self.bodies:
+                return path
+            path = path.rpartition("/")[0]
+        return None
+
+    def _contents(self) -> None:
+        """Masses and shapes of the bodies."""
+        inertials = {path: self._inertial(self.prims[path]) for path in self.bodies}
+        solids: dict[str, list[Solid]] = {path: [] for path in self.bodies}
+        lost = []
+        for prim in self.prims.values():
+            carrier = self._carrier(prim.path)
+            if carrier is None or not (prim.told["shape"] or f"{PREFIX}:mesh" in prim.values):
+                continue
+            solid = self._solid(prim, self.prims[carrier])
+            if solid is None:
+                lost.append(prim.path)
+            else:
+                solids[carrier].append(solid)
+        if lost:
+            self.result.note("ignored", f"{len(lost)} shapes that other dialects have no words for: {comma_list(lost)}")
+        for path, link in self.bodies.items():
+            content = fragments(Content(inertials[path], tuple(solids[path])))
+            self.result.links[link] = Link(link, xml=content)
+
+    def _inertial(self, prim: _Prim) -> Inertial | None:
+        """UsdPhysics: a mass of zero is one that the simulator computes, as are moments of zero."""
+        values = prim.values
+        mass = _number(values.get("physics:mass"))
+        if not mass > 0:
+            return None
+        centre = _vector(values.get("physics:centerOfMass"))
+        centre = np.zeros(3) if centre is None else prim.X[:3, :3].T @ prim.M @ centre
+        moments, turn = _vector(values.get("physics:diagonalInertia")), _quaternion(values.get("physics:principalAxes"))
+        if moments is None or not np.any(moments):
+            return Inertial(mass * self.kilograms, frozen(pose(centre)))
+        R = np.eye(3) if turn is None else turn
+        inertia = self.kilograms * self.metres**2 * (R @ np.diag(moments) @ R.T)
+        exact = values.get(f"{PREFIX}:inertia")
+        if isinstance(exact, list) and len(exact) == 6:
+            xx, yy, zz, xy, xz, yz = exact
+            tensor = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+            inertia = tensor if np.max(np.abs(tensor - inertia)) <= SINGLE * np.max(np.abs(inertia)) else inertia
+        return Inertial(mass * self.kilograms, frozen(pose(centre)), frozen(inertia))
+
+    def _solid(self, prim: _Prim, body: _Prim) -> Solid | None:
+        """A shape in the frame of its body, where its kind and its stretching can be told."""
+        values, X = prim.values, inverse(body.X) @ prim.X
+        stretch = prim.X[:3, :3].T @ prim.M
+        sizes = np.diag(stretch)
+        role = "collision" if self._collides(prim, body) else "visual"
+        name = prim.name if values.get(f"{PREFIX}:name") else None
+        colour = tuple(prim.told["colour"]) if prim.told["colour"] is not None and role == "visual" else None
+        if np.max(np.abs(stretch - np.diag(sizes))) > SINGLE * np.max(np.abs(sizes)) or not np.all(sizes > 0):
+            return None
+        if f"{PREFIX}:mesh" in values or prim.kind == "Mesh":
+            address = values.get(f"{PREFIX}:mesh")
+            own = f"{self.file.rpartition('/')[2]}#{prim.path}"
+            scale = _vector(values.get(f"{PREFIX}:scale"))
+            factors = tuple(float(v) for v in (sizes if address is None or scale is None else scale))
+            return Solid("mesh", (), frozen(X), role, name, colour, str(address or own), factors)
+        along = AXES.get(values.get("axis", "Z"), AXES["Z"])
+        long = float(along @ sizes)
+        across = [float(size) for size, each in zip(sizes, along, strict=True) if not each]
+        rounds = max(sizes) - min(sizes) <= SINGLE * max(sizes)
+        radius, height = (_number(values.get(key)) for key in ("radius", "height"))
+        turned = frozen(X @ pose(rotation=along_z(along))) if not along[2] else frozen(X)
+        if prim.kind == "Cube":
+            edges = tuple(_number(values.get("size", 2.0)) * float(size) for size in sizes)
+            return Solid("box", edges, frozen(X), role, name, colour) if min(edges) > 0 else None
+        if prim.kind == "Sphere" and rounds and radius > 0:
+            return Solid("sphere", (radius * float(sizes[0]),), frozen(X), role, name, colour)
+        if prim.kind in ("Cylinder", "Capsule") and abs(across[0] - across[1]) <= SINGLE * across[0] and min(
+                radius, height) > 0 and (prim.kind == "Cylinder" or rounds):
+            return Solid(prim.kind.lower(), (radius * across[0], height * long), turned, role, name, colour)
+        return None
+
+    def _collides(self, prim: _Prim, body: _Prim) -> bool:
+        path = prim.path
+        while len(path) >= len(body.path):
+            if path in self.prims and self.prims[path].has("PhysicsCollisionAPI"):
+                return True
+            path = path.rpartition("/")[0]
+        return bool(prim.told["guide"])
+
+    def _joint(self, prim: _Prim) -> None:
+        """A joint: its frames on its two bodies, what it leaves free."""
+        graph, values = self.result, prim.values
+        if values.get("physics:jointEnabled") is False:
+            graph.note("ignored", f"the joint {prim.name!r}, which is not enabled")
+            return
+        if prim.kind == "PhysicsDistanceJoint":
+            self.defect(prim.path, "a distance joint", None, "two spherical joints and the rod between them")
+            return
+        if not prim.kind.startswith("Physics") or not prim.kind.endswith("Joint"):
+            graph.note("ignored", f"the joint {prim.name!r} of type {prim.kind or 'none'}, which UsdPhysics does not "
+                                  "have; --close says what it holds together")
+            return
+        ends = [self._end(prim, side) for side in (0, 1)]
+        if ends[0] is None or ends[1] is None:
+            return
+        one, two = ends[0], ends[1]
+        if one.link == two.link:
+            self.defect(prim.path, "a joint of a body to itself", one.link)
+            return
+        name = prim.name
+        if name in graph.joints or name in graph.links:
+            name = graph.fresh(name)
+        free = self._freedoms(prim)
+        excluded = values.get("physics:excludeFromArticulation") is True and len(free) < 6
+        self._add(name, prim, (one, two), free, in_tree=not excluded)
+
+    def _end(self, prim: _Prim, side: int) -> FrameSpec | None:
+        """The joint's frame on one of its bodies (on the world where none is named)."""
+        targets = prim.relations.get(f"physics:body{side}", [])
+        if len(targets) > 1 or (targets and targets[0] not in self.prims):
+            self.defect(prim.path, f"physics:body{side}", " ".join(targets)[:80], "one prim of the stage")
+            return None
+        turn = _quaternion(prim.values.get(f"physics:localRot{side}"), prim.values.get(f"{PREFIX}:localRot{side}"))
+        place = _vector(prim.values.get(f"physics:localPos{side}"), prim.values.get(f"{PREFIX}:localPos{side}"))
+        if turn is None or place is None or not np.all(np.abs(place) <= LARGEST_NUMBER):
+            self.defect(prim.path, f"the joint's frame on physics:body{side}", None, "a finite position, a rotation")
+            return None
+        if not targets:
+            return FrameSpec(self.world, frozen(self.up @ pose(self.metres * place, turn)))
+        target, carrier = self.prims[targets[0]], self._carrier(targets[0])
+        X = target.X @ pose(target.X[:3, :3].T @ target.M @ place, turn)
+        if carrier is None:
+            return FrameSpec(self.world, frozen(X))
+        body = self.prims[carrier]
+        return FrameSpec(self.bodies[carrier], frozen(X if carrier == "/" else inverse(body.X) @ X))
+
+    def _freedoms(self, prim: _Prim) -> tuple[str, ...]:
+        """What a joint leaves free: of one of its own type that, of a D6 what no limit locks."""
+        axis = str(prim.values.get("physics:axis", "X"))
+        kind = _KINDS.get(prim.kind)
+        if kind is not None and axis not in AXES:
+            self.defect(prim.path, "physics:axis", axis, "X, Y, Z")
+            axis = "X"
+        locked = [each for each in FREEDOMS if _locked(prim.values, each)]
+        match kind:
+            case JointType.REVOLUTE:
+                return (f"rot{axis}",)
+            case JointType.PRISMATIC:
+                return (f"trans{axis}",)
+            case JointType.SPHERICAL:
+                return FREEDOMS[3:]
+            case JointType.FIXED:
+                return ()
+        if prim.kind != "PhysicsJoint":
+            self.defect(prim.path, "unknown joint type", prim.kind, ", ".join((*_KINDS, "PhysicsJoint")))
+        return tuple(each for each in FREEDOMS if each not in locked)
+
+    def _add(self, name: str, prim: _Prim, ends: tuple[FrameSpec, FrameSpec], free: tuple[str, ...], *, in_tree: bool
+             ) -> None:
+        """One joint, or a chain of slides and turns where no type leaves just these free."""
+        axes: tuple[Array, ...]
+        slides, turns = ([AXES[each[-1]] for each in free if each.startswith(word)] for word in ("trans", "rot"))
+        letters = "".join(each[-1] for each in free)
+        limits = self._limits(prim, free)
+        match len(slides), len(turns):
+            case 0, 0:
+                kind, axes = JointType.FIXED, ()
+            case (1, 0) | (0, 1):
+                kind, axes = (JointType.PRISMATIC if slides else JointType.REVOLUTE), tuple(slides + turns)
+            case 0, 2:
+                # PhysX turns the predecessor's swing (Y, Z) first, the successor's twist (X) last
+                kind, axes = JointType.UNIVERSAL, (turns[1], turns[0])
+                if letters == "YZ":
+                    axes = (turns[0], turns[1])
+                    self.result.assumed.setdefault(_SWINGS, []).append(name)
+            case 0, 3:
+                kind, axes = JointType.SPHERICAL, ()
+            case 1, 1 if letters[0] == letters[1]:
+                kind, axes = JointType.CYLINDRICAL, tuple(slides)
+            case 2, 1 if letters[2] not in letters[:2]:
+                kind, axes = JointType.PLANAR, tuple(turns)
+            case 3, 3:
+                kind, axes = JointType.FREE, ()
+            case _:
+                self._chain(name, ends, slides, turns, in_tree=in_tree)
+                return
+        self.result.joints[name] = JointSpec(name, kind, ends, axes, limits, in_tree=in_tree)
+
+    def _chain(self, name: str, ends: tuple[FrameSpec, FrameSpec], slides: list[Array], turns: list[Array], *,
+               in_tree: bool) -> None:
+        graph, before = self.result, ends[0]
+        parts = [(JointType.PRISMATIC, axis) for axis in slides] + [(JointType.REVOLUTE, axis) for axis in turns[::-1]]
+        for number, (kind, axis) in enumerate(parts, 1):
+            last = number == len(parts)
+            title = graph.fresh(part(name, number))
+            if not last:
+                graph.links[title] = Link(title)
+                self.poses[title] = self.poses[str(ends[0].link)] @ ends[0].X
+            graph.joints[title] = JointSpec(title, kind, (before, ends[1] if last else FrameSpec(title)), (axis,),
+                                            in_tree=in_tree or not last)
+            before = FrameSpec(title)
+
+    def _limits(self, prim: _Prim, free: tuple[str, ...]) -> Limits | None:
+        """Degrees and units of the stage as radians and metres, of joints of one freedom or with the same limits in
+        all."""
+        pairs = []
+        for each in free:
+            factor = math.pi / 180 if each.startswith("rot") else self.metres
+            keys = [("physics:lowerLimit", "physics:upperLimit"), tuple(f"limit:{each}:physics:{k}" for k in
+                                                                        ("low", "high"))]
+            found = next(((prim.values[a], prim.values[b]) for a, b in keys if a in prim.values and b in prim.values),
+                         (None, None))
+            pairs.append(tuple(None if value is None or not math.isfinite(value) else factor * value
+                               for value in found))
+        lower, upper = pairs[0] if pairs and len(set(pairs)) == 1 else (None, None)
+        if lower is not None and upper is not None and not lower < upper:
+            lower = upper = None
+        values = {"lower": lower, "upper": upper}
+        for key, value in values.items():
+            exact = prim.values.get(f"{PREFIX}:{key}")
+            if isinstance(exact, float) and value is not None and abs(exact - value) <= SINGLE * max(1.0, abs(value)):
+                values[key] = exact
+        for key in ("velocity", "effort"):
+            exact = prim.values.get(f"{PREFIX}:{key}")
+            values[key] = exact if isinstance(exact, float) else None
+        if values["effort"] is None and len(free) == 1:
+            forces = [value for key, value in prim.values.items() if re.fullmatch(r"drive:\w+:physics:maxForce", key)]
+            values["effort"] = forces[0] if forces and math.isfinite(forces[0]) else None
+        return Limits(**values) if any(value is not None for value in values.values()) else None
+
+    def _held(self) -> None:
+        """Kinematic bodies stand still in the world."""
+        for path, link in self.bodies.items():
+            if self.prims[path].values.get("physics:kinematicEnabled") is True:
+                name = self.result.fresh(f"{link}_held")
+                ends = FrameSpec(self.world, self.prims[path].X), FrameSpec(link)
+                self.result.joints[name] = JointSpec(name, JointType.FIXED, ends)
+                self.result.note("merged", f"the kinematic body {link!r} stands still in the world")
+
+    def _mimics(self, joints: list[_Prim]) -> None:
+        """PhysX's mimic joints: q + gearing × q of the reference + offset = 0."""
+        titles = {prim.path: prim.name for prim in joints}
+        for prim in joints:
+            for key, gearing in prim.values.items():
+                match = _MIMIC.fullmatch(key)
+                stem = key.removesuffix("gearing")
+                targets = prim.relations.get(f"{stem}referenceJoint", [])
+                if match is None or len(targets) != 1 or targets[0] not in titles:
+                    continue
+                names = titles[targets[0]], prim.name
+                if not all(name in self.result.joints for name in names):
+                    continue
+                types = {self.result.joints[name].type for name in names}
+                turns = types == {JointType.REVOLUTE}
+                if not turns and types != {JointType.PRISMATIC}:
+                    self.defect(prim.path, "a mimic of joints of two kinds", None, "two revolute or two prismatic ones")
+                    continue
+                exact = prim.values.get(f"{PREFIX}:ratio")
+                ratio = -float(gearing)
+                if isinstance(exact, float) and abs(exact - ratio) <= SINGLE * max(1.0, abs(ratio)):
+                    ratio = exact
+                offset = -_number(prim.values.get(f"{stem}offset")) * (math.pi / 180 if turns else self.metres)
+                label = prim.values.get(f"{PREFIX}:coupling")
+                title = label if isinstance(label, str) else self.result.fresh(f"mimic_{prim.name}")
+                self.result.gears.append(GearSpec(title, *names, ratio, offset or 0.0))
+
+    def _stand(self, graph: JointGraph) -> None:
+        """Joints count from where the file puts their bodies, where that is a motion of theirs."""
+        apart = []
+        for name, joint in graph.joints.items():
+            T, S = joint.frames(self.poses)
+            D = inverse(T) @ S
+            if np.max(np.abs(D - np.eye(4))) <= EXACT:
+                continue
+            if residual(joint, T, S, max(1.0, *(float(np.linalg.norm(end.X[:3, 3])) for end in joint.ends))) > NOISE:
+                if joint.in_tree:
+                    apart.append(name)
+                continue
+            if not joint.in_tree:
+                continue
+            q, kind = 0.0, joint.kind
+            if kind is JointType.REVOLUTE:
+                q = turn_about(joint.axes[0], D[:3, :3])[0]
+            elif kind is JointType.PRISMATIC:
+                q = float(joint.axes[0] @ D[:3, 3])
+            axes = joint.axes
+            if kind is JointType.UNIVERSAL:
+                axes = frozen(D[:3, :3].T @ axes[0]), axes[1]
+            limits = joint.limits
+            if limits is not None and q:
+                lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
+                limits = replace(limits, lower=lower, upper=upper)
+            near = replace(joint.ends[0], X=frozen(inverse(self.poses[joint.links[0]]) @ S))
+            graph.joints[name] = replace(joint, ends=(near, joint.ends[1]), axes=axes, limits=limits)
+        if apart:
+            graph.note("guess", "the bodies of these joints are not where they hold them, and are put there: "
+                                + comma_list(apart))
+
+    def _says(self, prim: _Prim) -> None:
+        """Platform, camera, motors, observations, as our writer adds them."""
+        for text in prim.values[f"{PREFIX}:says"] or []:
+            key, _, rest = str(text).partition(" ")
+            wrong = read_annotation(self.result, key, rest)
+            if wrong is not None:
+                self.defect(prim.path, wrong, str(text)[:80])
+
+    def _drives(self, joints: list[_Prim]) -> None:
+        """Joints whose drives have gains are driven; where none has, all that have drives."""
+        gains: dict[str, bool] = {}
+        for prim in joints:
+            names = [each for each in (prim.name, *(part(prim.name, k) for k in range(1, 7)))
+                     if each in self.result.joints and self.result.joints[each].kind.freedoms]
+            if prim.has("PhysicsDriveAPI") and names:
+                drives = [value for key, value in prim.values.items()
+                          if re.fullmatch(r"drive:\w+:physics:(stiffness|damping)", key)]
+                limp = any(value == 0 for key, value in prim.values.items()
+                           if re.fullmatch(r"drive:\w+:physics:maxForce", key))
+                gains[prim.name] = any(_number(value) > 0 for value in drives) and not limp
+                for name in names:
+                    gains[name] = gains[prim.name]
+        driven = [name for name in gains if gains[name] or not any(gains.values())]
+        for name in [each for each in driven if each in self.result.joints]:
+            self.result.joints[name] = replace(self.result.joints[name], motor=Motor(f"motor_{name}"))
+        if len(driven) < len(gains):
+            self.result.note("guess", f"the motors are {comma_list(driven)}: the joints whose drives have gains "
+                                      "(--motors to change them)")
+
+
+def _locked(values: Mapping[str, Any], freedom: str) -> bool:
+    low, high = (values.get(f"limit:{freedom}:physics:{key}") for key in ("low", "high"))
+    return low is not None and high is not None and bool(low >= high)
+
+
+def _number(value: Any) -> float:
+    """A number of single precision as the decimals that were meant."""
+    if not isinstance(value, int | float) or not math.isfinite(value):
+        return 0.0
+    return float(str(np.float32(value))) if float(np.float32(value)) == value else float(value)
+
+
+def _vector(value: Any, exact: Any = None) -> Array | None:
+    """Three finite numbers; those of double precision beside them where they are the same."""
+    found = np.array(value, dtype=float) if isinstance(value, list) and len(value) == 3 else None
+    if found is None or not np.all(np.isfinite(found)):
+        return None
+    if isinstance(exact, list) and len(exact) == 3:
+        better = np.array(exact, dtype=float)
+        if np.max(np.abs(better - found)) <= SINGLE * max(1.0, float(np.max(np.abs(found)))):
+            return better
+    return np.array([_number(v) for v in found])
+
+
+def _quaternion(value: Any, exact: Any = None) -> Array | None:
+    """The rotation of a quaternion w x y z, in the same manner; None for what is none."""
+    found = np.array(value, dtype=float) if isinstance(value, list) and len(value) == 4 else None
+    if found is None or not np.linalg.norm(found) > WITHOUT_DIRECTION or not np.all(np.isfinite(found)):
+        return None
+    if isinstance(exact, list) and len(exact) == 4:
+        better = np.array(exact, dtype=float)
+        found = better if np.max(np.abs(better - found)) <= SINGLE else found
+    return rotation_of(unit(found))

@@ -1,0 +1,53 @@
+"""Stages of USD, opened in a process of their own: a file that breaks OpenUSD's library breaks nothing else."""
+
+from __future__ import annotations
+
+import importlib.util
+import json
+import subprocess
+import sys
+import tempfile
+from pathlib import Path
+from typing import Any
+
+from ....budgets import LARGEST_FILE, MOST_INCLUDES, USD_SECONDS
+from ....errors import MissingExtra
+from ... import xml
+
+PROCESS = Path(__file__).with_name("stage_process.py")
+
+
+def prims(path: Path) -> dict[str, Any]:
+    """What a stage holds, as plain values: ``stage`` and ``prims``; raises ``BadRobotFile``, and ``MissingExtra`` where
+    OpenUSD's package is not installed."""
+    found: dict[str, Any] = json.loads(_run(path, "prims", str(path)))
+    return found
+
+
+def mesh(path: Path, prim: str) -> bytes:
+    """A mesh of a stage as the text of an ``.obj`` file, in its own frame and units."""
+    return _run(path, "mesh", str(path), prim)
+
+
+def binary(text: str) -> bytes:
+    """The binary form of a stage given as text."""
+    with tempfile.TemporaryDirectory() as folder:
+        one, two = Path(folder, "robot.usda"), Path(folder, "robot.usdc")
+        one.write_text(text, encoding="utf-8")
+        _run(one, "binary", str(one), str(two))
+        return two.read_bytes()
+
+
+def _run(path: Path, *arguments: str) -> bytes:
+    if importlib.util.find_spec("pxr") is None:
+        raise MissingExtra(f"{path}: USD", "usd")
+    command = [sys.executable, "-P", str(PROCESS), str(LARGEST_FILE), str(MOST_INCLUDES), *arguments]
+    try:
+        run = subprocess.run(command, capture_output=True, timeout=USD_SECONDS, check=False)
+    except (subprocess.TimeoutExpired, ValueError):
+        raise xml.refusal(path, "OpenUSD does not come to an end", f"{USD_SECONDS} seconds") from None
+    if run.returncode:
+        lines = [line for line in run.stderr.decode("utf-8", "replace").splitlines() if line.startswith("refused: ")]
+        what = lines[-1].removeprefix("refused: ") if lines else "OpenUSD cannot open it"
+        raise xml.refusal(path, what[:400])
+    return run.stdout

@@ -1,0 +1,165 @@
+"""Run as a program, under limits of time and memory: what a USD stage holds as JSON, one of its meshes, or its binary
+form. Layers are composed only from the stage's own folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import sys
+from pathlib import Path
+from typing import Any
+
+MEMORY = 6_000_000_000
+SECONDS = 20
+LISTED = 64
+"""Entries of an array beyond which only their number is told."""
+MOST_PRIMS = 50_000
+ENDINGS = (".usd", ".usda", ".usdc")
+
+
+def refuse(what: str) -> None:
+    """End with what is wrong."""
+    print("refused: " + " ".join(what.split()), file=sys.stderr)
+    os._exit(2)
+
+
+def require_inside(start: Path, largest: int, most: int) -> None:
+    """Refuse a stage whose layers lie elsewhere than in its folder and below, are too many or too large."""
+    from pxr import Sdf  # type: ignore[import-untyped]
+
+    folder, pending, seen, size = start.resolve().parent, [Path(os.path.abspath(start))], set(), 0
+    while pending:
+        path = pending.pop()
+        if path in seen:
+            continue
+        seen.add(path)
+        size += path.stat().st_size
+        if size > largest:
+            refuse(f"layers too large, allowed: up to {largest} bytes together")
+        if len(seen) > most:
+            refuse(f"too many layers, allowed: up to {most}")
+        layer = Sdf.Layer.FindOrOpen(str(path))
+        if layer is None:
+            refuse(f"OpenUSD cannot open {path.name}")
+        clips: list[str] = []
+
+        def look(place: Any, layer: Any = layer, clips: list[str] = clips) -> None:
+            if place.IsPrimPath() and layer.GetPrimAtPath(place).HasInfo("clips"):
+                clips.append(str(place))
+
+        layer.Traverse(Sdf.Path.absoluteRootPath, look)
+        if clips:
+            refuse(f"value clips, which are not read, found {clips[0]}")
+        for asset in layer.GetCompositionAssetDependencies():
+            cure = "allowed: layers in the file's folder (usdcat --flatten makes one of all)"
+            other = Path(os.path.normpath(path.parent / asset)) if "`" not in asset and "://" not in asset else None
+            if other is None or not other.resolve().is_relative_to(folder):
+                refuse(f"a layer outside of the file's folder, found {asset}, {cure}")
+            elif other.suffix.lower() not in ENDINGS:
+                refuse(f"a layer that is no USD file, found {asset}, allowed: {', '.join(ENDINGS)}")
+            elif not other.is_file():
+                refuse(f"a layer that is not there, found {asset}, {cure}")
+            else:
+                pending.append(other)
+
+
+def plain(value: Any) -> Any:
+    """A value of USD as one of JSON: quaternions as w x y z, matrices as rows, long arrays as their number."""
+    if value is None or isinstance(value, bool | int | float | str):
+        return value
+    if hasattr(value, "GetImaginary"):
+        return [float(value.GetReal()), *map(float, value.GetImaginary())]
+    if hasattr(value, "path") and hasattr(value, "resolvedPath"):
+        return value.path
+    try:
+        if len(value) > LISTED:
+            return {"count": len(value)}
+        return [plain(each) for each in value]
+    except TypeError:
+        return str(value)
+
+
+def colour_of(prim: Any) -> Any:
+    """The colour of a shape: its display colour, else that of its bound preview surface."""
+    from pxr import UsdGeom, UsdShade
+
+    shape = UsdGeom.Gprim(prim)
+    own = shape.GetDisplayColorPrimvar().ComputeFlattened() if shape.GetDisplayColorPrimvar() else None
+    if own:
+        clear = shape.GetDisplayOpacityPrimvar().ComputeFlattened() if shape.GetDisplayOpacityPrimvar() else None
+        return [*map(float, own[0]), float(clear[0]) if clear else 1.0] if len(own) == 1 else None
+    material = UsdShade.MaterialBindingAPI(prim).ComputeBoundMaterial()[0]
+    shader = material.ComputeSurfaceSource()[0] if material else None
+    found = shader.GetInput("diffuseColor").Get() if shader and shader.GetInput("diffuseColor") else None
+    return None if found is None else [*map(float, found), 1.0]
+
+
+def told(stage: Any) -> dict[str, Any]:
+    """The stage's units and all prims that may matter: shapes, joints, what carries a schema of physics."""
+    from pxr import Usd, UsdGeom, UsdPhysics
+
+    found, cache = [], UsdGeom.XformCache()
+    for number, prim in enumerate(Usd.PrimRange.Stage(stage, Usd.TraverseInstanceProxies())):
+        if number > MOST_PRIMS:
+            refuse(f"too many prims, allowed: up to {MOST_PRIMS}")
+        kind, apis = str(prim.GetTypeName()), [str(each) for each in prim.GetAppliedSchemas()]
+        relations = {str(each.GetName()): [str(to) for to in each.GetTargets()] for each in prim.GetRelationships()}
+        shape, joint = prim.IsA(UsdGeom.Gprim), kind.endswith("Joint") and "physics:body1" in {**relations}
+        joint = joint or prim.IsA(UsdPhysics.Joint) or "physics:body0" in relations
+        own = [each for each in prim.GetAttributes()
+               if shape or joint or any("Physics" in api for api in apis) or each.GetName().startswith("hrsynth:")]
+        found.append({"path": str(prim.GetPath()), "name": str(prim.GetName()), "type": kind, "apis": apis,
+                      "shape": shape, "joint": joint, "relations": relations,
+                      "values": {str(each.GetName()): plain(each.Get()) for each in own},
+                      "X": plain(cache.GetLocalToWorldTransform(prim)) if prim.IsA(UsdGeom.Xformable) else None,
+                      "colour": colour_of(prim) if shape else None,
+                      "guide": shape and UsdGeom.Imageable(prim).ComputePurpose() == "guide"})
+    root = stage.GetDefaultPrim()
+    return {"prims": found, "name": str(root.GetName()) if root else "",
+            "metres": UsdGeom.GetStageMetersPerUnit(stage), "metres_told": UsdGeom.StageHasAuthoredMetersPerUnit(stage),
+            "kilograms": UsdPhysics.GetStageKilogramsPerUnit(stage), "up": str(UsdGeom.GetStageUpAxis(stage))}
+
+
+def obj(stage: Any, path: str) -> str:
+    """A mesh as the text of an .obj file."""
+    from pxr import UsdGeom
+
+    mesh = UsdGeom.Mesh(stage.GetPrimAtPath(path))
+    points, counts, corners = (each.Get() or [] for each in (
+        mesh.GetPointsAttr(), mesh.GetFaceVertexCountsAttr(), mesh.GetFaceVertexIndicesAttr()))
+    turn = -1 if mesh.GetOrientationAttr().Get() == "leftHanded" else 1
+    lines, at = [f"v {x:.9g} {y:.9g} {z:.9g}" for x, y, z in points], 0
+    for count in counts:
+        face = list(corners[at:at + count])[::turn]
+        if any(not 0 <= corner < len(points) for corner in face) or len(face) < count:
+            refuse(f"the faces of mesh {path} name points that there are not")
+        lines.append("f " + " ".join(str(corner + 1) for corner in face))
+        at += count
+    return "\n".join(lines) + "\n"
+
+
+def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
+    """One task on one file."""
+    for limit, amount in ((resource.RLIMIT_AS, MEMORY), (resource.RLIMIT_CPU, SECONDS)):
+        resource.setrlimit(limit, (amount, amount))
+    try:
+        from pxr import Tf, Usd
+    except ImportError as error:
+        refuse(f"OpenUSD's package cannot be loaded: {error}")
+    try:
+        require_inside(Path(name), int(largest), int(most))
+        stage = Usd.Stage.Open(name)
+        if task == "binary":
+            stage.GetRootLayer().Export(rest[0])
+        else:
+            sys.stdout.write(json.dumps(told(stage)) if task == "prims" else obj(stage, rest[0]))
+        sys.stdout.flush()
+    except (Tf.ErrorException, RuntimeError, OSError, MemoryError, RecursionError) as error:
+        text = " ".join(str(error).split())
+        refuse("OpenUSD refuses it: " + (text.partition(" : ")[2] or text or type(error).__name__))
+    os._exit(0)
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,272 @@
+"""A mechanism as USD text: rigid bodies of an articulation, joints of UsdPhysics, loops excluded from the articulation.
+
+UsdPhysics holds joint frames, limits and masses in single precision, angles in degrees. The same numbers stand beside
+them in double precision, as attributes ``hrsynth:…`` that other programs leave alone; reading takes those as long as
+they agree.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from collections.abc import Iterable, Iterator, Mapping
+
+import numpy as np
+
+from ....geometry.so3 import quaternions
+from ....geometry.vectors import Array, inverse, perpendicular, pose, unit
+from ....mechanism.model import Joint, JointType, Limits, Mechanism, Note
+from ... import numerals
+from ...annotations import PREFIX, annotations_of
+from ...contents import SIZES, Content, Solid, content_of, principal, unsaid
+from ...dialect import Written
+from ...jointgraph import comma_list
+from ...meshes import triangles
+from ...tree import outward, spanning
+from .read import FREEDOMS
+
+_TYPES = {JointType.REVOLUTE: "PhysicsRevoluteJoint", JointType.PRISMATIC: "PhysicsPrismaticJoint",
+          JointType.SPHERICAL: "PhysicsSphericalJoint", JointType.FIXED: "PhysicsFixedJoint"}
+_FREE = {JointType.REVOLUTE: ("rotX",), JointType.PRISMATIC: ("transX",), JointType.SPHERICAL: FREEDOMS[3:],
+         JointType.UNIVERSAL: ("rotX", "rotY"), JointType.CYLINDRICAL: ("transX", "rotX"),
+         JointType.PLANAR: ("transY", "transZ", "rotX"), JointType.FREE: FREEDOMS, JointType.FIXED: ()}
+"""What each type leaves free in frames whose x is the axis (of a universal joint the second; y is the first)."""
+
+
+def write(mechanism: Mechanism) -> Written:
+    """The USD text of a mechanism, and warnings of what it has no place for."""
+    robot = spanning(mechanism)
+    return _UsdWriter(robot).written()
+
+
+class _UsdWriter:
+    def __init__(self, robot: Mechanism) -> None:
+        self.robot = robot
+        self.root = _identifier(robot.name, {})
+        taken: dict[str, int] = {"joints": 1}
+        self.names = {link: _identifier(link, taken) for link in robot.links}
+        taken = {"to_world": 1}
+        self.joints = {joint: _identifier(joint, taken) for joint in robot.joints}
+        self.lost: list[Note] = []
+
+    def written(self) -> Written:
+        robot, body = self.robot, list[str]()
+        says = [f"{key} {text}" for key, text in annotations_of(robot, motors=True)]
+        body += [f"custom string {PREFIX}:name = {_text(robot.name)}",
+                 f"custom string[] {PREFIX}:says = [{', '.join(map(_text, says))}]"]
+        unread: list[str] = []
+        for name, link in robot.links.items():
+            body += self._body(name, link.pose, content_of(link, robot), unread)
+        order = [*outward(robot), *(joint for joint in robot.joints.values() if not joint.in_tree)]
+        weld = [f"rel physics:body1 = </{self.root}/{self.names[robot.base]}>"]
+        joints = _prim("PhysicsFixedJoint", "to_world", weld)
+        joints += [line for each in order for line in self._joint(each)]
+        body += _prim("Scope", "joints", joints)
+        head = ["#usda 1.0", "(", f"    defaultPrim = {_text(self.root)}", "    kilogramsPerUnit = 1",
+                "    metersPerUnit = 1", '    upAxis = "Z"', ")", ""]
+        text = "\n".join([*head, *_prim("Xform", self.root, body, ["PhysicsArticulationRootAPI"])]) + "\n"
+        self.lost += unsaid(robot, SIZES, dialect="USD")
+        if unread:
+            what = "meshes that cannot be read are written by their names alone: "
+            self.lost.append(Note("warning", what + comma_list(unread)))
+        wide = [joint.name for joint in robot.joints.values() if joint.type is JointType.SPHERICAL
+                and joint.limits is not None and (joint.limits.lower, joint.limits.upper) != (None, None)]
+        if wide:
+            what = "limits of the turns of spherical joints are not written: "
+            self.lost.append(Note("warning", what + comma_list(wide)))
+        return Written((text,), tuple(self.lost))
+
+    def _body(self, name: str, X: Array, content: Content, unread: list[str]) -> list[str]:
+        apis, lines = ["PhysicsRigidBodyAPI"], [*_label(name, self.names[name]), *_placed(X)]
+        inertial = content.inertial
+        if inertial is not None and inertial.mass > 0:
+            apis.append("PhysicsMassAPI")
+            lines += [f"float physics:mass = {_number(inertial.mass)}",
+                      f"point3f physics:centerOfMass = {_tuple(inertial.X[:3, 3])}"]
+            if inertial.inertia is not None:
+                R = inertial.X[:3, :3]
+                tensor = inertial.inertia if np.array_equal(R, np.eye(3)) else R @ inertial.inertia @ R.T
+                moments, turn = principal(tensor)
+                lines += [f"float3 physics:diagonalInertia = {_tuple(moments)}",
+                          f"quatf physics:principalAxes = {_tuple(quaternions(turn))}"]
+                six = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
+                lines.append(f"custom double[] {PREFIX}:inertia = [{', '.join(map(_number, six))}]")
+        taken: dict[str, int] = {}
+        for solid in content.solids:
+            lines += self._solid(name, solid, taken, unread)
+        return _prim("Xform", self.names[name], lines, apis)
+
+    def _solid(self, link: str, solid: Solid, taken: dict[str, int], unread: list[str]) -> list[str]:
+        """A shape; a mesh with its triangles and, for the way back, the name of its file."""
+        title = _identifier(solid.name or solid.role, taken)
+        lines = [f"custom string {PREFIX}:name = {_text(solid.name)}"] if solid.name else []
+        if solid.role == "collision":
+            lines.append('uniform token purpose = "guide"')
+        elif solid.colour is not None:
+            red, green, blue, opacity = solid.colour
+            lines.append(f"color3f[] primvars:displayColor = [{_tuple((red, green, blue))}]")
+            if opacity != 1:
+                lines.append(f"float[] primvars:displayOpacity = [{_number(opacity)}]")
+        apis = ["PhysicsCollisionAPI"] if solid.role == "collision" else []
+        kind, scale = {"box": "Cube"}.get(solid.kind, solid.kind.capitalize()), (1.0, 1.0, 1.0)
+        if solid.file is not None:
+            found = triangles(solid.file, self.robot.file)
+            lines += [f"custom string {PREFIX}:mesh = {_text(solid.file)}",
+                      f"custom double3 {PREFIX}:scale = {_tuple(solid.scale)}"]
+            if found is None:
+                unread.append(f"{link} ({solid.file})")
+                return _prim("Xform", title, [*lines, *_placed(solid.X)], apis)
+            points, faces = found
+            points = points * solid.scale
+            rows = ", ".join(_tuple(np.round(point, 9) + 0.0) for point in points)
+            lines += [f"point3f[] points = [{rows}]", f"int[] faceVertexCounts = [{', '.join(['3'] * len(faces))}]",
+                      f"int[] faceVertexIndices = [{', '.join(str(v) for v in np.ravel(faces))}]",
+                      'uniform token subdivisionScheme = "none"']
+        elif kind == "Cube":
+            lines.append("double size = 1")
+            scale = solid.sizes[0], solid.sizes[1], solid.sizes[2]
+        else:
+            lines += [f"double {'height' if key == 'length' else key} = {_number(value)}"
+                      for key, value in zip(SIZES[solid.kind], solid.sizes, strict=True)]
+            lines += ['uniform token axis = "Z"'] * (kind != "Sphere")
+        return _prim(kind, title, [*lines, *_placed(solid.X, scale)], apis)
+
+    def _joint(self, joint: Joint) -> list[str]:
+        """A joint between two bodies; what is no type of its own is a D6 whose other directions are locked."""
+        robot, kind = self.robot, joint.type
+        X_J = pose(joint.point, _frame(joint, robot))
+        lines = _label(joint.name, self.joints[joint.name])
+        if not joint.in_tree or kind is JointType.FREE:
+            lines.append("uniform bool physics:excludeFromArticulation = true")
+        for side, link in enumerate(joint.links):
+            X = inverse(robot.links[link].pose) @ X_J
+            turn = quaternions(X[:3, :3])
+            lines += [f"rel physics:body{side} = </{self.root}/{self.names[link]}>",
+                      f"point3f physics:localPos{side} = {_tuple(X[:3, 3])}",
+                      f"quatf physics:localRot{side} = {_tuple(turn)}",
+                      f"custom double3 {PREFIX}:localPos{side} = {_tuple(X[:3, 3])}",
+                      f"custom quatd {PREFIX}:localRot{side} = {_tuple(turn)}"]
+        apis: list[str] = []
+        free = _FREE[kind]
+        if kind in (JointType.REVOLUTE, JointType.PRISMATIC, JointType.SPHERICAL):
+            lines.append('uniform token physics:axis = "X"')
+        if kind not in _TYPES:
+            for each in (each for each in FREEDOMS if each not in free):
+                apis.append(f"PhysicsLimitAPI:{each}")
+                lines += [f"float limit:{each}:physics:low = 1", f"float limit:{each}:physics:high = -1"]
+        if joint.limits is not None:
+            lines += _limits(kind, joint.limits, free, apis)
+        if joint.motor is not None and free:
+            lines += _drive(kind, joint.limits, free, apis)
+        lines += self._mimic(joint, free, apis)
+        return _prim(_TYPES.get(kind, "PhysicsJoint"), self.joints[joint.name], lines, apis)
+
+    def _mimic(self, joint: Joint, free: tuple[str, ...], apis: list[str]) -> Iterator[str]:
+        """A gear in PhysX's words: q + gearing × q of the reference = 0."""
+        carriers = {each.successor: each for each in self.robot.joints.values() if each.in_tree}
+        for gear in self.robot.couplings:
+            if carriers.get(gear.successor) is not joint:
+                continue
+            other = carriers[gear.predecessor]
+            if len(free) != 1 or other.type is not joint.type:
+                what = f"USD has no gear between a turn and a slide; not written: {gear.name}"
+                self.lost.append(Note("warning", what))
+                continue
+            stem = f"physxMimicJoint:{free[0]}:"
+            apis.append(f"PhysxMimicJointAPI:{free[0]}")
+            yield f"float {stem}gearing = {_number(-gear.ratio)}"
+            yield f"float {stem}offset = 0"
+            yield f"rel {stem}referenceJoint = </{self.root}/joints/{self.joints[other.name]}>"
+            yield f"custom double {PREFIX}:ratio = {_number(gear.ratio)}"
+            yield f"custom string {PREFIX}:coupling = {_text(gear.name)}"
+
+
+def _frame(joint: Joint, robot: Mechanism) -> Array:
+    """A rotation (3, 3) with x along the axis; of a universal joint x along the second axis, y along the first."""
+    if not joint.axes:
+        return robot.links[joint.successor].pose[:3, :3]
+    x = joint.axes[-1]
+    y = perpendicular(x, joint.axes[0] if joint.type is JointType.UNIVERSAL else None)
+    return np.column_stack((x, y, unit(np.cross(x, y))))
+
+
+def _limits(kind: JointType, limits: Limits, free: tuple[str, ...], apis: list[str]) -> Iterator[str]:
+    for key in ("lower", "upper", "velocity", "effort"):
+        value = getattr(limits, key)
+        if value is not None and not (kind is JointType.SPHERICAL and key in ("lower", "upper")):
+            yield f"custom double {PREFIX}:{key} = {_number(value)}"
+    pairs: Mapping[str, str] = {"lower": "physics:lowerLimit", "upper": "physics:upperLimit"}
+    if kind is JointType.SPHERICAL or (limits.lower, limits.upper) == (None, None):
+        return
+    for each in free:
+        factor = 180 / math.pi if each.startswith("rot") else 1.0
+        if kind not in _TYPES:
+            apis.append(f"PhysicsLimitAPI:{each}")
+            pairs = {"lower": f"limit:{each}:physics:low", "upper": f"limit:{each}:physics:high"}
+        for key, name in pairs.items():
+            value = getattr(limits, key)
+            if value is not None:
+                yield f"float {name} = {_number(value * factor)}"
+
+
+def _drive(kind: JointType, limits: Limits | None, free: tuple[str, ...], apis: list[str]) -> Iterator[str]:
+    """A drive without gains (whoever runs a simulator chooses them) for each freedom."""
+    words = {JointType.REVOLUTE: ("angular",), JointType.PRISMATIC: ("linear",)}.get(kind, free)
+    for word in words:
+        apis.append(f"PhysicsDriveAPI:{word}")
+        yield f'uniform token drive:{word}:physics:type = "force"'
+        if limits is not None and limits.effort is not None:
+            yield f"float drive:{word}:physics:maxForce = {_number(limits.effort)}"
+
+
+def _prim(kind: str, name: str, lines: Iterable[str], apis: Iterable[str] = ()) -> list[str]:
+    """A prim: its schemas, and what it holds, one step further in."""
+    schemas = ", ".join(map(_text, apis))
+    head = [f"def {kind} {_text(name)} (", f"    prepend apiSchemas = [{schemas}]", ")"] if schemas else [
+        f"def {kind} {_text(name)}"]
+    return [*head, "{", *(f"    {line}" for line in lines), "}"]
+
+
+def _placed(X: Array, scale: tuple[float, ...] = (1.0, 1.0, 1.0)) -> list[str]:
+    """The transform of a prim in its parent's frame."""
+    found, order = [], []
+    if np.any(X[:3, 3]):
+        found.append(f"double3 xformOp:translate = {_tuple(X[:3, 3])}")
+        order.append("xformOp:translate")
+    if not np.array_equal(X[:3, :3], np.eye(3)):
+        found.append(f"quatd xformOp:orient = {_tuple(quaternions(X[:3, :3]))}")
+        order.append("xformOp:orient")
+    if scale != (1.0, 1.0, 1.0):
+        found.append(f"double3 xformOp:scale = {_tuple(scale)}")
+        order.append("xformOp:scale")
+    return [*found, f"uniform token[] xformOpOrder = [{', '.join(map(_text, order))}]"] if order else []
+
+
+def _label(name: str, identifier: str) -> list[str]:
+    """The name where USD's identifiers have no room for it."""
+    return [] if name == identifier else [f"custom string {PREFIX}:name = {_text(name)}"]
+
+
+def _identifier(name: str, taken: dict[str, int]) -> str:
+    """A name of letters, digits and underscores, which no prim beside it has."""
+    plain = re.sub(r"\W", "_", name, flags=re.ASCII) or "_"
+    plain = plain if not plain[0].isdigit() else f"_{plain}"
+    found, number = plain, 2
+    while found in taken:
+        found, number = f"{plain}_{number}", number + 1
+    taken[found] = 1
+    return found
+
+
+def _text(value: str) -> str:
+    """A text in quotes."""
+    return json.dumps(value, ensure_ascii=False)
+
+
+def _number(value: float) -> str:
+    return numerals.exact(value)
+
+
+def _tuple(values: Iterable[float]) -> str:
+    return f"({', '.join(_number(float(value)) for value in values)})"
