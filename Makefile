@@ -27,8 +27,9 @@ demo: setup  ## derive the hidden robot of a Quattro of which legs 1 and 4 are o
 test: setup-dev  ## the tests, without the slow ones
 	@$(PYTEST) --dist loadfile -m "not slow and not long and not browser" tests
 
+# the heavy ones stand beside each other: who has done its own takes from the other's
 test-all: setup-all setup-browser  ## all tests but the longest (AFTER_TEST=1: those that `make test` left out)
-	@$(PYTEST) -m "$(if $(AFTER_TEST),(slow or browser) and )not long" tests
+	@$(PYTEST) --dist worksteal -m "$(if $(AFTER_TEST),(slow or browser) and )not long" tests
 
 test-long: setup-all  ## the longest tests: many instances, all robots; more than an hour
 	@$(PYTEST) -m long tests
