@@ -106,6 +106,8 @@ SOURCE = (
     Option("close", "A closure: the frames of two links meet (default: in a point); again for more.", "A:B[:TYPE]",
            kind=list[str], group=READING),
     Option("freeze", "Joints to hold at zero.", "JOINTS", default="", group=READING),
+    Option("keyframe", "Its zero pose: a posture that the file, or an SRDF file beside it, names; or FILE.srdf:NAME.",
+           "NAME", group=READING),
 )
 """A robot as the command line names it, with what its file does not say."""
 

@@ -79,6 +79,10 @@ class GearSpec:
     line: int | None = None
 
 
+Posture = Mapping[str, Array]
+"""The values of some joints, by name, as :mod:`.jointmotion` has them; all others are at zero."""
+
+
 @dataclass
 class JointGraph:
     """What a foreign file says; with every tree joint at zero its frames on both links coincide."""
@@ -99,6 +103,8 @@ class JointGraph:
     """Frames that only tell where a loop closes."""
     assumed: dict[str, list[str]] = field(default_factory=dict)
     """Guesses of one kind about many joints: what, and which."""
+    postures: dict[str, Posture] = field(default_factory=dict)
+    """Postures that the file names."""
 
     def note(self, kind: str, text: str) -> None:
         """Record what the file does not say."""

@@ -17,8 +17,8 @@ CLOSURES = {"3d": JointType.SPHERICAL, "6d": JointType.FIXED, **LOOP_TYPES}
 
 @dataclass(frozen=True)
 class Overrides:
-    """Base, platform, the motors' joints, closures ``A:B[:type]``, joints to freeze, links to observe; None or empty
-    where the file (or a guess) decides."""
+    """Base, platform, the motors' joints, closures ``A:B[:type]``, joints to freeze, links to observe, the posture that
+    is the zero pose; None or empty where the file (or a guess) decides."""
 
     base: str | None = None
     platform: str | None = None
@@ -26,11 +26,13 @@ class Overrides:
     close: tuple[str, ...] = ()
     freeze: tuple[str, ...] = ()
     observe: tuple[str, ...] | None = None
+    keyframe: str | None = None
 
     @property
     def any(self) -> bool:
         """Whether anything is given that changes what the file says."""
-        return bool(self.platform or self.motors is not None or self.close or self.freeze)
+        return bool(self.platform or self.motors is not None or self.close or self.freeze
+                    or self.keyframe is not None)
 
     def apply(self, graph: JointGraph) -> None:
         """Closures, frozen joints and motors, in the graph of a file."""

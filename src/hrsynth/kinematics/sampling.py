@@ -101,7 +101,7 @@ def sample(twin: PinocchioModel, question: Measurement, count: int, seed: int = 
         if freely or not (far := _far(roots[0])):
             break
         probe = _mode(_firmest(far), question)
-        if probe is None or probe.signature.agrees(Signature.of(members[0].relation)):
+        if probe is None or all(probe.signature.agrees(Signature.of(member.relation)) for member in members):
             break
     groups = group_modes([OperationMode(Signature.of(m.relation), m.configuration) for m in members])
     _require_one(groups, question, "the configurations reached differ as only those of several operation modes do")

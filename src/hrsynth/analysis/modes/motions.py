@@ -158,6 +158,8 @@ class _Follower:
         basis, joints = self.tangents(q, MOTION_FREE)
         found, came, home, rng = [], [], self.bodies(q), np.random.default_rng(0)
         size = basis.shape[1]
+        if not size:
+            return basis, []
         for c in np.vstack([np.eye(size), rng.normal(size=(size, size))]):
             step = joints @ (c / np.linalg.norm(c))
             part = MOTION_NEAR / max(1.0, float(np.abs(step).max()))  # of a unit twist of the bodies

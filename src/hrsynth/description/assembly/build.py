@@ -12,6 +12,7 @@ from ...mechanism.model import Coupling, Joint, JointType, Mechanism, Note
 from ...tolerances import NOISE, SAME_GEOMETRY
 from ..jointgraph import JointGraph, JointSpec, comma_list
 from ..overrides import Overrides
+from ..postures import posture
 from ..tree import spanning
 from . import closures, guess
 from .candidates import without_loop
@@ -43,14 +44,15 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     platform = overrides.platform or graph.platform or guess.platform(graph, overrides.base or base)
     if platform == base and overrides.base is None:
         raise BadRequest(f"{graph.file}: the platform is the base", platform, "another link")
-    assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears)
+    start = None if overrides.keyframe is None else posture(graph, overrides.keyframe)
+    assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears, start)
     if assembly.size > MOST_LOOP_COORDINATES or len(assembly.loops) > MOST_LOOP_COORDINATES:
         raise BadRequest(f"{graph.file}: {len(assembly.loops)} loops through joints with {assembly.size} coordinates",
                          None, f"up to {MOST_LOOP_COORDINATES} of each")
     solution = solve(assembly)
     if not solution.residual <= NOISE:
         raise LoopsNotClosed(graph.file, solution.residual, NOISE, assembly.worst(solution.values)[0])
-    _note_solution(graph, assembly, solution)
+    _note_solution(graph, assembly, solution, overrides.keyframe)
     mechanism = closures.planar_points(_mechanism(graph, base, platform, assembly, solution.values))
     if not all(joint.in_tree for joint in mechanism.joints.values()):
         mechanism = _away_from_singular(as_meant(mechanism, solution.residual))
@@ -59,13 +61,14 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     return with_weighed_motors(mechanism)
 
 
-def _note_solution(graph: JointGraph, assembly: LoopAssembly, solution: LoopSolution) -> None:
+def _note_solution(graph: JointGraph, assembly: LoopAssembly, solution: LoopSolution, keyframe: str | None) -> None:
     name, miss = assembly.worst(assembly.zero())
     moves = _moves(assembly, solution.values)
     if moves and miss > SAME_GEOMETRY:
         pushed = ", after a random push out of a flat pose" if solution.pushed else ""
-        graph.note("solved", f"at the file's zero pose the loop {name!r} is open by {miss:.3g} (characteristic "
-                             f"lengths, radians); closed{pushed} with {moves}")
+        where = "the file's zero pose" if keyframe is None else f"the keyframe {keyframe!r}"
+        graph.note("solved", f"at {where} the loop {name!r} is open by {miss:.3g} (characteristic lengths, radians); "
+                             f"closed{pushed} with {moves}")
 
 
 def _moves(assembly: LoopAssembly, values: Values) -> str:

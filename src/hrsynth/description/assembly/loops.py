@@ -17,7 +17,7 @@ from ...geometry.ranks import Rank, rank_of
 from ...geometry.vectors import Array, inverse, pose
 from ...mechanism.model import JointType, Mechanism
 from ...tolerances import FAINT, FIRM, NEARLY_SINGULAR, NEWTON_REACH, NOISE, RANK_CUTOFF, RANK_GAP, SOLVED
-from ..jointgraph import FrameSpec, GearSpec, JointSpec, TreeJoint, spanning_tree, zero_poses
+from ..jointgraph import FrameSpec, GearSpec, JointSpec, Posture, TreeJoint, spanning_tree, zero_poses
 from ..jointmotion import displacement, opening, screws, step_along, zero
 
 DAMPING = Damping(start=1.0, eased=0.1, least=1e-3, most=1e6)
@@ -26,10 +26,12 @@ Values = dict[str, Array]
 
 
 class LoopAssembly:
-    """Tree, loops and gears of a joint graph, in which tree joints take values."""
+    """Tree, loops and gears of a joint graph, in which tree joints take values; their zero pose may be a posture."""
 
-    def __init__(self, base: str, joints: Sequence[JointSpec], gears: Sequence[GearSpec] = ()) -> None:
+    def __init__(self, base: str, joints: Sequence[JointSpec], gears: Sequence[GearSpec] = (),
+                 start: Posture | None = None) -> None:
         self.base = base
+        self._start = start or {}
         tree = spanning_tree(base, joints)
         self.length = _spread(base, tree)
         self.tree = [(_scale(joint, self.length), parent, child) for joint, parent, child in tree]
@@ -61,8 +63,16 @@ class LoopAssembly:
         return frozenset(names)
 
     def zero(self) -> Values:
-        """All tree joints at zero."""
-        return {joint.name: zero(joint) for joint, _, _ in self.tree}
+        """All tree joints at zero, or in the posture."""
+        return {joint.name: self._at_start(joint) for joint, _, _ in self.tree}
+
+    def _at_start(self, joint: JointSpec) -> Array:
+        """The value of a joint in the posture, its lengths in characteristic lengths."""
+        at_zero = zero(joint)
+        value = self._start.get(joint.name, at_zero)
+        if value.shape != at_zero.shape:
+            return at_zero
+        return _stretch(value, 1 / self.length) if value.ndim == 2 else value / self.unit(joint)
 
     def unit(self, joint: JointSpec) -> float:
         """Metres or radians in one unit of a joint's coordinate."""

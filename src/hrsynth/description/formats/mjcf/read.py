@@ -8,11 +8,12 @@ import numpy as np
 
 from ....geometry.vectors import Array, frozen, inverse, pose
 from ....mechanism.model import JointType, Limits, Link, Motor
-from ... import xml
+from ... import numerals, xml
 from ...annotations import PREFIX, drop_world, read_annotation
 from ...dialect import RobotFile
 from ...elements import XmlReader
 from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec
+from ...postures import from_keyframe
 from .defaults import Compiler, Defaults, with_includes
 
 WORLD = "world"
@@ -50,6 +51,7 @@ class _MjcfReader(XmlReader):
         if len(graph.links) == 1:
             self.defect(xml.line(root), "no bodies")
         self.require_sound()
+        self._keyframes()
         for section in root.findall("equality"):
             for element in xml.children(section):
                 self._equality(element)
@@ -205,6 +207,22 @@ class _MjcfReader(XmlReader):
         else:
             offset, ratio = (float(value) for value in coefficients[:2])
             graph.gears.append(GearSpec(name, driver, driven, ratio, offset, line))
+
+    def _keyframes(self) -> None:
+        """The postures of ``<keyframe>``, by name or number; those with other than the model's coordinates are told."""
+        graph = self.result
+        joints = {name: joint.kind for name, joint in graph.joints.items() if name in self.zeros}
+        for number, key in enumerate(self.root.iterfind("keyframe/key")):
+            name, words = key.get("name") or str(number), key.get("qpos")
+            try:
+                qpos = None if words is None else numerals.parse(words, len(words.split()))
+                found = {} if qpos is None else from_keyframe(joints, self.zeros, qpos)
+            except ValueError:
+                found = None
+            if found is None:
+                graph.note("ignored", f"the keyframe {name!r}: its qpos has not the coordinates of the joints")
+            else:
+                graph.postures[name] = found
 
     def _actuator(self, element: xml.Element) -> None:
         graph = self.result

@@ -16,7 +16,8 @@ from ...annotations import NAMESPACE, drop_world, read_annotation
 from ...dialect import RobotFile
 from ...elements import XmlReader
 from ...jointgraph import ORIGIN, JointGraph
-from .joint import JointFrames, add, guess_motors, name_gears, pose_of, text
+from ...postures import value_of
+from .joint import JointFrames, add, guess_motors, name_gears, numbers, pose_of, text
 
 MODEL, WORLD = "__model__", "world"
 VERSIONS = "1.4 to 1.12"
@@ -61,6 +62,7 @@ class _SdfReader(XmlReader):
         graph.note_assumed()
         name_gears(self, graph)
         guess_motors(graph)
+        self._states(model.get("name"))
         self.require_sound()
         if any(WORLD in joint.links for joint in graph.joints.values()):
             graph.links = {WORLD: Link(WORLD), **graph.links}
@@ -72,6 +74,21 @@ class _SdfReader(XmlReader):
                 self.defect(xml.line(element), wrong, element.text)
         self.require_sound()
         return drop_world(graph)
+
+    def _states(self, model: str | None) -> None:
+        """The joints' coordinates in the states of the document's worlds, by ``world_name``."""
+        for state in self.root.iterfind("world/state"):
+            joints = [joint for each in state.findall("model") if each.get("name") == model
+                      for joint in each.findall("joint")]
+            found = {}
+            for joint in joints:
+                known = self.result.joints.get(joint.get("name", ""))
+                angles = [float(numbers(self, angle, (0,))[0]) for angle in joint.findall("angle")]
+                value = None if known is None else value_of(known.kind, angles)
+                if known is not None and value is not None:
+                    found[known.name] = value
+            if found:
+                self.result.postures[state.get("world_name") or state.get("name") or "state"] = found
 
     def _version(self) -> tuple[int, int]:
         text = self.root.get("version", "1.6")

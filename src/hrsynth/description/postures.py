@@ -1,0 +1,107 @@
+"""Postures that files name: keyframes of MJCF, the state of an SDF world, group states of an SRDF file beside a robot.
+
+A posture gives the values of tree joints, counted from the file's zero pose, as :mod:`.jointmotion` has them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from ..errors import BadRequest
+from ..geometry.so3 import rotation_of
+from ..geometry.vectors import Array, frozen, pose
+from ..mechanism.model import JointType
+from ..tolerances import WITHOUT_DIRECTION
+from . import numerals, xml
+from .jointgraph import JointGraph, Posture, comma_list
+
+SRDF = ".srdf"
+
+
+def value_of(kind: JointType, numbers: Array | Sequence[float], *, scalar_first: bool = True) -> Array | None:
+    """The value of a joint of this type that a file's numbers mean, None where they are not as many as it has.
+
+    A turn may be one angle or its cosine and sine; a ball is a unit quaternion, a free joint a place and one (w x y z,
+    or x y z w where its scalar is not first).
+    """
+    given = np.array(numbers, dtype=float)
+    if kind in (JointType.SPHERICAL, JointType.FREE):
+        shift = 0 if kind is JointType.SPHERICAL else 3
+        size = float(np.linalg.norm(given[shift:]))
+        if len(given) != shift + 4 or not size > WITHOUT_DIRECTION:
+            return None
+        q = given[shift:] / size
+        return frozen(pose(given[:shift] if shift else np.zeros(3), rotation_of(q if scalar_first else np.roll(q, 1))))
+    if kind is JointType.REVOLUTE and len(given) == 2:
+        given = np.array([np.arctan2(given[1], given[0])])
+    return frozen(given) if len(given) == kind.freedoms else None
+
+
+def posture(graph: JointGraph, wanted: str) -> Posture:
+    """The posture of that name in the file itself or in the SRDF file beside it; of ``FILE.srdf:NAME`` in that file.
+    Raises ``BadRequest`` with the names there are."""
+    if wanted in graph.postures:
+        return graph.postures[wanted]
+    stated, _, name = wanted.rpartition(":")
+    files = [Path(stated)] if stated.endswith(SRDF) else _beside(Path(graph.file))
+    states = {key: state for file in files for key, state in _group_states(file).items()}
+    name = name if stated.endswith(SRDF) else wanted
+    if name not in states:
+        known = [*graph.postures, *states]
+        raise BadRequest(f"{graph.file}: no such keyframe", wanted, comma_list(known) if known else
+                         "a file that has keyframes, or FILE.srdf:NAME")
+    return _of_state(graph, name, states[name])
+
+
+def _beside(path: Path) -> list[Path]:
+    """The SRDF files that belong to a robot file by their place and name."""
+    places = path.with_suffix(SRDF), path.parent.parent / "srdf" / (path.stem + SRDF)
+    return [place for place in places if place.is_file()][:1]
+
+
+def _group_states(path: Path) -> dict[str, xml.Element]:
+    """The group states of an SRDF file by name; ``GROUP/NAME`` where groups share a name."""
+    found: dict[str, xml.Element] = {}
+    for state in xml.document(xml.content(path), str(path)).findall("group_state"):
+        name = state.get("name", "")
+        found[f"{state.get('group')}/{name}" if name in found else name] = state
+    return found
+
+
+def _of_state(graph: JointGraph, name: str, state: xml.Element) -> Posture:
+    """The values that a group state gives to joints of the file; others are told."""
+    found, ignored = dict[str, Array](), list[str]()
+    for element in state.findall("joint"):
+        title, words = element.get("name", ""), element.get("value", "")
+        value = None
+        if title in graph.joints:
+            try:
+                numbers = numerals.parse(words, len(words.split()))
+                value = value_of(graph.joints[title].kind, numbers, scalar_first=False)
+            except ValueError:
+                value = None
+        if value is None:
+            ignored.append(title)
+        else:
+            found[title] = value
+    if ignored:
+        graph.note("ignored", f"the values that the keyframe {name!r} has for {comma_list(ignored)}: no such joints, "
+                              "or not as many numbers as they have freedoms")
+    return found
+
+
+def from_keyframe(joints: Mapping[str, JointType], zeros: Mapping[str, float], qpos: Array) -> Posture | None:
+    """The posture of MuJoCo's coordinates: joint after joint, a ball has 4, a free joint 7; R and P counted from
+    ``zeros``. None where there are not as many."""
+    found, rest = dict[str, Array](), list(qpos)
+    for name, kind in joints.items():
+        count = {JointType.SPHERICAL: 4, JointType.FREE: 7}.get(kind, 1)
+        value = value_of(kind, rest[:count])
+        if value is None:
+            return None
+        found[name] = value if kind.freedoms > 1 else frozen(value - zeros.get(name, 0.0))
+        rest = rest[count:]
+    return None if rest else found
