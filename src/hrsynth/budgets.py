@@ -42,6 +42,8 @@ LOOP_EFFORT = 100_000
 """Joints visited there (and their like) after which solving is given up: some seconds."""
 LOOP_TRIES = 24
 """Random pushes and steps before the best pose found has to do."""
+NEARBY_AGREED = 4
+"""Configurations nearby that must agree before a zero pose is called special."""
 FIRMER_BY = 2.0
 """Factor by which another pose must be firmer to take the place of a nearly singular one."""
 MOST_RELATED_ON_LINK = 40

@@ -14,7 +14,7 @@ import numpy as np
 
 from ..budgets import REMEMBERED
 from ..description import load
-from ..errors import BadMechanism, BadRequest, HrsynthError, NoSegment, NotSampled
+from ..errors import BadMechanism, BadRequest, NoSegment, NotSampled
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
@@ -26,7 +26,7 @@ from ..mechanism.legs import LegDecomposition, decompose
 from ..mechanism.normal import NormalForm, normal_form
 from ..mechanism.observation import Direction, labels_of
 from ..mechanism.pose import RADIANS, ModeNumber, Pose, PoseForm
-from ..mechanism.sensors import default_observation, encoders, observation_of
+from ..mechanism.sensors import default_observation, defaults_of, encoders, observation_of
 from ..progress import tell
 from ..results import Value, content
 
@@ -260,21 +260,6 @@ def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...]
                            (*defaults.values(), *extra))
     drawn = sample(PinocchioModel(normal.mechanism), question, samples, seed, led_by=observed)
     return ObservedRobot(robot, normal, anatomy, observed, drawn, len(defaults))
-
-
-def defaults_of(anatomy: LegDecomposition) -> dict[str, Observation]:
-    """The segment of each leg that has one: the file's choice, else the default one."""
-    table: dict[str, Observation] = {}
-    given = {o.leg: o for o in reversed(anatomy.mechanism.observations)}
-    for leg in anatomy.legs:
-        if leg.label in given:
-            table[leg.label] = given[leg.label]
-            continue
-        try:
-            table[leg.label] = default_observation(anatomy, leg)
-        except HrsynthError:
-            continue
-    return table
 
 
 def _observed(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str, Observation],

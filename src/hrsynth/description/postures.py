@@ -5,20 +5,22 @@ A posture gives the values of tree joints, counted from the file's zero pose, as
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from ..errors import BadRequest
 from ..geometry.so3 import rotation_of
-from ..geometry.vectors import Array, frozen, pose
+from ..geometry.vectors import Array, frozen, inverse, pose
 from ..mechanism.model import JointType
 from ..tolerances import WITHOUT_DIRECTION
 from . import numerals, xml
-from .jointgraph import JointGraph, Posture, comma_list
+from .jointgraph import JointGraph, JointSpec, Posture, comma_list
 
 SRDF = ".srdf"
+STAY = "zero"
+"""The posture that every file has, unless it names another so."""
 
 
 def value_of(kind: JointType, numbers: Array | Sequence[float], *, scalar_first: bool = True) -> Array | None:
@@ -43,8 +45,8 @@ def value_of(kind: JointType, numbers: Array | Sequence[float], *, scalar_first:
 def posture(graph: JointGraph, wanted: str) -> Posture:
     """The posture of that name in the file itself or in the SRDF file beside it; of ``FILE.srdf:NAME`` in that file.
     Raises ``BadRequest`` with the names there are."""
-    if wanted in graph.postures:
-        return graph.postures[wanted]
+    if wanted in graph.postures or wanted == STAY:
+        return graph.postures.get(wanted, {})
     stated, _, name = wanted.rpartition(":")
     files = [Path(stated)] if stated.endswith(SRDF) else _beside(Path(graph.file))
     states = {key: state for file in files for key, state in _group_states(file).items()}
@@ -93,15 +95,18 @@ def _of_state(graph: JointGraph, name: str, state: xml.Element) -> Posture:
     return found
 
 
-def from_keyframe(joints: Mapping[str, JointType], zeros: Mapping[str, float], qpos: Array) -> Posture | None:
-    """The posture of MuJoCo's coordinates: joint after joint, a ball has 4, a free joint 7; R and P counted from
-    ``zeros``. None where there are not as many."""
+def from_keyframe(joints: Iterable[JointSpec], zeros: Mapping[str, float], qpos: Array) -> Posture | None:
+    """The posture of MuJoCo's coordinates, joint after joint: R and P count from ``zeros``, a ball has 4 numbers, a
+    free joint 7, its pose in the world. None where there are not as many."""
     found, rest = dict[str, Array](), list(qpos)
-    for name, kind in joints.items():
+    for joint in joints:
+        kind, name = joint.kind, joint.name
         count = {JointType.SPHERICAL: 4, JointType.FREE: 7}.get(kind, 1)
         value = value_of(kind, rest[:count])
         if value is None:
             return None
-        found[name] = value if kind.freedoms > 1 else frozen(value - zeros.get(name, 0.0))
+        if kind is JointType.FREE:
+            value = frozen(inverse(joint.ends[0].X) @ value)
+        found[name] = value if kind.freedoms > 1 else frozen(value - zeros[name])
         rest = rest[count:]
     return None if rest else found

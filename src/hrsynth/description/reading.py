@@ -28,8 +28,15 @@ def read(path: Path, overrides: Overrides) -> Mechanism:
             raise xml.refusal(path, f"{len(robot.links)} links and {len(robot.joints)} joints",
                               f"up to {MOST_LINKS} links")
         from .assembly.build import build
+        from .assembly.generic import with_generic_zero
 
-        robot = build(robot, overrides)
+        robot = _part(build(robot, overrides), overrides)
+        return robot if overrides.keyframe is not None else with_generic_zero(robot)
+    return _part(robot, overrides)
+
+
+def _part(robot: Mechanism, overrides: Overrides) -> Mechanism:
+    """What of a robot is asked about: all of it, or what lies between base and platform; and what is watched."""
     if overrides.base is not None:
         robot = spanning(between(robot, overrides.base, overrides.platform or robot.platform))
     return robot if overrides.observe is None else observe_links(robot, overrides.observe)

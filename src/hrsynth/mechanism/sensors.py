@@ -5,7 +5,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..errors import BadRequest, NoSegment
+from ..errors import BadRequest, HrsynthError, NoSegment
 from ..geometry import lines
 from ..geometry.vectors import Array, frozen, perpendicular, unit
 from ..tolerances import SAME_POINT
@@ -14,7 +14,7 @@ from .composites import WordEdge
 from .legs import Leg, LegDecomposition
 from .model import Joint, JointType, Mechanism
 from .normal import centre_pair
-from .observation import AngleEncoder, Direction, Encoder, LinePosition, SlideEncoder
+from .observation import AngleEncoder, Direction, Encoder, LinePosition, Observation, SlideEncoder
 
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 
@@ -35,6 +35,21 @@ def default_observation(anatomy: LegDecomposition, leg: Leg) -> Direction:
     if len(nodes) < 3:
         raise NoSegment(f"leg {leg.label} has no segment to observe: it is one joint", path[-1].joints[0])
     return segments.at(len(nodes) - 2)
+
+
+def defaults_of(anatomy: LegDecomposition) -> dict[str, Observation]:
+    """The segment of each leg that has one: the file's choice, else the default one."""
+    table: dict[str, Observation] = {}
+    given = {o.leg: o for o in reversed(anatomy.mechanism.observations)}
+    for leg in anatomy.legs:
+        if leg.label in given:
+            table[leg.label] = given[leg.label]
+            continue
+        try:
+            table[leg.label] = default_observation(anatomy, leg)
+        except HrsynthError:
+            continue
+    return table
 
 
 def observation_of(anatomy: LegDecomposition, link: str) -> Direction:

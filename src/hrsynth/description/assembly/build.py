@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from ...budgets import MOST_LOOP_COORDINATES
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed
-from ...geometry.vectors import Array, inverse, unit
+from ...geometry.vectors import Array, unit
 from ...mechanism.model import Coupling, Joint, JointType, Mechanism, Note
 from ...tolerances import NOISE, SAME_GEOMETRY
 from ..jointgraph import JointGraph, JointSpec, comma_list
@@ -19,6 +19,7 @@ from .candidates import without_loop
 from .coordinates import with_weighed_motors, without_coordinates
 from .loops import LoopAssembly, LoopSolution, Values, regular_values, solve
 from .relations import as_meant
+from .zero import moves, with_limits, with_zero_at
 
 
 def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
@@ -63,24 +64,12 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
 
 def _note_solution(graph: JointGraph, assembly: LoopAssembly, solution: LoopSolution, keyframe: str | None) -> None:
     name, miss = assembly.worst(assembly.zero())
-    moves = _moves(assembly, solution.values)
-    if moves and miss > SAME_GEOMETRY:
+    moved = moves(assembly, solution.values)
+    if moved and miss > SAME_GEOMETRY:
         pushed = ", after a random push out of a flat pose" if solution.pushed else ""
         where = "the file's zero pose" if keyframe is None else f"the keyframe {keyframe!r}"
         graph.note("solved", f"at {where} the loop {name!r} is open by {miss:.3g} (characteristic lengths, radians); "
-                             f"closed{pushed} with {moves}")
-
-
-def _moves(assembly: LoopAssembly, values: Values) -> str:
-    """The coordinates that differ from zero, in words."""
-    found = []
-    for joint in assembly.active:
-        value = values[joint.name]
-        for number, q in enumerate(value if value.ndim == 1 else value[:3, :3][[2, 0, 1], [1, 2, 0]]):
-            if abs(q) > NOISE:
-                suffix = f"[{number}]" if value.size > 1 else ""
-                found.append(f"{joint.name}{suffix} = {q * assembly.unit(joint):.6g}")
-    return comma_list(found)
+                             f"closed{pushed} with {moved}")
 
 
 def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssembly, values: Values) -> Mechanism:
@@ -88,7 +77,7 @@ def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssemb
     tree = {joint.name for joint, _, _ in assembly.tree}
     joints = {name: _joint(joint, poses, name in tree) for name, joint in graph.joints.items()}
     links = {name: replace(link, pose=poses[name]) for name, link in graph.links.items()}
-    mechanism = Mechanism(graph.name, links, _with_limits(joints, assembly, values), base, platform,
+    mechanism = Mechanism(graph.name, links, with_limits(joints, assembly, values), base, platform,
                           tuple(graph.observations), (), graph.camera, tuple(graph.rest), graph.file,
                           tuple(graph.notes))
     mechanism = spanning(mechanism)
@@ -108,19 +97,6 @@ def _joint(joint: JointSpec, poses: Mapping[str, Array], in_tree: bool) -> Joint
     point = X_P[:3, 3] if in_tree or kind.slides or kind is JointType.PLANAR else (X_P[:3, 3] + X_S[:3, 3]) / 2
     motor = None if kind is JointType.FIXED else joint.motor
     return Joint(joint.name, kind, *joint.links, point, axes, motor, joint.limits, in_tree, joint.xml, joint.line)
-
-
-def _with_limits(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Values) -> dict[str, Joint]:
-    """The joints with the limits of R and P counted from where ``values`` put them."""
-    found = dict(joints)
-    for tree_joint, _, _ in assembly.tree:
-        joint = joints[tree_joint.name]
-        limits = joint.limits
-        if limits is not None and joint.type in (JointType.REVOLUTE, JointType.PRISMATIC):
-            q = float(values[joint.name][0]) * assembly.unit(tree_joint)
-            lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
-            found[joint.name] = replace(joint, limits=replace(limits, lower=lower, upper=upper))
-    return found
 
 
 def _couplings(graph: JointGraph, mechanism: Mechanism) -> list[Coupling]:
@@ -148,18 +124,5 @@ def _away_from_singular(mechanism: Mechanism) -> Mechanism:
     freedoms = [assembly.size - rank.value for rank in (here, after)]
     why = (f"singular (its loops have {freedoms[0]} freedoms there, {freedoms[1]} nearby)" if freedoms[1] < freedoms[0]
            else f"nearly singular (weakest singular value {here.weakest:.1e}, {after.weakest:.1e} nearby)")
-    note = Note("solved", f"the zero pose is {why}: moved to {_moves(assembly, there)}")
-    return replace(_with_zero_at(mechanism, assembly, there), notes=(*mechanism.notes, note))
-
-
-def _with_zero_at(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> Mechanism:
-    """The same mechanism with another closed configuration for its zero."""
-    poses = assembly.poses(values)
-    motion = {name: poses[name] @ inverse(link.pose) for name, link in mechanism.links.items()}
-    joints = {}
-    for joint in mechanism.joints.values():
-        X, Y = (motion[link] for link in joint.links)
-        axes = tuple(Z[:3, :3] @ axis for Z, axis in zip((X, Y), joint.axes, strict=False))
-        joints[joint.name] = replace(joint, point=X[:3, :3] @ joint.point + X[:3, 3], axes=axes)
-    links = {name: replace(link, pose=poses[name]) for name, link in mechanism.links.items()}
-    return replace(mechanism, links=links, joints=_with_limits(joints, assembly, values))
+    note = Note("solved", f"the zero pose is {why}: moved to {moves(assembly, there)}")
+    return replace(with_zero_at(mechanism, assembly, there), notes=(*mechanism.notes, note))

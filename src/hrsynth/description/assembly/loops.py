@@ -78,7 +78,7 @@ class LoopAssembly:
         """Metres or radians in one unit of a joint's coordinate."""
         return self.length if joint.type is JointType.PRISMATIC else 1.0
 
-    def _poses(self, values: Values) -> dict[str, Array]:
+    def scaled_poses(self, values: Values) -> dict[str, Array]:
         """The pose (4, 4) of every link in the base frame, lengths in characteristic lengths."""
         X = {self.base: np.eye(4)}
         for joint, parent, child in self.tree:
@@ -91,12 +91,12 @@ class LoopAssembly:
 
     def poses(self, values: Values) -> dict[str, Array]:
         """The pose (4, 4) of every link in the base frame, in metres."""
-        return {link: _stretch(X, self.length) for link, X in self._poses(values).items()}
+        return {link: _stretch(X, self.length) for link, X in self.scaled_poses(values).items()}
 
     def system(self, values: Values) -> tuple[Array, Array]:
         """What is open in all loops and gears (rows,), and its derivative by the active coordinates (rows, size)."""
         self._spent += self._effort
-        X = self._poses(values)
+        X = self.scaled_poses(values)
         twists = np.zeros((6, self.size))
         for joint in self.active:
             twists[:, self._columns[joint.name]] = np.array(screws(joint, *joint.frames(X))).reshape(-1, 6).T
@@ -121,9 +121,32 @@ class LoopAssembly:
             rows.append(row)
         return np.concatenate(errors), np.vstack(rows)
 
+    def velocity(self, values: Values, link: str) -> Array:
+        """The twists (6, n) of a link (linear at the base origin, angular) for a basis of the velocities that keep the
+        loops closed, joints in no loop last; lengths in characteristic lengths."""
+        X, kernel = self.scaled_poses(values), self.kernel(values)
+        loose = [joint for joint, _, _ in self.tree if joint.name not in self._columns]
+        inside = np.zeros((6, self.size))
+        outside = {joint.name: np.zeros((6, joint.kind.freedoms)) for joint in loose}
+        while link != self.base:
+            joint, parent = self._parent[link]
+            sign = 1.0 if joint.links[0] == parent else -1.0
+            twists = sign * np.array(screws(joint, *joint.frames(X))).reshape(-1, 6).T
+            if joint.name in outside:
+                outside[joint.name] = twists
+            else:
+                inside[:, self._columns[joint.name]] = twists
+            link = parent
+        return np.hstack([inside @ kernel, *outside.values()])
+
+    def apart(self, one: Values, other: Values) -> float:
+        """The largest difference of the links' poses, lengths in characteristic lengths."""
+        X, Y = self.scaled_poses(one), self.scaled_poses(other)
+        return max(float(np.abs(X[link] - Y[link]).max()) for link in X)
+
     def step(self, values: Values, step: Array) -> Values:
         """The values that a step in the active coordinates leads to."""
-        X, after = self._poses(values), dict(values)
+        X, after = self.scaled_poses(values), dict(values)
         for joint in self.active:
             R = joint.frames(X)[0][:3, :3]
             after[joint.name] = step_along(joint, values[joint.name], step[self._columns[joint.name]], R)
@@ -184,7 +207,7 @@ class LoopAssembly:
 
     def worst(self, values: Values) -> tuple[str, float]:
         """The loop that is open most, and by how much."""
-        X = self._poses(values)
+        X = self.scaled_poses(values)
         found = [(float(np.linalg.norm(opening(loop, *loop.frames(X))[0])), loop.name) for loop in self.loops]
         found += [(abs(float(_slip(gear, values)[0])), gear.name) for gear in self.gears]
         miss, name = max(found, default=(0.0, "none"))

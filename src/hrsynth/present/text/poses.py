@@ -84,7 +84,10 @@ def _posture(posture: Posture, length: float) -> Rows:
 
 
 def _kinds(name: str, what: str, kinds: Kinds, lost: str) -> Rows:
-    title = f"{what}: {_STATES[kinds.state]} (smallest rank gap {kinds.gap:.1e}, needed {RANK_GAP:.0e})"
+    state = _STATES[kinds.state]
+    if kinds.classes is not None and kinds.classes.RO < 0:
+        state += f", but special: {-kinds.classes.RO} fewer are lost than at generic poses"
+    title = f"{what}: {state} (smallest rank gap {kinds.gap:.1e}, needed {RANK_GAP:.0e})"
     if kinds.classes is None:
         return [(name, title)]
     counts = "  ".join(f"{key} {value}" for key, value in kinds.classes.to_dict().items())

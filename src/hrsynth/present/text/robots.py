@@ -30,9 +30,9 @@ _SHOWN = 6
 
 def robot(found: Mechanism) -> str:
     """Name, size and motors; legs with their default segments, where the mechanism has legs; notes of its reading."""
-    from ...analysis.observed import defaults_of
     from ...mechanism.legs import decompose
     from ...mechanism.normal import normal_form
+    from ...mechanism.sensors import defaults_of
 
     rows: Rows = [("links, joints", f"{len(found.links)}, {len(found.joints)}"), ("base", found.base),
                   ("platform", found.platform),

@@ -211,7 +211,7 @@ class _MjcfReader(XmlReader):
     def _keyframes(self) -> None:
         """The postures of ``<keyframe>``, by name or number; those with other than the model's coordinates are told."""
         graph = self.result
-        joints = {name: joint.kind for name, joint in graph.joints.items() if name in self.zeros}
+        joints = [joint for name, joint in graph.joints.items() if name in self.zeros]
         for number, key in enumerate(self.root.iterfind("keyframe/key")):
             name, words = key.get("name") or str(number), key.get("qpos")
             try:

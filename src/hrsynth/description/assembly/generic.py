@@ -1,0 +1,139 @@
+"""A zero pose at which ρ is special, though the loops are as free as nearby (a dead point), is left for a generic one.
+
+ρ is the space of (t, u̇) that the loops allow (docs/pages/theory.md, section 2): t of the platform, u̇ of the default
+segments of the legs. Samples propose; what is said of the robot later is computed anew.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...budgets import LOOP_TRIES, NEARBY_AGREED
+from ...errors import HrsynthError
+from ...geometry.ranks import Rank, range_basis
+from ...geometry.screws import point_velocity
+from ...geometry.vectors import Array, hat, transform
+from ...mechanism.legs import decompose
+from ...mechanism.model import Mechanism, Note
+from ...mechanism.normal import normal_form
+from ...mechanism.observation import Direction
+from ...mechanism.sensors import defaults_of
+from ...tolerances import RANK_GAP, SOLVED
+from ..postures import STAY
+from .loops import LoopAssembly, Values
+from .zero import moves, with_zero_at
+
+
+@dataclass(frozen=True)
+class _Ranks:
+    """The loops' freedoms, dim ρ, the platform's dof, and how much of that the legs see: all together, then each."""
+
+    freedoms: int
+    dimension: int
+    dof: int
+    seen: tuple[int, ...]
+
+    def beside(self, other: _Ranks, labels: tuple[str, ...]) -> str:
+        """Where this and another differ, in words."""
+        for label, one, two in zip((f"legs {', '.join(labels)}" if len(labels) > 1 else f"leg {labels[0]}",
+                                    *(f"leg {each}" for each in labels)), self.seen, other.seen, strict=True):
+            if (one, self.dof) != (two, other.dof):
+                sees = "see" if label.startswith("legs") else "sees"
+                return (f"there {label} {sees} {one} of the platform's {self.dof} freedoms, nearby {two}"
+                        + (f" of {other.dof}" if self.dof != other.dof else ""))
+        return f"there platform and segments move together in {self.dimension} ways, nearby in {other.dimension}"
+
+
+def with_generic_zero(mechanism: Mechanism) -> Mechanism:
+    """The mechanism, its zero pose a generic one nearby where it is special; as it is where it has no loops or legs,
+    and where the configurations nearby do not agree."""
+    if all(joint.in_tree for joint in mechanism.joints.values()):
+        return mechanism
+    try:
+        anatomy = decompose(normal_form(mechanism).mechanism)
+    except HrsynthError:
+        return mechanism  # what is wrong is told where it is asked about
+    segments = [each for each in defaults_of(anatomy).values() if isinstance(each, Direction)]
+    if not segments:
+        return mechanism
+    assembly = LoopAssembly.of(mechanism)
+    zero = assembly.zero()
+
+    def ranks(values: Values) -> tuple[_Ranks, bool]:
+        return _ranks(mechanism, anatomy.point, segments, assembly, values)
+
+    here, _ = ranks(zero)
+    found: list[tuple[float, float, Values]] = []
+    generic: _Ranks | None = None
+    rng = np.random.default_rng(0)
+    for number in range(LOOP_TRIES):
+        there = _nearby(assembly, zero, (0.3, 0.15, 0.5)[number % 3], rng)
+        if there is None:
+            continue
+        after, clear = ranks(there)
+        if clear and (after == here or after.freedoms != here.freedoms or generic not in (None, after)):
+            return mechanism
+        if clear:
+            generic = after
+            found.append((_beyond_limits(mechanism, assembly, there), -assembly.rank(there).weakest, there))
+        if len(found) == NEARBY_AGREED:
+            break
+    if generic is None or len(found) < NEARBY_AGREED:
+        return mechanism
+    there = min(found, key=lambda each: each[:2])[2]
+    labels = tuple(dict.fromkeys(each.leg for each in segments))
+    note = Note("solved", f"the zero pose is special ({here.beside(generic, labels)}): moved to "
+                          f"{moves(assembly, there)} (--keyframe {STAY} to stay)")
+    return replace(with_zero_at(mechanism, assembly, there), notes=(*mechanism.notes, note))
+
+
+def _ranks(mechanism: Mechanism, point: Array | None, segments: list[Direction], assembly: LoopAssembly, values: Values
+           ) -> tuple[_Ranks, bool]:
+    """The ranks at closed values, and whether their gaps leave no doubt."""
+    poses = assembly.scaled_poses(values)
+    X = poses[mechanism.platform]
+    V = assembly.velocity(values, mechanism.platform)
+    platform = V if point is None else point_velocity(V, transform(X, point / assembly.length))
+    seen_from = assembly.velocity(values, mechanism.reference)[3:]
+    rates = [-hat(poses[each.link][:3, :3] @ each.direction) @ (assembly.velocity(values, each.link)[3:] - seen_from)
+             for each in segments]
+    basis, whole = range_basis(np.vstack([platform, *rates]))
+    rows = len(platform)
+    t, u = basis[:rows], basis[rows:]
+    every: list[Rank] = [whole, range_basis(t, 1.0)[1]]
+    seen = []
+    for part in [u, *(u[3 * k : 3 * k + 3] for k in range(len(segments)))] if len(segments) > 1 else [u]:
+        together, alone = range_basis(np.vstack([t, part]), 1.0)[1], range_basis(part, 1.0)[1]
+        seen.append(every[1].value - (together.value - alone.value))  # dof − dim {t : (t, 0) ∈ ρ}
+        every += [together, alone]
+    loops = assembly.rank(values)
+    clear = all(each.gap >= RANK_GAP for each in (loops, *every))
+    return _Ranks(assembly.freedoms(loops), whole.value, every[1].value, tuple(seen)), clear
+
+
+def _nearby(assembly: LoopAssembly, zero: Values, size: float, rng: np.random.Generator) -> Values | None:
+    """Closed values a random step away, all joints moved; None where they do not close near the step's end."""
+    kernel = assembly.kernel(zero)
+    step = kernel @ rng.normal(size=kernel.shape[1])
+    step *= size / float(np.max(np.abs(step), initial=1e-12))
+    ahead = assembly.step(zero, step)
+    there, residual = assembly.close(ahead)
+    if residual > 10 * SOLVED or assembly.apart(ahead, there) > assembly.apart(ahead, zero) / 2:
+        return None
+    loose = {joint.name for joint, _, _ in assembly.tree} - {joint.name for joint in assembly.active}
+    return {name: value + size * rng.uniform(-1, 1, value.shape) if name in loose and value.ndim == 1 else value
+            for name, value in there.items()}
+
+
+def _beyond_limits(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> float:
+    """By how much tree joints of one freedom are beyond their limits, all together (m, radians)."""
+    total = 0.0
+    for spec, _, _ in assembly.tree:
+        limits = mechanism.joints[spec.name].limits
+        if limits is not None and spec.kind.freedoms == 1:
+            q = float(values[spec.name][0]) * assembly.unit(spec)
+            total += max(0.0, 0.0 if limits.lower is None else limits.lower - q,
+                         0.0 if limits.upper is None else q - limits.upper)
+    return total

@@ -1,0 +1,50 @@
+"""Another closed configuration as a mechanism's zero pose."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+
+from ...geometry.vectors import inverse
+from ...mechanism.model import Joint, JointType, Mechanism
+from ...tolerances import NOISE
+from ..jointgraph import comma_list
+from .loops import LoopAssembly, Values
+
+
+def with_zero_at(mechanism: Mechanism, assembly: LoopAssembly, values: Values) -> Mechanism:
+    """The same mechanism with another closed configuration for its zero."""
+    poses = assembly.poses(values)
+    motion = {name: poses[name] @ inverse(link.pose) for name, link in mechanism.links.items()}
+    joints = {}
+    for joint in mechanism.joints.values():
+        X, Y = (motion[link] for link in joint.links)
+        axes = tuple(Z[:3, :3] @ axis for Z, axis in zip((X, Y), joint.axes, strict=False))
+        joints[joint.name] = replace(joint, point=X[:3, :3] @ joint.point + X[:3, 3], axes=axes)
+    links = {name: replace(link, pose=poses[name]) for name, link in mechanism.links.items()}
+    return replace(mechanism, links=links, joints=with_limits(joints, assembly, values))
+
+
+def with_limits(joints: Mapping[str, Joint], assembly: LoopAssembly, values: Values) -> dict[str, Joint]:
+    """The joints with the limits of R and P counted from where ``values`` put them."""
+    found = dict(joints)
+    for tree_joint, _, _ in assembly.tree:
+        joint = joints[tree_joint.name]
+        limits = joint.limits
+        if limits is not None and joint.type in (JointType.REVOLUTE, JointType.PRISMATIC):
+            q = float(values[joint.name][0]) * assembly.unit(tree_joint)
+            lower, upper = (None if bound is None else bound - q for bound in (limits.lower, limits.upper))
+            found[joint.name] = replace(joint, limits=replace(limits, lower=lower, upper=upper))
+    return found
+
+
+def moves(assembly: LoopAssembly, values: Values) -> str:
+    """The coordinates that differ from zero, in words."""
+    found = []
+    for joint, _, _ in assembly.tree:
+        value = values[joint.name]
+        for number, q in enumerate(value if value.ndim == 1 else value[:3, :3][[2, 0, 1], [1, 2, 0]]):
+            if abs(q) > NOISE:
+                suffix = f"[{number}]" if value.size > 1 else ""
+                found.append(f"{joint.name}{suffix} = {q * assembly.unit(joint):.6g}")
+    return comma_list(found)

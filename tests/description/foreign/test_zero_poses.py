@@ -1,0 +1,188 @@
+"""Zero poses that are special, and the postures that files name instead."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from description.foreign.test_traps import read
+from hrsynth import check, derive, legs, modes
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.description import load
+from hrsynth.errors import BadRequest
+from hrsynth.geometry.so3 import exponential, quaternions
+from hrsynth.mechanism import Mechanism
+from oracle import Oracle, span
+
+
+def numbers(*values: float) -> str:
+    return " ".join(f"{value:.17g}" for value in values)
+
+
+def leg(seed: int, crank: float = 0.0, hips: int = 0) -> str:
+    """The leg of a walking robot, thrown: hip, knee and shin in a row, held by a rod with two balls; below it a foot on
+    a four-bar whose crank makes ``crank`` with its rod: at 0 a dead point. ``hips`` more hinges bear the hip."""
+    rng = np.random.default_rng(seed)
+    turned = numbers(*quaternions(exponential(rng.normal(size=3))))
+    a, b, foot, c, d = rng.uniform([0.3, 0.35, 0.3, 0.05, 0.2], [0.5, 0.5, 0.4, 0.08, 0.3])
+    joints = "".join(f'<body name="hip{k}" pos="{numbers(*rng.uniform(-0.1, 0.1, 3))}">'
+                     f'<joint name="hip{k}" axis="{numbers(*rng.normal(size=3))}"/>' for k in range(hips))
+    pin = np.array([c * np.cos(crank), c * np.sin(crank)])
+    end = pin + [d, 0.0]  # where the foot's rod ends, in the shin
+    pivot = end - [0.02, c]
+    ball = np.array([0.05, 0.08, 0.03])  # of the long rod, on the shin
+    return f"""<mujoco model="leg"><compiler angle="radian"/><worldbody>
+ <body name="pelvis" quat="{turned}" pos="{numbers(*rng.normal(size=3))}">{joints}
+  <body name="rod"><joint name="top" type="ball"/></body>
+  <body name="thigh" pos="0.1 0 0"><joint name="knee" axis="0 0 1"/>
+   <body name="spring" pos="0.05 {numbers(-a)} 0"><joint name="spring" axis="0 0 1"/>
+    <body name="shin" pos="{numbers(b)} 0 0"><joint name="shin" axis="0 0 1"/>
+     <body name="crank"><joint name="crank" axis="0 0 1"/>
+      <body name="link" pos="{numbers(*pin)} 0"><joint name="link" axis="0 0 1"/></body></body>
+     <body name="foot" pos="{numbers(*pivot)} 0"><joint name="foot" axis="0 0 1"/></body>
+ </body></body></body></body>{"</body>" * hips}</worldbody>
+ <equality><connect body1="link" body2="foot" anchor="{numbers(d)} 0 0"/>
+  <connect body1="rod" body2="shin" anchor="{numbers(0.15 + b + ball[0], ball[1] - a, ball[2])}"/></equality>
+ <actuator><motor joint="knee"/><motor joint="foot"/></actuator></mujoco>"""
+
+
+def seen(robot: Mechanism, walk: np.random.Generator) -> dict[tuple[str, ...], int]:
+    """How many of the platform's freedoms each set of default segments sees at random configurations, by screws: the
+    dof less the dimension of what moves with all directions at rest."""
+    setting = ObservedRobot.of(robot)
+    oracle = Oracle(setting.mechanism)
+    (state,) = oracle.random_walk(walk, 1)
+    sets = {each.legs: [o for o in setting.segments if o.leg in each.legs] for each in legs(robot).sets}
+    found = {}
+    for labels, observed in sets.items():
+        rho = oracle.relation(state, observed)
+        t, u = rho[:6], rho[6:]
+        _, s, right = np.linalg.svd(u)
+        still = right[int(np.sum(s > 1e-7)):].T
+        found[labels] = span(t).shape[1] - (span(t @ still).shape[1] if still.size else 0)
+    return found
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_leg_at_a_dead_point_is_judged_at_generic_configurations(seed: int, tmp_path: Path):
+    robot = read(tmp_path, leg(seed), "xml", base="pelvis", platform="foot")
+    answer = legs(robot)
+    assert {each.legs: each.rank for each in answer.sets} == seen(robot, np.random.default_rng(seed))
+    assert max(each.rank for each in answer.sets) < answer.dof == 3
+    special = [note.text for note in robot.notes if "special" in note.text]
+    assert len(special) == 1
+    (posture,) = check(robot).postures
+    assert not any(posture.hidden.classes.to_dict().values())
+    setting = ObservedRobot.of(robot)
+    assert (setting.everything.led, posture.hidden.rank) == (True, answer.sets[-1].rank)
+
+
+@pytest.mark.parametrize("hips", [1, 2])
+def test_a_dead_point_below_further_joints_is_no_meeting_of_modes(hips: int, tmp_path: Path):
+    robot = read(tmp_path, leg(0, hips=hips), "xml", base="pelvis", platform="foot", keyframe="zero")
+    answer = legs(robot)
+    assert {each.legs: each.rank for each in answer.sets} == seen(robot, np.random.default_rng(hips))
+
+
+def test_every_question_is_answered_at_a_dead_point(tmp_path: Path):
+    robot = read(tmp_path, leg(0), "xml", base="pelvis", platform="foot", keyframe="zero")
+    (posture,) = check(robot).postures
+    generic = legs(robot).sets[-1]
+    assert posture.hidden.rank == posture.dof
+    assert f"but special: {generic.dof - generic.rank} fewer are lost than at generic poses" in str(check(robot))
+    assert modes(robot).found.continuum is not None
+    assert derive(robot).verdict.rank == generic.rank
+
+
+def test_a_regular_zero_pose_is_kept(tmp_path: Path):
+    robot = read(tmp_path, leg(0, crank=0.7), "xml", base="pelvis", platform="foot")
+    assert not [note for note in robot.notes if note.kind == "solved"]
+
+
+TREE = """<mujoco model="tree"><compiler angle="{unit}"/><worldbody>
+ <body name="trunk" pos="0 0 1"><freejoint/><geom size="0.1"/>
+  <body name="thigh" pos="0.1 0.2 0" euler="{euler}"><joint name="hip" axis="1 2 0" ref="{ref}"/><geom size="0.1"/>
+   <body name="shank" pos="0.3 0 0"><joint name="slide" type="slide" axis="0 1 1" ref="0.25"/>
+    <joint name="turn" axis="0 0 1" pos="0.1 0 0"/><geom size="0.1"/>
+    <body name="foot" pos="0 0.1 0.2"><joint name="ankle" type="ball" pos="0.02 0 0.01"/><geom size="0.1"/></body>
+ </body></body></body></worldbody>
+ <keyframe><key name="crouch" qpos="{qpos}"/><key qpos="{other}"/><key name="short" qpos="1 2"/></keyframe></mujoco>"""
+
+
+@pytest.mark.parametrize("unit", ["radian", "degree"])
+def test_keyframes_place_all_links_as_mujoco_does(unit: str, tmp_path: Path):
+    mujoco = pytest.importorskip("mujoco")
+    rng = np.random.default_rng(3)
+    scale = 1.0 if unit == "radian" else 180 / np.pi
+    poses = rng.uniform(-0.8, 0.8, (2, 14))
+    text = TREE.format(unit=unit, euler=numbers(*(scale * rng.normal(size=3))), ref=numbers(0.4 * scale),
+                       qpos=numbers(*poses[0]), other=numbers(*poses[1]))
+    sound = text.replace('<key name="short" qpos="1 2"/>', "")
+    model = mujoco.MjModel.from_xml_string(sound)
+    for number, name in enumerate(("crouch", "1")):
+        robot = read(tmp_path, text, "xml", platform="foot", base="world", keyframe=name)
+        assert any("keyframe 'short'" in note.text for note in robot.notes)
+        data = mujoco.MjData(model)
+        mujoco.mj_resetDataKeyframe(model, data, number)
+        mujoco.mj_forward(model, data)
+        for link in ("trunk", "thigh", "shank", "foot"):
+            body = data.body(link)
+            assert np.allclose(robot.links[link].pose[:3, 3], body.xpos, atol=1e-12)
+            assert np.allclose(robot.links[link].pose[:3, :3], body.xmat.reshape(3, 3), atol=1e-12)
+    with pytest.raises(BadRequest, match="allowed: crouch, 1"):
+        read(tmp_path, text, "xml", platform="foot", keyframe="stand")
+
+
+def test_a_keyframe_that_is_open_is_closed_beside_itself(tmp_path: Path):
+    robot = read(tmp_path, leg(1).replace("</mujoco>", """<keyframe><key name="home" qpos="0.99 0 0.1 0.1
+                 0.2 -0.1 0.1 0.9 -0.9 0.05"/></keyframe></mujoco>"""), "xml", base="pelvis", platform="foot",
+                 keyframe="home")
+    (note,) = [note.text for note in robot.notes if note.kind == "solved"]
+    assert note.startswith("at the keyframe 'home' the loop")
+    oracle = Oracle(robot)
+    assert oracle.error(oracle.zero()) < 1e-9
+
+
+ARM = """<robot name="arm"><link name="base"/><link name="upper"/><link name="fore"/><link name="cart"/>
+ <joint name="a" type="revolute"><parent link="base"/><child link="upper"/><origin xyz="0 0 0.1"/><axis xyz="0 1 0"/>
+  <limit lower="-1" upper="2" effort="1" velocity="1"/></joint>
+ <joint name="b" type="continuous"><parent link="upper"/><child link="fore"/><origin xyz="0.3 0 0"/>
+  <axis xyz="0 1 0"/></joint>
+ <joint name="c" type="prismatic"><parent link="fore"/><child link="cart"/><axis xyz="1 0 0"/>
+  <limit lower="0" upper="1" effort="1" velocity="1"/></joint></robot>"""
+STATES = """<robot name="arm"><group_state name="ready" group="arm"><joint name="a" value="0.5"/>
+ <joint name="b" value="0.6 0.8"/><joint name="c" value="0.2"/><joint name="root_joint" value="1 2 3"/></group_state>
+ <group_state name="ready" group="other"><joint name="a" value="-0.5"/></group_state></robot>"""
+WORLD = """<sdf version="1.7"><world name="w"><model name="arm"><link name="base"/>
+ <link name="upper"><pose>0 0 0.1 0 0 0</pose></link><link name="fore"><pose>0.3 0 0.1 0 0 0</pose></link>
+ <link name="cart"><pose>0.3 0 0.1 0 0 0</pose></link>
+ <joint name="a" type="revolute"><parent>base</parent><child>upper</child><axis><xyz>0 1 0</xyz></axis></joint>
+ <joint name="b" type="revolute"><parent>upper</parent><child>fore</child><axis><xyz>0 1 0</xyz></axis></joint>
+ <joint name="c" type="prismatic"><parent>fore</parent><child>cart</child><axis><xyz>1 0 0</xyz></axis></joint></model>
+ <state world_name="ready"><model name="arm"><joint name="a"><angle axis="0">0.5</angle></joint>
+ <joint name="b"><angle axis="0">0.9272952180016122</angle></joint>
+ <joint name="c"><angle axis="0">0.2</angle></joint></model></state></world></sdf>"""
+
+
+def test_postures_of_srdf_and_sdf(tmp_path: Path):
+    (tmp_path / "robot.srdf").write_text(STATES)
+    (tmp_path / "urdf").mkdir()
+    elsewhere = tmp_path / "urdf" / "arm.urdf"
+    elsewhere.write_text(ARM)
+    robots = [read(tmp_path, ARM, keyframe="ready"), read(tmp_path, WORLD, "sdf", keyframe="ready"),
+              load(elsewhere, keyframe=f"{tmp_path / 'robot.srdf'}:ready")]
+    (tmp_path / "srdf").mkdir()
+    (tmp_path / "robot.srdf").rename(tmp_path / "srdf" / "arm.srdf")
+    robots.append(load(elsewhere, keyframe="ready"))
+    one, two = 0.5, 0.5 + np.arctan2(0.8, 0.6)
+    reached = [0.3 * np.cos(one) + 0.2 * np.cos(two), 0, 0.1 - 0.3 * np.sin(one) - 0.2 * np.sin(two)]
+    for robot in robots:
+        assert np.allclose(robot.links["cart"].pose[:3, 3], reached, atol=1e-12)
+        assert robot.joints["a"].limits is None or np.isclose(robot.joints["a"].limits.upper, 1.5)
+    assert any("root_joint" in note.text for note in robots[0].notes)
+    other = load(elsewhere, keyframe="other/ready")
+    assert np.allclose(other.links["upper"].pose[:3, 0], exponential(np.array([0, -0.5, 0]))[:, 0])
+    with pytest.raises(BadRequest, match="ready"):
+        load(elsewhere, keyframe="sleep")
