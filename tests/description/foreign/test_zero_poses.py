@@ -26,7 +26,7 @@ def leg(seed: int, crank: float = 0.0, hips: int = 0) -> str:
     a four-bar whose crank makes ``crank`` with its rod: at 0 a dead point. ``hips`` more hinges bear the hip."""
     rng = np.random.default_rng(seed)
     turned = numbers(*quaternions(exponential(rng.normal(size=3))))
-    a, b, foot, c, d = rng.uniform([0.3, 0.35, 0.3, 0.05, 0.2], [0.5, 0.5, 0.4, 0.08, 0.3])
+    a, b, c, d = rng.uniform([0.3, 0.35, 0.05, 0.2], [0.5, 0.5, 0.08, 0.3])
     joints = "".join(f'<body name="hip{k}" pos="{numbers(*rng.uniform(-0.1, 0.1, 3))}">'
                      f'<joint name="hip{k}" axis="{numbers(*rng.normal(size=3))}"/>' for k in range(hips))
     pin = np.array([c * np.cos(crank), c * np.sin(crank)])
