@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from . import completion, files, schema
+from . import completion, files, importing, schema
 from .catalog import catalog
 from .commands import HELP, WholeGroup
 from .questions import QUESTIONS
@@ -23,6 +23,7 @@ app = typer.Typer(
 for question in QUESTIONS:
     question.add(app)
 files.add(app)
+importing.add(app)
 app.add_typer(catalog)
 schema.add(app)
 completion.add(app)

@@ -115,14 +115,19 @@ SOURCE = (
 def robot_of(values: dict[str, Any]) -> Mechanism:
     """The mechanism that the options of ``SOURCE`` name, which are taken out of ``values``; what was guessed or solved
     goes to standard error, a line each."""
+    mechanism = quiet_robot_of(values)
+    for note in mechanism.notes:
+        warn(str(note))
+    return mechanism
+
+
+def quiet_robot_of(values: dict[str, Any]) -> Mechanism:
+    """The same mechanism, of which nothing is told."""
     from ..description import load
 
     given = {option.name: values.pop(option.name) for option in SOURCE}
     given["freeze"] = [name for name in given["freeze"].split(",") if name]
-    mechanism = load(given.pop("robot"), **{**given, "close": given["close"] or ()})
-    for note in mechanism.notes:
-        warn(str(note))
-    return mechanism
+    return load(given.pop("robot"), **{**given, "close": given["close"] or ()})
 
 
 def warn(text: str) -> None:

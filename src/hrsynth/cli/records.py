@@ -792,6 +792,21 @@ class Convert(OfRobot):
     warnings: list[str]
 
 
+class Import(OfRobot):
+    """A robot that was read with answers or guesses and written, and the command that does so without questions."""
+
+    file: str
+    repeat: str
+    links: int
+    joints: int
+    base: str
+    platform: str
+    motors: list[str]
+    observed: dict[str, str]
+    notes: list[str]
+    warnings: list[str]
+
+
 class Verify(Head):
     """A certificate that was accepted, and what it proves."""
 
@@ -889,6 +904,7 @@ RECORDS: dict[str, Any] = {
     "derive": Derive, "legs": LegsAnswer, "check": CheckAnswer, "singular": Singular, "advise": Advise,
     "modes": AssemblyModesRecord, "atlas": AtlasAnswer, "path": Path, "servo": Servo, "accuracy": AccuracyAnswer,
     "select": Select, "view": ViewAnswer, "verify": Verify, "robots": Robots, "convert": Convert,
+    "import": Import,
     "catalog build": CatalogBuild, "catalog list": CatalogList, "catalog show": CatalogShow,
     "catalog site": CatalogSite}
 """The type of each command's record."""

@@ -60,18 +60,22 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
             raise BadRequest("what a file does not say is given for a robot that was read", robot.name,
                              "the file of a robot, or its name")
         return robot
+    return read(file_of(robot), overrides)
+
+
+def file_of(robot: str | Path) -> Path:
+    """The file that a name or a path stands for; raises ``BadRequest`` for a name of no robot."""
     path = Path(robot)
     if isinstance(robot, str) and robot.startswith(PREFIX) and not os.path.exists(robot):
-        found = _named(robot.removeprefix(PREFIX), examples(), "not a robot of example-robot-data", "robots --examples")
-        return read(found, overrides)
+        return _named(robot.removeprefix(PREFIX), examples(), "not a robot of example-robot-data", "robots --examples")
     if isinstance(robot, str) and not path.suffix and len(path.parts) == 1:
         robots = shipped()
         with contextlib.suppress(OSError, ValueError):
             if path.is_file():
-                return read(path, overrides)
+                return path
         if robot in robots or not os.path.exists(robot):
-            return read(_named(robot, robots, "neither a file nor a shipped robot", "robots"), overrides)
-    return read(path, overrides)
+            return _named(robot, robots, "neither a file nor a shipped robot", "robots")
+    return path
 
 
 def _named(name: str, files: dict[str, Path], what: str, command: str) -> Path:

@@ -40,6 +40,13 @@ def platform(graph: JointGraph, base: str) -> str:
     return link
 
 
+def platforms(graph: JointGraph, base: str) -> tuple[list[str], str]:
+    """The link that is guessed and why, or the links among which nothing decides, and no reason."""
+    bodies = _RigidBodies(graph, base)
+    body, why, rivals = bodies.platform()
+    return [bodies.title(each) for each in (rivals if body is None else (body,))], why
+
+
 class _RigidBodies:
     """Links held together by fixed joints are one body, named by its first link."""
 
