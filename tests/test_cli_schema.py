@@ -38,6 +38,7 @@ QUICK = {
     "verify": ["c.json"],
     "robots": ["", "--examples"],
     "convert": ["delta d.yaml", "3rrr_m1 r.sdf"],
+    "import": ["delta -o d.urdf"],
     "catalog build": ["--check --sample 1 planar"],
     "catalog list": ["--legs 3 --dof 2", "--text refused"],
     "catalog show": ["'3(Rz*-Rz-Rz)'"],

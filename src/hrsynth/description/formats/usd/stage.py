@@ -48,6 +48,6 @@ def _run(path: Path, *arguments: str) -> bytes:
         raise xml.refusal(path, "OpenUSD does not come to an end", f"{USD_SECONDS} seconds") from None
     if run.returncode:
         lines = [line for line in run.stderr.decode("utf-8", "replace").splitlines() if line.startswith("refused: ")]
-        what = lines[-1].removeprefix("refused: ") if lines else "OpenUSD cannot open it"
+        what = lines[-1].removeprefix("refused: ") if lines else "OpenUSD does not open it"
         raise xml.refusal(path, what[:400])
     return run.stdout

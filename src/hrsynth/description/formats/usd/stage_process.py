@@ -41,7 +41,7 @@ def require_inside(start: Path, largest: int, most: int) -> None:
             refuse(f"too many layers, allowed: up to {most}")
         layer = Sdf.Layer.FindOrOpen(str(path))
         if layer is None:
-            refuse(f"OpenUSD cannot open {path.name}")
+            refuse(f"OpenUSD does not open {path.name}")
         clips: list[str] = []
 
         def look(place: Any, layer: Any = layer, clips: list[str] = clips) -> None:
@@ -146,7 +146,7 @@ def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
     try:
         from pxr import Tf, Usd
     except ImportError as error:
-        refuse(f"OpenUSD's package cannot be loaded: {error}")
+        refuse(f"OpenUSD's package does not load: {error}")
     try:
         require_inside(Path(name), int(largest), int(most))
         stage = Usd.Stage.Open(name)
