@@ -14,12 +14,16 @@ LARGEST_GRID = 100_000
 FARTHEST_POSE = 1e9
 """Metres or radians in a pose beyond which it is taken for a slip: numbers no longer tell nearby poses apart
 there."""
+LARGEST_ROBOT = 20.0
+"""Characteristic length (m) above which it is asked whether a file has millimetres."""
 LARGEST_NUMBER = 1e9
 """Largest magnitude of a number that a robot file may hold (metres, radians)."""
 LARGEST_FILE = 20_000_000
 """Bytes above which a robot file is not read at all."""
 MOST_ELEMENTS = 100_000
 """Elements above which an XML document is not parsed."""
+MOST_PREFIXES = 16
+"""Times that a document is parsed again with what stopped the parser left out."""
 MOST_LINKS = 1000
 """Links above which a foreign file is refused."""
 MOST_INCLUDES = 50
@@ -50,6 +54,8 @@ MOST_RELATED_ON_LINK = 40
 """Joints of one link above which relations among them are not looked for."""
 MOST_CANDIDATES = 12
 """Pairs of frames that are told as possible closures."""
+MOST_BESIDE = 50
+"""Files of a kind beside a robot file above which none of them is looked at."""
 LARGEST_YAML = 1_000_000
 """Bytes of a YAML file above which it is not read."""
 LARGEST_GUESSED = 150

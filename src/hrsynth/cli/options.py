@@ -4,6 +4,7 @@ completion of shells are made of them."""
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Annotated, Any
@@ -103,11 +104,13 @@ SOURCE = (
     Option("base", "Look only at what lies between this link and the platform.", "LINK", group=READING),
     Option("platform", "The platform, where the file names none.", "LINK", group=READING),
     Option("motors", "The driven joints, where the file names none.", "JOINTS", group=READING),
-    Option("close", "A closure: the frames of two links meet (default: in a point); again for more.", "A:B[:TYPE]",
-           kind=list[str], group=READING),
+    Option("close", "A closure: the frames of two links, or points A@x,y,z in them, meet (default: in a point); again "
+           "for more.", "A:B[:TYPE]", kind=list[str], group=READING),
     Option("freeze", "Joints to hold at zero.", "JOINTS", default="", group=READING),
     Option("keyframe", "Its zero pose: a posture that the file, or an SRDF file beside it, names; or FILE.srdf:NAME.",
            "NAME", group=READING),
+    Option("unit", "The unit of the file's lengths: m, mm, cm or in.", "UNIT", group=READING,
+           words=("m", "mm", "cm", "in")),
 )
 """A robot as the command line names it, with what its file does not say."""
 
@@ -133,6 +136,17 @@ def quiet_robot_of(values: dict[str, Any]) -> Mechanism:
 def warn(text: str) -> None:
     """Say something beside the answer."""
     typer.echo(f"hrsynth: {text}", err=True)
+
+
+def told_radians(option: str, text: str | None) -> None:
+    """Say how many degrees a small angle is that was given without a unit."""
+    for field in (text or "").split(","):
+        try:
+            angle = float(field.rpartition("=")[2])
+        except ValueError:
+            continue
+        warn(f"--{option} {field.strip()}: radians, that is {math.degrees(angle):.3g} degrees "
+             f"({field.strip()}deg would be degrees)")
 
 
 def listed(text: str) -> list[str]:

@@ -28,6 +28,7 @@ from .options import (
     listed,
     output,
     robot_of,
+    told_radians,
     warn,
 )
 from .progress import Progress
@@ -65,6 +66,8 @@ class Question:
         files = {each: values.pop(each.option) for each in OUTPUTS[self.name].files if each.option is not None}
         for each, path in files.items():
             each.require(path, values)
+        for option in ("cone", "noise"):
+            told_radians(option, values.get(option))
         source = values["robot"]
         more = {each.record: None for each in files if each.record is not None}
         writers = []

@@ -16,7 +16,7 @@ from .dialect import Dialect
 from .example_data import PREFIX, examples
 from .files import require_same, write_whole
 from .formats import native
-from .overrides import Overrides, names
+from .overrides import Overrides, closures, names
 from .reading import read
 from .tree import spanning
 
@@ -32,16 +32,17 @@ def shipped() -> dict[str, Path]:
 
 def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: str | None = None,
          motors: Iterable[str] | str | None = None, observe: Iterable[str] | str | None = None,
-         close: Iterable[str] | str = (), freeze: Iterable[str] | str = (), keyframe: str | None = None
-         ) -> Mechanism:
+         close: Iterable[str] | str = (), freeze: Iterable[str] | str = (), keyframe: str | None = None,
+         unit: str | None = None) -> Mechanism:
     """The mechanism of a robot file in any dialect, of a shipped robot given by its name, or of one of the package
     example-robot-data (``example:cassie``); a mechanism is given back as it is.
 
     What a file does not say may be given: the ``platform`` link, the joints of the ``motors``, the links to
-    ``observe`` at their default segments, closures ``A:B[:type]`` that make the frames of two links meet, joints to
-    ``freeze``, a ``keyframe`` that the file or an SRDF file beside it names, which becomes the zero pose (or
-    ``FILE.srdf:NAME``). With ``base`` only what lies between base and platform remains. Lists may be texts with commas.
-    What was guessed or solved is told in the mechanism's ``notes``.
+    ``observe`` at their default segments, closures ``A:B[:type]`` that make the frames of two links (or points
+    ``A@x,y,z`` in them) meet, joints to ``freeze``, a ``keyframe`` that the file or an SRDF file beside it names, which
+    becomes the zero pose (or ``FILE.srdf:NAME``), the ``unit`` of the file's lengths (m, mm, cm, in). With ``base``
+    only what lies between base and platform remains. Lists may be texts with commas. What was guessed or solved is told
+    in the mechanism's ``notes``.
 
     Raises
     ------
@@ -53,8 +54,8 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
     LoopsNotClosed, RankUndecided
         For a file whose loops stay open, or in which rounded numbers leave no gap between free and held.
     """
-    overrides = Overrides(base, platform, names(motors), names(close) or (), names(freeze) or (), names(observe),
-                          keyframe)
+    overrides = Overrides(base, platform, names(motors), closures(close), names(freeze) or (), names(observe), keyframe,
+                          unit)
     if isinstance(robot, Mechanism):
         if overrides.any or base is not None or observe is not None:
             raise BadRequest("what a file does not say is given for a robot that was read", robot.name,

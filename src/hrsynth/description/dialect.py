@@ -15,12 +15,13 @@ from .jointgraph import JointGraph
 @dataclass(frozen=True, eq=False)
 class RobotFile:
     """A file that was opened: its place, its document (None where it is no XML), whether what it says of itself stands,
-    as nothing was given that changes it, and what it begins with."""
+    as nothing was given that changes it, what it begins with, and what was left out of its text."""
 
     path: Path
     root: xml.Element | None
     strict: bool = True
     start: bytes = b""
+    notes: tuple[Note, ...] = ()
 
     @property
     def document(self) -> xml.Element:

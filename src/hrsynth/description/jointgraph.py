@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -105,6 +105,8 @@ class JointGraph:
     """Guesses of one kind about many joints: what, and which."""
     postures: dict[str, Posture] = field(default_factory=dict)
     """Postures that the file names."""
+    unit: float = 1.0
+    """Metres in the file's unit of length, in which postures stay."""
 
     def note(self, kind: str, text: str) -> None:
         """Record what the file does not say."""
@@ -130,6 +132,31 @@ class JointGraph:
         """Add a joint that closes a loop; of ``axes`` it takes as many as its type has."""
         self.joints[name] = JointSpec(name, kind, ends, tuple(axes[: kind.axes]), None, (), line, motor, in_tree=False)
 
+    def scale(self, factor: float) -> None:
+        """Multiply all lengths: frames on links, limits and gears of slides."""
+        self.unit *= factor
+        slides = {name for name, joint in self.joints.items() if joint.type is JointType.PRISMATIC}
+        for name, joint in self.joints.items():
+            one, two = (FrameSpec(end.link, scaled(end.X, factor), end.line) for end in joint.ends)
+            limits = joint.limits
+            if limits is not None and name in slides:
+                lower, upper, velocity = (None if value is None else factor * value
+                                          for value in (limits.lower, limits.upper, limits.velocity))
+                limits = replace(limits, lower=lower, upper=upper, velocity=velocity)
+            self.joints[name] = replace(joint, ends=(one, two), limits=limits)
+        units = {name: factor if name in slides else 1.0 for name in self.joints}
+        self.gears = [replace(gear, ratio=gear.ratio * units[gear.driven] / units[gear.driver],
+                              offset=gear.offset * units[gear.driven]) for gear in self.gears]
+
+    def in_metres(self, posture: Posture) -> Posture:
+        """A posture of the file with its lengths in metres."""
+        if self.unit == 1:
+            return posture
+        slides = (JointType.PRISMATIC, JointType.FREE)
+        return {name: scaled(value, self.unit) if value.ndim == 2 else self.unit * value
+                if name in self.joints and self.joints[name].type in slides else value
+                for name, value in posture.items()}
+
     def prune(self, base: str) -> None:
         """Leave out what no chain of joints joins to ``base``, and record it."""
         kept = graphs.component(graphs.adjacency(self.links, (joint.links for joint in self.joints.values())), base)
@@ -146,6 +173,15 @@ def comma_list(names: Iterable[str], most: int = 8) -> str:
     """Names set apart by commas, the first of many."""
     every = list(names)
     return ", ".join(every[:most]) + (" …" if every[most:] else "")
+
+
+def scaled(X: Array, factor: float) -> Array:
+    """A pose (4, 4) with its translation multiplied."""
+    if X is ORIGIN:
+        return X
+    larger = X.copy()
+    larger[:3, 3] *= factor
+    return frozen(larger)
 
 
 TreeJoint = tuple[JointSpec, str, str]

@@ -2,23 +2,34 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
+import numpy as np
+
 from ..errors import BadRequest
+from ..geometry.vectors import frozen, pose
 from ..mechanism.legs import decompose
 from ..mechanism.model import JointType, Mechanism, Motor
 from ..mechanism.normal import normal_form
 from ..mechanism.sensors import observation_of
+from . import numerals
 from .jointgraph import LOOP_TYPES, FrameSpec, JointGraph, comma_list
 
 CLOSURES = {"3d": JointType.SPHERICAL, "6d": JointType.FIXED, **LOOP_TYPES}
+UNITS = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "in": 0.0254}
+"""Units of length (m)."""
+_NUMBER = r"[+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?"
+_END = rf"(?:[^:,@]|::)+(?:@{_NUMBER},{_NUMBER},{_NUMBER})?"
+_CLOSURE = re.compile(rf"(?P<one>{_END}):(?P<two>{_END})(?::(?P<kind>\w+))?")
 
 
 @dataclass(frozen=True)
 class Overrides:
-    """Base, platform, the motors' joints, closures ``A:B[:type]``, joints to freeze, links to observe, the posture that
-    is the zero pose; None or empty where the file (or a guess) decides."""
+    """Base, platform, the motors' joints, closures ``A:B[:type]`` (A, B links, or points ``A@x,y,z`` in them), joints
+    to freeze, links to observe, the posture that is the zero pose, the unit of the file's lengths; None or empty where
+    the file (or a guess) decides."""
 
     base: str | None = None
     platform: str | None = None
@@ -27,15 +38,20 @@ class Overrides:
     freeze: tuple[str, ...] = ()
     observe: tuple[str, ...] | None = None
     keyframe: str | None = None
+    unit: str | None = None
 
     @property
     def any(self) -> bool:
         """Whether anything is given that changes what the file says."""
-        return bool(self.platform or self.motors is not None or self.close or self.freeze
+        return bool(self.platform or self.motors is not None or self.close or self.freeze or self.unit
                     or self.keyframe is not None)
 
     def apply(self, graph: JointGraph) -> None:
-        """Closures, frozen joints and motors, in the graph of a file."""
+        """Unit, closures, frozen joints and motors, in the graph of a file."""
+        if self.unit is not None:
+            if self.unit not in UNITS:
+                raise BadRequest("--unit", self.unit, ", ".join(UNITS))
+            graph.scale(UNITS[self.unit])
         for closure in self.close:
             _close(graph, closure)
         for name in self.freeze:
@@ -54,20 +70,47 @@ def names(value: str | Iterable[str] | None) -> tuple[str, ...] | None:
     return tuple(name.strip() for name in parts)
 
 
+def closures(value: str | Iterable[str]) -> tuple[str, ...]:
+    """A list of closures, also as one text set apart by commas, of which points have some of their own."""
+    if not isinstance(value, str):
+        return tuple(each.strip() for each in value)
+    whole = re.fullmatch(rf"\s*{_CLOSURE.pattern}(?:\s*,\s*{_CLOSURE.pattern.replace('?P<', '?P<_')})*\s*", value)
+    return tuple(match[0].strip() for match in _CLOSURE.finditer(value)) if whole else names(value) or ()
+
+
 def _close(graph: JointGraph, wish: str) -> None:
-    """A closure ``A:B[:type]``: the frames of links A and B meet in all that the type does not leave free (its axis is
-    the z axis of A's frame); a point where no type is given."""
-    parts = wish.split(":")
-    kind = CLOSURES.get(parts[2] if len(parts) == 3 else "spherical")
-    if len(parts) not in (2, 3) or kind is None or kind is JointType.UNIVERSAL:
-        raise BadRequest("--close", wish, "A:B or A:B:TYPE with TYPE one of "
-                         + ", ".join(name for name in CLOSURES if name != "universal"))
-    for link in parts[:2]:
+    """A closure ``A:B[:type]``: the frames of links A and B, or those frames shifted to points ``A@x,y,z``, meet in all
+    that the type does not leave free (its axis is the z axis of A's frame); a point where no type is given. What closes
+    the same two frames in the file gives way to it."""
+    match = _CLOSURE.fullmatch(wish)
+    kind = None if match is None else CLOSURES.get(match["kind"] or "spherical")
+    if match is None or kind is None or kind is JointType.UNIVERSAL:
+        raise BadRequest("--close", wish, "A:B or A:B:TYPE, A and B links or points A@x,y,z in them (metres), TYPE one "
+                         "of " + ", ".join(name for name in CLOSURES if name != "universal"))
+    ends = []
+    for end in (match["one"], match["two"]):
+        link, at, point = end.partition("@")
         if link not in graph.links:
             raise BadRequest("--close: no such link", link, comma_list(graph.links))
-    if parts[0] == parts[1]:
+        try:
+            ends.append(FrameSpec(link, frozen(pose(numerals.parse(point.replace(",", " "), 3)))) if at
+                        else FrameSpec(link))
+        except ValueError as error:
+            raise BadRequest("--close: a point", end, str(error)) from None
+    one, two = ends
+    if one.link == two.link:
         raise BadRequest("--close: a link cannot meet itself", wish, "two links")
-    graph.close(graph.fresh(f"close_{parts[0]}_{parts[1]}"), kind, (FrameSpec(parts[0]), FrameSpec(parts[1])))
+    for name, joint in list(graph.joints.items()):
+        if not joint.in_tree and _same_ends(joint.ends, (one, two)):
+            del graph.joints[name]
+    graph.close(graph.fresh(f"close_{one.link}_{two.link}"), kind, (one, two))
+
+
+def _same_ends(ends: tuple[FrameSpec, FrameSpec], others: tuple[FrameSpec, FrameSpec]) -> bool:
+    """Whether two closures join the same two places."""
+    table = {end.link: end.X[:3, 3] for end in others}
+    return {end.link for end in ends} == set(table) and all(
+        np.array_equal(table[end.link], end.X[:3, 3]) for end in ends)
 
 
 def _drive(graph: JointGraph, wanted: Iterable[str]) -> None:

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import os
+from dataclasses import replace
 from pathlib import Path
 
-from ..budgets import MOST_LINKS
-from ..mechanism.model import Mechanism
+from ..budgets import LARGEST_ROBOT, MOST_LINKS
+from ..mechanism.model import Mechanism, Note
 from ..mechanism.part import between
 from . import formats, xml
 from .dialect import RobotFile
@@ -39,6 +40,9 @@ def _part(robot: Mechanism, overrides: Overrides) -> Mechanism:
     """What of a robot is asked about: all of it, or what lies between base and platform; and what is watched."""
     if overrides.base is not None:
         robot = spanning(between(robot, overrides.base, overrides.platform or robot.platform))
+    if overrides.unit is None and robot.length > LARGEST_ROBOT:
+        text = f"the robot's characteristic length is {robot.length:.3g} m: if its file has millimetres, --unit mm"
+        robot = replace(robot, notes=(*robot.notes, Note("open", text)))
     return robot if overrides.observe is None else observe_links(robot, overrides.observe)
 
 
@@ -51,10 +55,11 @@ def robot_file(path: Path, *, strict: bool = True) -> RobotFile:
         return RobotFile(path, None, strict, data[:8])
     if path.suffix.lower() in (".yaml", ".yml") and not data.lstrip().startswith(b"<"):
         return RobotFile(path, None, strict)
-    root = xml.document(data, str(path))
+    notes: list[Note] = []
+    root = xml.document(data, str(path), notes)
     if not (strict and root.find("hrsynth") is not None):
         _require_few(path, root)
-    return RobotFile(path, xacro.expand(path) if xacro.is_needed(root) else root, strict)
+    return RobotFile(path, xacro.expand(path) if xacro.is_needed(root) else root, strict, notes=tuple(notes))
 
 
 def _require_few(path: Path, root: xml.Element) -> None:

@@ -10,12 +10,15 @@ from typing import TypeAlias
 
 from lxml import etree
 
-from ..budgets import LARGEST_FILE, MOST_ELEMENTS
+from ..budgets import LARGEST_FILE, MOST_ELEMENTS, MOST_PREFIXES
 from ..errors import BadRequest, BadRobotFile, Defect
+from ..mechanism.model import Note
 
 Element: TypeAlias = etree._Element
 
 _COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+_PREFIX = re.compile(r"Namespace prefix (?P<prefix>[A-Za-z_][\w.-]*) (?:on|for) ", re.ASCII)
+_ROOT = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s+|<\?.*?\?>|<!--.*?-->)*<[^\s/>]+", re.DOTALL)
 _DECLARATION = re.compile(rb"<!\s*(DOCTYPE|ENTITY)")
 
 _ATTRIBUTE = re.compile(r"@(?P<name>(\{[^}]*\})?[^=]*)=(?P<value>.*)", re.DOTALL)
@@ -54,8 +57,12 @@ def content(path: str | Path) -> bytes:
     return data
 
 
-def document(text: bytes | str, file: str) -> Element:
-    """The root element of an XML document; raises :class:`BadRobotFile` with the line where it stops being one."""
+def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> Element:
+    """The root element of an XML document; raises :class:`BadRobotFile` with the line where it stops being one.
+
+    Where ``notes`` are taken, comments that hold ``--`` are left out, and prefixes that nothing declares are read as
+    if it did; both are noted.
+    """
     data = text.encode() if isinstance(text, str) else text
     if not data.strip():
         raise refusal(file, "an empty file", line=1)
@@ -70,15 +77,39 @@ def document(text: bytes | str, file: str) -> Element:
     if declaration := _DECLARATION.search(bare):
         raise refusal(file, "a document type declaration, which is not allowed",
                       line=bare.count(b"\n", 0, declaration.start()) + 1)
-    try:
-        return etree.fromstring(data, _parser())
-    except etree.XMLSyntaxError as error:
-        what, at = (error.msg or "syntax error").split(", line ")[0], error.lineno or 1
-    except (ValueError, LookupError) as error:
-        what, at = str(error), 1
+    for _ in range(MOST_PREFIXES):
+        try:
+            return etree.fromstring(data, _parser())
+        except etree.XMLSyntaxError as error:
+            what, at = (error.msg or "syntax error").split(", line ")[0], error.lineno or 1
+        except (ValueError, LookupError) as error:
+            what, at = str(error), 1
+        mended = data if notes is None else _mended(data, what, notes)
+        if mended == data:
+            break
+        data = mended
     # raised here, not above: libraries that send errors between processes take their context along, and the parser's
     # own error cannot be sent
     raise refusal(file, "malformed XML", value=what, line=at)
+
+
+def _mended(data: bytes, what: str, notes: list[Note]) -> bytes:
+    """A document without what stopped the parser, where that means nothing: its lines stay where they are."""
+    prefix, root = _PREFIX.search(what), _ROOT.match(data)
+    if prefix is not None and root is not None:
+        notes.append(Note("ignored", f"no xmlns:{prefix['prefix']} declares the prefix {prefix['prefix']!r}; its "
+                                     "elements are read all the same"))
+        declared = f' xmlns:{prefix["prefix"]}="urn:undeclared:{prefix["prefix"]}"'.encode()
+        return data[: root.end()] + declared + data[root.end():]
+    if "comment" not in what.lower():
+        return data
+    wrong = [match for match in _COMMENT.finditer(data) if b"--" in match[0][4:-2]]
+    if wrong:
+        line = data.count(b"\n", 0, wrong[0].start()) + 1
+        notes.append(Note("ignored", f"{len(wrong)} comments that hold '--', which XML does not allow, the first in "
+                                     f"line {line}" if wrong[1:] else
+                          f"a comment that holds '--', which XML does not allow, in line {line}"))
+    return _COMMENT.sub(lambda match: b"\n" * match[0].count(b"\n") if b"--" in match[0][4:-2] else match[0], data)
 
 
 class SourceLine(int):

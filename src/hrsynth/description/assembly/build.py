@@ -35,7 +35,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     closures.join_halves(graph)
     overrides.apply(graph)
     closures.merge_points(graph)
-    base = graph.base or guess.base(graph)
+    base = guess.standing(graph, graph.base or guess.base(graph), overrides.base)
     graph.prune(base)
     for role, link in (("base", overrides.base), ("platform", overrides.platform)):
         if link is not None and link not in graph.links:
@@ -45,7 +45,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     platform = overrides.platform or graph.platform or guess.platform(graph, overrides.base or base)
     if platform == base and overrides.base is None:
         raise BadRequest(f"{graph.file}: the platform is the base", platform, "another link")
-    start = None if overrides.keyframe is None else posture(graph, overrides.keyframe)
+    start = None if overrides.keyframe is None else graph.in_metres(posture(graph, overrides.keyframe))
     assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears, start)
     if assembly.size > MOST_LOOP_COORDINATES or len(assembly.loops) > MOST_LOOP_COORDINATES:
         raise BadRequest(f"{graph.file}: {len(assembly.loops)} loops through joints with {assembly.size} coordinates",
@@ -54,7 +54,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     if not solution.residual <= NOISE:
         raise LoopsNotClosed(graph.file, solution.residual, NOISE, assembly.worst(solution.values)[0])
     _note_solution(graph, assembly, solution, overrides.keyframe)
-    mechanism = closures.planar_points(_mechanism(graph, base, platform, assembly, solution.values))
+    mechanism = closures.points_as_hinges(_mechanism(graph, base, platform, assembly, solution.values))
     if not all(joint.in_tree for joint in mechanism.joints.values()):
         mechanism = _away_from_singular(as_meant(mechanism, solution.residual))
     if graph.platform is None:

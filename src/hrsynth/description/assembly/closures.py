@@ -59,27 +59,62 @@ def _frame(z: Array, near: Array | None) -> Array:
     return np.column_stack((x, np.cross(unit(z), x), unit(z)))
 
 
-def planar_points(mechanism: Mechanism) -> Mechanism:
-    """A point closure between two links that can only move in a plane is a revolute joint normal to it."""
+def points_as_hinges(mechanism: Mechanism) -> Mechanism:
+    """A point closure between two links that can only move in a plane is a revolute joint normal to it; one between two
+    links that can only turn about a common centre is a revolute joint through that centre."""
     joints, notes = dict(mechanism.joints), list(mechanism.notes)
     for joint in [j for j in joints.values() if j.type is JointType.SPHERICAL and not j.in_tree]:
-        normal = _plane_of(joint, list(joints.values()))
-        if normal is not None:
-            joints[joint.name] = replace(joint, type=JointType.REVOLUTE, axes=(normal,))
-            notes.append(Note("merged", f"the point {joint.name!r} closes a planar loop: read as a revolute joint"))
+        axis, what = _plane_of(joint, list(joints.values())), "planar"
+        if axis is None:
+            axis, what = _spoke_of(joint, list(joints.values()), NOISE * mechanism.length), "spherical"
+        if axis is not None:
+            joints[joint.name] = replace(joint, type=JointType.REVOLUTE, axes=(axis,))
+            notes.append(Note("merged", f"the point {joint.name!r} closes a {what} loop: read as a revolute joint"))
     return replace(mechanism, joints=joints, notes=tuple(notes))
 
 
 def _plane_of(joint: Joint, joints: list[Joint]) -> Array | None:
     """The normal of the plane in which the joint's two links move relative to each other, or None."""
-    bonds = graphs.adjacency(joint.links, (j.links for j in joints if j.type is JointType.FIXED))
-    bodies = {link for end in joint.links for link in graphs.component(bonds, end)}
-    for candidate in [j for j in joints if j.type is JointType.REVOLUTE and bodies & set(j.links)]:
+    for candidate in _hinges_on(joint, joints):
         normal = candidate.axis
         flat = graphs.adjacency(joint.links, (j.links for j in joints if j.name != joint.name and _flat(j, normal)))
         if joint.links[1] in graphs.component(flat, joint.links[0]):
             return normal
     return None
+
+
+def _spoke_of(joint: Joint, joints: list[Joint], tolerance: float) -> Array | None:
+    """The direction to the joint from the centre about which its two links turn relative to each other, or None;
+    ``tolerance`` (m) is how far axes may miss each other there."""
+    others = [j for j in joints if j.name != joint.name]
+    for candidate in _hinges_on(joint, others):
+        for other in others:
+            if other.type is not JointType.REVOLUTE or lines.parallel(other.axis, candidate.axis):
+                continue
+            centre = lines.meeting_point([(candidate.point, candidate.axis), (other.point, other.axis)], tolerance)
+            if centre is None or np.linalg.norm(joint.point - centre) <= tolerance:
+                continue
+            still = graphs.adjacency(joint.links, (j.links for j in others if _keeps(j, centre, tolerance)))
+            if joint.links[1] in graphs.component(still, joint.links[0]):
+                return unit(joint.point - centre)
+    return None
+
+
+def _hinges_on(joint: Joint, joints: list[Joint]) -> list[Joint]:
+    """The revolute joints on the two bodies that a joint joins."""
+    bonds = graphs.adjacency(joint.links, (j.links for j in joints if j.type is JointType.FIXED))
+    bodies = {link for end in joint.links for link in graphs.component(bonds, end)}
+    return [j for j in joints if j.type is JointType.REVOLUTE and bodies & set(j.links)]
+
+
+def _keeps(joint: Joint, centre: Array, tolerance: float) -> bool:
+    """Whether a joint lets its two links only turn about a centre."""
+    match joint.type:
+        case JointType.REVOLUTE:
+            return lines.distance(centre, joint.point, joint.axis) <= tolerance
+        case JointType.UNIVERSAL | JointType.SPHERICAL:
+            return bool(np.linalg.norm(joint.point - centre) <= tolerance)
+    return joint.type is JointType.FIXED
 
 
 def _flat(joint: Joint, normal: Array) -> bool:

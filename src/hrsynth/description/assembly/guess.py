@@ -21,6 +21,27 @@ def base(graph: JointGraph) -> str:
     return free[0]
 
 
+def standing(graph: JointGraph, base: str, wanted: str | None) -> str:
+    """The link from which a robot is read: its base; where the ``wanted`` one hangs on something else, the root of
+    that; of a robot with loops that only a free joint holds (``<freejoint>``), the link that floats."""
+    bonds = graphs.adjacency(graph.links, (joint.links for joint in graph.joints.values()))
+    if wanted is not None and wanted in graph.links and wanted not in graphs.component(bonds, base):
+        base = wanted
+        carriers = {joint.links[1]: joint.links[0] for joint in graph.joints.values() if joint.in_tree}
+        for _ in carriers:
+            base = carriers.get(base, base)
+    held = [joint for joint in graph.joints.values() if base in joint.links]
+    chain = all(joint.in_tree for joint in graph.joints.values())
+    if wanted == base or chain or len(held) != 1 or held[0].type is not JointType.FREE:
+        return base
+    (free,) = held
+    trunk = next(link for link in free.links if link != base)
+    graph.note("guess", f"{trunk!r} floats on the free joint {free.name!r}: it is the base, and what it floats in is "
+                        "left out")
+    del graph.joints[free.name], graph.links[base]
+    return trunk
+
+
 def platform(graph: JointGraph, base: str) -> str:
     """The link that most ways join to the base; else the only frame on a fixed joint; else the link farthest away.
 

@@ -17,7 +17,7 @@ from ...geometry.ranks import Rank, rank_of
 from ...geometry.vectors import Array, inverse, pose
 from ...mechanism.model import JointType, Mechanism
 from ...tolerances import FAINT, FIRM, NEARLY_SINGULAR, NEWTON_REACH, NOISE, RANK_CUTOFF, RANK_GAP, SOLVED
-from ..jointgraph import FrameSpec, GearSpec, JointSpec, Posture, TreeJoint, spanning_tree, zero_poses
+from ..jointgraph import FrameSpec, GearSpec, JointSpec, Posture, TreeJoint, scaled, spanning_tree, zero_poses
 from ..jointmotion import displacement, opening, screws, step_along, zero
 
 DAMPING = Damping(start=1.0, eased=0.1, least=1e-3, most=1e6)
@@ -72,7 +72,7 @@ class LoopAssembly:
         value = self._start.get(joint.name, at_zero)
         if value.shape != at_zero.shape:
             return at_zero
-        return _stretch(value, 1 / self.length) if value.ndim == 2 else value / self.unit(joint)
+        return scaled(value, 1 / self.length) if value.ndim == 2 else value / self.unit(joint)
 
     def unit(self, joint: JointSpec) -> float:
         """Metres or radians in one unit of a joint's coordinate."""
@@ -91,7 +91,7 @@ class LoopAssembly:
 
     def poses(self, values: Values) -> dict[str, Array]:
         """The pose (4, 4) of every link in the base frame, in metres."""
-        return {link: _stretch(X, self.length) for link, X in self.scaled_poses(values).items()}
+        return {link: scaled(X, self.length) for link, X in self.scaled_poses(values).items()}
 
     def system(self, values: Values) -> tuple[Array, Array]:
         """What is open in all loops and gears (rows,), and its derivative by the active coordinates (rows, size)."""
@@ -283,14 +283,8 @@ def _slip(gear: GearSpec, values: Values) -> Array:
 
 
 def _scale(joint: JointSpec, length: float) -> JointSpec:
-    one, two = (FrameSpec(end.link, _stretch(end.X, 1 / length), end.line) for end in joint.ends)
+    one, two = (FrameSpec(end.link, scaled(end.X, 1 / length), end.line) for end in joint.ends)
     return replace(joint, ends=(one, two))
-
-
-def _stretch(X: Array, factor: float) -> Array:
-    scaled = X.copy()
-    scaled[:3, 3] *= factor
-    return scaled
 
 
 def _spread(base: str, tree: Sequence[TreeJoint]) -> float:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import pkgutil
+from dataclasses import replace
 from functools import cache
 from importlib import import_module
 
@@ -31,7 +32,11 @@ def read(file: RobotFile) -> JointGraph | Mechanism:
     """What a file says, in whatever dialect; one that none of them knows is refused as the native one refuses it."""
     name = next((name for name, dialect in dialects().items() if dialect.knows(file)), NATIVE)
     reader: Read = import_module(f"{__name__}.{name}.read").read
-    return reader(file)
+    robot = reader(file)
+    if isinstance(robot, JointGraph):
+        robot.notes[:0] = file.notes
+        return robot
+    return replace(robot, notes=(*file.notes, *robot.notes)) if file.notes else robot
 
 
 def writer(dialect: str) -> Write:

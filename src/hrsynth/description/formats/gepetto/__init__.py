@@ -5,17 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 
 from ...dialect import Dialect, RobotFile
-from .settings import settings_beside
-
-_YAML = (".yaml", ".yml")
+from .settings import ENDINGS, settings_beside
 
 
 def _files(path: Path) -> tuple[Path, ...]:
-    return path.with_suffix(".urdf"), path if path.suffix.lower() in _YAML else path.with_suffix(".yaml")
+    return path.with_suffix(".urdf"), path if path.suffix.lower() in ENDINGS else path.with_suffix(".yaml")
 
 
 def _knows(file: RobotFile) -> bool:
     return file.root is None or settings_beside(file) is not None
 
 
-DIALECT = Dialect("gepetto", _knows, _YAML, _files, rank=-1)
+DIALECT = Dialect("gepetto", _knows, ENDINGS, _files, rank=-1)

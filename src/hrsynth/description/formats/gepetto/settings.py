@@ -6,10 +6,12 @@ import os
 from pathlib import Path
 from typing import Any
 
-from ....budgets import LARGEST_YAML
+from ....budgets import LARGEST_YAML, MOST_BESIDE
+from ....errors import BadRobotFile
 from ... import xml
 from ...dialect import RobotFile
 
+ENDINGS = (".yaml", ".yml")
 KEYS = ("closed_loop", "type", "name_mot", "joint_name", "joint_type")
 
 
@@ -35,8 +37,10 @@ def settings_in(path: Path) -> dict[str, Any] | None:
 
 
 def settings_beside(file: RobotFile) -> tuple[Path, dict[str, Any]] | None:
-    """The YAML file beside a URDF that has no loops of its own and what it says, where there is one of this dialect."""
-    if file.tag != "robot" or file.has("loop"):
+    """The YAML file beside a URDF that has no loops of its own and what it says, where there is one of this dialect: of
+    the same name, else the only one of another name that closes loops at links and joints which the URDF has. Raises
+    ``BadRobotFile`` where several do."""
+    if file.root is None or file.tag != "robot" or file.has("loop"):
         return None
     own = file.path.with_suffix(".yaml").name
     for name in dict.fromkeys((own, *(("robot.yaml", "robot.yml") if file.path.stem == "robot" else ()))):
@@ -45,4 +49,38 @@ def settings_beside(file: RobotFile) -> tuple[Path, dict[str, Any]] | None:
             found = settings_in(beside)
             if found is not None:
                 return beside, found
-    return None
+    if file.has("hrsynth"):
+        return None
+    named = [(path, found) for path in in_folder(file.path, *ENDINGS) if (found := _closing(path)) is not None
+             and frames_of(found) <= {str(each.get("name")) for each in file.root.iter("link", "joint")}]
+    if len(named) > 1:
+        raise xml.refusal(file.path, f"{len(named)} YAML files beside it close its loops", "one of them named instead",
+                          value=", ".join(path.name for path, _ in named))
+    return named[0] if named else None
+
+
+def in_folder(path: Path, *endings: str) -> list[Path]:
+    """The files beside a file that end so, in order; none where they are too many to be meant for it."""
+    try:
+        found = sorted(each for each in path.parent.iterdir() if each.suffix.lower() in endings and each != path)
+    except OSError:
+        return []
+    return found if len(found) <= MOST_BESIDE else []
+
+
+def frames_of(said: dict[str, Any]) -> set[str]:
+    """The names of the frames that closures are said to join."""
+    pairs = said.get("closed_loop")
+    flat = [each for pair in (pairs if isinstance(pairs, list) else []) for each in
+            (pair if isinstance(pair, list) else [pair])]
+    return {str(each) for each in flat}
+
+
+def _closing(path: Path) -> dict[str, Any] | None:
+    """What a YAML file says that may be meant for something else: None unless it closes loops."""
+    try:
+        data = xml.content(path)
+        found = settings_in(path) if b"closed_loop" in data else None
+    except BadRobotFile:
+        return None
+    return found if found is not None and frames_of(found) else None

@@ -14,6 +14,7 @@ from ...dialect import RobotFile
 from ...elements import XmlReader
 from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec
 from ...postures import from_keyframe
+from ..paired import onshape_pairs, other_pairs
 from .defaults import Compiler, Defaults, with_includes
 
 WORLD = "world"
@@ -55,6 +56,10 @@ class _MjcfReader(XmlReader):
         for section in root.findall("equality"):
             for element in xml.children(section):
                 self._equality(element)
+        if all(joint.in_tree for joint in graph.joints.values()):
+            frames = {name: FrameSpec(link, frozen(X)) for name, (link, X) in self.sites.items()}
+            onshape_pairs(self, graph, frames)
+            other_pairs(graph, frames)
         for section in root.findall("actuator"):
             for element in xml.children(section):
                 self._actuator(element)

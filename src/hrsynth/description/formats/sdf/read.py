@@ -8,15 +8,17 @@ import numpy as np
 
 from ....budgets import MOST_NESTED_MODELS
 from ....errors import BadRobotFile
-from ....geometry.vectors import Array, inverse
+from ....geometry.vectors import Array, frozen, inverse
 from ....mechanism.model import Link
 from ....tolerances import SAME_GEOMETRY
 from ... import xml
 from ...annotations import NAMESPACE, drop_world, read_annotation
 from ...dialect import RobotFile
 from ...elements import XmlReader
-from ...jointgraph import ORIGIN, JointGraph
+from ...jointgraph import ORIGIN, FrameSpec, JointGraph
 from ...postures import value_of
+from ..extensions import read_drake, read_plugins
+from ..paired import onshape_pairs, other_pairs
 from .joint import JointFrames, add, guess_motors, name_gears, numbers, pose_of, text
 
 MODEL, WORLD = "__model__", "world"
@@ -63,6 +65,7 @@ class _SdfReader(XmlReader):
         name_gears(self, graph)
         guess_motors(graph)
         self._states(model.get("name"))
+        self._closures(model)
         self.require_sound()
         if any(WORLD in joint.links for joint in graph.joints.values()):
             graph.links = {WORLD: Link(WORLD), **graph.links}
@@ -89,6 +92,29 @@ class _SdfReader(XmlReader):
                     found[known.name] = value
             if found:
                 self.result.postures[state.get("world_name") or state.get("name") or "state"] = found
+
+    def _closures(self, model: xml.Element) -> None:
+        """What other tools add to the format to close loops."""
+        read_drake(self, self.result, model, self._frame_spec)
+        plugins = [*model.findall("plugin"), *self.root.findall("world/plugin")]
+        if plugins:
+            poses = {link: self._pose(link, None) for link in self.result.links}
+            others = [name for each in self.root.iter("model") if each is not model for name in [each.get("name")]]
+            read_plugins(self.result, plugins, poses, tuple(map(str, others)))
+        if all(joint.in_tree for joint in self.result.joints.values()):
+            found = {name: self._frame_spec(name) for name, frame in self.frames.items() if frame.kind == "frame"}
+            frames = {name: frame for name, frame in found.items() if frame is not None}
+            onshape_pairs(self, self.result, frames)
+            other_pairs(self.result, frames)
+
+    def _frame_spec(self, name: str) -> FrameSpec | None:
+        """The link that a link or frame of that name is fixed to, and where; None for no such name."""
+        frame = self.frames.get(name)
+        line = None if frame is None or frame.element is None else xml.line(frame.element)
+        link = None if frame is None else self._link(name, line)
+        if link is None:
+            return None
+        return FrameSpec(link, frozen(inverse(self._pose(link, line)) @ self._pose(name, line)), line)
 
     def _version(self) -> tuple[int, int]:
         text = self.root.get("version", "1.6")

@@ -5,7 +5,6 @@ A new convention is one more function and its line in ``CONVENTIONS``.
 
 from __future__ import annotations
 
-import re
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -15,6 +14,8 @@ from ....geometry.vectors import Array, frozen, inverse, perpendicular, pose
 from ....mechanism.model import JointType
 from ... import xml
 from ...jointgraph import LOOP_TYPES, FrameSpec, JointGraph, Z, spanning_tree, zero_poses
+from ..extensions import read_drake, read_plugins
+from ..paired import onshape_pairs, other_pairs
 from ..sdf import joint as sdf
 from .elements import UrdfReader
 
@@ -42,13 +43,13 @@ def _joins(reader: UrdfReader, what: str, element: xml.Element, ends: Ends) -> b
 
 
 def gazebo(reader: UrdfReader, graph: JointGraph) -> None:
-    """``<gazebo><joint>``: a joint of SDFormat (in the conventions of 1.6) closes a loop where its child is at zero."""
+    """``<gazebo><joint>``: a joint of SDFormat (in the conventions of 1.6) closes a loop where its child is at zero; so
+    does a plugin that holds two links together."""
     found = [joint for element in reader.root.findall("gazebo") for joint in element.findall("joint")]
-    if not found:
+    plugins = [plugin for element in reader.root.findall("gazebo") for plugin in element.findall("plugin")]
+    if not found and not plugins:
         return
-    carried = {joint.links[1] for joint in graph.joints.values()}
-    base = next((link for link in graph.links if link not in carried), next(iter(graph.links)))
-    poses = zero_poses(base, spanning_tree(base, (joint for joint in graph.joints.values() if joint.in_tree)))
+    poses = _at_zero(graph)
     for element in found:
         parent, child = (sdf.text(element, tag) for tag in ("parent", "child"))
         if parent is None or child is None or parent == child:
@@ -65,6 +66,14 @@ def gazebo(reader: UrdfReader, graph: JointGraph) -> None:
         sdf.add(reader, graph, element, (parent, child), frames, (1, 6), in_tree=False)
     sdf.name_gears(reader, graph)
     graph.note_assumed()
+    read_plugins(graph, plugins, poses, ())
+
+
+def _at_zero(graph: JointGraph) -> dict[str, Array]:
+    """The poses (4, 4) of the links that hang on the first root, all joints at zero."""
+    carried = {joint.links[1] for joint in graph.joints.values()}
+    base = next((link for link in graph.links if link not in carried), next(iter(graph.links)))
+    return zero_poses(base, spanning_tree(base, (joint for joint in graph.joints.values() if joint.in_tree)))
 
 
 CONSTRAINTS = {**LOOP_TYPES, "ball": JointType.SPHERICAL, "weld": JointType.FIXED, "point": JointType.SPHERICAL}
@@ -110,52 +119,70 @@ def _constraint_axis(reader: UrdfReader, element: xml.Element, side: str) -> Arr
 
 
 def loop_joint(reader: UrdfReader, graph: JointGraph) -> None:
-    """``<loop_joint name type>`` of Isaac Sim: two ends with ``xyz`` and ``rpy`` (real files write two ``<link1>``)."""
+    """``<loop_joint name type>``: of Isaac Sim with two ends that have ``xyz`` and ``rpy`` (real files write two
+    ``<link1>``), of exporters for Fusion with ``<parent>`` and ``<child>`` as a ``<constraint>`` has them."""
     for element in reader.root.findall("loop_joint"):
         name = reader.attribute(element, "name")
-        kind = LOOP_TYPES.get(element.get("type", "spherical"))
+        kind = CONSTRAINTS.get(element.get("type", "spherical"))
         if kind is None or kind.axes > 1:
             reader.defect(xml.line(element), "unknown loop_joint type", element.get("type"),
-                          ", ".join(key for key in LOOP_TYPES if key != "universal"))
+                          ", ".join(key for key in CONSTRAINTS if key != "universal"))
             continue
-        found = [child for child in xml.children(element) if child.tag in ("link1", "link2", "link")]
-        if len(found) != 2:
-            reader.defect(xml.line(element), "loop_joint: number of links", str(len(found)), "2")
-            continue
-        frames = [reader.pose(child) for child in found]
-        one, two = (FrameSpec(reader.attribute(child, "link"), X, xml.line(child))
-                    for child, X in zip(found, frames, strict=True))
+        axis = element.find("axis")
+        z = Z if axis is None else reader.direction(axis, "xyz", (0, 0, 1))
+        if element.find("parent") is not None:
+            one, two = _fusion_ends(reader, graph, element)
+        else:
+            found = [child for child in xml.children(element) if child.tag in ("link1", "link2", "link")]
+            if len(found) != 2:
+                reader.defect(xml.line(element), "loop_joint: number of links", str(len(found)), "2")
+                continue
+            one, two = (FrameSpec(reader.attribute(child, "link"), reader.pose(child), xml.line(child))
+                        for child in found)
         if name is not None and _joins(reader, "loop_joint", element, (one, two)):
-            axis = element.find("axis")
-            z = Z if axis is None else reader.direction(axis, "xyz", (0, 0, 1))
             graph.close(graph.fresh(name), kind, (one, two), [z], xml.line(element), reader.motors.get(name))
 
 
-_CLOSING_FRAME = re.compile(r"closing_(?P<name>.+)_(?P<number>[12])")
+def _fusion_ends(reader: UrdfReader, graph: JointGraph, element: xml.Element) -> Ends:
+    """The parent's joint frame, parallel to the parent's own, and the child's, parallel to it at the file's pose: the
+    axis is given in the parent, and each link has the point where the joint is."""
+    links = [str(each.get("link", each.text)).strip() for side in _SIDES for each in element.findall(side)[:1]]
+    if len(links) < 2:
+        reader.defect(xml.line(element), "loop_joint without two links", element.get("name"))
+        return FrameSpec(None), FrameSpec(None)
+    one, two = (reader.pose(element.find(f"{side}_origin")) for side in _SIDES)
+    poses = _at_zero(graph)
+    if set(links) <= set(poses):
+        two = two @ pose(rotation=poses[links[1]][:3, :3].T @ poses[links[0]][:3, :3])
+    line = xml.line(element)
+    return FrameSpec(links[0], frozen(one), line), FrameSpec(links[1], frozen(two), line)
 
 
-def closing_frames(reader: UrdfReader, graph: JointGraph) -> None:
-    """Frames ``closing_X_1`` and ``closing_X_2`` meet; with ``closing_X_1_z``, ``closing_X_2_z`` as well, in a hinge. A
-    frame without its partner is a defect."""
-    for link in list(graph.links):
-        match = _CLOSING_FRAME.fullmatch(link)
-        if match is None:
-            continue
-        partner = f"closing_{match['name']}_{3 - int(match['number'])}"
-        if partner not in graph.links:
-            reader.defect(graph.links[link].line, f"closing frame {link!r} without its partner", None,
-                          f"a link {partner!r} as well")
-        elif match["number"] == "1":
-            hinge = f"{link}_z" in graph.links and f"{partner}_z" in graph.links
-            kind = JointType.REVOLUTE if hinge else JointType.SPHERICAL
-            graph.close(graph.fresh(match["name"]), kind, (FrameSpec(link), FrameSpec(partner)))
-            graph.closing.update({link, partner, f"{link}_z", f"{partner}_z"})
+def drake(reader: UrdfReader, graph: JointGraph) -> None:
+    """Drake's ball constraints and bushings between links and ``<frame>`` elements."""
+    frames = {name: FrameSpec(name) for name in graph.links}
+    for element in reader.root.findall("frame"):
+        name, link = element.get("name"), element.get("link")
+        if name is not None and link in graph.links:
+            frames[name] = FrameSpec(link, frozen(reader.pose(element)), xml.line(element))
+    read_drake(reader, graph, reader.root, frames.get)
+
+
+def named_frames(reader: UrdfReader, graph: JointGraph) -> None:
+    """Links on one fixed joint that carry nothing, whose names tell where a loop closes."""
+    carried = {joint.links[1]: joint for joint in graph.joints.values()}
+    carriers = {joint.links[0] for joint in graph.joints.values()}
+    frames = {name: FrameSpec(name, line=link.line) for name, link in graph.links.items()}
+    onshape_pairs(reader, graph, frames)
+    other_pairs(graph, {name: frame for name, frame in frames.items() if name not in carriers and name in carried
+                        and carried[name].type is JointType.FIXED})
 
 
 CONVENTIONS = (
     Convention("Gazebo", gazebo, "gazebo"),
     Convention("urdfdom (proposed)", constraint, "constraint"),
     Convention("Isaac Sim", loop_joint, "loop_joint"),
-    Convention("onshape-to-robot", closing_frames),
+    Convention("Drake", drake, "drake"),
+    Convention("onshape-to-robot and others", named_frames),
 )
 """All conventions, in the order in which their closures are added."""

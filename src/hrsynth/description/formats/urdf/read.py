@@ -7,15 +7,17 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from ....mechanism.model import JointType, Limits, Motor
+from ....mechanism.model import JointType, Limits, Link, Motor
 from ....mechanism.observation import Direction
 from ... import xml
 from ...dialect import RobotFile
 from ...elements import sound_limits
 from ...jointgraph import GearSpec, JointGraph, JointSpec, comma_list
+from ..extensions import DRAKE, is_drake, local
 from .conventions import CONVENTIONS
 from .elements import TREE_TYPES, UrdfReader
 
+WORLD = "world"
 TYPES = {**TREE_TYPES, "spherical": JointType.SPHERICAL, "ball": JointType.SPHERICAL}
 _KNOWN = ("link", "joint", "loop", "coupling", "transmission", "hrsynth",
           *(convention.tag for convention in CONVENTIONS if convention.tag is not None))
@@ -44,7 +46,8 @@ class _TolerantReader(UrdfReader):
         for kind, text in self.notes:
             graph.note(kind, text)
         graph.joints = {name: replace(joint, motor=self.motors.get(name)) for name, joint in self.joints.items()}
-        graph.rest = list(xml.unknown(self.root, ["name"], _KNOWN))
+        closing = [str(each.tag) for each in xml.children(self.root) if is_drake(each) and local(each) in DRAKE]
+        graph.rest = list(xml.unknown(self.root, ["name"], [*_KNOWN, *closing]))
         self.add_gears(graph)
         for convention in CONVENTIONS:
             if convention.tag is not None or frames:
@@ -90,6 +93,9 @@ class _TolerantReader(UrdfReader):
         """Every end of every joint is a link that is there, and no joints carry each other in a ring."""
         if len(self.links) < len(self.root.findall("link")):
             self.require_sound()
+        if WORLD not in self.links and any(end.link == WORLD for joint in self.joints.values() for end in joint.ends):
+            self.links = {WORLD: Link(WORLD), **self.links}
+            self.notes.append(("guess", f"no link {WORLD!r} is declared: it is read as the ground"))
         self.check_ends("joint")
         if not self.links:
             self.defect(xml.line(self.root), "no links")

@@ -1,0 +1,145 @@
+"""Closures that tools add to URDF and SDFormat alike: Drake's constraints and bushings, plugins of Gazebo.
+
+What can be read becomes a closure; what only looks like one is told, with the ``--close`` that would make it one.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Mapping
+
+import numpy as np
+from lxml import etree
+
+from ...geometry.vectors import Array, frozen, inverse, pose
+from ...mechanism.model import JointType
+from .. import xml
+from ..elements import XmlReader
+from ..jointgraph import FrameSpec, JointGraph
+
+Frames = Callable[[str], FrameSpec | None]
+"""From the name of a link or frame to the link with the frame's pose in it; None where there is none."""
+
+_ATTACHER = re.compile(r"attach", re.IGNORECASE)
+_DETACHABLE = re.compile(r"detachable.?joint", re.IGNORECASE)
+_BUSHING = "bushing_"
+DRAKE = ("ball_constraint", "linear_bushing_rpy")
+"""Elements of Drake that are closures."""
+
+
+def local(element: xml.Element) -> str:
+    """The name of an element without its namespace or prefix."""
+    return etree.QName(element).localname.rpartition(":")[2]
+
+
+def is_drake(element: xml.Element) -> bool:
+    """Whether an element is one of Drake's, by its namespace, whatever that is."""
+    space = etree.QName(element).namespace or ""
+    return "drake" in space or str(element.tag).startswith("drake:")
+
+
+def _said(element: xml.Element, tag: str) -> str | None:
+    """What a child element says: ``value`` or ``name`` of it in URDF, its text in SDFormat."""
+    child = next((each for each in xml.children(element) if local(each) == tag), None)
+    if child is None:
+        return None
+    return (child.get("value") or child.get("name") or child.text or "").strip() or None
+
+
+def _ends(reader: XmlReader, element: xml.Element, tags: tuple[str, str], frame_of: Frames
+          ) -> tuple[FrameSpec, FrameSpec] | None:
+    """The two frames that child elements name; a name that is none, or one link twice, is a defect."""
+    line, found = xml.line(element), []
+    for tag in tags:
+        name = _said(element, tag)
+        frame = None if name is None else frame_of(name)
+        if frame is None:
+            reader.defect(line, f"<{local(element)}>: <{tag}> is no link or frame", name)
+        else:
+            found.append(frame)
+    if len(found) < 2:
+        return None
+    if found[0].link == found[1].link:
+        reader.defect(line, f"<{local(element)}> joins a link to itself", found[0].link)
+        return None
+    return found[0], found[1]
+
+
+def read_drake(reader: XmlReader, graph: JointGraph, root: xml.Element, frame_of: Frames) -> None:
+    """Drake's ball constraints, which are points, and its bushings, by what they are stiff against."""
+    for element in filter(is_drake, xml.children(root)):
+        match local(element):
+            case "ball_constraint":
+                _ball_constraint(reader, graph, element, frame_of)
+            case "linear_bushing_rpy":
+                _bushing(reader, graph, element, frame_of)
+            case name if name.endswith("_constraint"):
+                graph.note("open", f"<drake:{name}> (line {xml.line(element)}) is not read; where it holds two links "
+                                   "together, --close A@x,y,z:B@x,y,z:TYPE does so")
+
+
+def _ball_constraint(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_of: Frames) -> None:
+    ends = _ends(reader, element, ("ball_constraint_body_A", "ball_constraint_body_B"), frame_of)
+    if ends is None:
+        return
+    points = (_vector(reader, element, f"ball_constraint_{point}") for point in ("p_AP", "p_BQ"))
+    one, two = (FrameSpec(end.link, frozen(end.X @ pose(point)), end.line)
+                for end, point in zip(ends, points, strict=True))
+    graph.close(graph.fresh("ball_constraint"), JointType.SPHERICAL, (one, two), line=xml.line(element))
+
+
+def _bushing(reader: XmlReader, graph: JointGraph, element: xml.Element, frame_of: Frames) -> None:
+    """A bushing holds what it is stiff against; a joint where that is one that loops can have."""
+    ends = _ends(reader, element, (_BUSHING + "frameA", _BUSHING + "frameC"), frame_of)
+    if ends is None:
+        return
+    force, torque = (_vector(reader, element, f"{_BUSHING}{what}_stiffness") > 0 for what in ("force", "torque"))
+    free = tuple(int(k) for k in np.flatnonzero(~force)), tuple(int(k) for k in np.flatnonzero(~torque))
+    name, links = graph.fresh("bushing"), f"{ends[0].link}:{ends[1].link}"
+    kind = {(0, 0): JointType.FIXED, (0, 1): JointType.REVOLUTE, (0, 3): JointType.SPHERICAL,
+            (1, 0): JointType.PRISMATIC, (1, 1): JointType.CYLINDRICAL}.get((len(free[0]), len(free[1])))
+    if kind is None or (kind is JointType.CYLINDRICAL and free[0] != free[1]):
+        graph.note("open", f"the bushing between {ends[0].link!r} and {ends[1].link!r} is not stiff against "
+                           f"{len(free[0])} translations and {len(free[1])} turns, which is no joint of a loop: left "
+                           f"out (--close {links}:TYPE for the joint that it is meant to be)")
+        return
+    axis = np.eye(3)[(free[1] or free[0] or (2,))[0]]
+    graph.close(name, kind, ends, [axis], xml.line(element))
+    graph.note("guess", f"{name!r} between {ends[0].link!r} and {ends[1].link!r} is read as a {kind.name.lower()} "
+                        "joint: it holds what its stiffness is not zero for")
+
+
+def _vector(reader: XmlReader, element: xml.Element, tag: str) -> Array:
+    return reader.values(_said(element, tag), (0, 0, 0), xml.line(element), f"<{tag}>")
+
+
+def read_plugins(graph: JointGraph, plugins: list[xml.Element], poses: Mapping[str, Array], models: tuple[str, ...]
+                 ) -> None:
+    """Gazebo's detachable joints hold two links as they lie at zero (``poses`` in the model's frame); plugins that
+    attach links while the simulation runs are told. ``models``: the other models of the file."""
+    for plugin in plugins:
+        title = f"{plugin.get('name', '')} {plugin.get('filename', '')}"
+        named = [text for child in plugin.iter() if isinstance(child.tag, str) and "link" in child.tag.lower()
+                 for text in [(child.text or "").strip()] if text in poses]
+        if _DETACHABLE.search(title):
+            _detachable(graph, plugin, poses, models)
+        elif len(dict.fromkeys(named)) == 2:
+            pair = ":".join(dict.fromkeys(named))
+            graph.note("open", f"the plugin {title.split()[0]!r} names two links; where it holds them together, "
+                               f"--close {pair}:fixed (or another type) does so")
+        elif _ATTACHER.search(title):
+            graph.note("open", f"the plugin {title.split()[0]!r} can attach links while the simulation runs; the file "
+                               "does not say which: --close A:B:TYPE where that closes a loop")
+
+
+def _detachable(graph: JointGraph, plugin: xml.Element, poses: Mapping[str, Array], models: tuple[str, ...]) -> None:
+    parent, child = ((plugin.findtext(f"{end}_link") or "").strip() for end in ("parent", "child"))
+    model = (plugin.findtext("child_model") or "").strip()
+    if model in models or parent not in poses or child not in poses or parent == child:
+        graph.note("ignored", f"the detachable joint from {parent!r} to {child!r} of the model {model!r}, which are "
+                              "not two links of this robot")
+        return
+    ends = FrameSpec(parent), FrameSpec(child, frozen(inverse(poses[child]) @ poses[parent]))
+    graph.close(graph.fresh("detachable_joint"), JointType.FIXED, ends, line=xml.line(plugin))
+    graph.note("guess", f"the detachable joint of Gazebo holds {parent!r} and {child!r} as they lie at zero: read as a "
+                        "rigid closure")
