@@ -16,12 +16,15 @@ from ..errors import BadRequest
 from ..geometry.vectors import Array
 from . import plots
 from .modes import why_undrawn
-from .plots import COLOURS, PNG, Paper, cell_edges, entry, panels, printed, styled
+from .paper import PNG, Paper, printed
+from .plots import COLOURS, cell_edges, entry, panels, styled
 
 CELLS = {SAME: ("#b9dcb1", "="), SEPARATED: ("#f2c0b0", "|"), UNDECIDED: ("#e3e3e3", "?")}
 CURVE, CUSP, NODE = "black", COLOURS[1], COLOURS[2]
 SHADES = ("white", "#e8eef4", "#c9d9e8", "#9dbbd6")
 """No mode, two, four, six."""
+LEAST_PANEL = 3.0
+"""The least width (inches) of one of several drawings."""
 COUNTED, PLACES = 161, 480
 """Directions a side for which modes are counted, and places of the first corner that are looked at for it."""
 
@@ -56,14 +59,18 @@ def picture(found: Atlas, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
     if why is not None:
         raise BadRequest(f"{found.listed.setting.robot.name}: there is nothing to draw: {why}", None, "isolated modes")
     count = 1 if drawn.found is None else 3
-    figure, axes = panels(1, count, 5.4 * count, 6.6)
+    columns = paper.columns(count, LEAST_PANEL)
+    rows = -(-count // columns)
+    figure, axes = panels(rows, columns, 5.4 * columns, 5.4 * rows + 1.2, paper, (0.6 * columns, 0.6 * rows + 1.2))
+    for place in axes[count:]:
+        place.set_visible(False)
     _table(axes[0], found)
     entries = [entry(verdict, linestyle="", marker="s", markersize=10, color=colour, markeredgecolor="0.5")
                for verdict, (colour, _) in CELLS.items()
                if any(verdict in row for row in found.table)]
     if drawn.found is not None:
-        entries += _curves(axes[1:], found, *drawn.found)
-    plots.legend(figure, entries)
+        entries += _curves(axes[1:3], found, *drawn.found)
+    plots.legend(figure, entries, paper)
     seen = ", ".join(found.listed.setting.labels)
     told = ", cuspidal" if found.cuspidal else ""
     figure.suptitle(f"{found.listed.setting.robot.name}, legs {seen} watched\n{found.listed.count}, "

@@ -19,17 +19,15 @@ from ..geometry.vectors import Array
 from ..mechanism.pose import PARTS
 from ..tolerances import DARKEST_DISTANCE, DISTANCE_FLOOR
 from . import plots
+from .paper import PNG, Paper, printed
 from .plots import (
-    PNG,
     MapPlane,
-    Paper,
     along,
     cell_edges,
     entry,
     heading,
     missing_entry,
     panels,
-    printed,
     round_ticks,
     styled,
     tick_values,
@@ -55,6 +53,8 @@ NEAR_TYPE_1 = 0.5
 """Fraction of its median to which the distance to Type 1 falls at a boundary of that kind."""
 ERRORS = "cividis"
 """A scale that readers with any colour vision see in the same order."""
+LEAST_MAP, LEAST_CURVE = 2.1, 4.4
+"""The least width (inches) of one of several maps, and of a map with a scale of its own."""
 HIGHEST = 30.0
 """Multiple of the median error at which the scale ends."""
 
@@ -70,13 +70,13 @@ def distance_map(found: Check, paper: Paper = PNG) -> bytes:
                          "another grid, or a table (.csv)")
     numbers = np.array([np.nan if value is None else value for value in grid.values("type2")]).reshape(grid.grid.shape)
     states = np.array(grid.states).reshape(grid.grid.shape)
-    figure = (_distance_curve(grid, numbers, states) if grid.grid.ndim == 1
-              else _distance_maps(grid, numbers, states, found.setting.motion))
+    figure = (_distance_curve(grid, numbers, states, paper) if grid.grid.ndim == 1
+              else _distance_maps(grid, numbers, states, found.setting.motion, paper))
     entries = [missing_entry()] if UNREACHABLE in grid.states else []
     entries += _robot(figure, grid.grid, found.setting)
     entries += [entry(label, linestyle="", marker=mark, color="red", markeredgecolor="white")
                 for state, (mark, label) in MARKS.items() if state in grid.states]
-    plots.legend(figure, entries)
+    plots.legend(figure, entries, paper)
     heading(figure, f"{found.setting.robot.name}: distance to Type 2 singularities, legs "
             f"{', '.join(found.setting.labels)} observed", grid.grid.fixed)
     return printed(figure, paper)
@@ -88,23 +88,26 @@ def _robot(figure: Any, grid: Grid, setting: ObservedRobot) -> list[Any]:
         figure, setting.everything.start)
 
 
-def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion) -> Any:
+def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_], motion: PlatformMotion,
+                   paper: Paper) -> Any:
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
 
     pname, ps = (*grid.grid.axes, ("", np.zeros(1)))[2]
     shape = (*grid.grid.shape[:2], -1)
     numbers, states = numbers.reshape(shape), states.reshape(shape)
-    columns = min(len(ps), 4)
+    columns = paper.columns(min(len(ps), 4), LEAST_MAP)
     rows = -(-len(ps) // columns)
     size = 3.6 if columns > 1 else 5.6
     plane = MapPlane.of(grid.grid.axes, motion, 0.3, 2.0)
-    figure, axes = panels(rows, columns, size * columns + 1.4, (size * plane.tall + 0.7) * rows + 0.8)
+    figure, axes = panels(rows, columns, size * columns + 1.4, (size * plane.tall + 0.7) * rows + 0.8, paper,
+                          (1.5 + 0.2 * columns, 0.8 + 0.7 * rows))
     low, high, ticks = _scale(numbers)
     norm = LogNorm(low, high)
     for k, place in enumerate(axes[: len(ps)]):
         _distances(place, plane, np.maximum(numbers[..., k], low), states[..., k], norm)
         plane.finish(place)
+        plots.outer(place, k, columns, len(ps))
         if pname:
             plots.layer_title(place, pname, tick_values(pname, ps)[k])
     for place in axes[len(ps):]:
@@ -127,10 +130,10 @@ def _distances(place: Any, plane: MapPlane, numbers: Array, states: NDArray[np.s
                       linewidth=0.6)
 
 
-def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_]) -> Any:
+def _distance_curve(grid: GridCheck, numbers: Array, states: NDArray[np.str_], paper: Paper) -> Any:
     ((name, values),) = grid.grid.axes
     x = tick_values(name, values)
-    figure, (place,) = panels(1, 1, 7.0, 4.6)
+    figure, (place,) = panels(1, 1, 7.0, 4.6, paper)
     low, high, ticks = _scale(numbers)
     floor = low / (high / low) ** 0.1 if np.nanmin(numbers) < low else low
     place.semilogy(x, np.where(numbers < low, np.nan, numbers), ".-", color="C0")
@@ -177,8 +180,10 @@ def locus(found: Singularity, plane: Pose | str | None, steps: int, seed: int) -
 @styled
 def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
     """Type 2 loci of the hidden and the real robot over a plane, the Type 1 boundary and what is not reached (PNG)."""
+    from matplotlib.patches import Patch
+
     plane = MapPlane.of(drawn.grid.axes, found.setting.motion, 0.4, 1.6)
-    figure, (place,) = panels(1, 1, 7.2, 6.0 * plane.tall + 1.6)
+    figure, (place,) = panels(1, 1, 7.2, 6.0 * plane.tall + 1.6, paper)
     shade = np.log10(np.maximum(drawn.hidden.type2, DARKEST_DISTANCE))
     plane.cells(place, np.where(np.isfinite(drawn.hidden.type2), shade, np.nan), cmap="Greys_r",
                 vmin=np.nanmin(shade), vmax=np.nanmax(shade) + 1.0)
@@ -188,11 +193,11 @@ def locus_map(found: Singularity, drawn: Locus, paper: Paper = PNG) -> bytes:
         if field is not None:
             entries.insert(0, _drawn_locus(place, plane, field, name))
     plane.finish(place, plane.x, plane.y)
-    entries += borders
+    entries += [Patch(facecolor="0.5", label="darker: nearer to Type 2"), *borders]
     if not np.isfinite(drawn.hidden.type2).all():
         entries.append(missing_entry())
     entries += plane.robot(figure, found.setting.everything.start)
-    plots.legend(figure, entries)
+    plots.legend(figure, entries, paper)
     heading(figure, f"{found.setting.robot.name}: Type 2 singularities, legs {', '.join(found.setting.labels)} "
             "observed", drawn.grid.fixed)
     return printed(figure, paper)
@@ -242,16 +247,17 @@ def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     shown = [(values, label) for values, label in shown if np.nanmax(values, initial=0.0) > 0]
     if not shown:
         raise BadRequest("there is nothing to draw", str(field.grid.fixed), "a robot whose platform has errors")
-    figure, locus = (_error_curves(field, shown) if field.grid.ndim == 1
-                     else _error_maps(field, shown, found.setting.motion))
-    plots.legend(figure, _error_entries(field, locus) + _robot(figure, field.grid, found.setting))
+    figure, locus = (_error_curves(field, shown, paper) if field.grid.ndim == 1
+                     else _error_maps(field, shown, found.setting.motion, paper))
+    plots.legend(figure, _error_entries(field, locus) + _robot(figure, field.grid, found.setting), paper)
     legs = ", ".join(f"{o.leg} within {np.degrees(cone):.3g}°"
                      for o, cone in zip(found.setting.observed, found.cones, strict=True))
     heading(figure, f"{found.setting.robot.name}: largest errors\nobserved legs: {legs}", field.grid.fixed, "; ")
     return printed(figure, paper)
 
 
-def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: PlatformMotion) -> tuple[Any, bool]:
+def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: PlatformMotion,
+                paper: Paper) -> tuple[Any, bool]:
     """The figure, and whether a place where a freedom is lost is in it."""
     from matplotlib.cm import ScalarMappable
     from matplotlib.colors import LogNorm
@@ -259,16 +265,21 @@ def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: Platf
     pname, ps = (*field.grid.axes, ("", np.zeros(1)))[2]
     flat = field.grid.ndim == 2
     plane = MapPlane.of(field.grid.axes, motion, 0.4, 1.6)
-    rows, columns = (1, len(shown)) if flat else (len(shown), len(ps))
     size = 5.0 if flat else 3.0
-    figure, axes = panels(rows, columns, size * columns + (1.4 * len(shown) if flat else 1.4),
-                          (size * plane.tall + 0.8) * rows + (0.5 if flat else 0.0))
+    columns = paper.columns(len(shown), LEAST_CURVE) if flat else paper.columns(len(ps), LEAST_MAP)
+    each = -(-len(ps) // columns)
+    rows = -(-len(shown) // columns) if flat else len(shown) * each
+    figure, axes = panels(rows, columns, size * columns + (1.4 * columns if flat else 1.4),
+                          (size * plane.tall + 0.8) * rows + (0.5 if flat else 0.0), paper,
+                          (1.9 * columns if flat else 1.5 + 0.2 * columns, 0.8 * rows + 0.5))
     locus = False
     for number, (values, label) in enumerate(shown):
         low, high = _ends(values)
         norm = LogNorm(low, high)
-        places = axes[number : number + 1] if flat else axes[number * columns : (number + 1) * columns]
-        for k, place in enumerate(places):
+        places = axes[number : number + 1] if flat else axes[number * each * columns : (number + 1) * each * columns]
+        for place in places[len(ps):]:
+            place.set_visible(False)
+        for k, place in enumerate(places[: len(ps)]):
             layer = values if flat else values[..., k]
             plane.cells(place, np.where(np.isinf(layer), high, layer), norm=norm, cmap=ERRORS)
             missing = np.isnan(layer)
@@ -277,6 +288,7 @@ def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: Platf
             if not flat and field.determinant is not None:
                 locus |= _lost(place, plane, field.determinant[..., k])
             plane.finish(place, cell_edges(plane.x), cell_edges(plane.y))
+            plots.outer(place, k, columns, len(ps))
             if pname:
                 plots.layer_title(place, pname, tick_values(pname, ps)[k])
         bar = figure.colorbar(ScalarMappable(norm, ERRORS), ax=list(places), label=f"{label}, logarithmic",
@@ -287,10 +299,10 @@ def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: Platf
     return figure, (flat and _locus(field, axes[: len(shown)], plane)) or locus
 
 
-def _ends(values: Array) -> tuple[float, float]:
+def _ends(values: Array, highest: float = HIGHEST) -> tuple[float, float]:
     """The ends of a logarithmic scale: the smallest error, and the largest unless that is far above the median."""
     finite = values[np.isfinite(values) & (values > 0)]
-    low, high = float(finite.min()), float(min(finite.max(), HIGHEST * np.median(finite)))
+    low, high = float(finite.min()), float(min(finite.max(), highest * np.median(finite)))
     return (low, high) if high > 1.01 * low else (0.9 * low, 1.1 * low)
 
 
@@ -313,13 +325,16 @@ def _lost(place: Any, plane: MapPlane, determinant: Array) -> bool:
     return all([plane.sign_change(place, determinant, colour, width) for colour, width in strokes])
 
 
-def _error_curves(field: ErrorField, shown: list[tuple[Array, str]]) -> tuple[Any, bool]:
+def _error_curves(field: ErrorField, shown: list[tuple[Array, str]], paper: Paper) -> tuple[Any, bool]:
     ((name, values),) = field.grid.axes
     x = tick_values(name, values)
-    figure, axes = panels(len(shown), 1, 7.0, 3.0 * len(shown) + 1.2)
+    figure, axes = panels(len(shown), 1, 7.0, 3.0 * len(shown) + 1.2, paper)
     for place, (errors, label) in zip(axes, shown, strict=True):
         place.semilogy(x, np.where(np.isfinite(errors), errors, np.nan), ".-", color="C0")
-        along(place, name, x, np.isnan(errors), label, which="both")
+        place.minorticks_off()
+        ticks = round_ticks(*_ends(np.where(np.isfinite(errors), errors, np.nan), np.inf))
+        place.set_yticks(list(ticks), labels=tick_words(ticks))
+        along(place, name, x, np.isnan(errors), label)
     return figure, False
 
 

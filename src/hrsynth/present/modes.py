@@ -12,7 +12,8 @@ import numpy as np
 from ..analysis.modes.modes import AssemblyModes
 from ..errors import BadRequest
 from ..geometry.vectors import Array
-from .plots import PNG, Paper, empty_figure, entry, printed, styled
+from .paper import PNG, Paper, legend_within, printed, settled, wrap
+from .plots import empty_figure, entry, styled
 from .scenes import CLOSES, GOAL, NEAR, OPEN, UNKNOWN, ModesScene, Placed, scene
 from .sketch import Box, Sketch
 
@@ -27,11 +28,10 @@ DPI, SHADES = 150, 160
 """Resolution; colours of the file, whose translucent surfaces would else have thousands and be large."""
 MOST, FEW = 16, 6
 """Robots drawn beside the curves at most; modes up to which their platforms are drawn among the curves too."""
-SIDE, LEFT, GAP, BELOW, ABOVE, TITLE = 5.2, 0.8, 0.3, 1.05, 0.9, 0.25
+SIDE, LEFT, GAP, BELOW, ABOVE, TITLE = 5.2, 0.8, 0.3, 0.6, 0.3, 0.25
 """The side of the drawing of curves, and the spaces about it and above each robot (inches)."""
-
-WIDEST, SIGN = 112, 6
-"""Letters of a legend in one row at most, and what the sign of an entry takes of them."""
+LEAST_CELL = 1.3
+"""The least side of the drawing of a robot (inches): on narrower paper the robots stand below the curves."""
 
 
 def picture(found: AssemblyModes, paper: Paper = PNG) -> bytes:
@@ -40,7 +40,7 @@ def picture(found: AssemblyModes, paper: Paper = PNG) -> bytes:
     from PIL.PngImagePlugin import PngInfo
 
     drawn = drawable(found)
-    whole = figure(found, drawn)
+    whole = figure(found, drawn, paper)
     if paper.ending != ".png":
         return printed(whole, paper)
     paper.fit(whole)
@@ -75,27 +75,40 @@ def description(found: AssemblyModes, drawn: ModesScene) -> dict[str, Any]:
 
 
 @styled
-def figure(found: AssemblyModes, drawn: ModesScene) -> Any:
-    """The picture as a matplotlib figure."""
+def figure(found: AssemblyModes, drawn: ModesScene, paper: Paper = PNG) -> Any:
+    """The picture as a matplotlib figure: the robots beside the curves, or below where the paper is narrow."""
     placed = drawn.placed[:MOST]
     columns, rows = _grid(len(placed))
-    cell = SIDE / rows
-    top = BELOW + (SIDE + cell * -(-len(placed) // columns)) / 2
-    page = np.array([LEFT + SIDE + GAP + columns * cell, BELOW + SIDE + ABOVE])
-    whole = empty_figure(*page, dpi=DPI)
+    wide = paper.wide(LEFT + SIDE + GAP + columns * SIDE / rows)
+    whole = empty_figure(wide, SIDE, dpi=DPI)
+    above, below = ABOVE + _heading(whole, found, drawn), BELOW + _legend(whole, drawn)
+    side = (wide - LEFT - GAP) / (1 + columns / rows)
+    cell = side / rows
+    if beside := cell >= LEAST_CELL - 1e-9:
+        start, top, tall = LEFT + side + GAP, below + (side + cell * -(-len(placed) // columns)) / 2, side
+    else:
+        columns = int(wide / LEAST_CELL)
+        side, cell = min(SIDE, wide - LEFT - GAP / 2), wide / columns
+        start, top = 0.0, below + cell * -(-len(placed) // columns) - BELOW / 2
+        tall = side + top - below + BELOW
+    page = np.array([wide, below + tall + above])
+    whole.set_figheight(page[1])
+    whole._suptitle.set_y(1 - ABOVE / 2 / page[1])
+    bottom = page[1] - above - side
+    left = LEFT if beside else (wide - side + LEFT - GAP / 2) / 2
     lines = [trace.points for trace in drawn.traces if trace.points.ndim == 2 and not trace.moving]
     sketch = Sketch.of(drawn.normal, np.array([each.at for each in drawn.placed]), lines)
-    _curves(sketch, whole, _box(page, 0.0 if drawn.normal is None else LEFT, BELOW, LEFT + SIDE, BELOW + SIDE), drawn)
+    wall = left if drawn.normal is not None else left - LEFT
+    _curves(sketch, whole, _box(page, wall, bottom, left + side, page[1] - above), drawn)
     robots = np.vstack([drawn.ground, *(part for each in placed for part in (*each.platform, *each.strokes))])
     for k, each in enumerate(placed):
         row, column = divmod(k, columns)
-        x, y = LEFT + SIDE + GAP + column * cell, top - (row + 1) * cell
-        whole.text((x + cell / 2) / page[0], (y + cell - TITLE / 2) / page[1], f"{each.label}  {each.words}",
-                   ha="center", va="center", fontsize=9 if columns < 3 else 8, color=_colour(k))
+        x, y = start + column * cell, top - (row + 1) * cell
+        words = whole.text((x + cell / 2) / page[0], (y + cell - TITLE / 2) / page[1], f"{each.label}  {each.words}",
+                           ha="center", va="center", fontsize=9 if columns < 3 else 8, color=_colour(k))
+        wrap(words, 0.95 * cell)
         _robot(sketch, sketch.place(whole, _box(page, x, y + 0.1, x + cell, y + cell - TITLE), robots, bare=True),
                drawn, each, k)
-    _heading(whole, found, drawn)
-    _legend(whole, drawn)
     return whole
 
 
@@ -157,7 +170,8 @@ def _robot(sketch: Sketch, place: Any, drawn: ModesScene, each: Placed, k: int) 
     _mark(sketch, place, each, k, 0.8)
 
 
-def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> None:
+def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> float:
+    """Write the title; its height (inches)."""
     setting, count = found.setting, found.found
     held = f"directions of legs {', '.join(setting.labels)}" if found.kind == "hidden" else "motor coordinates"
     many = found.count + ("" if count.complete else ", not proved to be all")
@@ -167,7 +181,7 @@ def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> None:
         many += f"\nof the points where the curves meet, only these fit leg{'s' * (len(drawn.rest) > 1)} "
         many += ", ".join(drawn.rest) + " as well"
     title = f"{setting.robot.name}   {setting.anatomy.architecture()}\nassembly modes with the same {held}: {many}"
-    whole.suptitle(title, fontsize=12, y=0.985, va="top")
+    return settled(whole, whole.suptitle(title, fontsize=12, va="top"))
 
 
 def _colours(drawn: ModesScene) -> Iterator[str]:
@@ -178,17 +192,16 @@ def _colours(drawn: ModesScene) -> Iterator[str]:
         k += not trace.moving
 
 
-def _legend(whole: Any, drawn: ModesScene) -> None:
+def _legend(whole: Any, drawn: ModesScene) -> float:
+    """Draw the legend; its height (inches)."""
     from matplotlib.patches import Patch
 
     entries: dict[str, Any] = {}
     for trace, colour in zip(drawn.traces, _colours(drawn), strict=True):
-        entries.setdefault(trace.words, Patch(facecolor=colour, alpha=0.4) if trace.points.ndim == 3
-                           else entry("", color=colour, linewidth=1.8))
+        entries.setdefault(trace.words, Patch(facecolor=colour, alpha=0.4, label=trace.words)
+                           if trace.points.ndim == 3 else entry(trace.words, color=colour, linewidth=1.8))
     for state in dict.fromkeys(each.state for each in drawn.placed):
         mark, size, words = MARKS[state]
-        entries[words] = entry("", linestyle="", marker=mark, markersize=0.8 * size, color="0.6",
+        entries[words] = entry(words, linestyle="", marker=mark, markersize=0.8 * size, color="0.6",
                                markeredgecolor="black")
-    long = sum(len(words) + SIGN for words in entries) > WIDEST
-    columns = -(-len(entries) // 2) if long else len(entries)
-    whole.legend(list(entries.values()), list(entries), loc="lower center", ncols=columns)
+    return legend_within(whole, list(entries.values()), whole.get_figwidth(), loc="lower center")

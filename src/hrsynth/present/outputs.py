@@ -72,7 +72,7 @@ class File:
             if asked.get(name) is not None and (path is None or Path(path).suffix.lower() not in FIGURES):
                 raise BadRequest(f"--{name} is of a figure", asked[name], f"--output with {', '.join(FIGURES)}")
             if asked.get(name) is not None:
-                function("plots:paper")(PNG, asked.get("width"), asked.get("font"))
+                function("paper:asked")(PNG, asked.get("width"), asked.get("font"))
         if path is None:
             if asked.get("plane") is not None and "plane" in self.takes:
                 raise BadRequest("a plane of poses is drawn", asked["plane"], "--plane together with --output FILE.png")
@@ -102,7 +102,7 @@ class File:
         """The file's content and what the JSON says more; raises ``BadRequest`` where there is nothing to draw."""
         maker = function(self.makers[ending])
         if ending in FIGURES and self.drawn:
-            maker = partial(maker, paper=function("plots:paper")(ending, asked.get("width"), asked.get("font")))
+            maker = partial(maker, paper=function("paper:asked")(ending, asked.get("width"), asked.get("font")))
         if self.computed is None:
             return maker(found), {}
         value = function(self.computed)(found, **{name: asked[name] for name in (*self.takes, "seed")})

@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import difflib
-import io
-import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import wraps
@@ -13,11 +10,12 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from ..errors import BadRequest, MissingExtra
+from ..errors import MissingExtra
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.pose import Pose
+from .paper import BESIDE, PNG, Paper, legend_within
 from .skeleton import legs_of, outline
 from .sketch import Sketch, axis_label
 from .view.view import plane_normal
@@ -26,14 +24,9 @@ STYLE = "hrsynth.present.style"
 """The one style of all plots, ``style.mplstyle`` of this folder."""
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")
 """Its colours, which colour-blind readers tell apart."""
-BESIDE = 2.3
-"""Room for a legend beside the axes (inches)."""
+PAD = 0.07
+"""Left free about axes, titles and legends (inches)."""
 FEWEST_TICKS = 3
-LARGEST_TEXT = 1.25
-"""Multiple of its part of the width up to which text is made larger: above, it would run into what is beside it."""
-MILLIMETRES = {"mm": 1.0, "cm": 10.0, "in": 25.4}
-WIDTHS, TEXTS = (1.0, 40.0), (4.0, 40.0)
-"""The least and the largest width of a figure (inches) and size of its text (points)."""
 PLACES = 6
 """Decimals of metres and degrees in words."""
 Asked = ParamSpec("Asked")
@@ -64,96 +57,6 @@ def styled(draw: Callable[Asked, Given]) -> Callable[Asked, Given]:
     return drawn
 
 
-@dataclass(frozen=True)
-class Paper:
-    """How a figure is printed: the ending of its file, its width (inches), the size (points) of its text and its font;
-    None: as it was made, text of the same part of the width."""
-
-    ending: str = ".png"
-    width: float | None = None
-    size: float | None = None
-    font: str | None = None
-
-    def fit(self, figure: Any) -> None:
-        """Give a figure this width, with all strokes, and this font; raises ``BadRequest`` for text that is too large
-        for its place."""
-        from matplotlib.text import Text
-
-        scale = 1.0 if self.width is None else self.width / figure.get_figwidth()
-        if (scale, self.size, self.font) == (1.0, None, None):
-            return
-        figure.draw_without_rendering()
-        every: list[Any] = list({id(each): each for each in figure.findobj()}.values())
-        texts: list[Any] = [each for each in every if isinstance(each, Text) and each.get_text()]
-        usual = float(np.median([each.get_fontsize() for each in texts]))
-        size = scale if self.size is None else self.size / usual
-        if size > LARGEST_TEXT * scale:
-            raise BadRequest(f"text does not fit a figure {25.4 * scale * figure.get_figwidth():.0f} mm wide",
-                             f"{self.size:g}pt", f"up to {LARGEST_TEXT * scale * usual:.2g}pt, or a width of "
-                             f"{25.4 * size / LARGEST_TEXT * figure.get_figwidth():.0f}mm and more")
-        for each in texts:
-            each.set(fontsize=size * each.get_fontsize(), fontfamily=self.font or each.get_fontfamily())
-        for axis in (axis for place in figure.axes for axis in (place.xaxis, place.yaxis)):
-            for label in axis.get_ticklabels()[:1]:
-                axis.set_tick_params(labelsize=label.get_fontsize(), labelfontfamily=label.get_fontfamily())
-        for each in every:
-            if hasattr(each, "set_linewidth"):
-                each.set_linewidth(np.multiply(scale, each.get_linewidth()))
-            if hasattr(each, "set_markersize"):
-                each.set_markersize(scale * each.get_markersize())
-            if hasattr(each, "set_sizes"):
-                each.set_sizes(scale**2 * each.get_sizes())
-        figure.set_size_inches(scale * figure.get_size_inches())
-
-
-PNG = Paper()
-
-
-def paper(ending: str, width: str | None, font: str | None) -> Paper:
-    """What a figure is printed on: ``width`` as 88mm, 8.8cm or 3.5in, ``font`` as a name, a size (8pt) or both
-    (Times 8pt). Raises ``BadRequest``."""
-    inches = size = None
-    if width is not None:
-        found = re.fullmatch(r"(\d+\.?\d*) *(mm|cm|in)", width.strip())
-        inches = 0.0 if found is None else float(found[1]) * MILLIMETRES[found[2]] / MILLIMETRES["in"]
-        if not WIDTHS[0] <= inches <= WIDTHS[1]:
-            raise BadRequest("width of a figure", width, f"{WIDTHS[0]:g}in to {WIDTHS[1]:g}in, as 88mm, 8.8cm or 3.5in")
-    if font is not None:
-        name, points = re.fullmatch(r"(.*?)(?:(?:^| +)(\d+\.?\d*) *pt)?", font.strip()).groups()  # type: ignore[union-attr]
-        size = None if points is None else float(points)
-        if size is not None and not TEXTS[0] <= size <= TEXTS[1]:
-            raise BadRequest("font of a figure", font, f"a name, a size of {TEXTS[0]:g}pt to {TEXTS[1]:g}pt, or both")
-        font = require_font(name)
-    return Paper(ending, inches, size, font)
-
-
-def require_font(name: str) -> str | None:
-    """A font that is installed, None for no name; raises ``BadRequest``."""
-    from matplotlib import font_manager
-
-    known = {each.name for each in font_manager.fontManager.ttflist}
-    if name and name not in known and name not in ("serif", "sans-serif", "monospace"):
-        close = difflib.get_close_matches(name, known, 3, 0.4)
-        raise BadRequest("font of a figure", name, ", ".join(["an installed font", *close, "serif, sans-serif"]))
-    return name or None
-
-
-def printed(figure: Any, paper: Paper) -> bytes:
-    """The bytes of a matplotlib figure; of a PNG without ``savefig``, which would draw it twice."""
-    import matplotlib
-
-    stream = io.BytesIO()
-    paper.fit(figure)
-    if paper.ending == ".png":
-        figure.set_dpi(150)
-        figure.canvas.print_png(stream, pil_kwargs={"compress_level": 3})
-    else:
-        known = {"CreationDate": None} if paper.ending == ".pdf" else {"Date": None}
-        with matplotlib.rc_context({"pdf.fonttype": 42, "svg.hashsalt": "hrsynth"}):
-            figure.savefig(stream, format=paper.ending[1:], metadata=known, dpi=150)
-    return stream.getvalue()
-
-
 def empty_figure(width: float, height: float, **style: Any) -> Any:
     """A figure of this size (inches) without axes."""
     from matplotlib.backends.backend_agg import FigureCanvasAgg
@@ -164,9 +67,14 @@ def empty_figure(width: float, height: float, **style: Any) -> Any:
     return figure
 
 
-def panels(rows: int, columns: int, width: float, height: float) -> tuple[Any, Any]:
-    """A figure (width, height in inches) and its axes, row by row."""
-    figure = empty_figure(width, height, layout="constrained")
+def panels(rows: int, columns: int, width: float, height: float, paper: Paper = PNG,
+           around: tuple[float, float] = (1.2, 1.2)) -> tuple[Any, Any]:
+    """A figure and its axes, row by row: ``width``, ``height`` (inches) where the paper has room, and else narrower
+    with axes of the same shape; ``around`` is what is not axes."""
+    wide = paper.axes(width)
+    height = around[1] + (height - around[1]) * (wide - around[0]) / (width - around[0])
+    figure = empty_figure(wide, height, layout="constrained")
+    figure.get_layout_engine().set(w_pad=PAD, h_pad=PAD)
     return figure, figure.subplots(rows, columns, squeeze=False).ravel()
 
 
@@ -299,6 +207,17 @@ def _own_axes(names: tuple[str, str], motion: PlatformMotion) -> tuple[tuple[str
     return (first, second), shear, sketch.axes @ (home - moved @ np.array(chosen) @ home), sketch.axes
 
 
+def outer(place: Any, k: int, columns: int, count: int) -> None:
+    """Leave out the names and numbers of axes that stand at the map beside or below too: map ``k`` of ``count`` in
+    ``columns`` has them at the left and where no map is below."""
+    if k % columns:
+        place.set_ylabel("")
+        place.tick_params(labelleft=False)
+    if k + columns < count:
+        place.set_xlabel("")
+        place.tick_params(labelbottom=False)
+
+
 def layer_title(place: Any, name: str, value: float) -> None:
     """The value of the third part of a pose over a map."""
     place.set_title(f"{axis_label(name)}: {value:.4g}", fontsize=10)
@@ -345,8 +264,14 @@ def missing_entry() -> Any:
     return Patch(label="not reached", **MISSING)
 
 
-def legend(figure: Any, entries: Sequence[Any]) -> None:
-    """The legend beside the axes, where there is something to explain."""
-    if entries:
-        figure.set_figwidth(figure.get_figwidth() + BESIDE)
+def legend(figure: Any, entries: Sequence[Any], paper: Paper) -> None:
+    """The legend beside the axes, or below where the paper is narrow, where there is something to explain."""
+    wide = figure.get_figwidth()
+    if not entries:
+        return
+    if wide + BESIDE <= paper.room + 1e-9:
+        figure.set_figwidth(wide + BESIDE)
         figure.legend(handles=entries, loc="outside right center", labelspacing=0.8)
+    else:
+        tall = legend_within(figure, list(entries), wide, loc="outside lower center")
+        figure.set_figheight(figure.get_figheight() + tall)
