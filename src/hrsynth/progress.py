@@ -18,7 +18,14 @@ def tell(stage: str) -> None:
 
 @contextmanager
 def following(listener: Callable[[str], None]) -> Iterator[None]:
-    """Tell a function each step of all that is asked within: ``with following(print): derive(robot)``."""
+    """Tell a function each step of all that is asked within: ``with following(print): derive(robot)``.
+
+    >>> stages = []
+    >>> with hrsynth.following(stages.append):
+    ...     found = hrsynth.observe("3rrr_m1", seed=7)
+    >>> "sampling" in stages
+    True
+    """
     token = _listener.set(listener)
     try:
         yield

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import wraps
 from inspect import Parameter, signature
-from typing import Any, ClassVar
+from typing import Any, ClassVar, ParamSpec, TypeVar
 
 from .errors import shortened
 
 LONGEST_LINE, LONGEST_PART = 160, 48
 """Characters of a value at a prompt, and of each of its fields there."""
+P = ParamSpec("P")
+R = TypeVar("R")
 LISTED = 3
 """Members of a tuple that are shown; of more their number is."""
 
@@ -122,6 +125,26 @@ class Result(Compared):
 
     def _repr_html_(self) -> str:
         return str(Result.public("html")(self))
+
+
+def require_keywords(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
+    """Raise ``TypeError`` for a keyword that a function has not, with the nearest of those that it has."""
+    known = [name for name, each in signature(function).parameters.items() if each.kind is not Parameter.VAR_KEYWORD]
+    for name in given:
+        if name not in known:
+            near = difflib.get_close_matches(name, known, 1)
+            raise TypeError(f"{function.__name__} has no {name!r}{f', did you mean {near[0]!r}' if near else ''}; "
+                            f"it takes {', '.join(known)}")
+
+
+def spelled(function: Callable[P, R]) -> Callable[P, R]:
+    """A function that tells of a wrong keyword which ones it has."""
+    @wraps(function)
+    def called(*args: P.args, **given: P.kwargs) -> R:
+        require_keywords(function, given)
+        return function(*args, **given)
+
+    return called
 
 
 def by_name(value: type[Any], keyword: str) -> Callable[[Callable[..., Any]], Callable[..., Any]]:

@@ -181,6 +181,9 @@ def advise(robot: RobotLike, observe: LegsLike = None, camera: str | None = None
     direction is observed, and an encoder on any joint. Every set that is returned is verified at all samples; of the
     smallest ones at most ``most`` are. Raises
     ``BadRequest`` for unknown names, ``RankUndecided`` where what is seen now has no clear rank.
+
+    >>> hrsynth.advise("3rrr_m1", "1,2")
+    <Advice: 3rrr_m1, watching 1, 2: partially controllable, 15 sets of 1 more>
     """
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     now = verdict_of(setting, setting.labels, setting.samples)

@@ -12,6 +12,7 @@ from ..kinematics.assembly import of_links
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezero
 from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
+from ..results import spelled
 from ..tolerances import AS_PRINTED
 from .observed import SAMPLES, LegsLike, ObservedRobot, RobotLike, as_robot
 
@@ -19,6 +20,7 @@ if TYPE_CHECKING:
     from .modes.modes import AssemblyModes
 
 
+@spelled
 def observe(robot: RobotLike, legs: LegsLike = None, camera: str | None = None, *,
             at: PoseLike | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
     """A robot with what is watched of it, its normal form and samples of its motion: what every question takes.
@@ -30,6 +32,12 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: str | None = None, 
     assembled.
 
     Raises ``BadRequest`` for labels, links, parts of a pose and modes that there are not, ``PoseNotReached``.
+
+    >>> robot = hrsynth.observe("quattro", [1, 4])
+    >>> robot
+    <ObservedRobot: quattro, watching 1, 4>
+    >>> hrsynth.derive(robot).verdict == "controllable"
+    True
     """
     robot = as_robot(robot)
     if at is None:

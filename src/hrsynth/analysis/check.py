@@ -92,6 +92,9 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
 
     Raises ``BadRequest`` for names that there are not and for parts of a pose that the platform cannot change,
     ``PoseNotReached`` for poses out of reach, ``PlaneNotMet`` for a grid of them.
+
+    >>> hrsynth.check("3rrr_m1", at=["x=0,y=0,phi=0", [0.01, 0, 0]])
+    <Check: 3rrr_m1, watching 1, 2, 3: x=0,y=0,z=0,phi=0 regular; x=0.01,y=0,z=0,phi=0 regular>
     """
     poses = asked_poses(at)
     cells = Grid.parse(grid) if isinstance(grid, str) else grid

@@ -58,7 +58,11 @@ class Legs(Result, shown_as="legs"):
 @question()
 def legs(robot: RobotLike, camera: str | None = None, *, at: PoseLike | None = None, seed: int = 0) -> Legs:
     """The verdict of every set of legs at their default segments (theory.md 6), on the branch of the zero
-    configuration, or of the pose ``at`` (``mode:2``: a mode with all legs watched)."""
+    configuration, or of the pose ``at`` (``mode:2``: a mode with all legs watched).
+
+    >>> hrsynth.legs("quattro").minimal
+    (('1', '3'), ('1', '4'), ('2', '3'), ('2', '4'))
+    """
     setting = observe(robot, None, camera, at=at, seed=seed)
     anatomy = setting.anatomy
     segments = setting.segments

@@ -134,6 +134,12 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: str | None = None
     need be, or one of its modes (``mode:2``); an observed robot says all of that itself. ``form`` is ``simplified`` or
     ``general``; ``paper``: with the paper's own form beside it. Raises ``BadRequest`` for unknown names,
     ``NotCertified`` if even the exact lift fails.
+
+    >>> found = hrsynth.derive("quattro", [1, 4])
+    >>> found
+    <Derivation: quattro 4-R̲-{2-SS}, watching 1, 4: hidden robot 2-Π-{2-U̲U}, controllable>
+    >>> found.verdict == "controllable"
+    True
     """
     if form not in FORMS:
         raise BadRequest("unknown form", form, tuple(FORMS))

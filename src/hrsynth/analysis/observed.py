@@ -225,7 +225,7 @@ def as_robot(given: RobotLike) -> Mechanism | ObservedRobot:
 
 
 def as_names(given: LegsLike) -> tuple[str, ...] | None:
-    """The legs or links that are given, None for all; raises ``BadRequest``."""
+    """The legs or links that are given, None for all (None, ``all``); raises ``BadRequest``."""
     if given is None:
         return None
     every: Any = given.split(",") if isinstance(given, str) else given if isinstance(given, Iterable) else [given]
@@ -233,7 +233,8 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
     if not all(isinstance(each, str | Integral) and not isinstance(each, bool) for each in every):
         raise BadRequest("legs to watch", given, "a label or a link such as 1 or 'rod_1a', several in a list or in a "
                          "text with commas, or 'all'")
-    return tuple(str(each).strip() for each in every)
+    names = tuple(str(each).strip() for each in every)
+    return None if names == ("all",) else names
 
 
 def forget_robots() -> None:

@@ -13,8 +13,8 @@ from typing import Any, ParamSpec, TypeVar
 from ..budgets import REMEMBERED_ANSWERS, REMEMBERED_GRIDS
 from ..errors import MissingExtra
 from ..mechanism import Mechanism
-from ..results import content
-from .observed import as_robot, forget_robots
+from ..results import content, require_keywords
+from .observed import as_names, as_robot, forget_robots
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -47,7 +47,10 @@ _ANSWERS, _GRIDS = AnswerMemory(REMEMBERED_ANSWERS), AnswerMemory(REMEMBERED_GRI
 
 
 def forget() -> None:
-    """Forget all answers and samples that are remembered."""
+    """Forget all answers and samples that are remembered.
+
+    >>> hrsynth.forget()
+    """
     forget_answers()
     forget_robots()
 
@@ -77,13 +80,19 @@ def question(**old: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
                 warnings.warn(f"{function.__name__}: {name} is called {old[name]} now; the old name goes with the next "
                               "version", DeprecationWarning, stacklevel=2)
                 given[old[name]] = given.pop(name)
-            bound = known.bind(*args, **given)
+            require_keywords(function, given)
+            try:
+                bound = known.bind(*args, **given)
+            except TypeError as error:
+                raise TypeError(f"{function.__name__}: {error}; it takes {', '.join(known.parameters)}") from None
             robot = bound.arguments["robot"] = as_robot(bound.arguments["robot"])
             if given.get("seconds") is not None:
                 return function(*bound.args, **bound.kwargs)
             source = robot if isinstance(robot, Mechanism) else robot.robot
             every = known.bind(*args, **given)
             every.apply_defaults()
+            if "observe" in every.arguments:
+                every.arguments["observe"] = as_names(every.arguments["observe"])
             options = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
             key = (function.__qualname__, robot, source.file, source.notes, *options)
             try:

@@ -20,7 +20,11 @@ from .verify_certificate import verify as _verify
 
 def certificate(found: AssemblyModes | Derivation) -> dict[str, Any]:
     """The certificate of a complete list of modes, or of a derivation's verdict in exact arithmetic: plain data, as
-    ``verify`` and the one file ``verify_certificate.py`` check it. Raises ``NoCertificate``."""
+    ``verify`` and the one file ``verify_certificate.py`` check it. Raises ``NoCertificate``.
+
+    >>> hrsynth.certificate(hrsynth.modes("3rrr_m1"))["complex"]
+    6
+    """
     if isinstance(found, AssemblyModes):
         return modes.certificate(found)
     if isinstance(found, Derivation):
@@ -37,7 +41,11 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | None = Non
     """What a certificate, or the file of one, proves, in words, by the checker's own computation; with ``robot`` also
     that its geometry is that robot's, to ``SAME_RELATION`` of its size.
 
-    Raises ``CertificateRefused`` where it does not hold, ``BadRequest`` for a file that cannot be read."""
+    Raises ``CertificateRefused`` where it does not hold, ``BadRequest`` for a file that cannot be read.
+
+    >>> hrsynth.verify(hrsynth.certificate(hrsynth.modes("3rrr_m1")))
+    '2 real of 6 complex poses, and no other'
+    """
     if isinstance(source, Mapping):
         record, name = dict(source), "the certificate"
     else:

@@ -160,7 +160,8 @@ def _goal(help: str) -> Option:
 
 
 FIGURE = (
-    Option("width", "Width of a figure, as 88mm or 3.5in.", "LENGTH", group=OUTPUT),
+    Option("width", "Width of a figure, as 88mm or 3.5in: it is laid out for that, with text of 8pt.", "LENGTH",
+           group=OUTPUT),
     Option("font", "Font of a figure, its size, or both: serif, 8pt, 'DejaVu Sans 8pt'.", group=OUTPUT),
 )
 POSES = "or mode:2, of the list that modes gives; again for more (default: the zero configuration)."

@@ -24,7 +24,11 @@ __all__ = ["examples", "load", "native", "save", "shipped", "spanning", "targets
 
 
 def shipped() -> dict[str, Path]:
-    """The robots that come with the package: name to file, sorted by name."""
+    """The robots that come with the package: name to file, sorted by name.
+
+    >>> "quattro" in hrsynth.shipped()
+    True
+    """
     packaged = Path(str(resources.files("hrsynth").joinpath("robots")))
     folder = packaged if packaged.is_dir() else Path(__file__).parents[3] / "robots"
     return {path.stem: path for path in sorted(folder.glob("*.urdf"), key=lambda path: path.stem)}
@@ -53,6 +57,9 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
         With every defect of the file and its line.
     LoopsNotClosed, RankUndecided
         For a file whose loops stay open, or in which rounded numbers leave no gap between free and held.
+
+    >>> hrsynth.load("3rrr_m1")
+    <Mechanism: 3rrr_m1, 8 links, 9 joints, 3 motors>
     """
     overrides = Overrides(base, platform, names(motors), closures(close), names(freeze) or (), names(observe), keyframe,
                           unit)
@@ -105,6 +112,10 @@ def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | Non
     ------
     BadRequest
         For an unknown dialect or ending; where the file cannot be written, or the mechanism not be said in the dialect.
+
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as folder:
+    ...     notes = hrsynth.save(hrsynth.load("3rrr_m1"), f"{folder}/robot.urdf")
     """
     chosen, mechanism = _dialect(Path(path), dialect), load(mechanism)
     written = formats.writer(chosen.name)(mechanism)

@@ -17,6 +17,8 @@ def examples() -> dict[str, Path]:
     """Name to file, sorted by name: the file's, with the folder's before it where several files have one name.
 
     Raises ``MissingExtra`` where the package is not installed.
+
+    >>> robots = hrsynth.examples()
     """
     try:
         folder = Path(str(distribution(PACKAGE).locate_file(FOLDER)))

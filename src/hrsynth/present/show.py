@@ -5,26 +5,34 @@ from __future__ import annotations
 import html as markup
 import json
 import re
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from .. import __version__
 from ..errors import BadRequest, MissingExtra
-from ..results import Result
-from .outputs import OUTPUTS, function
+from ..results import Result, spelled
+from .outputs import FIGURES, OUTPUTS, File, function
 
 if TYPE_CHECKING:
     from ..mechanism.pose import Pose
 
+PICTURES = (*FIGURES, ".gif")
+"""Endings of pictures."""
+
 
 @dataclass(frozen=True, repr=False)
 class Picture:
-    """A picture, ``png`` or ``svg``; a notebook shows it."""
+    """A picture, as a notebook shows it where it is ``png`` or ``svg``."""
 
     content: bytes
     words: str
-    kind: str = "png"
+    kind: str
+    draws: Callable[[str], bytes]
+    """Draws it in a file with another of the ``endings``."""
+    endings: tuple[str, ...]
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.words}>"
@@ -36,17 +44,20 @@ class Picture:
         return self.content.decode() if self.kind == "svg" else None
 
     def save(self, file: str | Path) -> None:
-        """Write it, whole or not at all; raises ``BadRequest`` for another ending than its kind's."""
-        from ..description.files import require_folder, write_whole
+        """Write it, whole or not at all, drawn again for the ending of another kind; raises ``BadRequest`` for an
+        ending that is none of its kinds."""
+        from ..description.files import write_whole
 
-        if Path(file).suffix.lower() != f".{self.kind}":
-            raise BadRequest("cannot write the picture: its ending is not its kind", str(file), f".{self.kind}")
-        require_folder(file)
-        write_whole(file, self.content)
+        ending = _ending(file, self.endings)
+        write_whole(file, self.content if ending == f".{self.kind}" else self.draws(ending))
 
 
 def text(result: Result) -> str:
-    """The text that the command line prints of a result."""
+    """The text that the command line prints of a result.
+
+    >>> print(hrsynth.text(hrsynth.legs("rrrrr_m1")).splitlines()[0])
+    rrrrr_m1   R*RRRR*   2 dof
+    """
     shown: str = function(OUTPUTS[result.shown_as].text)(result)
     return shown
 
@@ -61,7 +72,11 @@ def record(command: str, robot: str | None, fields: dict[str, Any]) -> str:
 
 def html(result: Result) -> str:
     """What a notebook shows: a view as it moves; else the same text in columns, with lines that are not broken, motors
-    underlined by markup, which any font can."""
+    underlined by markup, which any font can.
+
+    >>> hrsynth.html(hrsynth.derive("3rrr_m1"))[:4]
+    '<pre'
+    """
     said, inline = text(result), OUTPUTS[result.shown_as].inline
     if inline is not None:
         try:
@@ -72,20 +87,51 @@ def html(result: Result) -> str:
     return f'<pre style="white-space: pre; overflow-x: auto">{shown}</pre>'
 
 
-def draw(result: Result, *, plane: Pose | str | None = None, steps: int = 51) -> Picture:
-    """A picture of a result: the kinematic schemes of a derivation's robots, and as ``-o`` draws them assembly modes, a
-    servo run, checked or accuracy poses over a grid, and where a freedom is lost over a ``plane`` of poses (``steps`` a
-    side).
+@spelled
+def draw(result: Result, file: str | Path | None = None, *, plane: Pose | str | None = None, steps: int = 51,
+         width: str | None = None, font: str | None = None) -> Picture:
+    """A picture of a result, written to ``file`` (.png, .pdf or .svg; of a servo run .gif too) where one is named: the
+    kinematic schemes of a derivation's robots (.svg), and as ``-o`` draws them assembly modes, an atlas, a servo run,
+    checked or accuracy poses over a grid, and where a freedom is lost over a ``plane`` of poses (``steps`` a side).
+    ``width`` (``"88mm"``) and ``font`` (``"serif 8pt"``) as on the command line.
+
+    >>> picture = hrsynth.draw(hrsynth.modes("3rrr_m1"), width="88mm")
+    >>> picture
+    <Picture: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0.01,y=-0.015,z=0,rpy=0/0/0>
 
     Raises ``BadRequest`` for a result that has no picture.
     """
-    asked = {"plane": plane, "steps": steps, "seed": 0}
-    drawn = [(file, ending) for file in OUTPUTS[result.shown_as].files for ending in (".png", ".svg")
-             if ending in file.makers and (file.part is None or getattr(result, file.part) is not None)]
-    if plane is not None and not any("plane" in file.takes for file, _ in drawn):
-        raise BadRequest("a plane is drawn", type(result).__name__, "only of the result of singular")
-    for file, ending in drawn:
-        content, _ = file.content(result, ending, asked)
-        return Picture(b"".join([content] if isinstance(content, bytes) else content), result.headline(), ending[1:])
-    raise BadRequest("there is no picture of", repr(result),
-                     "derive, modes, servo, singular; check with a grid; accuracy with a plane or grid")
+    asked = {"plane": plane, "steps": steps, "seed": 0, "width": width, "font": font}
+    for drawn in OUTPUTS[result.shown_as].files:
+        endings = tuple(each for each in PICTURES if each in drawn.makers)
+        if not endings or (drawn.part is not None and getattr(result, drawn.part) is None):
+            continue
+        if plane is not None and "plane" not in drawn.takes:
+            raise BadRequest("a plane is drawn", type(result).__name__, "only of the result of singular")
+        if not drawn.drawn and (width is not None or font is not None):
+            raise BadRequest("width and font are of a figure", type(result).__name__, "what is drawn with axes")
+        draws = partial(_content, drawn, result, asked)
+        ending = endings[0] if file is None else _ending(file, endings)
+        picture = Picture(draws(ending), result.headline(), ending[1:], draws, endings)
+        if file is not None:
+            picture.save(file)
+        return picture
+    raise BadRequest("there is no picture of", repr(result), [
+        f"{name} with {each.words}" if each.words else name for name, outputs in OUTPUTS.items()
+        for each in outputs.files if any(ending in each.makers for ending in PICTURES)])
+
+
+def _ending(file: str | Path, endings: tuple[str, ...]) -> str:
+    """The ending of a file that a picture can be written to; raises ``BadRequest``."""
+    from ..description.files import require_folder
+
+    ending = Path(file).suffix.lower()
+    if ending not in endings:
+        raise BadRequest("cannot write the picture: unknown extension", str(file), endings)
+    require_folder(file)
+    return ending
+
+
+def _content(drawn: File, result: Result, asked: dict[str, Any], ending: str) -> bytes:
+    content, _ = drawn.content(result, ending, asked)
+    return b"".join([content] if isinstance(content, bytes) else content)

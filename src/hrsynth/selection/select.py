@@ -198,6 +198,9 @@ def select(robot: RobotLike, camera: str | None = None, *, start: PoseLike, goal
     neither kept nor discarded. Runs are made from the best set on, until ``runs`` of them ended at the goal.
 
     Raises ``BadRequest``, ``PoseNotReached``.
+
+    >>> hrsynth.select("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=0")
+    <Selection: 3rrr_m1: 7 sets, 1 kept, best 1, 2, 3>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
     setting = ObservedRobot.of(robot, None, camera, seed=seed).telling(wanted)

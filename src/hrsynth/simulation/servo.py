@@ -118,6 +118,9 @@ def servo(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
 
     Raises ``BadRequest`` for names that there are not, legs that do not see the platform, singular poses;
     ``PoseNotReached`` for poses out of reach; ``MissingExtra``.
+
+    >>> hrsynth.servo("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=0", gain=0.8)
+    <Servo: 3rrr_m1, watching 1, 2, 3: ended at x=0.02,y=0,z=0,phi=0, goal>
     """
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     task = ServoTask.of(setting, start=start, goal=goal, conditions=conditions, seed=seed)

@@ -148,6 +148,9 @@ def atlas(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
 
     At most ``budget`` intervals are tried for a path, ``budgets.ATLAS_INTERVALS`` for all of them. Modes at which the
     real robot was not found assembled are undecided. Raises what ``modes`` raises.
+
+    >>> hrsynth.atlas("rrrrr_m1")
+    <Atlas: rrrrr_m1, watching 1, 2: 2 real of 2 complex (hidden robot) at x=0.02,y=0.24,z=0,rpy=0/0/0, aspects: 2>
     """
     listed = modes(robot, observe, camera, at=at, seed=seed)
     aspects = Aspects.of(listed.setting, seed=seed)

@@ -265,6 +265,9 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, 
     intervals are tried. ``observe`` and ``camera`` as for ``derive``.
 
     Raises ``BadRequest`` for names and parts of a pose that there are not, ``PoseNotReached``.
+
+    >>> hrsynth.path("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=5deg")
+    <PathAnswer: 3rrr_m1, watching 1, 2, 3: same aspect>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
     aspects = Aspects.of(ObservedRobot.of(robot, observe, camera, seed=seed).telling(wanted), seed=seed)

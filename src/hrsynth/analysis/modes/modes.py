@@ -190,6 +190,9 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
 
     Raises ``BadRequest`` for names that there are not, ``PoseNotReached`` for a pose out of reach, ``MeaningUndecided``
     where special geometry may be meant or not.
+
+    >>> hrsynth.modes("3rrr_m1", at="x=0,y=0,phi=0")
+    <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0,y=0,z=0,phi=0>
     """
     if real and observe not in (None, "all", ["all"]):
         raise BadRequest("the motors are held instead of directions", f"real with observe {observe}", "one of the two")

@@ -95,6 +95,9 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: str | None = No
 
     Words, expression and rank are compared at ``points`` random reachable poses and at singular poses constructed from
     the expression; raises ``Disagreement`` where they do not agree, ``BadRequest`` where a robot has no motor.
+
+    >>> hrsynth.singular("rrrrr_m1", points=200)
+    <Singularity: rrrrr_m1, watching 1, 2: the tangents τ1, τ2 are parallel>
     """
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)

@@ -133,6 +133,9 @@ def view(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, 
 
     ``observe`` and ``camera`` as for ``derive``, which also says what is raised. Assembly modes that cannot be listed
     and meshes that are missing are told in ``notes``.
+
+    >>> hrsynth.view("3rrr_m1")
+    <View: 3rrr_m1, 3 sliders, 1 other assembly modes>
     """
     setting = ObservedRobot.of(robot, observe, camera, seed=seed)
     derivation = derive(setting, seed=seed) if hidden else None

@@ -1,0 +1,80 @@
+"""What a person types in Python: examples in every help, wrong keywords told, one question however legs are written,
+pictures in any kind of file."""
+
+from __future__ import annotations
+
+import doctest
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import hrsynth
+from hrsynth.errors import BadRequest, MissingExtra
+
+FUNCTIONS = sorted({*hrsynth.__all__} - {"__version__", "catalog"})
+SLOW = {"atlas", "draw", "select"}
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=pytest.mark.slow) if name in SLOW else name
+                                  for name in FUNCTIONS])
+def test_help_has_an_example_that_works(name: str):
+    if name == "examples":
+        try:
+            hrsynth.examples()
+        except MissingExtra:
+            pytest.skip("example-robot-data is not installed")
+    (example,) = doctest.DocTestFinder(recurse=False).find(getattr(hrsynth, name), name, globs={"hrsynth": hrsynth})
+    assert f"hrsynth.{name}(" in example.docstring
+    assert doctest.DocTestRunner(verbose=False).run(example).failed == 0
+
+
+@pytest.mark.parametrize(("ask", "near"), [
+    (lambda wrong: hrsynth.derive("3rrr_m1", **wrong("observed")), "observe"),
+    (lambda wrong: hrsynth.select("3rrr_m1", start="x=0", goal="x=0", **wrong("run")), "runs"),
+    (lambda wrong: hrsynth.observe("3rrr_m1", **wrong("leg")), "legs"),
+    (lambda wrong: hrsynth.servo("3rrr_m1", start="x=0", goal="x=0", **wrong("gian")), "gain"),
+    (lambda wrong: hrsynth.map("check", ["3rrr_m1"], jobs=1, **wrong("camra")), "camera"),
+    (lambda wrong: hrsynth.draw(hrsynth.modes("rrrrr_m1"), **wrong("widht")), "width")])
+def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
+    given: list[str] = []
+
+    def wrong(name: str) -> dict[str, int]:
+        given.append(name)
+        return {name: 1}
+
+    with pytest.raises(TypeError, match="did you mean") as told:
+        ask(wrong)
+    said = str(told.value)
+    assert re.search(rf"has no {given[0]!r}, did you mean {near!r}; it takes .*\b{near}\b", said), said
+
+
+def test_what_is_left_out_is_told_with_the_function():
+    with pytest.raises(TypeError, match=r"^accuracy: .*'cone'; it takes robot, .*cone"):
+        hrsynth.accuracy("3rrr_m1")
+
+
+def test_legs_in_any_form_are_one_question():
+    for forms in (("1,2", "1, 2", ["1", "2"], [1, 2], (1, "2"), {1, 2}), (None, "all", ["all"])):
+        answers = {id(hrsynth.derive("rrrrr_m1", form)) for form in forms}
+        assert len(answers) == 1, forms
+
+
+def test_a_picture_is_written_in_any_kind_of_file(tmp_path: Path):
+    found = hrsynth.modes("rrrrr_m1")
+    picture = hrsynth.draw(found, tmp_path / "a.pdf", width="88mm", font="serif 8pt")
+    assert (tmp_path / "a.pdf").read_bytes() == picture.content
+    box = re.search(rb"/MediaBox \[ 0 0 ([\d.]+) [\d.]+ \]", picture.content)
+    assert box is not None
+    assert float(box[1]) * 25.4 / 72 == pytest.approx(88, abs=0.01)
+    picture.save(tmp_path / "b.svg")
+    assert b'width="249.4488' in (tmp_path / "b.svg").read_bytes()
+    picture.save(tmp_path / "c.png")
+    assert (tmp_path / "c.png").read_bytes().startswith(b"\x89PNG")
+    for wrong in ("d.jpg", "d"):
+        with pytest.raises(BadRequest, match=r"\.png, \.pdf, \.svg"):
+            hrsynth.draw(found, tmp_path / wrong)
+    with pytest.raises(BadRequest, match="atlas"):
+        hrsynth.draw(hrsynth.legs("rrrrr_m1"))
+    assert {file.name for file in tmp_path.iterdir()} == {"a.pdf", "b.svg", "c.png"}
