@@ -52,6 +52,8 @@ FIRMER_BY = 2.0
 """Factor by which another pose must be firmer to take the place of a nearly singular one."""
 MOST_RELATED_ON_LINK = 40
 """Joints of one link above which relations among them are not looked for."""
+LINKAGE_STARTS = 200
+"""Random starts from which a linkage is closed."""
 MOST_CANDIDATES = 12
 """Pairs of frames that are told as possible closures."""
 MOST_BESIDE = 50

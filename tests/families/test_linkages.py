@@ -92,6 +92,18 @@ def test_a_linkage_is_written_by_its_name(tmp_path: Path):
         main(str(tmp_path), "robot")
 
 
+def test_dimensions_that_keep_a_joint_near_to_zero_end_with_the_farthest_angles():
+    linkage, zero, _ = drawn("goldberg", 2)
+    assert 0.05 < np.abs(np.sin(zero)).min() < 0.1
+    values = np.linalg.svd(linkage.axes(zero), compute_uv=False)
+    assert values[4] < 1e-9 < values[3]
+
+
+def test_dimensions_that_do_not_close_are_refused():
+    with pytest.raises(BadRequest, match="linkage"):
+        Linkage.of([1.0, 0.1, 0.1, 0.1], [0.5] * 4).regular(np.random.default_rng(0))
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", LINKAGES)
 def test_many_linkages(name: str):

@@ -12,6 +12,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..budgets import LINKAGE_STARTS
+from ..errors import BadRequest
 from ..geometry.vectors import Array, rotation_about
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
@@ -63,15 +65,26 @@ class Linkage:
         return angles(end.x) if np.abs(end.fun).max() < SOLVED else None
 
     def regular(self, rng: np.random.Generator) -> Array:
-        """Closed angles (n,) at which it can move, in one way, away from special configurations."""
+        """Closed angles (n,) at which it can move, in one way, away from special configurations: the first that are
+        well away, otherwise, of dimensions that keep some joint near to 0 or π, the farthest of a stated number.
+
+        Raises ``BadRequest`` where none of them closes so.
+        """
         count = len(self.lengths)
-        while True:
+        best, most = None, 0.0
+        for _ in range(LINKAGE_STARTS):
             found = self.closed(rng.uniform(-math.pi, math.pi, count))
             if found is None:
                 continue
             *_, weakest, lost = np.linalg.svd(self.axes(found), compute_uv=False)
-            if lost < RANK_CUTOFF and weakest > 0.05 * self.lengths.max() and np.all(np.abs(np.sin(found)) > 0.1):
-                return found
+            away = min(weakest / (0.05 * self.lengths.max()), np.abs(np.sin(found)).min() / 0.1)
+            if lost < RANK_CUTOFF and away > most:
+                best, most = found, away
+                if away > 1:
+                    break
+        if best is None:
+            raise BadRequest("dimensions of a linkage", self.lengths.tolist(), "such as close, and move in one way")
+        return best
 
     def mechanism(self, name: str, zero: Array | None = None, tilt: Array | None = None) -> Mechanism:
         """The linkage closed at ``zero`` (n,), by default at regular angles that are always the same, its base turned
