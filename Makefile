@@ -55,7 +55,7 @@ robots: setup  ## regenerate robots/*.urdf from the families
 	@$(BIN)/python -m hrsynth.families
 
 readme: setup  ## regenerate the tables of robots/README.md and of docs/pages
-	@$(BIN)/python -m hrsynth.present.readme robots/README.md docs/pages/papers.md
+	@$(BIN)/python -m hrsynth.present.readme robots/README.md docs/pages/papers.md docs/pages/lint.md
 	@$(BIN)/python -m hrsynth.catalog.readme docs/pages/catalog.md
 	@$(BIN)/python -m hrsynth.claims docs/pages/claims.md
 

@@ -24,6 +24,7 @@ FOLDERS = [
     {"geometry"},
     {"mechanism"},
     {"description"},
+    {"linting"},
     {"families"},
     {"kinematics"},
     {"closed_forms"},
@@ -40,8 +41,8 @@ FOLDERS = [
 ]
 LEVEL = {name: level for level, names in enumerate(FOLDERS) for name in names}
 
-ENGINE = {"geometry", "mechanism", "description", "kinematics", "closed_forms", "batch", "rewrite", "constraints"} | {
-    "analysis", "simulation", "selection", "certificates", "present"}
+ENGINE = {"geometry", "mechanism", "description", "linting", "kinematics", "closed_forms", "batch", "rewrite"} | {
+    "constraints", "analysis", "simulation", "selection", "certificates", "present"}
 ROBOTS = re.compile(
     r"(?<![a-z])(quattro|delta|orthoglide|gough|stewart|hexaglide|uranesx|i4l|tsai)(?![a-z])", re.IGNORECASE
 )

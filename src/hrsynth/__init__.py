@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .analysis.study import map
     from .certificates import certificate, verify
     from .description import examples, load, save, shipped
+    from .linting.lint import lint
     from .present.show import draw, html, text
     from .present.view.view import view
     from .progress import following
@@ -39,7 +40,7 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 __all__ = ["__version__", "accuracy", "advise", "atlas", "catalog", "certificate", "check", "derive", "draw",
-           "examples", "following", "forget", "html", "legs", "load", "map", "modes", "observe", "path", "save",
+           "examples", "following", "forget", "html", "legs", "lint", "load", "map", "modes", "observe", "path", "save",
            "select", "servo", "shipped", "singular", "text", "verify", "view"]
 
 _HOME = {
@@ -55,6 +56,7 @@ _HOME = {
     "forget": ".analysis.question",
     "html": ".present.show",
     "legs": ".analysis.controllability",
+    "lint": ".linting.lint",
     "load": ".description",
     "map": ".analysis.study",
     "modes": ".analysis.modes.modes",

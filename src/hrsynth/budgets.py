@@ -40,6 +40,15 @@ LARGEST_MESHES = 2_000_000_000
 """Bytes that they may have together."""
 MOST_LOOP_COORDINATES = 240
 """Coordinates of joints in loops above which the loops of a foreign file are not solved."""
+LARGEST_ROBOT = 20.0
+"""Characteristic length (m) of a file's robot above which its unit is asked for; and how many characteristic lengths
+wide the body of an inertia may be."""
+SMALLEST_ROBOT = 1e-3
+"""Characteristic length (m) below which it is."""
+LINTED_POSES = 3
+"""Configurations near the zero one at which a rank must be the same before lint says anything of it."""
+MOST_MENDING = 8
+"""Rounds in which what a mend uncovers is mended too."""
 LOOP_STRIDE = 0.4
 """Largest change of a coordinate in one step where they are (characteristic lengths, radians)."""
 LOOP_EFFORT = 100_000

@@ -110,6 +110,19 @@ AT_ORIGIN = 1e-12
 """Distance (m) below which a joint's centre is the origin of the link that it carries, where a file is written."""
 WITHOUT_DIRECTION = 1e-9
 """Length up to which a vector in a file has no direction."""
+OPPOSITE = 1e-3
+"""One plus the cosine of the angle between two axes of a closure below which they point opposite ways."""
+SAME_ROBOT = 1e-5
+"""Difference (characteristic lengths, radians; of masses, as part of them) up to which two files say the same of a
+robot: what five printed digits leave."""
+NO_BODY = 1e-6
+"""Part of an inertia's largest entry by which a second moment may be negative: printed digits of a flat body's."""
+IN_DEGREES = 5.0
+"""Angles in a file that are whole multiples of it (degrees) and larger than a turn in radians are taken for degrees."""
+UNIT_AXIS = 1e-3
+"""By how much the length of an axis in a file may differ from one before that is told: printed digits do."""
+TURN_IN_RADIANS = 6.3
+"""Radians above which an angle in a file is more than a turn."""
 
 # Singularities
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from . import completion, files, importing, schema
+from . import completion, files, importing, lint, schema
 from .catalog import catalog
 from .commands import HELP, WholeGroup
 from .questions import QUESTIONS
@@ -22,6 +22,7 @@ app = typer.Typer(
     help="Hidden robots of parallel robots that are controlled by watching the directions of their legs.")
 for question in QUESTIONS:
     question.add(app)
+lint.add(app)
 files.add(app)
 importing.add(app)
 app.add_typer(catalog)

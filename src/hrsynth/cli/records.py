@@ -900,11 +900,41 @@ class CatalogSite(Head):
     differ: list[Differing]
 
 
+class FindingRecord(TypedDict):
+    """What a rule found; `line` is null where it is about the whole file, `fix` what to do about it, and `mends`
+    whether --fix does it."""
+
+    rule: str
+    severity: Literal["error", "warning", "note"]
+    file: str
+    line: int | None
+    message: str
+    fix: str | None
+    mends: bool
+
+
+class LintCounts(TypedDict):
+    """How many findings are of each severity."""
+
+    error: int
+    warning: int
+    note: int
+
+
+class LintAnswer(Head, WrittenTo):
+    """What is wrong, doubtful or lost in files; `mended` is what --fix did, `file` where that is written."""
+
+    files: list[str]
+    findings: list[FindingRecord]
+    counts: LintCounts
+    mended: list[FindingRecord]
+
+
 RECORDS: dict[str, Any] = {
     "derive": Derive, "legs": LegsAnswer, "check": CheckAnswer, "singular": Singular, "advise": Advise,
     "modes": AssemblyModesRecord, "atlas": AtlasAnswer, "path": Path, "servo": Servo, "accuracy": AccuracyAnswer,
     "select": Select, "view": ViewAnswer, "verify": Verify, "robots": Robots, "convert": Convert,
-    "import": Import,
+    "import": Import, "lint": LintAnswer,
     "catalog build": CatalogBuild, "catalog list": CatalogList, "catalog show": CatalogShow,
     "catalog site": CatalogSite}
 """The type of each command's record."""

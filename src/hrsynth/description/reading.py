@@ -23,10 +23,15 @@ def read(path: Path, overrides: Overrides) -> Mechanism:
     Raises ``BadRobotFile`` for what is no robot, ``BadRequest`` for what has to be given, ``LoopsNotClosed`` and
     ``RankUndecided`` where its loops stay open or undecided.
     """
-    robot = formats.read(robot_file(path, strict=not overrides.any))
+    return understood(robot_file(path, strict=not overrides.any), overrides)
+
+
+def understood(file: RobotFile, overrides: Overrides) -> Mechanism:
+    """The mechanism of a file that was opened; raises as :func:`read`."""
+    robot = formats.read(file)
     if isinstance(robot, JointGraph):
         if len(robot.links) > MOST_LINKS or len(robot.joints) > 2 * MOST_LINKS:
-            raise xml.refusal(path, f"{len(robot.links)} links and {len(robot.joints)} joints",
+            raise xml.refusal(file.path, f"{len(robot.links)} links and {len(robot.joints)} joints",
                               f"up to {MOST_LINKS} links")
         from .assembly.build import build
         from .assembly.generic import with_generic_zero

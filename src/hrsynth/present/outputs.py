@@ -184,6 +184,7 @@ OUTPUTS = {
         CERTIFICATE,
         File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None, plotted=()))),
     "legs": Outputs("text.robots:legs"),
+    "lint": Outputs("text.lint:lint"),
     "modes": Outputs("text.poses:modes", (
         File("cannot draw the modes", figures("modes:picture"), "The picture of the modes",
              "Draw the modes: modes.png, .pdf, .svg.", nothing="modes:why_undrawn", drawn=True),

@@ -216,15 +216,23 @@ class LoopAssembly:
     @classmethod
     def of(cls, mechanism: Mechanism) -> LoopAssembly:
         """The assembly of a mechanism's own joints: closed at zero."""
-        joints = []
-        for joint in mechanism.joints.values():
-            one, two = (FrameSpec(link, inverse(mechanism.links[link].pose) @ pose(joint.point))
-                        for link in joint.links)
-            joints.append(JointSpec(joint.name, joint.type, (one, two), joint.axes, in_tree=joint.in_tree))
-        carrier = {joint.successor: joint.name for joint in mechanism.joints.values() if joint.in_tree}
-        gears = [GearSpec(each.name, carrier[each.predecessor], carrier[each.successor], each.ratio)
-                 for each in mechanism.couplings]
-        return cls(mechanism.base, joints, gears)
+        return cls(mechanism.base, joints_of(mechanism), gears_of(mechanism))
+
+
+def joints_of(mechanism: Mechanism) -> list[JointSpec]:
+    """A mechanism's joints as a file would give them: both frames at the joint's centre, parallel to the base's."""
+    found = []
+    for joint in mechanism.joints.values():
+        one, two = (FrameSpec(link, inverse(mechanism.links[link].pose) @ pose(joint.point)) for link in joint.links)
+        found.append(JointSpec(joint.name, joint.type, (one, two), joint.axes, in_tree=joint.in_tree))
+    return found
+
+
+def gears_of(mechanism: Mechanism) -> list[GearSpec]:
+    """A mechanism's couplings by the joints that carry their links."""
+    carrier = {joint.successor: joint.name for joint in mechanism.joints.values() if joint.in_tree}
+    return [GearSpec(each.name, carrier[each.predecessor], carrier[each.successor], each.ratio)
+            for each in mechanism.couplings]
 
 
 @dataclass(frozen=True, eq=False)

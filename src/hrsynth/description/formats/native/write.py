@@ -22,7 +22,7 @@ from ..urdf.elements import simple_transmission
 
 _LOOP_NAMES = {kind: name for name, kind in LOOP_TYPES.items() if name != "continuous"}
 _OWN = re.compile(r"<hrsynth[\s/>]")
-_NO_LIMIT = {"lower": -1000.0, "upper": 1000.0, "effort": 1000.0, "velocity": 1000.0}
+NO_LIMIT = {"lower": -1000.0, "upper": 1000.0, "effort": 1000.0, "velocity": 1000.0}
 
 
 def write(mechanism: Mechanism) -> Written:
@@ -201,21 +201,21 @@ def _limit(element: xml.Element, kind: JointType, limits: Limits | None) -> None
     """Append a ``<limit>`` with all that URDF demands; ``free`` names the values that stand for no limit."""
     known = {} if limits is None else _known(limits)
     if kind is JointType.PRISMATIC or (kind is JointType.REVOLUTE and {"lower", "upper"} & set(known)):
-        needed = list(_NO_LIMIT)
+        needed = list(NO_LIMIT)
     elif known:
         needed = ["effort", "velocity"]
     else:
         return
     free = [key for key in needed if key not in known]
-    values = known | {key: _NO_LIMIT[key] for key in free}
-    attributes = {key: numerals.exact(values[key]) for key in _NO_LIMIT if key in values}
+    values = known | {key: NO_LIMIT[key] for key in free}
+    attributes = {key: numerals.exact(values[key]) for key in NO_LIMIT if key in values}
     if free:
         attributes["free"] = " ".join(free)
     etree.SubElement(element, "limit", attributes)
 
 
 def _known(limits: Limits) -> dict[str, float]:
-    return {key: value for key in _NO_LIMIT if (value := getattr(limits, key)) is not None}
+    return {key: value for key in NO_LIMIT if (value := getattr(limits, key)) is not None}
 
 
 def _motors(motor: Motor | None, names: Sequence[str], all_names: set[str]) -> list[xml.Element]:

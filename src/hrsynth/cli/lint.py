@@ -1,0 +1,74 @@
+"""The command lint: findings in the format that is asked for, and an exit status for continuous integration."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from typing import Any
+
+import typer
+
+from .colour import painted
+from .commands import add_command
+from .options import JSON, NEEDED, OUTPUT, SOURCE, Option, flag, output
+from .progress import Progress
+
+FORMATS = ("text", "github", "sarif", "json")
+FAILING = ("error", "warning", "note", "nothing")
+
+
+def rules() -> Iterable[str]:
+    """The names of the rules."""
+    from ..linting.rules import lint_rules
+
+    return lint_rules()
+
+
+def programs() -> Iterable[str]:
+    """The names of the programs whose reading is known."""
+    from ..linting.rules.readers import PROGRAMS
+
+    return PROGRAMS
+
+
+def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[str] | None, ignore: list[str] | None,
+         close: list[str] | None, **given: Any) -> None:
+    """Print what is found; exit status 1 where it is bad enough."""
+    import hrsynth
+
+    from ..errors import BadRequest
+    from ..present.show import record
+    from ..present.text import lint as shown
+
+    for name, value, known in (("--format", format, FORMATS), ("--fail-on", fail_on, FAILING)):
+        if value not in known:
+            raise BadRequest(name, value, known)
+    with Progress():
+        found = hrsynth.lint(files, readers=reader or (), ignore=ignore or (), close=close or (), **given)
+    if json or format == "json":
+        typer.echo(record("lint", None, found.to_dict()))
+    elif format == "text":
+        typer.echo(painted(hrsynth.text(found)))
+    else:
+        typer.echo(shown.github(found) if format == "github" else shown.sarif(found))
+    if fail_on != "nothing" and found.reaches(fail_on):
+        raise typer.Exit(1)
+
+
+def add(app: typer.Typer) -> None:
+    """Make it a command."""
+    said = [each for each in SOURCE if each.name in ("base", "platform", "motors", "close")]
+    add_command(app, "lint", "What is wrong, doubtful or lost in robot files, by rules with names, and what mends it.",
+                (Option("files", "Robot files in any dialect, or names of shipped robots.", "FILES", list[str], NEEDED,
+                        argument=True),
+                 flag("fix", "Mend what there is one way to mend, and write the file in its place or to --output."),
+                 Option("compare", "Another file of the same robot: where the two differ.", "OTHER"),
+                 Option("reader", "A program that shall read the file (mujoco, gazebo …): a closure that it loses is "
+                        "an error; again for more.", "NAME", list[str], words=programs),
+                 Option("ignore", "A rule to leave out; again for more.", "RULE", list[str], words=rules),
+                 Option("fail_on", "The mildest severity that makes the exit status 1: error, warning, note, nothing.",
+                        "SEVERITY", default="error", words=FAILING),
+                 Option("format", "text, github (annotations), sarif (2.1.0) or json.", default="text", words=FORMATS,
+                        group=OUTPUT),
+                 output("The mended file, of one file with --fix."), JSON, *said), lint,
+                ("robot.urdf", "robot.urdf --fix -o mended.urdf", "robot.urdf --compare robot.xml",
+                 "a.urdf b.xml --reader mujoco --format github --fail-on warning"))

@@ -1,0 +1,74 @@
+"""What a rule of ``lint`` is, and what it finds: data that every output shows in its own way."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from ..results import Value
+
+if TYPE_CHECKING:
+    from .subject import LintedFile
+
+SEVERITIES = ("note", "warning", "error")
+"""From the mildest to the worst."""
+Mend = Callable[[], None]
+"""Changes the file's document in place."""
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Where a rule found something: the line, what is there, what mends it (None where a person must decide), and the
+    advice where it is another than the rule's own."""
+
+    line: int | None
+    message: str
+    mend: Mend | None = None
+    advice: str | None = None
+    severity: str | None = None
+
+
+@dataclass(frozen=True)
+class LintRule:
+    """A rule: its name, how bad it is, what it says in a few words, why that matters, what to do; ``mends`` says
+    whether ``--fix`` does it (where there is one way to). ``find`` looks for it in a file that was opened."""
+
+    name: str
+    severity: str
+    title: str
+    explanation: str
+    advice: str
+    find: Callable[[LintedFile], Iterable[Spot]] = field(repr=False)
+    mends: bool = False
+
+    def __post_init__(self) -> None:
+        assert self.severity in SEVERITIES
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Finding(Value):
+    """One thing that is wrong, doubtful or lost, with its file and line and what to do about it."""
+
+    rule: str
+    severity: str
+    file: str
+    line: int | None
+    message: str
+    advice: str | None = None
+    mend: Mend | None = field(default=None, repr=False)
+
+    @property
+    def rank(self) -> int:
+        """How bad it is: 0 a note, 2 an error."""
+        return SEVERITIES.index(self.severity)
+
+    @property
+    def where(self) -> str:
+        """File and line."""
+        return self.file if self.line is None else f"{self.file}:{self.line}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"rule": self.rule, "severity": self.severity, "file": self.file, "line": self.line,
+                "message": self.message, "fix": self.advice, "mends": self.mend is not None}

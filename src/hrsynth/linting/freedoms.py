@@ -1,0 +1,124 @@
+"""Freedoms of a mechanism at closed configurations near its zero: of all, with parts left out, with links held.
+
+Every count is a rank of the loops' constraints with its gap; at several configurations it must be the same, else
+nothing is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Collection, Iterator
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..budgets import LINTED_POSES, LOOP_TRIES, MOST_LOOP_COORDINATES
+from ..description.assembly.loops import LoopAssembly, Values, gears_of, joints_of
+from ..description.jointgraph import FrameSpec, JointSpec
+from ..errors import HrsynthError
+from ..geometry.vectors import Array, inverse, pose, transform
+from ..mechanism.legs import decompose
+from ..mechanism.model import JointType, Mechanism
+from ..mechanism.normal import normal_form
+from ..tolerances import RANK_GAP, SOLVED
+
+Pair = tuple[str, str]
+
+
+@dataclass(frozen=True, eq=False)
+class NearbyFreedoms:
+    """A mechanism at closed configurations near its zero one."""
+
+    mechanism: Mechanism
+
+    @cached_property
+    def assembly(self) -> LoopAssembly:
+        """Its own loops."""
+        return LoopAssembly.of(self.mechanism)
+
+    @cached_property
+    def configurations(self) -> tuple[Values, ...]:
+        """Closed values some way from zero along random motions; zero alone where nothing moves or closes."""
+        zero = self.assembly.zero()
+        if self.assembly.size > MOST_LOOP_COORDINATES:
+            return ()
+        found: list[Values] = []
+        rng = np.random.default_rng(0)
+        kernel = self.assembly.kernel(zero)
+        for _ in range(LOOP_TRIES if kernel.shape[1] else 0):
+            step = kernel @ rng.normal(size=kernel.shape[1])
+            there, residual = self.assembly.close(self.assembly.step(zero, 0.15 * step / np.max(np.abs(step))))
+            if residual <= 10 * SOLVED:
+                found.append(there)
+            if len(found) == LINTED_POSES:
+                break
+        return tuple(found) or (zero,)
+
+    def count(self, without: Collection[str] = (), held: Collection[Pair] = ()) -> int | None:
+        """The freedoms where joints that close loops (or gears) are left out, and pairs of links held as they stand;
+        None where they are not the same at all configurations, or a rank is not clear."""
+        found = set(self._counts(without, held))
+        return found.pop() if len(found) == 1 else None
+
+    def _counts(self, without: Collection[str], held: Collection[Pair]) -> Iterator[int | None]:
+        joints = [joint for joint in joints_of(self.mechanism) if joint.name not in without]
+        gears = [gear for gear in gears_of(self.mechanism) if gear.name not in without]
+        for values in self.configurations:
+            poses = self.assembly.poses(values)
+            locks = [self._lock(f"held {number}", pair, poses) for number, pair in enumerate(held)]
+            assembly = LoopAssembly(self.mechanism.base, [*joints, *locks], gears)
+            rank = assembly.rank(values)
+            free = sum(joint.kind.freedoms for joint, _, _ in assembly.tree)
+            yield free - rank.value if rank.gap >= RANK_GAP else None
+
+    @cached_property
+    def point(self) -> Array | None:
+        """The point that the platform is, in its frame, where its turn is idle (docs/pages/theory.md, section 1)."""
+        try:
+            return decompose(normal_form(self.mechanism).mechanism).point
+        except HrsynthError:
+            return None
+
+    def _lock(self, name: str, pair: Pair, poses: dict[str, Array]) -> JointSpec:
+        """What holds two links as they stand; of a platform that is a point, that point."""
+        one, two = pair
+        at, kind = np.eye(4), JointType.FIXED
+        if pair == (self.mechanism.base, self.mechanism.platform) and self.point is not None:
+            at, kind = pose(transform(poses[two], self.point)), JointType.SPHERICAL
+        ends = FrameSpec(one, inverse(poses[one]) @ at), FrameSpec(two, inverse(poses[two]) @ at)
+        return JointSpec(name, kind, ends, in_tree=False)
+
+    @property
+    def closures(self) -> list[str]:
+        """The joints that close loops, and the gears."""
+        return [*(joint.name for joint in self.mechanism.joints.values() if not joint.in_tree),
+                *(gear.name for gear in self.mechanism.couplings)]
+
+    def dead(self) -> Iterator[str]:
+        """Closures and gears without which the mechanism is as free as with them, the last of the file first; each
+        without those before it."""
+        whole, gone = self.count(), list[str]()
+        for name in reversed(self.closures) if whole is not None else ():
+            if self.count([*gone, name]) == whole:
+                gone.append(name)
+                yield name
+
+    def redundant(self, rows: Callable[[str], int]) -> dict[str, int]:
+        """How many of a closure's constraints (it has ``rows`` of them) repeat what those before it say."""
+        gone = self.closures
+        before, found = self.count(gone), dict[str, int]()
+        for name in self.closures:
+            gone = gone[1:]
+            after = self.count(gone)
+            if before is None or after is None:
+                return {}
+            if rows(name) > before - after:
+                found[name] = rows(name) - (before - after)
+            before = after
+        return found
+
+    def platform(self, held: Collection[Pair] = ()) -> int | None:
+        """The freedoms of the platform where other links are held."""
+        whole = self.count(held=held)
+        rest = self.count(held=[*held, (self.mechanism.base, self.mechanism.platform)])
+        return None if whole is None or rest is None else whole - rest

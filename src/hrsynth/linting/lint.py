@@ -1,0 +1,133 @@
+"""``lint``: all rules on files of robots, what they find, and the files mended."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ..budgets import MOST_MENDING
+from ..description import shipped
+from ..description.files import write_whole
+from ..description.overrides import Overrides, names
+from ..errors import BadRequest, BadRobotFile, Defect
+from ..results import Result
+from .findings import SEVERITIES, Finding
+from .rules import lint_rules
+from .rules.readers import PROGRAMS
+from .subject import LintedFile
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Lint(Result, shown_as="lint"):
+    """What was found in which files, and what was mended and where that is written."""
+
+    files: tuple[str, ...]
+    findings: tuple[Finding, ...]
+    mended: tuple[Finding, ...] = ()
+    written: str | None = None
+    rules: tuple[str, ...] = field(default=(), repr=False)
+
+    def headline(self) -> str:
+        """How much was found."""
+        counts = self.counts
+        found = ", ".join(f"{counts[name]} {name}{'s' * (counts[name] != 1)}" for name in reversed(SEVERITIES))
+        return f"{len(self.files)} file{'s' * (len(self.files) != 1)}: {found}"
+
+    @property
+    def counts(self) -> dict[str, int]:
+        """How many findings are of each severity."""
+        return {name: sum(each.severity == name for each in self.findings) for name in SEVERITIES}
+
+    def reaches(self, severity: str) -> bool:
+        """Whether a finding is at least that bad."""
+        return any(each.rank >= SEVERITIES.index(severity) for each in self.findings)
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"files": list(self.files), "findings": [each.to_dict() for each in self.findings],
+                "counts": self.counts, "mended": [each.to_dict() for each in self.mended], "file": self.written}
+
+
+def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None = None,
+         readers: Iterable[str] | str = (), ignore: Iterable[str] | str = (), fix: bool = False,
+         output: str | Path | None = None, base: str | None = None, platform: str | None = None,
+         motors: Iterable[str] | str | None = None, close: Iterable[str] | str = ()) -> Lint:
+    """Everything that is wrong, doubtful or lost in robot files, by the rules of ``hrsynth.linting.rules``.
+
+    ``compare`` is another file of the same robot: where the two differ is found too. ``readers`` are programs that
+    shall read the files: a closure that one of them loses is an error. ``ignore`` names rules to leave out. With
+    ``fix`` all that there is one way to mend is mended, and the file written, whole or not at all, to ``output`` or in
+    its place; what is found then is what is left. ``base``, ``platform``, ``motors`` and ``close`` say of all files
+    what they do not say themselves.
+
+    Raises ``BadRobotFile`` for what cannot be opened, or is no document; ``BadRequest`` for names that there are not,
+    for several files with ``output``, and where the file cannot be written.
+    """
+    paths = [files] if isinstance(files, str | Path) else list(files)
+    paths = [shipped().get(path, path) if isinstance(path, str) and not Path(path).exists() else path for path in paths]
+    skipped, programs = names(ignore) or (), tuple(names(readers) or ())
+    for what, given, known in (("rule", skipped, tuple(lint_rules())), ("reader", programs, PROGRAMS)):
+        unknown = [name for name in given if name and name not in known]
+        if unknown:
+            raise BadRequest(f"no {what} of this name", unknown[0], known)
+    if not paths:
+        raise BadRequest("no file to look at", None, "one or more")
+    if output is not None and (not fix or len(paths) > 1):
+        raise BadRequest("an output is the mended file", str(output), "one file with --fix")
+    said = Overrides(base, platform, names(motors), names(close) or ())
+    other = None if compare is None else LintedFile(compare, said)
+    opened, defects = [], list[Defect]()
+    for path in paths:
+        try:
+            opened.append(LintedFile(path, said, readers=programs, other=other))
+        except BadRobotFile as error:
+            defects += error.defects
+    if defects:
+        raise BadRobotFile(defects)
+    mended: list[Finding] = []
+    written = None
+    if fix:
+        for number, file in enumerate(opened):
+            after, gone = _mended(file, skipped)
+            mended += gone
+            target = file.path if output is None else Path(output)
+            if gone or output is not None:
+                write_whole(target, file.data if after is file else after.data)
+                written = str(target)
+            opened[number] = after
+    found = [each for file in opened for each in findings(file, skipped)]
+    return Lint(tuple(file.file for file in opened), tuple(found), tuple(mended), written,
+                tuple(name for name in lint_rules() if name not in skipped))
+
+
+def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[Finding]:
+    """What the rules find in a file, by line, the worst of a line first; what is told by a rule of its own is not told
+    again as refused."""
+    found = []
+    for rule in lint_rules().values():
+        for spot in rule.find(file) if rule.name not in ignore else ():
+            where, line = getattr(spot.line, "file", file.file), None if file.expanded else spot.line
+            found.append(Finding(rule.name, spot.severity or rule.severity, where, line, spot.message,
+                                 spot.advice or rule.advice, None if file.expanded else spot.mend))
+    told = {each.line for each in found if each.rule != "refused" and each.severity == "error"}
+    found = [each for each in found if each.rule != "refused" or each.line is None or each.line not in told]
+    return sorted(found, key=lambda each: (each.line is None, each.line or 0, -each.rank))
+
+
+def _mended(file: LintedFile, ignore: Sequence[str]) -> tuple[LintedFile, list[Finding]]:
+    """The file with all mends, and what they mended: round by round, as one may uncover or undo the cause of
+    another."""
+    gone: list[Finding] = []
+    for _ in range(MOST_MENDING):
+        found = [each for each in findings(file, ignore) if each.mend is not None]
+        if not found:
+            break
+        first = lint_rules()[found[0].rule]
+        for each in found:
+            if each.rule == first.name and each.mend is not None:
+                each.mend()
+                gone.append(each)
+        file = file.after()
+    return file, gone

@@ -1,0 +1,158 @@
+"""Which joint and link of one file is which of another file of the same robot: by name, by place, by structure."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from ..geometry.vectors import Array, pose
+from ..mechanism.model import Joint, JointType, Mechanism
+from ..tolerances import NOISE, TURNING_ARM
+
+_ALONG = (JointType.REVOLUTE, JointType.CYLINDRICAL)
+_ACROSS = (JointType.PRISMATIC, JointType.PLANAR)
+
+
+@dataclass(frozen=True, eq=False)
+class LinkFit:
+    """The rigid motion ``X`` (4, 4) that brings a link's joints in one robot to their places in the other, what it
+    leaves (characteristic lengths, radians) at each joint, and whether it is the only one."""
+
+    X: Array
+    misses: Mapping[str, float]
+    only: bool
+
+
+@dataclass(frozen=True, eq=False)
+class RobotMatch:
+    """Joints and links of the robot ``one`` with those of ``other``."""
+
+    one: Mechanism
+    other: Mechanism
+
+    @cached_property
+    def joints(self) -> dict[str, str]:
+        """Joint of one: joint of the other. Equal names first; then one of the same type in the same place; then the
+        only ones of their kind by structure."""
+        found = {name: name for name in self.one.joints if name in self.other.joints}
+        found |= self._placed(found)
+        found |= self._structured(found)
+        return found
+
+    def _left(self, found: Mapping[str, str]) -> tuple[list[Joint], list[Joint]]:
+        taken = set(found.values())
+        return ([joint for name, joint in self.one.joints.items() if name not in found],
+                [joint for name, joint in self.other.joints.items() if name not in taken])
+
+    def _placed(self, found: Mapping[str, str]) -> dict[str, str]:
+        mine, theirs = self._left(found)
+        near = {}
+        for joint in mine:
+            same = [each.name for each in theirs if each.type is joint.type
+                    and _miss(joint, each, np.eye(4), self.one.length) <= NOISE]
+            if len(same) == 1:
+                near[joint.name] = same[0]
+        often = Counter(near.values())
+        return {mine: yours for mine, yours in near.items() if often[yours] == 1}
+
+    def _structured(self, found: Mapping[str, str]) -> dict[str, str]:
+        mine, theirs = self._left(found)
+        pairs = {name: number for number, pair in enumerate(found.items()) for name in [pair]}
+        a = _colours(self.one, {pair[0]: number for pair, number in pairs.items()})
+        b = _colours(self.other, {pair[1]: number for pair, number in pairs.items()})
+        often, there = Counter(a.values()), Counter(b.values())
+        by_colour = {b[joint.name]: joint.name for joint in theirs}
+        return {joint.name: by_colour[a[joint.name]] for joint in mine
+                if often[a[joint.name]] == 1 == there[a[joint.name]] and a[joint.name] in by_colour}
+
+    @cached_property
+    def links(self) -> dict[str, str]:
+        """Link of one: the link of the other that carries the most of its joints, of equal ones that with its name."""
+        found = {}
+        for link in self.one.links:
+            votes: Counter[str] = Counter()
+            for joint in self.one.joints_of(link):
+                if joint.name in self.joints:
+                    votes.update(self.other.joints[self.joints[joint.name]].links)
+            if votes:
+                found[link] = max(votes, key=lambda name: (votes[name], name == link))
+            elif link in self.other.links:
+                found[link] = link
+        return found
+
+    def fit(self, link: str) -> LinkFit | None:
+        """How the joints of a link agree in both robots, wherever the link is at zero; None where it has none."""
+        pairs = [(joint, other) for joint in self.one.joints_of(link) if joint.name in self.joints
+                 and (other := self.other.joints[self.joints[joint.name]]).type is joint.type
+                 and self.links.get(link) in other.links]
+        if not pairs:
+            return None
+        length = self.one.length
+        shift = np.zeros(len(pairs))
+        X = np.eye(4)
+        only = False
+        for _ in range(20):  # the centre of a hinge is any point of its axis: slid to where both files agree most
+            points = [(mine.point, their.point + s * _slide(their))
+                      for (mine, their), s in zip(pairs, shift, strict=True)]
+            axes = [(mine, their) for pair in pairs for mine, their in zip(pair[0].axes, pair[1].axes, strict=True)]
+            X, only = _fitted(points, axes, length)
+            for number, (mine, their) in enumerate(pairs):
+                if their.type in _ALONG:
+                    moved = X[:3, :3] @ their.point + X[:3, 3]
+                    shift[number] = float((mine.point - moved) @ (X[:3, :3] @ their.axis))
+        return LinkFit(X, {mine.name: _miss(mine, their, X, length) for mine, their in pairs}, only)
+
+
+def _slide(joint: Joint) -> Array:
+    return np.asarray(joint.axis if joint.type in _ALONG else np.zeros(3))
+
+
+def _fitted(points: Sequence[tuple[Array, Array]], axes: Sequence[tuple[Array, Array]], length: float
+            ) -> tuple[Array, bool]:
+    """The rigid motion that brings the second of each pair nearest to the first (Kabsch); whether no other does."""
+    mine, theirs = (np.array([pair[k] for pair in points]) for k in (0, 1))
+    H = (theirs - theirs.mean(axis=0)).T @ (mine - mine.mean(axis=0)) / length**2
+    R = _rotation(H + sum((np.outer(b, a) for a, b in axes), np.zeros((3, 3))))
+    signed = [(a, b if a @ R @ b >= 0 else -b) for a, b in axes]
+    H = H + sum((np.outer(b, a) for a, b in signed), np.zeros((3, 3)))
+    R = _rotation(H)
+    sizes = np.linalg.svd(H, compute_uv=False)
+    return pose(mine.mean(axis=0) - R @ theirs.mean(axis=0), R), bool(sizes[1] > TURNING_ARM**2)
+
+
+def _rotation(H: Array) -> Array:
+    U, _, Vt = np.linalg.svd(H)
+    D = np.diag([1.0, 1.0, float(np.sign(np.linalg.det(Vt.T @ U.T)))])
+    return np.asarray(Vt.T @ D @ U.T)
+
+
+def _miss(mine: Joint, their: Joint, X: Array, length: float) -> float:
+    """By how much a joint of the other robot, moved by X, is another one: axes as lines without sense."""
+    gap = mine.point - (X[:3, :3] @ their.point + X[:3, 3])
+    axes = [X[:3, :3] @ axis for axis in their.axes]
+    if mine.type in _ALONG:
+        gap = gap - (gap @ mine.axis) * mine.axis
+    elif mine.type in _ACROSS:
+        gap = (gap @ mine.axis) * mine.axis if mine.type is JointType.PLANAR else np.zeros(3)
+    turns = [float(np.linalg.norm(np.cross(a, b))) for a, b in zip(mine.axes, axes, strict=True)]
+    return max([float(np.linalg.norm(gap)) / length, *turns])
+
+
+def _colours(robot: Mechanism, known: Mapping[str, int]) -> dict[str, int]:
+    """Joints coloured by what they are and what hangs on them, refined until no colour splits; ``known`` ones apart."""
+    colours: dict[str, int] = {name: hash((joint.type, known.get(name))) for name, joint in robot.joints.items()}
+    ends = {link: hash((link == robot.base, link == robot.platform)) for link in robot.links}
+    for _ in range(len(robot.links)):
+        ends = {link: hash((ends[link], tuple(sorted(colours[joint.name] for joint in robot.joints_of(link)))))
+                for link in robot.links}
+        after = {name: hash((colours[name], tuple(sorted(ends[link] for link in joint.links))))
+                 for name, joint in robot.joints.items()}
+        done = len(set(after.values())) == len(set(colours.values()))
+        colours = after
+        if done:
+            break
+    return colours

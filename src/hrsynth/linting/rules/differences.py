@@ -1,0 +1,206 @@
+"""Where two files of one robot differ: found with ``--compare OTHER`` alone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import numpy as np
+
+from ...description import xml
+from ...mechanism.model import Joint
+from ...tolerances import SAME_ROBOT
+from ..elements import inertials
+from ..findings import LintRule, Spot
+from ..matching import LinkFit, RobotMatch
+from ..subject import LintedFile
+
+
+def _match(file: LintedFile) -> RobotMatch | None:
+    """The two robots, where both files were read."""
+    one, other = file.mechanism, None if file.other is None else file.other.mechanism
+    return None if one is None or other is None else file.remembered("match", lambda: RobotMatch(one, other))
+
+
+def _fits(file: LintedFile, match: RobotMatch) -> dict[str, LinkFit]:
+    return file.remembered("fits", lambda: {link: fit for link in match.one.links if (fit := match.fit(link))})
+
+
+def _pairs(file: LintedFile) -> Iterator[tuple[Joint, Joint]]:
+    match = _match(file)
+    if match is not None:
+        for mine, theirs in match.joints.items():
+            yield match.one.joints[mine], match.other.joints[theirs]
+
+
+def _named(mine: Joint, theirs: Joint) -> str:
+    return repr(mine.name) if mine.name == theirs.name else f"{mine.name!r} ({theirs.name!r} in the other file)"
+
+
+def _joints(file: LintedFile) -> Iterator[Spot]:
+    match = _match(file)
+    if match is None:
+        return
+    for name, joint in match.one.joints.items():
+        if name not in match.joints:
+            yield Spot(joint.line, f"{_what(joint)} {name!r} of type {joint.type} is only in this file")
+    taken = set(match.joints.values())
+    for name, joint in match.other.joints.items():
+        if name not in taken:
+            yield Spot(None, f"{_what(joint)} {name!r} of type {joint.type} is only in the other file")
+
+
+def _what(joint: Joint) -> str:
+    return "joint" if joint.in_tree else "closure"
+
+
+def _types(file: LintedFile) -> Iterator[Spot]:
+    for mine, theirs in _pairs(file):
+        if mine.type is not theirs.type:
+            yield Spot(mine.line, f"joint {_named(mine, theirs)} is of type {mine.type} here, {theirs.type} there")
+
+
+def _ends(file: LintedFile) -> Iterator[Spot]:
+    match = _match(file)
+    for mine, theirs in _pairs(file):
+        assert match is not None
+        here = {match.links.get(link) for link in mine.links}
+        if here != set(theirs.links):
+            yield Spot(mine.line, f"joint {_named(mine, theirs)} joins {' and '.join(mine.links)} here, "
+                                  f"{' and '.join(theirs.links)} there")
+    if match is None:
+        return
+    for role in ("base", "platform"):
+        one, two = getattr(match.one, role), getattr(match.other, role)
+        if match.links.get(one) != two:
+            yield Spot(match.one.links[one].line, f"the {role} is {one!r} here, {two!r} there")
+
+
+def _geometry(file: LintedFile) -> Iterator[Spot]:
+    match = _match(file)
+    if match is None:
+        return
+    for link, fit in _fits(file, match).items():
+        worst = max(fit.misses, key=lambda name: fit.misses[name])
+        if fit.misses[worst] > SAME_ROBOT:
+            joint = match.one.joints[worst]
+            yield Spot(joint.line, f"link {link!r}: its joints do not lie as in the other file; best laid over each "
+                                   f"other they miss by up to {fit.misses[worst]:.3g} (characteristic lengths, "
+                                   f"radians), at joint {worst!r}")
+
+
+def _zero(file: LintedFile) -> Iterator[Spot]:
+    match = _match(file)
+    if match is None:
+        return
+    fits = {link: fit for link, fit in _fits(file, match).items()
+            if fit.only and max(fit.misses.values()) <= SAME_ROBOT}
+    moved = []
+    for name in match.joints:
+        joint = match.one.joints[name]
+        if all(link in fits for link in joint.links):
+            X, Y = (fits[link].X for link in joint.links)
+            size = max(float(np.max(np.abs(X[:3, :3] - Y[:3, :3]))),
+                       float(np.max(np.abs((X - Y) @ np.append(match.other.joints[match.joints[name]].point, 1.0))))
+                       / match.one.length)
+            if size > SAME_ROBOT:
+                moved.append(name)
+    if moved:
+        yield Spot(None, f"the zero configuration is another one: {', '.join(moved[:8])}{' …' * bool(moved[8:])} stand "
+                         "otherwise in the other file")
+
+
+def _senses(file: LintedFile) -> Iterator[Spot]:
+    match = _match(file)
+    for mine, theirs in _pairs(file):
+        assert match is not None
+        fit = _fits(file, match).get(mine.predecessor)
+        if fit is None or not fit.only or mine.type is not theirs.type or not mine.axes:
+            continue
+        turned = mine.predecessor != _partner(match, theirs)
+        cosine = float(mine.axis @ fit.X[:3, :3] @ theirs.axis) * (-1 if turned else 1)
+        if mine.in_tree and theirs.in_tree and cosine < -1 + SAME_ROBOT:
+            yield Spot(mine.line, f"joint {_named(mine, theirs)} counts in the opposite sense in the other file")
+
+
+def _partner(match: RobotMatch, theirs: Joint) -> str | None:
+    """The link of one that is the other joint's predecessor."""
+    return next((mine for mine, link in match.links.items() if link == theirs.predecessor), None)
+
+
+def _motors(file: LintedFile) -> Iterator[Spot]:
+    for mine, theirs in _pairs(file):
+        if mine.actuated != theirs.actuated:
+            yield Spot(mine.line, f"joint {_named(mine, theirs)} is {'driven' if mine.actuated else 'passive'} here, "
+                                  f"{'driven' if theirs.actuated else 'passive'} there")
+
+
+def _limits(file: LintedFile) -> Iterator[Spot]:
+    for mine, theirs in _pairs(file):
+        here, there = ((None, None) if each.limits is None else (each.limits.lower, each.limits.upper)
+                       for each in (mine, theirs))
+        if any((a is None) != (b is None) or (a is not None and abs(a - (b or 0.0)) > SAME_ROBOT * max(1.0, abs(a)))
+               for a, b in zip(here, there, strict=True)):
+            yield Spot(mine.line, f"joint {_named(mine, theirs)}: limits {_range(here)} here, {_range(there)} there")
+
+
+def _range(limits: tuple[float | None, float | None]) -> str:
+    return "none" if limits == (None, None) else " to ".join("…" if each is None else f"{each:.6g}" for each in limits)
+
+
+def _masses(file: LintedFile) -> Iterator[Spot]:
+    match = _match(file)
+    if match is None or file.other is None:
+        return
+    theirs = {each.link: each for each in inertials(file.other)}
+    for mine in inertials(file):
+        other, line = theirs.get(match.links.get(mine.link, mine.link)), xml.line(mine.element)
+        if other is None:
+            if theirs:
+                yield Spot(line, f"link {mine.link!r} has a mass only in this file")
+            continue
+        a, b = (None if each.mass is None else each.mass.value for each in (mine, other))
+        if a is not None and b is not None and abs(a - b) > SAME_ROBOT * abs(a):
+            yield Spot(line, f"link {mine.link!r}: mass {a:g} here, {b:g} there")
+        if mine.inertia is not None and other.inertia is not None:
+            moments = [np.linalg.eigvalsh(each) for each in (mine.inertia, other.inertia)]
+            if np.max(np.abs(moments[0] - moments[1])) > SAME_ROBOT * np.max(np.abs(moments[0])):
+                yield Spot(line, f"link {mine.link!r}: principal moments of inertia differ")
+
+
+def _gears(file: LintedFile) -> Iterator[Spot]:
+    match = _match(file)
+    if match is None:
+        return
+    mine = {(match.links.get(each.predecessor, ""), match.links.get(each.successor, "")): each
+            for each in match.one.couplings}
+    theirs = {(each.predecessor, each.successor): each for each in match.other.couplings}
+    for ends in dict.fromkeys([*mine, *theirs]):
+        a, b = mine.get(ends), theirs.get(ends)
+        if a is None or b is None or abs(a.ratio - b.ratio) > SAME_ROBOT * abs(a.ratio):
+            words = ["no gear" if each is None else f"{each.name!r} with the ratio {each.ratio:g}" for each in (a, b)]
+            yield Spot(None if a is None else a.line, f"{words[0]} here, {words[1]} there")
+
+
+def _rule(name: str, severity: str, title: str, find: Callable[[LintedFile], Iterator[Spot]],
+          explanation: str = "Two files of one robot that differ are two robots.") -> LintRule:
+    return LintRule(f"differs-{name}", severity, title, explanation, "correct the file that is wrong", find)
+
+
+RULES = (
+    _rule("joint", "error", "a joint or closure that one file has", _joints,
+          "What has no partner by name, place or structure. A closure that one dialect cannot say is often lost so."),
+    _rule("type", "error", "joints of different types", _types),
+    _rule("ends", "error", "joints between other links, another base or platform", _ends),
+    _rule("geometry", "error", "joints that lie elsewhere on a link", _geometry,
+          "Compared link by link, so that it does not matter where the link is at zero, how its frame lies, or where "
+          "on its axis a hinge has its origin."),
+    _rule("zero", "warning", "another zero configuration", _zero,
+          "Coordinates of the one are not those of the other: offsets of motors, limits and keyframes shift."),
+    _rule("sense", "warning", "a joint that counts in the opposite sense", _senses,
+          "A command for the one moves the other backwards."),
+    _rule("motor", "error", "a joint that is driven in one file", _motors),
+    _rule("limit", "warning", "other limits", _limits,
+          "Counted from the zero of each file."),
+    _rule("mass", "warning", "other masses or inertias", _masses),
+    _rule("gear", "error", "other gears", _gears),
+)

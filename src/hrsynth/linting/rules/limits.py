@@ -1,0 +1,98 @@
+"""Limits of joints: what readers drop, what excludes the pose that everything is counted from, what is missing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from lxml import etree
+
+from ...description import numerals, xml
+from ...description.formats.native.write import NO_LIMIT
+from ...mechanism.model import JointType
+from ..elements import LimitElement, joints, limits, number
+from ..findings import LintRule, Mend, Spot
+from ..subject import LintedFile
+
+
+def _order(file: LintedFile) -> Iterator[Spot]:
+    for each in limits(file):
+        if each.bounds is not None and each.bounds[0] > each.bounds[1]:
+            lower, upper = each.bounds
+            yield Spot(xml.line(each.element), f"joint {each.joint!r}: lower limit {lower:g} above the upper one "
+                                               f"{upper:g}", _exchange(each))
+
+
+def _exchange(limit: LimitElement) -> Mend:
+    def mend() -> None:
+        assert limit.lower is not None
+        assert limit.upper is not None
+        lower, upper = limit.lower.text or "", limit.upper.text or ""
+        limit.lower.put(upper)
+        limit.upper.put(lower)
+
+    return mend
+
+
+def _empty(file: LintedFile) -> Iterator[Spot]:
+    for each in limits(file):
+        if each.bounds is not None and each.bounds[0] == each.bounds[1]:
+            yield Spot(xml.line(each.element), f"joint {each.joint!r}: both limits are {each.bounds[0]:g}")
+
+
+def _zero(file: LintedFile) -> Iterator[Spot]:
+    for each in limits(file):
+        home = (number(each.owner.get("ref")) or 0.0) if file.dialect == "mjcf" else 0.0
+        if each.bounds is not None and each.bounds[0] < each.bounds[1] and not (
+                each.bounds[0] <= home <= each.bounds[1]):
+            yield Spot(xml.line(each.element), f"joint {each.joint!r}: its limits {each.bounds[0]:g} to "
+                                               f"{each.bounds[1]:g} exclude its zero")
+
+
+def _demanded(file: LintedFile) -> Iterator[Spot]:
+    if file.dialect != "urdf":
+        return
+    for joint in joints(file):
+        kind = joint.get("type")
+        if joint.tag == "joint" and kind in ("revolute", "prismatic") and joint.find("limit") is None:
+            yield Spot(xml.line(joint), f"joint {joint.get('name')!r} of type {kind} has no <limit>",
+                       _without_range(joint, kind))
+
+
+def _without_range(joint: xml.Element, kind: str) -> Mend:
+    def mend() -> None:
+        if kind == "revolute":
+            joint.set("type", "continuous")
+        else:
+            values = {key: numerals.exact(value) for key, value in NO_LIMIT.items()}
+            etree.SubElement(joint, "limit", {**values, "free": " ".join(NO_LIMIT)})
+
+    return mend
+
+
+def _unlimited(file: LintedFile) -> Iterator[Spot]:
+    graph = file.said
+    for joint in () if graph is None else graph.joints.values():
+        open_ended = joint.limits is None or None in (joint.limits.lower, joint.limits.upper)
+        if joint.motor is not None and joint.type in (JointType.REVOLUTE, JointType.PRISMATIC) and open_ended:
+            yield Spot(joint.line, f"the driven joint {joint.name!r} has no range")
+
+
+RULES = (
+    LintRule("limits-order", "error", "lower limit above upper limit",
+             "No value of the coordinate satisfies both. Some readers refuse the file, others leave the limits out.",
+             "exchange the two numbers", _order, mends=True),
+    LintRule("limits-empty", "warning", "both limits are the same number",
+             "Exporters write 0 and 0 where they know no range. Simulators then hold the joint still; this program "
+             "reads the joint as free.",
+             "write the true range; a revolute joint without one is of type continuous", _empty),
+    LintRule("limits-zero", "warning", "limits exclude the zero of the joint",
+             "Loops are closed, mechanisms compared and most controllers started at the zero configuration. Where "
+             "limits forbid it, simulators start with a jump.",
+             "count the coordinate from another pose, or widen the limits", _zero),
+    LintRule("limits-demanded", "warning", "URDF demands limits of this joint",
+             "A revolute or prismatic joint without <limit> is refused by urdfdom, and with it by most of ROS.",
+             "make a revolute joint continuous; give a prismatic one its range", _demanded, mends=True),
+    LintRule("motor-unlimited", "note", "a driven joint without a range",
+             "Paths, grids and the choice of legs respect limits only where the file gives them.",
+             "write the motor's range", _unlimited),
+)

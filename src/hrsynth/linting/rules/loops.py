@@ -1,0 +1,214 @@
+"""What closes loops: closures that are open at zero, on the wrong side, that repeat others, or say nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+import numpy as np
+
+from ...budgets import MOST_LOOP_COORDINATES
+from ...description import numerals, xml
+from ...description.assembly import guess
+from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, solve
+from ...description.jointgraph import JointGraph, JointSpec
+from ...description.jointmotion import displacement, opening
+from ...errors import HrsynthError
+from ...mechanism.model import Joint, JointType
+from ...tolerances import NOISE, OPPOSITE
+from ..elements import NumberAt
+from ..findings import LintRule, Mend, Spot
+from ..freedoms import NearbyFreedoms
+from ..subject import LintedFile
+from .names import remove
+
+CLOSING = ("loop", "constraint", "loop_joint", "joint", "connect", "weld", "coupling")
+"""Elements that say how a loop closes, in any dialect."""
+
+
+def as_written(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
+    """The loops of a file before anything is solved, merged or made exact."""
+    try:
+        graph = file.graph()
+        file.given.apply(graph)
+    except HrsynthError:
+        return None
+    base = graph.base or guess.base(graph)
+    graph.prune(base)
+    assembly = LoopAssembly(base, list(graph.joints.values()), graph.gears)
+    return None if max(assembly.size, len(assembly.loops)) > MOST_LOOP_COORDINATES else (graph, assembly)
+
+
+def _open(file: LintedFile) -> Iterator[Spot]:
+    found = as_written(file)
+    if found is None:
+        return
+    graph, assembly = found
+    zero = assembly.poses(assembly.zero())
+    misses = {}
+    for loop in assembly.loops:
+        given = graph.joints[loop.name]
+        if not _opposite(given, zero):
+            misses[loop.name] = _miss(given, zero, assembly.length)
+    worst = max(misses, key=lambda name: misses[name], default=None)
+    if worst is None or misses[worst] <= NOISE:
+        return
+    closed = solve(assembly)
+    size = ", ".join(f"{name!r} by {miss:.3g}" for name, miss in list(misses.items())[:6] if miss > NOISE)
+    text = f"at zero the loops are open: {size} (characteristic lengths, radians)"
+    if closed.residual > NOISE:
+        yield Spot(graph.joints[worst].line, text + f"; no way to close them was found (residual "
+                                                    f"{closed.residual:.3g})", None,
+                   "correct the dimensions, or the frames in which the closures are given")
+        return
+    yield Spot(graph.joints[worst].line, text, _closed(file, graph, assembly, closed),
+               severity="warning" if file.refusal is None else None)
+
+
+def _miss(joint: JointSpec, poses: dict[str, np.ndarray], length: float) -> float:
+    error, _ = opening(joint, *joint.frames(poses))
+    gap = 3 - (2 if joint.kind is JointType.PLANAR else 1 if joint.kind.slides else 0)
+    return float(np.linalg.norm([*(error[:gap] / length), *error[gap:]]))
+
+
+def _closed(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed: LoopSolution) -> Mend | None:
+    """Let every joint that moved count from where it is closed: its origin takes the displacement, its limits lose
+    it."""
+    if file.dialect != "urdf" or file.expanded:
+        return None
+    moved = []
+    for joint, _, _ in assembly.tree:
+        if np.array_equal(displacement(joint, closed.values[joint.name]), np.eye(4)):
+            continue
+        element = file.element(graph.joints[joint.name].line, "joint")
+        if element is None or joint.kind not in (JointType.REVOLUTE, JointType.PRISMATIC):
+            return None
+        moved.append((joint, element))
+    return partial(_rezero, moved, closed.values, graph, assembly)
+
+
+def _rezero(moved: list[tuple[JointSpec, xml.Element]], values: Values, graph: JointGraph,
+            assembly: LoopAssembly) -> None:
+    for scaled, element in moved:
+        joint = graph.joints[scaled.name]
+        q = float(values[joint.name][0]) * assembly.unit(scaled)
+        X = joint.ends[0].X @ displacement(joint, np.array([q]))
+        origin = element.find("origin")
+        if origin is None:
+            origin = element.makeelement("origin", {})
+            element.insert(0, origin)
+        origin.set("xyz", numerals.exact_vector(X[:3, 3]))
+        origin.set("rpy", numerals.exact_vector(numerals.rpy(X[:3, :3])))
+        for limit in element.findall("limit"):
+            free = (limit.get("free") or "").split()
+            for key in ("lower", "upper"):
+                value = NumberAt(limit, key).value
+                if value is not None and key not in free:
+                    limit.set(key, numerals.exact(value - q))
+
+
+def _opposite(joint: JointSpec, poses: dict[str, np.ndarray]) -> bool:
+    """Whether a hinge's (or slide's) two axes point opposite ways where its frames meet."""
+    if joint.kind not in (JointType.REVOLUTE, JointType.CYLINDRICAL, JointType.PLANAR) or len(joint.axes) != 1:
+        return False
+    X, Y = joint.frames(poses)
+    return float(X[:3, :3] @ joint.axes[0] @ (Y[:3, :3] @ joint.axes[0])) < -1 + OPPOSITE
+
+
+def _mirrored(file: LintedFile) -> Iterator[Spot]:
+    found = as_written(file)
+    if found is None:
+        return
+    graph, assembly = found
+    poses = assembly.poses(assembly.zero())
+    for loop in assembly.loops:
+        joint = graph.joints[loop.name]
+        if _opposite(joint, poses):
+            yield Spot(joint.line, f"the two axes of {joint.name!r} point opposite ways at zero", _turned(file, joint))
+
+
+def _turned(file: LintedFile, joint: JointSpec) -> Mend | None:
+    """Turn the child's axis of a ``<constraint>`` round."""
+    element = file.element(joint.line, "constraint")
+    axis = None if element is None else element.find("child_axis")
+    if axis is None:
+        return None
+
+    def mend() -> None:
+        values = numerals.parse(axis.get("xyz", "1 0 0"), 3)
+        axis.set("xyz", numerals.exact_vector(-values))
+
+    return mend
+
+
+def nearby(file: LintedFile) -> NearbyFreedoms | None:
+    """The freedoms of the file's mechanism, where it has loops and was read."""
+    robot = file.mechanism
+    return None if robot is None else file.remembered("freedoms", lambda: NearbyFreedoms(robot))
+
+
+def _dead(file: LintedFile) -> Iterator[Spot]:
+    found = nearby(file)
+    for name in [] if found is None else found.dead():
+        graph = file.said
+        line = _line(file, name)
+        own = None if graph is None else graph.joints.get(name)
+        element = None if own is not None and own.in_tree else file.element(line, *CLOSING)
+        yield Spot(line, f"without {name!r} the mechanism is as free as with it",
+                   None if element is None else partial(remove, element))
+
+
+def _line(file: LintedFile, name: str) -> int | None:
+    graph, robot = file.said, file.mechanism
+    for table in ({} if graph is None else graph.joints, {} if robot is None else robot.joints):
+        if name in table:
+            return table[name].line
+    gears = [] if graph is None else [gear for gear in graph.gears if gear.name == name]
+    return gears[0].line if gears else None
+
+
+def _redundant(file: LintedFile) -> Iterator[Spot]:
+    found = nearby(file)
+    if found is None:
+        return
+    joints = found.mechanism.joints
+
+    def rows(name: str) -> int:
+        joint: Joint | None = joints.get(name)
+        return 1 if joint is None else 6 - joint.type.freedoms
+
+    dead = set(found.dead())
+    for name, count in found.redundant(rows).items():
+        if name not in dead:
+            yield Spot(_line(file, name), f"{count} of the {rows(name)} constraints of {name!r} repeat what the loops "
+                                          "before it say")
+
+
+def _none(file: LintedFile) -> Iterator[Spot]:
+    robot = file.mechanism
+    if robot is not None and not robot.couplings and all(joint.in_tree for joint in robot.joints.values()):
+        yield Spot(None, "the file closes no loop")
+
+
+RULES = (
+    LintRule("loop-open", "error", "loops that are open at the zero configuration",
+             "A simulator pulls them shut with a jump, and where two closings are possible the wrong one may be taken. "
+             "This program solves for the nearest closed pose, tells the joints that it moves, and counts from there.",
+             "count the joints that moved from where the loops close (hrsynth convert does it in any dialect)", _open,
+             mends=True),
+    LintRule("loop-mirrored", "error", "a closure whose two axes point opposite ways",
+             "The hinge fits, but to make the axes agree a link has to be turned by half a turn: the robot is read as "
+             "its mirror image, or not at all.",
+             "turn one of the two axes round", _mirrored, mends=True),
+    LintRule("constraint-dead", "warning", "a closure or gear that constrains nothing",
+             "What is closed twice is over-determined: solvers of constraint forces have no single answer, and rounded "
+             "numbers may lock the loop.",
+             "remove it", _dead, mends=True),
+    LintRule("constraint-redundant", "note", "constraints that repeat others",
+             "Normal in planar and over-constrained loops, in ideal geometry harmless. Solvers of constraint forces "
+             "have no single answer, and rounded numbers may lock the loop.",
+             "nothing, or a joint with more freedoms (a ball instead of a hinge)", _redundant),
+    LintRule("loop-none", "warning", "no loop",
+             "What closes loops was perhaps lost on the way, or stands in a file or launch script beside this one.",
+             "close it: --close A:B[:TYPE], where A and B are frames that meet", _none),
+)

@@ -1,0 +1,106 @@
+"""Masses and inertias that no body has: simulators refuse them, leave the link out, or let it gain energy."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...description import xml
+from ...geometry.vectors import Array
+from ...mechanism.model import JointType
+from ...tolerances import NO_BODY
+from ..elements import InertialElement, inertials
+from ..findings import LintRule, Mend, Spot
+from ..subject import LintedFile
+
+
+def moving(file: LintedFile) -> set[str]:
+    """The links that some joint moves: those that are not held to the base by fixed joints alone."""
+    graph = file.said
+    if graph is None:
+        return set()
+    return {link for joint in graph.joints.values() if joint.kind is not JointType.FIXED and joint.in_tree
+            for link in joint.links[1:]}
+
+
+def _negative(file: LintedFile) -> Iterator[Spot]:
+    for each in inertials(file):
+        if each.mass is not None and (value := each.mass.value) is not None and value < 0:
+            yield Spot(xml.line(each.element), f"link {each.link!r} has the mass {value:g}", _without_sign(each))
+
+
+def _without_sign(inertial: InertialElement) -> Mend:
+    def mend() -> None:
+        assert inertial.mass is not None
+        inertial.mass.put((inertial.mass.text or "").lstrip("-"))
+
+    return mend
+
+
+def _zero(file: LintedFile) -> Iterator[Spot]:
+    moved = moving(file)
+    for each in inertials(file):
+        massless = each.mass is None or each.mass.value == 0
+        if massless and each.link in moved and each.inertia is not None and np.any(each.inertia):
+            yield Spot(xml.line(each.element), f"link {each.link!r} moves, has an inertia, and no mass")
+
+
+def second_moments(inertia: Array) -> tuple[Array, Array]:
+    """Eigenvalues and eigenvectors of ∫ r rᵀ dm = ½ tr(I) 1 − I: no body has a negative one, which is the triangle
+    inequality of the principal moments."""
+    return np.linalg.eigh(np.trace(inertia) / 2 * np.eye(3) - inertia)
+
+
+def _impossible(file: LintedFile) -> Iterator[Spot]:
+    for each in inertials(file):
+        if each.inertia is None or not np.any(each.inertia):
+            continue
+        values, _ = second_moments(each.inertia)
+        if values[0] < -NO_BODY * float(np.max(np.abs(each.inertia))):
+            moments = ", ".join(f"{value:.4g}" for value in np.linalg.eigvalsh(each.inertia))
+            yield Spot(xml.line(each.element), f"link {each.link!r}: principal moments {moments}, of which one is "
+                                               "negative or larger than the two others together", _nearest(each))
+
+
+def _nearest(inertial: InertialElement) -> Mend:
+    """The inertia with the same second moments but for the negative ones, which are zero."""
+    def mend() -> None:
+        assert inertial.inertia is not None
+        values, vectors = second_moments(inertial.inertia)
+        kept = np.maximum(values, 0.0)
+        floor = 2 * NO_BODY * float(np.sum(kept))  # no rounding of the written digits is below zero again
+        moments = vectors @ np.diag(np.maximum(kept, floor)) @ vectors.T
+        matrix = np.trace(moments) * np.eye(3) - moments
+        inertial.write((matrix + matrix.T) / 2)
+
+    return mend
+
+
+def _missing(file: LintedFile) -> Iterator[Spot]:
+    known = {each.link for each in inertials(file)}
+    graph, root = file.said, file.root
+    if not known or graph is None or root is None:
+        return
+    for name in [name for name in moving(file) if name in graph.links and name not in known]:
+        link = graph.links[name]
+        if link.line is not None and file.element(link.line, "link", "body") is not None:
+            yield Spot(link.line, f"link {name!r} moves and has no <inertial>, as others in the file have")
+
+
+RULES = (
+    LintRule("mass-negative", "error", "negative mass",
+             "No body has one: simulators refuse the file, or the robot gains energy.",
+             "drop the sign", _negative, mends=True),
+    LintRule("mass-zero", "warning", "a moving link with an inertia but no mass",
+             "Gazebo leaves such links out, with their joints; MuJoCo refuses them.",
+             "write the link's mass, or leave out <inertial> of a link without a body", _zero),
+    LintRule("inertia-impossible", "error", "an inertia that no body has",
+             "Principal moments are not negative, and the largest is at most the sum of the two others (triangle "
+             "inequality). MuJoCo and Gazebo refuse others; elsewhere simulations blow up.",
+             "take the nearest inertia of a body: negative second moments set to zero", _impossible, mends=True),
+    LintRule("inertia-missing", "warning", "a moving link without <inertial> in a file that has some",
+             "Gazebo leaves links without <inertial> out when it reads a URDF, with all that hangs on them; MuJoCo "
+             "refuses moving bodies without mass.",
+             "write the link's mass and inertia", _missing),
+)

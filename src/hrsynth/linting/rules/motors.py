@@ -1,0 +1,54 @@
+"""Whether the motors of a file move the platform, and only they."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ...mechanism.model import Mechanism
+from ..findings import LintRule, Spot
+from ..freedoms import Pair
+from ..subject import LintedFile
+from .loops import nearby
+
+
+def _held(robot: Mechanism) -> list[Pair]:
+    return [joint.links for joint in robot.joints.values() if joint.actuated]
+
+
+def _none(file: LintedFile) -> Iterator[Spot]:
+    robot = file.mechanism
+    if robot is not None and not _held(robot):
+        yield Spot(None, "no joint has a motor")
+
+
+def _few(file: LintedFile) -> Iterator[Spot]:
+    robot, found = file.mechanism, nearby(file)
+    if robot is None or found is None or not _held(robot):
+        return
+    whole, rest = found.platform(), found.platform(_held(robot))
+    if whole and rest:
+        yield Spot(None, f"with all motors held, the platform {robot.platform!r} keeps {rest} of its {whole} freedoms")
+
+
+def _many(file: LintedFile) -> Iterator[Spot]:
+    robot, found = file.mechanism, nearby(file)
+    if robot is None or found is None or not _held(robot):
+        return
+    driven = sum(joint.type.freedoms for joint in robot.joints.values() if joint.actuated)
+    whole, rest = found.count(), found.count(held=_held(robot))
+    if whole is not None and rest is not None and driven > whole - rest:
+        yield Spot(None, f"{driven} coordinates are driven, and {whole - rest} of them are independent")
+
+
+RULES = (
+    LintRule("motor-none", "note", "no motor",
+             "Which joints are driven decides Type 2 singularities of the real robot; URDF+ and plain URDF often do "
+             "not say it.",
+             "name them: a <transmission> each, or --motors JOINTS", _none),
+    LintRule("motors-few", "warning", "motors that do not determine the platform",
+             "With every motor held the platform still moves, near the zero configuration.",
+             "name the motor that is missing, or hold or drive the joint that is left free", _few),
+    LintRule("motors-many", "warning", "more driven coordinates than the mechanism has",
+             "Tools put an actuator on every joint, passive ones too. Driven so, the motors work against each other.",
+             "drop the motors of passive joints, or name the driven ones: --motors JOINTS", _many),
+)

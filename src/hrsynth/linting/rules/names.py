@@ -1,0 +1,114 @@
+"""Names that other readers confuse, and links that hang on nothing."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Iterator
+
+from ...description import xml
+from ...description.chains import CUT, END, TIP
+from ...mechanism import graphs
+from ..elements import joints
+from ..findings import LintRule, Mend, Spot
+from ..subject import LintedFile
+
+RESERVED = re.compile(r"__.*__|world|.*::.*")
+"""Names that SDFormat keeps for itself."""
+OWN = re.compile(rf"__[123]$|{TIP}$|{CUT}$|{END}$")
+"""Ends of the names that this program's writers give to a joint and the link that it carries."""
+
+
+def _clash(file: LintedFile) -> Iterator[Spot]:
+    if file.root is None or file.dialect == "mjcf":  # in which each kind has names of its own
+        return
+    links = {each.get("name") for each in file.root.iter("link")}
+    for joint in joints(file):
+        name = joint.get("name")
+        if name in links and not OWN.search(name or ""):
+            yield Spot(xml.line(joint), f"{joint.tag} {name!r} has the name of a link")
+
+
+def _case(file: LintedFile) -> Iterator[Spot]:
+    graph = file.said
+    if graph is None:
+        return
+    for what, table in (("link", graph.links), ("joint", graph.joints)):
+        often = Counter(name.casefold() for name in table)
+        for name in table:
+            if often[name.casefold()] > 1:
+                yield Spot(table[name].line, f"{what} {name!r}: another {what} has the same name but for capitals")
+
+
+def _reserved(file: LintedFile) -> Iterator[Spot]:
+    graph = file.said
+    for name, link in graph.links.items() if graph is not None else ():
+        if RESERVED.fullmatch(name) and link.line is not None and graph is not None and name != graph.base:
+            yield Spot(link.line, f"link {name!r}")
+
+
+def _motors(file: LintedFile) -> Iterator[Spot]:
+    if file.root is None:
+        return
+    names = file.root.iterfind("transmission") if file.dialect == "urdf" else (
+        each for section in file.root.findall("actuator") for each in section)
+    seen: set[str] = set()
+    for each in names:
+        name = each.get("name") if isinstance(each.tag, str) else None
+        if name is not None and name in seen:
+            yield Spot(xml.line(each), f"motor {name!r}: another one has this name")
+        seen.add(name or "")
+
+
+def _unused(file: LintedFile) -> Iterator[Spot]:
+    graph = file.said
+    if graph is None or len(graph.links) < 2:
+        return
+    parts = sorted(graphs.components(graphs.adjacency(graph.links, (each.links for each in graph.joints.values()))),
+                   key=len, reverse=True)
+    for part in parts[1:]:
+        for name in (each for each in graph.links if each in part):
+            alone = len(part) == 1 and name not in (graph.base, graph.platform)
+            element = file.element(graph.links[name].line, "link") if alone else None
+            yield Spot(graph.links[name].line, f"link {name!r}: no joint connects it to the others",
+                       None if element is None else _removed(element))
+
+
+def _removed(element: xml.Element) -> Mend:
+    def mend() -> None:
+        remove(element)
+
+    return mend
+
+
+def remove(element: xml.Element) -> None:
+    """Take an element out of its document, and the white space before it."""
+    parent, before = element.getparent(), element.getprevious()
+    if parent is None:
+        return
+    tail = element.tail or ""
+    if before is not None:
+        before.tail = tail if not (before.tail or "").strip() else (before.tail or "") + tail
+    elif not (parent.text or "").strip():
+        parent.text = tail if tail.strip() else parent.text
+    parent.remove(element)
+
+
+RULES = (
+    LintRule("name-clash", "note", "a joint with the name of a link",
+             "URDF allows it. SDFormat has one space of names and refuses it, and frames of that name are ambiguous "
+             "in ROS and Gepetto.",
+             "rename one of them, where it is named too", _clash),
+    LintRule("name-case", "note", "two names that differ in capitals only",
+             "They are confused by people, and by file systems where names become files.",
+             "rename one of them", _case),
+    LintRule("name-reserved", "warning", "a name that SDFormat keeps for itself",
+             "Names with ::, names between double underscores and `world` have a meaning of their own in SDFormat; in "
+             "Gazebo, Drake and MuJoCo `world` is the ground.",
+             "rename the link", _reserved),
+    LintRule("motor-name", "warning", "two motors of one name",
+             "Controllers find motors by their names.", "rename one of them", _motors),
+    LintRule("link-unused", "warning", "a link that no joint connects",
+             "Most readers refuse a second root; this one leaves out what does not hang together with the base.",
+             "remove it, or add its joint", _unused, mends=True),
+)

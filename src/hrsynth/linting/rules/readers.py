@@ -1,0 +1,101 @@
+"""Closures that other programs do not read: which construct each of them knows, as a table.
+
+Pinocchio 4.1, MuJoCo 4.0 and yourdfpy 0.0.60 were tried (a test does it again); what is said of Gazebo is from its
+tutorial on closed loops and gz-physics issue 25, of Isaac Sim from its importer's UrdfLoopJoint. Of a program that is
+in no row of a construct nothing is known, and nothing is said.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from ...description.jointgraph import comma_list
+from ..findings import LintRule, Spot
+from ..subject import LintedFile
+
+SILENT, REFUSED, READ = "leaves it out without a word", "refuses the file", "reads it"
+TOLD = "leaves it out with a message"
+ASKED = "leaves it out but in buildModelAndConstraintsFromMJCF"
+PROGRAMS = ("urdfdom", "pinocchio", "mujoco", "yourdfpy", "gazebo-classic", "gazebo", "isaac", "gepetto")
+_URDF_TREE = dict.fromkeys(("urdfdom", "pinocchio", "mujoco", "yourdfpy", "gazebo-classic", "gazebo", "isaac"), SILENT)
+CONSTRUCTS = {
+    "loop": _URDF_TREE,
+    "coupling": _URDF_TREE,
+    "constraint": _URDF_TREE,
+    "loop_joint": {**_URDF_TREE, "isaac": READ},
+    "gazebo/joint": {**_URDF_TREE, "gazebo-classic": READ, "gazebo": TOLD},
+    "closing frames": _URDF_TREE,
+    "second joint of one child": {"urdfdom": SILENT, "pinocchio": SILENT, "mujoco": REFUSED, "yourdfpy": REFUSED},
+    "closed_loop of the YAML file": {**_URDF_TREE, "gepetto": READ},
+    "mimic": {"pinocchio": SILENT, "mujoco": READ},
+    "equality/connect": {"mujoco": READ, "pinocchio": ASKED},
+    "equality/weld": {"mujoco": READ, "pinocchio": ASKED},
+    "equality/joint": {"mujoco": READ, "pinocchio": SILENT},
+    "second joint of one child in SDFormat": {"gazebo-classic": READ, "gazebo": TOLD},
+}
+"""What each program makes of each construct."""
+
+
+def _construct(file: LintedFile, name: str, line: int | None) -> str | None:
+    """The construct in which a file states a closure."""
+    graph = file.said
+    if graph is not None and graph.dialect == "Gepetto" and line is None:
+        return "closed_loop of the YAML file"
+    if file.dialect == "sdf":
+        return "second joint of one child in SDFormat"
+    element = file.element(line, "loop", "coupling", "constraint", "loop_joint", "joint", "mimic", "connect", "weld")
+    if element is None:
+        return "closing frames" if file.dialect == "urdf" and line is None else None
+    parent = element.getparent()
+    if element.tag == "joint" and file.dialect == "urdf":
+        inside = parent is not None and parent.tag == "gazebo"
+        return "gazebo/joint" if inside else "second joint of one child"
+    return f"equality/{element.tag}" if file.dialect == "mjcf" else str(element.tag)
+
+
+def closures(file: LintedFile) -> Iterator[tuple[str, int | None]]:
+    """Name and line of all that closes loops as the file says it."""
+    graph = file.said
+    if graph is None:
+        return
+    carried: set[str] = set()
+    for joint in graph.joints.values():
+        if not joint.in_tree or (file.dialect == "sdf" and joint.links[1] in carried):
+            yield joint.name, joint.line
+        carried.add(joint.links[1])
+    for gear in graph.gears:
+        yield gear.name, gear.line
+
+
+def _dropped(file: LintedFile) -> Iterator[Spot]:
+    told: dict[str, list[tuple[str, int | None]]] = {}
+    for name, line in closures(file):
+        construct = _construct(file, name, line) or ""
+        known = CONSTRUCTS.get(construct, {})
+        for program in [each for each in file.readers if known.get(each, READ) != READ]:
+            yield Spot(line, f"{name!r} ({construct}): {program} {known[program]}", severity="error")
+        if not file.readers and any(deed != READ for deed in known.values()):
+            told.setdefault(construct, []).append((name, line))
+    for construct, every in told.items():
+        names = comma_list((repr(name) for name, _ in every), 4)
+        yield Spot(every[0][1], f"{names} ({construct}): {_listed(CONSTRUCTS[construct])}")
+
+
+def _listed(known: dict[str, str]) -> str:
+    """What programs do, each deed once."""
+    parts = []
+    for what in (SILENT, ASKED, TOLD, REFUSED):
+        names = [program for program, deed in known.items() if deed == what]
+        if names:
+            plural = what.replace("leaves", "leave").replace("refuses", "refuse") if len(names) > 1 else what
+            parts.append(f"{', '.join(names)} {plural}")
+    return "; ".join(parts)
+
+
+RULES = (
+    LintRule("reader-drops", "note", "a closure that other programs do not read",
+             "The file loads there as an open tree: it falls apart in simulation, and its Jacobians are those of "
+             "another robot. With --reader NAME only that program is asked about.",
+             "write the file in a dialect that the program reads: hrsynth convert IN OUT.xml for MuJoCo, OUT.sdf for "
+             "Gazebo Classic, OUT.yaml for Gepetto's tools", _dropped),
+)

@@ -1,0 +1,55 @@
+"""What the readers of this program refuse, guess, solve and leave out, as findings."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+
+from ...errors import BadRequest, LoopsNotClosed
+from ..findings import LintRule, Spot
+from ..subject import LintedFile, defects_of
+
+
+def _refused(file: LintedFile) -> Iterator[Spot]:
+    error = file.refusal
+    if error is None or isinstance(error, LoopsNotClosed | BadRequest):
+        return
+    for line, text in defects_of(error):
+        yield Spot(line, text)
+
+
+def _asks(file: LintedFile) -> Iterator[Spot]:
+    if isinstance(file.refusal, BadRequest):
+        yield Spot(None, " ".join(str(file.refusal).removeprefix(f"{file.file}: ").split()))
+
+
+def noted(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[Spot]]:
+    """What finds the reader's notes of some kinds whose text begins with a pattern."""
+    def find(file: LintedFile) -> Iterator[Spot]:
+        robot = file.mechanism
+        for note in () if robot is None else robot.notes:
+            if note.kind in kinds and re.match(text, note.text):
+                yield Spot(None, note.text)
+
+    return find
+
+
+RULES = (
+    LintRule("refused", "error", "what this program refuses to read",
+             "Every command answers this file with this line.", "correct what the line says", _refused),
+    LintRule("unsaid", "warning", "what the file does not say, and no structure tells",
+             "Commands need it as an option.", "give the option that the line names", _asks),
+    LintRule("guessed", "note", "what the file does not say, guessed from its structure",
+             "A guess is taken only where structure leaves one choice; the answer depends on it all the same.",
+             "say it in the file, or by the option that the line names", noted("guess")),
+    LintRule("ignored", "warning", "what the reader leaves out",
+             "What is left out is in no answer.", "remove it, or correct the name that it gives", noted("ignored")),
+    LintRule("merged", "note", "what is read as something else",
+             "Closures and joints that mean one joint are read as that joint, and relations that hold but for printed "
+             "digits are made good.", "nothing, if it is meant so", noted("merged")),
+    LintRule("zero-singular", "warning", "a singular zero configuration",
+             "Ranks at that pose are not those nearby: motors are at a dead point, or the loops gain a freedom. This "
+             "program counts from a pose nearby.",
+             "choose another zero configuration (hrsynth convert writes the one that is used)",
+             noted("solved", text="the zero pose")),
+)

@@ -1,0 +1,113 @@
+"""Numbers that are right in another unit: degrees, millimetres, axes that are not of length one."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ...budgets import LARGEST_ROBOT, SMALLEST_ROBOT
+from ...description import numerals, xml
+from ...geometry.vectors import Array
+from ...tolerances import IN_DEGREES, TURN_IN_RADIANS, UNIT_AXIS
+from ..elements import NumberAt, inertials, joints, limits
+from ..findings import LintRule, Mend, Spot
+from ..subject import LintedFile
+
+
+def in_degrees(value: float | None) -> bool:
+    """Whether an angle that should be in radians looks like one in degrees."""
+    return value is not None and TURN_IN_RADIANS < abs(value) <= 360 and value % IN_DEGREES == 0
+
+
+def _converted(numbers: list[NumberAt]) -> Mend:
+    def mend() -> None:
+        for each in numbers:
+            each.put(numerals.exact(float(np.radians(each.value or 0.0))))
+
+    return mend
+
+
+def _limits(file: LintedFile) -> Iterator[Spot]:
+    if file.dialect == "mjcf":  # in which degrees are the default
+        return
+    for each in limits(file):
+        ends = [end for end in (each.lower, each.upper) if end is not None]
+        if each.turns and any(in_degrees(end.value) for end in ends):
+            values = " to ".join(str(end.text) for end in ends)
+            yield Spot(xml.line(each.element), f"joint {each.joint!r}: limits {values} rad", _converted(ends))
+
+
+def _angles(file: LintedFile) -> Iterator[Spot]:
+    if file.dialect != "urdf" or file.root is None:
+        return
+    for element in file.root.iter():
+        words = (element.get("rpy") or "").split() if isinstance(element.tag, str) else []
+        ends = [NumberAt(element, "rpy", place) for place in range(len(words))]
+        if any(in_degrees(end.value) for end in ends):
+            yield Spot(xml.line(element), f"rpy {' '.join(words)}, of <{element.tag}>", _converted(ends))
+
+
+def _length(file: LintedFile) -> Iterator[Spot]:
+    robot = file.mechanism
+    if robot is None:
+        return
+    if robot.length > LARGEST_ROBOT:
+        yield Spot(None, f"the joints are {robot.length:.3g} m from their middle on average: are these millimetres?")
+    elif robot.length < SMALLEST_ROBOT:
+        yield Spot(None, f"the joints are {robot.length:.3g} m from their middle on average")
+
+
+def _axis(file: LintedFile) -> Iterator[Spot]:
+    for joint in joints(file):
+        for axis in joint.iterfind("axis") if file.dialect == "urdf" else ():
+            vector = _vector(axis.get("xyz"))
+            size = 1.0 if vector is None else float(np.linalg.norm(vector))
+            if vector is not None and size > 0 and abs(size - 1) > UNIT_AXIS:
+                yield Spot(xml.line(axis), f"joint {joint.get('name')!r}: an axis of length {size:.6g}",
+                           _of_length_one(axis, vector))
+
+
+def _vector(text: str | None) -> Array | None:
+    try:
+        return None if text is None else numerals.parse(text, 3)
+    except ValueError:
+        return None
+
+
+def _of_length_one(axis: xml.Element, vector: Array) -> Mend:
+    def mend() -> None:
+        axis.set("xyz", numerals.axis(vector))
+
+    return mend
+
+
+def _inertia(file: LintedFile) -> Iterator[Spot]:
+    robot = file.mechanism
+    for each in inertials(file):
+        mass = None if each.mass is None else each.mass.value
+        if robot is None or each.inertia is None or mass is None or mass <= 0:
+            continue
+        gyration = float(np.sqrt(max(float(np.max(np.linalg.eigvalsh(each.inertia))), 0.0) / mass))
+        if gyration > LARGEST_ROBOT * robot.length:
+            yield Spot(xml.line(each.element), f"link {each.link!r}: mass {mass:g} kg and inertia as of a body "
+                                               f"{gyration:.3g} m wide, in a robot of {robot.length:.3g} m")
+
+
+RULES = (
+    LintRule("unit-limits", "warning", "limits that look like degrees",
+             "URDF and SDFormat count in radians: 90 is fourteen turns, so the limit limits nothing.",
+             "convert them to radians", _limits, mends=True),
+    LintRule("unit-angles", "warning", "roll, pitch, yaw that look like degrees",
+             "URDF counts in radians: 90 is fourteen turns and a bit, so the frame is turned by 116 degrees.",
+             "convert them to radians", _angles, mends=True),
+    LintRule("unit-length", "warning", "a robot as large as a house, or as small as a grain",
+             "Modelling tools export millimetres, readers take metres.", "scale it; --unit mm where a command reads it",
+             _length),
+    LintRule("unit-inertia", "warning", "an inertia of another unit than the mass",
+             "Tools export kg mm² or g mm². An inertia is at most its mass times the square of the body's extent.",
+             "convert the inertia to kg m²", _inertia),
+    LintRule("axis-length", "note", "an axis whose length is not one",
+             "This program and most others take its direction; some scale the joint's speed by it.",
+             "divide it by its length", _axis, mends=True),
+)
