@@ -27,8 +27,8 @@ LINKS = {"docs/pictures/": "pictures/", "docs/pages/": "", "CONTRIBUTING.md": "c
 """Where what the README links to lies in the site."""
 QUICK = "HRSYNTH_DOCS_QUICK"
 """Environment variable: notebooks of which no executed copy is kept are shown without outputs."""
-FOLDERS = ("geometry", "mechanism", "description", "families", "kinematics", "closed_forms", "batch", "rewrite",
-           "constraints", "analysis", "simulation", "selection", "present", "catalog")
+FOLDERS = ("geometry", "mechanism", "description", "linting", "families", "kinematics", "closed_forms", "batch",
+           "rewrite", "constraints", "analysis", "simulation", "selection", "present", "catalog")
 
 
 def on_files(files: Any, config: Any) -> Any:

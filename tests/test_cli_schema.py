@@ -36,6 +36,7 @@ QUICK = {
     "select": ["rrrrr_m1 --start x=0.05 --goal x=-0.01,y=0.03 --runs 1 --sight auto"],
     "view": ["rrrrr_m1 --static view.html"],
     "verify": ["c.json"],
+    "lint": ["quattro --reader mujoco --fail-on nothing", "delta --compare 3rrr_m1 --fail-on nothing"],
     "robots": ["", "--examples"],
     "convert": ["delta d.yaml", "3rrr_m1 r.sdf"],
     "import": ["delta -o d.urdf"],

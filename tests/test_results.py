@@ -35,6 +35,7 @@ ASKED = {
     "modes": lambda: hrsynth.modes(hrsynth.load("quattro"), LEGS, at=GOAL),
     "modes planar": lambda: hrsynth.modes(hrsynth.load("3rrr_m1")),
     "atlas": lambda: hrsynth.atlas(hrsynth.load("3rrr_m1")),
+    "lint": lambda: hrsynth.lint("quattro"),
     "path": lambda: hrsynth.path(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05"),
     "servo": lambda: hrsynth.servo(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05"),
     "select": lambda: hrsynth.select(hrsynth.load("3rrr_m1"), start="x=0.01,y=0,phi=0", goal="x=-0.01,y=0,phi=0.05",

@@ -56,7 +56,8 @@ class Finding(Value):
     line: int | None
     message: str
     advice: str | None = None
-    mend: Mend | None = field(default=None, repr=False)
+    mends: bool = False
+    """Whether ``--fix`` mends it."""
 
     @property
     def rank(self) -> int:
@@ -71,4 +72,4 @@ class Finding(Value):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"rule": self.rule, "severity": self.severity, "file": self.file, "line": self.line,
-                "message": self.message, "fix": self.advice, "mends": self.mend is not None}
+                "message": self.message, "fix": self.advice, "mends": self.mends}

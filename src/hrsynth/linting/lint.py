@@ -13,7 +13,7 @@ from ..description.files import write_whole
 from ..description.overrides import Overrides, names
 from ..errors import BadRequest, BadRobotFile, Defect
 from ..results import Result
-from .findings import SEVERITIES, Finding
+from .findings import SEVERITIES, Finding, Mend
 from .rules import lint_rules
 from .rules.readers import PROGRAMS
 from .subject import LintedFile
@@ -66,7 +66,7 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
     for several files with ``output``, and where the file cannot be written.
     """
     paths = [files] if isinstance(files, str | Path) else list(files)
-    paths = [shipped().get(path, path) if isinstance(path, str) and not Path(path).exists() else path for path in paths]
+    paths = [_located(path) for path in paths]
     skipped, programs = names(ignore) or (), tuple(names(readers) or ())
     for what, given, known in (("rule", skipped, tuple(lint_rules())), ("reader", programs, PROGRAMS)):
         unknown = [name for name in given if name and name not in known]
@@ -77,7 +77,7 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
     if output is not None and (not fix or len(paths) > 1):
         raise BadRequest("an output is the mended file", str(output), "one file with --fix")
     said = Overrides(base, platform, names(motors), names(close) or ())
-    other = None if compare is None else LintedFile(compare, said)
+    other = None if compare is None else LintedFile(_located(compare), said)
     opened, defects = [], list[Defect]()
     for path in paths:
         try:
@@ -97,23 +97,29 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
                 write_whole(target, file.data if after is file else after.data)
                 written = str(target)
             opened[number] = after
-    found = [each for file in opened for each in findings(file, skipped)]
+    found = [each for file in opened for each, _ in findings(file, skipped)]
     return Lint(tuple(file.file for file in opened), tuple(found), tuple(mended), written,
                 tuple(name for name in lint_rules() if name not in skipped))
 
 
-def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[Finding]:
-    """What the rules find in a file, by line, the worst of a line first; what is told by a rule of its own is not told
-    again as refused."""
+def _located(path: str | Path) -> str | Path:
+    """A file, or that of a shipped robot by its name."""
+    return path if isinstance(path, Path) or Path(path).exists() else shipped().get(path, path)
+
+
+def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding, Mend | None]]:
+    """What the rules find in a file and what mends it, by line, the worst of a line first; what is told by a rule of
+    its own is not told again as refused."""
     found = []
     for rule in lint_rules().values():
         for spot in rule.find(file) if rule.name not in ignore else ():
             where, line = getattr(spot.line, "file", file.file), None if file.expanded else spot.line
-            found.append(Finding(rule.name, spot.severity or rule.severity, where, line, spot.message,
-                                 spot.advice or rule.advice, None if file.expanded else spot.mend))
-    told = {each.line for each in found if each.rule != "refused" and each.severity == "error"}
-    found = [each for each in found if each.rule != "refused" or each.line is None or each.line not in told]
-    return sorted(found, key=lambda each: (each.line is None, each.line or 0, -each.rank))
+            mend = None if file.expanded else spot.mend
+            found.append((Finding(rule.name, spot.severity or rule.severity, where, line, spot.message,
+                                  spot.advice or rule.advice, mend is not None), mend))
+    told = {each.line for each, _ in found if each.rule != "refused" and each.severity == "error"} - {None}
+    found = [pair for pair in found if pair[0].rule != "refused" or pair[0].line not in told]
+    return sorted(found, key=lambda pair: (pair[0].line is None, pair[0].line or 0, -pair[0].rank))
 
 
 def _mended(file: LintedFile, ignore: Sequence[str]) -> tuple[LintedFile, list[Finding]]:
@@ -121,13 +127,12 @@ def _mended(file: LintedFile, ignore: Sequence[str]) -> tuple[LintedFile, list[F
     another."""
     gone: list[Finding] = []
     for _ in range(MOST_MENDING):
-        found = [each for each in findings(file, ignore) if each.mend is not None]
+        found = [(each, mend) for each, mend in findings(file, ignore) if mend is not None]
         if not found:
             break
-        first = lint_rules()[found[0].rule]
-        for each in found:
-            if each.rule == first.name and each.mend is not None:
-                each.mend()
+        for each, mend in found:
+            if each.rule == found[0][0].rule:
+                mend()
                 gone.append(each)
         file = file.after()
     return file, gone

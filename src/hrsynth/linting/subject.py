@@ -19,7 +19,9 @@ from ..errors import BadRobotFile, HrsynthError
 from ..mechanism.model import Mechanism
 
 Found = TypeVar("Found")
-_HEAD = re.compile(rb"\s*<\?xml.*?\?>\s*", re.DOTALL)
+_HEAD = re.compile(rb"(?>\s|<\?.*?\?>|<!--.*?-->)*", re.DOTALL)
+_TAIL = re.compile(rb"</[^<>]*>((?>\s|<!--.*?-->)*)$", re.DOTALL)
+"""What stands before and after the root element."""
 DIALECTS = {"robot": "urdf", "mujoco": "mjcf", "sdf": "sdf"}
 """The names of root elements, and what their documents are called here."""
 
@@ -36,6 +38,8 @@ class LintedFile:
                  readers: tuple[str, ...] = (), other: LintedFile | None = None) -> None:
         self.given, self.readers, self.other = given or Overrides(), readers, other
         opened = robot_file(Path(path), strict=False)
+        if opened.root is None and isinstance(graph := formats.read(opened), JointGraph):  # settings beside a document
+            opened = robot_file(Path(graph.file), strict=False)
         self.path, self.file = opened.path, str(opened.path)
         self.data = xml.content(opened.path) if text is None else text
         self.root = opened.root if text is None else xml.document(text, self.file)
@@ -108,9 +112,9 @@ class LintedFile:
         from lxml import etree
 
         assert self.root is not None
-        head = _HEAD.match(self.data)
-        text = etree.tostring(self.root.getroottree(), encoding="utf-8")
-        return (head[0] if head else b"") + text + (b"\n" if self.data.endswith(b"\n") else b"")
+        head, tail = _HEAD.match(self.data), _TAIL.search(self.data)
+        text = etree.tostring(self.root, encoding="utf-8", with_tail=False)
+        return (head[0] if head else b"") + text + (tail[1] if tail else b"")
 
 
 def defects_of(error: HrsynthError) -> list[tuple[int | None, str]]:

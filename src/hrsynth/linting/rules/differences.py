@@ -7,7 +7,9 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ...description import xml
-from ...mechanism.model import Joint
+from ...errors import HrsynthError
+from ...mechanism.model import Joint, Mechanism
+from ...mechanism.normal import normal_form
 from ...tolerances import SAME_ROBOT
 from ..elements import inertials
 from ..findings import LintRule, Spot
@@ -16,9 +18,18 @@ from ..subject import LintedFile
 
 
 def _match(file: LintedFile) -> RobotMatch | None:
-    """The two robots, where both files were read."""
+    """The two robots in normal form, where both files were read: dialects write one joint as several."""
     one, other = file.mechanism, None if file.other is None else file.other.mechanism
-    return None if one is None or other is None else file.remembered("match", lambda: RobotMatch(one, other))
+    if one is None or other is None:
+        return None
+    return file.remembered("match", lambda: RobotMatch(_normal(one), _normal(other)))
+
+
+def _normal(robot: Mechanism) -> Mechanism:
+    try:
+        return normal_form(robot).mechanism
+    except HrsynthError:
+        return robot
 
 
 def _fits(file: LintedFile, match: RobotMatch) -> dict[str, LinkFit]:
@@ -153,7 +164,8 @@ def _masses(file: LintedFile) -> Iterator[Spot]:
         return
     theirs = {each.link: each for each in inertials(file.other)}
     for mine in inertials(file):
-        other, line = theirs.get(match.links.get(mine.link, mine.link)), xml.line(mine.element)
+        name = mine.link if mine.link in theirs else match.links.get(mine.link)
+        other, line = theirs.get(name or ""), xml.line(mine.element)
         if other is None:
             if theirs:
                 yield Spot(line, f"link {mine.link!r} has a mass only in this file")
@@ -188,7 +200,8 @@ def _rule(name: str, severity: str, title: str, find: Callable[[LintedFile], Ite
 
 RULES = (
     _rule("joint", "error", "a joint or closure that one file has", _joints,
-          "What has no partner by name, place or structure. A closure that one dialect cannot say is often lost so."),
+          "What has no partner by name, place or structure. A closure for which one dialect has no words is often lost "
+          "so."),
     _rule("type", "error", "joints of different types", _types),
     _rule("ends", "error", "joints between other links, another base or platform", _ends),
     _rule("geometry", "error", "joints that lie elsewhere on a link", _geometry,

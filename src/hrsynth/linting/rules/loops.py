@@ -10,6 +10,7 @@ import numpy as np
 from ...budgets import MOST_LOOP_COORDINATES
 from ...description import numerals, xml
 from ...description.assembly import guess
+from ...description.assembly.candidates import closure_candidates
 from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, solve
 from ...description.jointgraph import JointGraph, JointSpec
 from ...description.jointmotion import displacement, opening
@@ -190,6 +191,19 @@ def _none(file: LintedFile) -> Iterator[Spot]:
         yield Spot(None, "the file closes no loop")
 
 
+def _coincide(file: LintedFile) -> Iterator[Spot]:
+    graph = file.said
+    if graph is None:
+        return
+    held = graph.closing | {link for joint in graph.joints.values() if not joint.in_tree for link in joint.links}
+    for each in closure_candidates(graph, graph.base or guess.base(file.graph())):
+        one, two = each.links
+        if each.coincides and not held & {one, two}:
+            yield Spot(graph.links[two].line, f"the frames of {one!r} and {two!r} lie {1000 * each.distance:.3g} mm "
+                                              "apart at zero, and nothing keeps them together when the joints move",
+                       advice=f"if they should meet: --close {each.wish}")
+
+
 RULES = (
     LintRule("loop-open", "error", "loops that are open at the zero configuration",
              "A simulator pulls them shut with a jump, and where two closings are possible the wrong one may be taken. "
@@ -211,4 +225,8 @@ RULES = (
     LintRule("loop-none", "warning", "no loop",
              "What closes loops was perhaps lost on the way, or stands in a file or launch script beside this one.",
              "close it: --close A:B[:TYPE], where A and B are frames that meet", _none),
+    LintRule("frames-coincide", "warning", "frames that coincide and are not closed",
+             "Two frames at one place, on links that move apart, are how several tools mark a loop; one that nobody "
+             "closes is an open chain.",
+             "if they should meet: --close A:B", _coincide),
 )

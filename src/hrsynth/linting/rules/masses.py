@@ -8,11 +8,13 @@ import numpy as np
 
 from ...description import xml
 from ...geometry.vectors import Array
+from ...mechanism import graphs
 from ...mechanism.model import JointType
 from ...tolerances import NO_BODY
 from ..elements import InertialElement, inertials
 from ..findings import LintRule, Mend, Spot
 from ..subject import LintedFile
+from .names import OWN
 
 
 def moving(file: LintedFile) -> set[str]:
@@ -82,10 +84,12 @@ def _missing(file: LintedFile) -> Iterator[Spot]:
     graph, root = file.said, file.root
     if not known or graph is None or root is None:
         return
-    for name in [name for name in moving(file) if name in graph.links and name not in known]:
-        link = graph.links[name]
-        if link.line is not None and file.element(link.line, "link", "body") is not None:
-            yield Spot(link.line, f"link {name!r} moves and has no <inertial>, as others in the file have")
+    bonds = graphs.adjacency(graph.links, (j.links for j in graph.joints.values() if j.kind is JointType.FIXED))
+    for name in [name for name in graph.links if name in moving(file) and not OWN.search(name)]:
+        line = graph.links[name].line
+        if not known & graphs.component(bonds, name) and file.element(line, "link", "body") is not None:
+            yield Spot(line, f"link {name!r} moves and has no <inertial>, as others in the file have, nor has one that "
+                             "is fixed to it")
 
 
 RULES = (
@@ -95,7 +99,7 @@ RULES = (
     LintRule("mass-zero", "warning", "a moving link with an inertia but no mass",
              "Gazebo leaves such links out, with their joints; MuJoCo refuses them.",
              "write the link's mass, or leave out <inertial> of a link without a body", _zero),
-    LintRule("inertia-impossible", "error", "an inertia that no body has",
+    LintRule("inertia-triangle", "error", "an inertia that no body has",
              "Principal moments are not negative, and the largest is at most the sum of the two others (triangle "
              "inequality). MuJoCo and Gazebo refuse others; elsewhere simulations blow up.",
              "take the nearest inertia of a body: negative second moments set to zero", _impossible, mends=True),

@@ -34,6 +34,9 @@ def noted(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[Spot]]
     return find
 
 
+_left_out = noted("ignored", text=r"(?!\d+ links that no joint)")  # those have a rule of their own
+
+
 RULES = (
     LintRule("refused", "error", "what this program refuses to read",
              "Every command answers this file with this line.", "correct what the line says", _refused),
@@ -43,7 +46,7 @@ RULES = (
              "A guess is taken only where structure leaves one choice; the answer depends on it all the same.",
              "say it in the file, or by the option that the line names", noted("guess")),
     LintRule("ignored", "warning", "what the reader leaves out",
-             "What is left out is in no answer.", "remove it, or correct the name that it gives", noted("ignored")),
+             "What is left out is in no answer.", "remove it, or correct the name that it gives", _left_out),
     LintRule("merged", "note", "what is read as something else",
              "Closures and joints that mean one joint are read as that joint, and relations that hold but for printed "
              "digits are made good.", "nothing, if it is meant so", noted("merged")),

@@ -1,0 +1,249 @@
+"""Each rule finds its one defect and nothing else; mended, the file is the sound one; sound files raise no alarm."""
+
+from __future__ import annotations
+
+from collections import Counter
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hrsynth
+from description.foreign.examples import FILES, URDF
+from description.foreign.test_dialects import written
+from hrsynth.description import load, save, shipped
+from hrsynth.errors import BadRequest, BadRobotFile
+from hrsynth.linting.elements import inertials
+from hrsynth.linting.rules import lint_rules
+from hrsynth.linting.subject import LintedFile
+from linting.defects import CASES, Case, damaged, put, sound
+
+ELSEWHERE = {"constraint-redundant", "loop-mirrored", "frames-coincide", "zero-singular", "merged"}
+"""Rules whose files are made in a test of their own."""
+
+
+def rules_in(path: Path, **given: object) -> Counter[str]:
+    return Counter(each.rule for each in hrsynth.lint(path, **given).findings)
+
+
+@pytest.fixture(scope="module")
+def shelf(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Where the sound files are."""
+    return tmp_path_factory.mktemp("sound")
+
+
+@cache
+def sound_file(robot: str, ending: str, shelf: Path) -> tuple[Path, Counter[str]]:
+    """A sound file, and the rules that find something in it: notes alone."""
+    path = shelf / f"{robot}_sound{ending}"
+    path.write_text(sound(robot, ending, shelf))
+    found = hrsynth.lint(path)
+    assert not found.reaches("warning")
+    return path, Counter(each.rule for each in found.findings)
+
+
+def files(case: Case, folder: Path, shelf: Path) -> tuple[Path, Path]:
+    """The sound file and the damaged one."""
+    one, _ = sound_file(case.robot, case.ending, shelf)
+    two = folder / f"damaged{case.ending}"
+    two.write_text(damaged(one.read_text(), case.damage))
+    return one, two
+
+
+def test_every_rule_has_a_case():
+    compared = {name for name in lint_rules() if name.startswith("differs-")}
+    assert set(lint_rules()) == {each.rule for each in CASES} | ELSEWHERE | compared
+
+
+@pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.rule}{case.ending}")
+def test_a_rule_finds_its_defect_and_no_other(case: Case, tmp_path: Path, shelf: Path):
+    _, two = files(case, tmp_path, shelf)
+    _, before = sound_file(case.robot, case.ending, shelf)
+    after = rules_in(two, **{} if case.reader is None else {"readers": case.reader})
+    if case.reader is None:
+        assert before[case.rule] == 0 or case.rule == "motor-unlimited"
+    assert after[case.rule] > (0 if case.reader else before[case.rule])
+    new = {name for name in after if after[name] > before[name]}
+    assert case.rule in new
+    assert new <= {case.rule, *case.follows}
+
+
+MENDED = [case for case in CASES if lint_rules()[case.rule].mends]
+
+
+@pytest.mark.parametrize("case", MENDED, ids=lambda case: f"{case.rule}{case.ending}")
+def test_what_is_mended_is_the_sound_file_again(case: Case, tmp_path: Path, shelf: Path):
+    one, two = files(case, tmp_path, shelf)
+    before = two.read_bytes()
+    target = tmp_path / f"mended{case.ending}"
+    found = hrsynth.lint(two, fix=True, output=target)
+    assert case.rule not in {each.rule for each in found.findings}
+    assert {each.rule for each in found.mended} == {case.rule}
+    assert Path(found.written or "") == target
+    assert two.read_bytes() == before
+    if case.geometry:
+        robot = load(target)
+        assert [text for text in robot.differences(load(one)) if "content of link" not in text] == []
+    else:
+        left = rules_in(target, compare=one)
+        assert {name for name in left if name.startswith("differs")} <= {"differs-zero", "differs-limit"}
+
+
+@pytest.mark.parametrize("rule", ["loop-open", pytest.param("constraint-dead", marks=pytest.mark.slow),
+                                  pytest.param("unit-angles", marks=pytest.mark.slow)])
+def test_what_is_mended_hides_the_same_robot(rule: str, tmp_path: Path, shelf: Path):
+    case = next(each for each in CASES if each.rule == rule)
+    one, two = files(case, tmp_path, shelf)
+    hrsynth.lint(two, fix=True)
+    mended, before = (hrsynth.derive(path, "1,2,3") for path in (two, one))
+    assert mended.hidden_architecture == before.hidden_architecture
+    assert mended.verdict.verdict == before.verdict.verdict
+    assert (mended.dof, mended.mobility) == (before.dof, before.mobility)
+    assert mended.certificate.passed
+
+
+def test_the_sound_limits_are_counted_from_the_new_zero(tmp_path: Path, shelf: Path):
+    """A mend of an open loop moves the zero of joints: what the limits allow stays the same poses."""
+    case = next(each for each in CASES if each.rule == "loop-open")
+    _, two = files(case, tmp_path, shelf)
+    before = load_tolerantly(two)
+    hrsynth.lint(two, fix=True)
+    after = load(two)
+    for name, joint in before.joints.items():
+        if joint.limits is not None and joint.limits.lower is not None:
+            assert np.allclose([after.joints[name].limits.lower, after.joints[name].limits.upper],
+                               [joint.limits.lower, joint.limits.upper])
+
+
+def load_tolerantly(path: Path):
+    found = LintedFile(path).mechanism
+    assert found is not None
+    return found
+
+
+def test_an_inertia_is_mended_to_the_nearest_of_a_body(tmp_path: Path, shelf: Path):
+    """Principal moments a ≥ b + c become those of a plate: the second moments that were not negative stay."""
+    case = next(each for each in CASES if each.rule == "inertia-triangle" and each.ending == ".urdf")
+    _, two = files(case, tmp_path, shelf)
+    (before,) = [each for each in inertials(LintedFile(two)) if each.inertia[2, 2] == 0.09]
+    hrsynth.lint(two, fix=True)
+    (after,) = [each for each in inertials(LintedFile(two)) if each.link == before.link]
+    for inertia, lowest in ((before.inertia, -0.05), (after.inertia, 0.0)):
+        moments = np.sort(np.linalg.eigvalsh(inertia))
+        assert moments[0] + moments[1] - moments[2] == pytest.approx(2 * lowest * 0.4, abs=0.005)
+    kept = [np.sort(np.linalg.eigvalsh(np.trace(each.inertia) / 2 * np.eye(3) - each.inertia))[1:]
+            for each in (before, after)]
+    assert kept[1] == pytest.approx(kept[0], rel=1e-5)
+
+
+def test_a_mirrored_closure_is_found_and_turned(tmp_path: Path):
+    text = URDF["constraint"]
+    good = tmp_path / "good.urdf"
+    good.write_text(text)
+    axis = "child_axis"
+    bad = tmp_path / "bad.urdf"
+    values = [float(word) for word in text.split(f'<{axis} xyz="')[1].split('"')[0].split()]
+    bad.write_text(damaged(text, put(f"constraint/{axis}", xyz=" ".join(str(-value) for value in values))))
+    assert rules_in(good)["loop-mirrored"] == 0
+    assert rules_in(bad)["loop-mirrored"] == 1
+    found = hrsynth.lint(bad, fix=True)
+    assert [each.rule for each in found.mended] == ["loop-mirrored"]
+    assert load(bad).differences(load(good)) == []
+
+
+def test_redundant_constraints_are_named_and_counted(tmp_path: Path):
+    """A planar loop closed by a hinge has 3 constraints too many, six balls have none."""
+    found = [each for each in hrsynth.lint("3rrr_m1").findings if each.rule == "constraint-redundant"]
+    assert [each.message for each in found] == [
+        f"3 of the 5 constraints of 'wrist_{leg}' repeat what the loops before it say" for leg in (2, 3)]
+    assert rules_in(shipped()["gough_stewart"])["constraint-redundant"] == 0
+
+
+def test_frames_that_nobody_closes_are_told(tmp_path: Path):
+    text = URDF["onshape"].replace("closing_", "tip_of_")
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    found = [each for each in hrsynth.lint(path).findings if each.rule == "frames-coincide"]
+    assert len(found) == 1
+    assert "--close tip_of_" in (found[0].advice or "")
+    given = (found[0].advice or "").split("--close ")[1]
+    assert rules_in(path, close=given)["loop-none"] == 0
+
+
+def test_a_singular_zero_pose_and_what_is_read_otherwise_are_told(tmp_path: Path):
+    flat = ('<robot name="flat">' + "".join(f'<link name="{name}"/>' for name in ("base", "a", "b", "c")) + "".join(
+        f'<joint name="{name}" type="continuous"><parent link="{one}"/><child link="{two}"/><origin xyz="{x} 0 0"/>'
+        '<axis xyz="0 0 1"/></joint>' for name, one, two, x in (("p", "base", "a", 0), ("q", "a", "b", 1),
+                                                                ("r", "base", "c", 2))) +
+            '<loop name="s" type="spherical"><predecessor link="b"><origin xyz="2 0 0"/></predecessor>'
+            '<successor link="c"><origin xyz="1 0 0"/></successor></loop></robot>')
+    path = tmp_path / "flat.urdf"
+    path.write_text(flat)
+    found = rules_in(path)
+    assert found["zero-singular"] == 1
+    assert found["merged"] >= 1
+
+
+SOME = ("quattro", "3rps", "rrrrr_m1")
+NAMES = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in shipped()]
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("ending", ["", ".xml", ".sdf", ".yaml"])
+def test_shipped_robots_raise_no_alarm_in_any_dialect(name: str, ending: str, tmp_path: Path):
+    path: str | Path = name
+    if ending:
+        path = tmp_path / f"robot{ending}"
+        save(load(name), path)
+    found = hrsynth.lint(path, compare=name)
+    loud = [each for each in found.findings if each.severity != "note"]
+    assert [each.rule for each in loud] == ["motors-many"] * (name == "quattro_rigid")  # four motors, three freedoms
+    assert not any(each.mends for each in found.findings)
+
+
+@pytest.mark.parametrize("name", FILES)
+def test_the_same_four_bar_in_every_dialect_is_the_same(name: str, tmp_path: Path):
+    (tmp_path / "other").mkdir()
+    path = written(tmp_path, FILES[name])
+    other = written(tmp_path / "other", FILES["urdf: urdf+"])
+    found = hrsynth.lint(path, compare=other)
+    really = {"differs-motor"} if name.startswith("sdf") else {"differs-limit"} if "classes" in name else set()
+    assert {each.rule for each in found.findings if each.rank} == really
+
+
+def test_nothing_is_written_where_nothing_is_mended_or_the_request_is_wrong(tmp_path: Path):
+    path = tmp_path / "robot.urdf"
+    path.write_text(sound())
+    before = path.stat().st_mtime_ns
+    assert hrsynth.lint(path, fix=True).written is None
+    assert path.stat().st_mtime_ns == before
+    for wrong in ({"output": tmp_path / "o.urdf"}, {"ignore": "nothing"}, {"readers": "nothing"}):
+        with pytest.raises(BadRequest):
+            hrsynth.lint(path, **wrong)
+    with pytest.raises(BadRequest):
+        hrsynth.lint([path, path], fix=True, output=tmp_path / "o.urdf")
+    with pytest.raises(BadRequest):
+        hrsynth.lint([])
+    assert sorted(each.name for each in tmp_path.iterdir()) == ["robot.urdf"]
+
+
+def test_all_files_that_cannot_be_opened_are_named(tmp_path: Path):
+    (tmp_path / "a.urdf").write_text("<robot")
+    (tmp_path / "c.urdf").write_text(sound())
+    with pytest.raises(BadRobotFile) as caught:
+        hrsynth.lint([tmp_path / name for name in ("a.urdf", "b.urdf", "c.urdf")])
+    assert {Path(each.file).name for each in caught.value.defects} == {"a.urdf", "b.urdf"}
+
+
+def test_comments_and_unknown_elements_stay_where_something_is_mended(tmp_path: Path):
+    text = ('<?xml version="1.0"?>\n<!-- made by hand -->\n' + damaged(sound(), CASES[0].damage).replace(
+        "<loop", "<!-- here --><vendor key='v'>text</vendor>\n  <loop", 1) + "\n")
+    path = tmp_path / "robot.urdf"
+    path.write_text(text)
+    hrsynth.lint(path, fix=True)
+    after = path.read_text()
+    changed = [(one, two) for one, two in zip(text.splitlines(), after.splitlines(), strict=True) if one != two]
+    assert [one.replace('"', "'") for one, _ in changed if "limit" not in one] == [
+        two.replace('"', "'") for _, two in changed if "limit" not in two]
+    assert len([one for one, _ in changed if "limit" in one]) == 1
