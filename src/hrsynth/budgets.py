@@ -40,11 +40,10 @@ LARGEST_MESHES = 2_000_000_000
 """Bytes that they may have together."""
 MOST_LOOP_COORDINATES = 240
 """Coordinates of joints in loops above which the loops of a foreign file are not solved."""
-LARGEST_ROBOT = 20.0
-"""Characteristic length (m) of a file's robot above which its unit is asked for; and how many characteristic lengths
-wide the body of an inertia may be."""
 SMALLEST_ROBOT = 1e-3
-"""Characteristic length (m) below which it is."""
+"""Characteristic length (m) below which it is doubted that a file's lengths are metres."""
+WIDEST_BODY = 20.0
+"""Characteristic lengths that the body of an inertia may be wide."""
 LINTED_POSES = 3
 """Configurations near the zero one at which a rank must be the same before lint says anything of it."""
 MOST_MENDING = 8

@@ -171,6 +171,8 @@ class Case:
     """Whether a mended file has the very geometry of the sound one."""
 
 
+HOLDER = ('<gazebo><plugin name="Holder" filename="holder.so"><one_link>prox_1</one_link><other_link>platform'
+          "</other_link></plugin></gazebo>")
 LOWER, UPPER = str(radians(-75)), str(radians(85))
 SHOULDER = 'joint[@name="shoulder_1"]'
 CASES = [
@@ -199,6 +201,7 @@ CASES = [
     Case("refused", put("loop", type="helical")),
     Case("unsaid", foreign(), robot="rrrrr_m1"),
     Case("guessed", foreign()),
+    Case("closure-unread", foreign(add(HOLDER)), ("guessed",)),
     Case("ignored", foreign(put("transmission/joint", name="nothing")), ("guessed", "motors-few")),
     Case("unit-limits", put(f"{SHOULDER}/limit", lower="-75", upper="85")),
     Case("unit-angles", put(f"{SHOULDER}/origin", rpy="0 0 360"), ("loop-open",), geometry=False),

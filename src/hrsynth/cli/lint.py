@@ -31,7 +31,7 @@ def programs() -> Iterable[str]:
 
 
 def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[str] | None, ignore: list[str] | None,
-         close: list[str] | None, **given: Any) -> None:
+         **given: Any) -> None:
     """Print what is found; exit status 1 where it is bad enough."""
     import hrsynth
 
@@ -43,7 +43,8 @@ def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[s
         if value not in known:
             raise BadRequest(name, value, known)
     with Progress():
-        found = hrsynth.lint(files, readers=reader or (), ignore=ignore or (), close=close or (), **given)
+        given["close"] = given["close"] or ()
+        found = hrsynth.lint(files, readers=reader or (), ignore=ignore or (), **given)
     if json or format == "json":
         typer.echo(record("lint", None, found.to_dict()))
     elif format == "text":
@@ -56,7 +57,6 @@ def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[s
 
 def add(app: typer.Typer) -> None:
     """Make it a command."""
-    said = [each for each in SOURCE if each.name in ("base", "platform", "motors", "close")]
     add_command(app, "lint", "What is wrong, doubtful or lost in robot files, by rules with names, and what mends it.",
                 (Option("files", "Robot files in any dialect, or names of shipped robots.", "FILES", list[str], NEEDED,
                         argument=True),
@@ -69,6 +69,6 @@ def add(app: typer.Typer) -> None:
                         "SEVERITY", default="error", words=FAILING),
                  Option("format", "text, github (annotations), sarif (2.1.0) or json.", default="text", words=FORMATS,
                         group=OUTPUT),
-                 output("The mended file, of one file with --fix."), JSON, *said), lint,
+                 output("The mended file, of one file with --fix."), JSON, *SOURCE[1:]), lint,
                 ("robot.urdf", "robot.urdf --fix -o mended.urdf", "robot.urdf --compare robot.xml",
                  "a.urdf b.xml --reader mujoco --format github --fail-on warning"))

@@ -16,7 +16,7 @@ from .dialect import Dialect
 from .example_data import PREFIX, examples
 from .files import require_same, write_whole
 from .formats import native
-from .overrides import Overrides, closures, names
+from .overrides import Overrides
 from .reading import read
 from .tree import spanning
 
@@ -61,8 +61,8 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
     >>> hrsynth.load("3rrr_m1")
     <Mechanism: 3rrr_m1, 8 links, 9 joints, 3 motors>
     """
-    overrides = Overrides(base, platform, names(motors), closures(close), names(freeze) or (), names(observe), keyframe,
-                          unit)
+    overrides = Overrides.said(base=base, platform=platform, motors=motors, close=close, freeze=freeze, observe=observe,
+                               keyframe=keyframe, unit=unit)
     if isinstance(robot, Mechanism):
         if overrides.any or base is not None or observe is not None:
             raise BadRequest("what a file does not say is given for a robot that was read", robot.name,

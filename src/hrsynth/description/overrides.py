@@ -40,6 +40,14 @@ class Overrides:
     keyframe: str | None = None
     unit: str | None = None
 
+    @classmethod
+    def said(cls, *, motors: str | Iterable[str] | None = None, close: str | Iterable[str] = (),
+             freeze: str | Iterable[str] = (), observe: str | Iterable[str] | None = None, **more: str | None
+             ) -> Overrides:
+        """What a user says, lists also as texts with commas."""
+        return cls(motors=names(motors), close=closures(close), freeze=names(freeze or ()) or (),
+                   observe=names(observe), **more)
+
     @property
     def any(self) -> bool:
         """Whether anything is given that changes what the file says."""

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ..budgets import MOST_MENDING
-from ..description import shipped
+from ..description import file_of
 from ..description.files import write_whole
 from ..description.overrides import Overrides, names
 from ..errors import BadRequest, BadRobotFile, Defect
@@ -52,36 +52,34 @@ class Lint(Result, shown_as="lint"):
 
 def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None = None,
          readers: Iterable[str] | str = (), ignore: Iterable[str] | str = (), fix: bool = False,
-         output: str | Path | None = None, base: str | None = None, platform: str | None = None,
-         motors: Iterable[str] | str | None = None, close: Iterable[str] | str = ()) -> Lint:
+         output: str | Path | None = None, **said: Any) -> Lint:
     """Everything that is wrong, doubtful or lost in robot files, by the rules of ``hrsynth.linting.rules``.
 
     ``compare`` is another file of the same robot: where the two differ is found too. ``readers`` are programs that
     shall read the files: a closure that one of them loses is an error. ``ignore`` names rules to leave out. With
     ``fix`` all that there is one way to mend is mended, and the file written, whole or not at all, to ``output`` or in
-    its place; what is found then is what is left. ``base``, ``platform``, ``motors`` and ``close`` say of all files
-    what they do not say themselves.
+    its place; what is found then is what is left. What no file says itself is given as for ``load`` (``platform``,
+    ``close`` …).
 
     Raises ``BadRobotFile`` for what cannot be opened, or is no document; ``BadRequest`` for names that there are not,
     for several files with ``output``, and where the file cannot be written.
     """
     paths = [files] if isinstance(files, str | Path) else list(files)
-    paths = [_located(path) for path in paths]
     skipped, programs = names(ignore) or (), tuple(names(readers) or ())
-    for what, given, known in (("rule", skipped, tuple(lint_rules())), ("reader", programs, PROGRAMS)):
-        unknown = [name for name in given if name and name not in known]
+    for what, asked, known in (("rule", skipped, tuple(lint_rules())), ("reader", programs, PROGRAMS)):
+        unknown = [name for name in asked if name and name not in known]
         if unknown:
             raise BadRequest(f"no {what} of this name", unknown[0], known)
     if not paths:
         raise BadRequest("no file to look at", None, "one or more")
     if output is not None and (not fix or len(paths) > 1):
         raise BadRequest("an output is the mended file", str(output), "one file with --fix")
-    said = Overrides(base, platform, names(motors), names(close) or ())
-    other = None if compare is None else LintedFile(_located(compare), said)
+    given = Overrides.said(**said)
+    other = None if compare is None else LintedFile(file_of(compare), given)
     opened, defects = [], list[Defect]()
     for path in paths:
         try:
-            opened.append(LintedFile(path, said, readers=programs, other=other))
+            opened.append(LintedFile(file_of(path), given, readers=programs, other=other))
         except BadRobotFile as error:
             defects += error.defects
     if defects:
@@ -100,11 +98,6 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
     found = [each for file in opened for each, _ in findings(file, skipped)]
     return Lint(tuple(file.file for file in opened), tuple(found), tuple(mended), written,
                 tuple(name for name in lint_rules() if name not in skipped))
-
-
-def _located(path: str | Path) -> str | Path:
-    """A file, or that of a shipped robot by its name."""
-    return path if isinstance(path, Path) or Path(path).exists() else shipped().get(path, path)
 
 
 def findings(file: LintedFile, ignore: Sequence[str] = ()) -> list[tuple[Finding, Mend | None]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, TypeVar
@@ -43,14 +44,16 @@ class LintedFile:
         self.path, self.file = opened.path, str(opened.path)
         self.data = xml.content(opened.path) if text is None else text
         self.root = opened.root if text is None else xml.document(text, self.file)
-        self.expanded = text is None and self.root is not None and xacro.is_needed(xml.document(self.data, self.file))
+        self._opened = replace(opened, root=self.root)
+        self.expanded = text is None and self.root is not None and xacro.is_needed(
+            xml.document(self.data, self.file, []))
         """Whether a program made the document of what stands in the file, where lines and mends are not those of it."""
         self._remembered: dict[str, Any] = {}
         self.dialect = None if self.root is None else DIALECTS.get(str(self.root.tag))
 
     def opened(self, *, strict: bool = False) -> RobotFile:
         """The file as readers get it, which may change its document."""
-        return RobotFile(self.path, copy.deepcopy(self.root), strict and not self.given.any)
+        return replace(self._opened, root=copy.deepcopy(self.root), strict=strict and not self.given.any)
 
     def graph(self) -> JointGraph:
         """What the file says before anything is put together; raises ``BadRobotFile``."""
@@ -96,11 +99,14 @@ class LintedFile:
         found: Found = self._remembered[name]
         return found
 
-    def element(self, line: int | None, *tags: str) -> xml.Element | None:
-        """The element of some name that starts in a line of this file, where there is one only."""
+    def element(self, line: int | None, *tags: str, name: str | None = None) -> xml.Element | None:
+        """The element with one of these tags that starts in a line of this file, where there is one only; of several in
+        one line that with the name."""
         if self.root is None or line is None or isinstance(line, xml.SourceLine):
             return None
         found = [each for each in self.root.iter(*tags) if xml.line(each) == line]
+        if len(found) > 1:
+            found = [each for each in found if each.get("name") == name]
         return found[0] if len(found) == 1 else None
 
     def after(self) -> LintedFile:

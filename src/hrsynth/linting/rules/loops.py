@@ -81,7 +81,7 @@ def _closed(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed:
     for joint, _, _ in assembly.tree:
         if np.array_equal(displacement(joint, closed.values[joint.name]), np.eye(4)):
             continue
-        element = file.element(graph.joints[joint.name].line, "joint")
+        element = file.element(graph.joints[joint.name].line, "joint", name=joint.name)
         if element is None or joint.kind not in (JointType.REVOLUTE, JointType.PRISMATIC):
             return None
         moved.append((joint, element))
@@ -130,7 +130,7 @@ def _mirrored(file: LintedFile) -> Iterator[Spot]:
 
 def _turned(file: LintedFile, joint: JointSpec) -> Mend | None:
     """Turn the child's axis of a ``<constraint>`` round."""
-    element = file.element(joint.line, "constraint")
+    element = file.element(joint.line, "constraint", name=joint.name)
     axis = None if element is None else element.find("child_axis")
     if axis is None:
         return None
@@ -154,7 +154,7 @@ def _dead(file: LintedFile) -> Iterator[Spot]:
         graph = file.said
         line = _line(file, name)
         own = None if graph is None else graph.joints.get(name)
-        element = None if own is not None and own.in_tree else file.element(line, *CLOSING)
+        element = None if own is not None and own.in_tree else file.element(line, *CLOSING, name=name)
         yield Spot(line, f"without {name!r} the mechanism is as free as with it",
                    None if element is None else partial(remove, element))
 

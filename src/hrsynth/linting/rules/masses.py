@@ -87,7 +87,7 @@ def _missing(file: LintedFile) -> Iterator[Spot]:
     bonds = graphs.adjacency(graph.links, (j.links for j in graph.joints.values() if j.kind is JointType.FIXED))
     for name in [name for name in graph.links if name in moving(file) and not OWN.search(name)]:
         line = graph.links[name].line
-        if not known & graphs.component(bonds, name) and file.element(line, "link", "body") is not None:
+        if not known & graphs.component(bonds, name) and file.element(line, "link", "body", name=name) is not None:
             yield Spot(line, f"link {name!r} moves and has no <inertial>, as others in the file have, nor has one that "
                              "is fixed to it")
 

@@ -69,7 +69,7 @@ def _unused(file: LintedFile) -> Iterator[Spot]:
     for part in parts[1:]:
         for name in (each for each in graph.links if each in part):
             alone = len(part) == 1 and name not in (graph.base, graph.platform)
-            element = file.element(graph.links[name].line, "link") if alone else None
+            element = file.element(graph.links[name].line, "link", name=name) if alone else None
             yield Spot(graph.links[name].line, f"link {name!r}: no joint connects it to the others",
                        None if element is None else _removed(element))
 

@@ -9,6 +9,8 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from lxml import etree
+
 from ...description.jointgraph import comma_list
 from ..findings import LintRule, Spot
 from ..subject import LintedFile
@@ -16,7 +18,7 @@ from ..subject import LintedFile
 SILENT, REFUSED, READ = "leaves it out without a word", "refuses the file", "reads it"
 TOLD = "leaves it out with a message"
 ASKED = "leaves it out but in buildModelAndConstraintsFromMJCF"
-PROGRAMS = ("urdfdom", "pinocchio", "mujoco", "yourdfpy", "gazebo-classic", "gazebo", "isaac", "gepetto")
+PROGRAMS = ("urdfdom", "pinocchio", "mujoco", "yourdfpy", "gazebo-classic", "gazebo", "drake", "isaac", "gepetto")
 _URDF_TREE = dict.fromkeys(("urdfdom", "pinocchio", "mujoco", "yourdfpy", "gazebo-classic", "gazebo", "isaac"), SILENT)
 CONSTRUCTS = {
     "loop": _URDF_TREE,
@@ -25,6 +27,9 @@ CONSTRUCTS = {
     "loop_joint": {**_URDF_TREE, "isaac": READ},
     "gazebo/joint": {**_URDF_TREE, "gazebo-classic": READ, "gazebo": TOLD},
     "closing frames": _URDF_TREE,
+    "ball_constraint": {**_URDF_TREE, "drake": READ},
+    "linear_bushing_rpy": {**_URDF_TREE, "drake": READ},
+    "plugin": {**_URDF_TREE, "gazebo": READ},
     "second joint of one child": {"urdfdom": SILENT, "pinocchio": SILENT, "mujoco": REFUSED, "yourdfpy": REFUSED},
     "closed_loop of the YAML file": {**_URDF_TREE, "gepetto": READ},
     "mimic": {"pinocchio": SILENT, "mujoco": READ},
@@ -34,6 +39,7 @@ CONSTRUCTS = {
     "second joint of one child in SDFormat": {"gazebo-classic": READ, "gazebo": TOLD},
 }
 """What each program makes of each construct."""
+TAGS = ("loop", "coupling", "constraint", "loop_joint", "joint", "mimic", "connect", "weld", "plugin")
 
 
 def _construct(file: LintedFile, name: str, line: int | None) -> str | None:
@@ -41,16 +47,17 @@ def _construct(file: LintedFile, name: str, line: int | None) -> str | None:
     graph = file.said
     if graph is not None and graph.dialect == "Gepetto" and line is None:
         return "closed_loop of the YAML file"
-    if file.dialect == "sdf":
-        return "second joint of one child in SDFormat"
-    element = file.element(line, "loop", "coupling", "constraint", "loop_joint", "joint", "mimic", "connect", "weld")
+    element = file.element(line, *TAGS, *(f"{{*}}{tag}" for tag in ("ball_constraint", "linear_bushing_rpy")),
+                           name=name)
+    if file.dialect == "sdf" and (element is None or element.tag == "joint"):
+        return "second joint of one child in SDFormat" if line is not None else None
     if element is None:
         return "closing frames" if file.dialect == "urdf" and line is None else None
     parent = element.getparent()
     if element.tag == "joint" and file.dialect == "urdf":
         inside = parent is not None and parent.tag == "gazebo"
         return "gazebo/joint" if inside else "second joint of one child"
-    return f"equality/{element.tag}" if file.dialect == "mjcf" else str(element.tag)
+    return f"equality/{element.tag}" if file.dialect == "mjcf" else etree.QName(element).localname
 
 
 def closures(file: LintedFile) -> Iterator[tuple[str, int | None]]:

@@ -34,6 +34,7 @@ def noted(*kinds: str, text: str = "") -> Callable[[LintedFile], Iterator[Spot]]
     return find
 
 
+_unread = noted("open", text=r"(?!\d+ coordinates are driven|the robot's char|nothing in the file closes)")
 _left_out = noted("ignored", text=r"(?!\d+ links that no joint)")  # those have a rule of their own
 
 
@@ -47,6 +48,9 @@ RULES = (
              "say it in the file, or by the option that the line names", noted("guess")),
     LintRule("ignored", "warning", "what the reader leaves out",
              "What is left out is in no answer.", "remove it, or correct the name that it gives", _left_out),
+    LintRule("closure-unread", "warning", "what may close a loop and is not read",
+             "Plugins and elements of simulators that hold links together, of which the file does not say enough.",
+             "close the loop as the line says", _unread),
     LintRule("merged", "note", "what is read as something else",
              "Closures and joints that mean one joint are read as that joint, and relations that hold but for printed "
              "digits are made good.", "nothing, if it is meant so", noted("merged")),

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from ...budgets import LARGEST_ROBOT, SMALLEST_ROBOT
+from ...budgets import LARGEST_ROBOT, SMALLEST_ROBOT, WIDEST_BODY
 from ...description import numerals, xml
 from ...geometry.vectors import Array
 from ...tolerances import IN_DEGREES, TURN_IN_RADIANS, UNIT_AXIS
@@ -89,7 +89,7 @@ def _inertia(file: LintedFile) -> Iterator[Spot]:
         if robot is None or each.inertia is None or mass is None or mass <= 0:
             continue
         gyration = float(np.sqrt(max(float(np.max(np.linalg.eigvalsh(each.inertia))), 0.0) / mass))
-        if gyration > LARGEST_ROBOT * robot.length:
+        if gyration > WIDEST_BODY * robot.length:
             yield Spot(xml.line(each.element), f"link {each.link!r}: mass {mass:g} kg and inertia as of a body "
                                                f"{gyration:.3g} m wide, in a robot of {robot.length:.3g} m")
 
@@ -102,7 +102,7 @@ RULES = (
              "URDF counts in radians: 90 is fourteen turns and a bit, so the frame is turned by 116 degrees.",
              "convert them to radians", _angles, mends=True),
     LintRule("unit-length", "warning", "a robot as large as a house, or as small as a grain",
-             "Modelling tools export millimetres, readers take metres.", "scale it; --unit mm where a command reads it",
+             "Modelling tools export millimetres, readers take metres.", "scale it, or say --unit mm to every command",
              _length),
     LintRule("unit-inertia", "warning", "an inertia of another unit than the mass",
              "Tools export kg mm² or g mm². An inertia is at most its mass times the square of the body's extent.",
