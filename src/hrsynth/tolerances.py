@@ -32,6 +32,8 @@ PASSED_BY = 1e-3
 AS_PRINTED = 1e-5
 """Difference (metres, radians; characteristic lengths) at which a part of a pose that never changes, or a pose of more
 parts than there are freedoms, is taken as its printed value."""
+HALF_TURN = 5e-7
+"""Angle (radians) from −π within which half a turn is printed as π: that of the digits that are printed."""
 NEAREST = 1e-10
 """Projected gradient (characteristic lengths, radians) at which a pose counts as the nearest one."""
 FOLLOWED = 1e-9

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..batch.reach import sweep
-from ..errors import PlaneNotMet
+from ..errors import HrsynthError, PlaneNotMet
 from ..mechanism.pose import SCALARS, Grid, PoseLike, asked_poses
 from ..progress import tell
 from ..results import Result, Value
 from .asked import configurations_at
 from .classes import Redundancy, listed
-from .observed import LegsLike, ObservedRobot, RobotLike
+from .observed import LegsLike, Mobility, ObservedRobot, RobotLike
 from .posture import ConfigurationAnalysis, Posture
 from .question import question
 
@@ -66,6 +66,14 @@ class Check(Result, shown_as="check"):
         """The characteristic length (m) that makes lengths comparable with angles."""
         return self.setting.everything.twin.length
 
+    @property
+    def as_written(self) -> Mobility | None:
+        """The mobility of the file's own links and joints, None where no samples of them can be drawn."""
+        try:
+            return self.setting.mobility_as_written
+        except HrsynthError:
+            return None
+
     def headline(self) -> str:
         """The robot, and the state of its hidden robot at each pose."""
         states = "; ".join(f"{each.pose} {each.hidden.state}" for each in self.postures)
@@ -73,8 +81,11 @@ class Check(Result, shown_as="check"):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
+        generic, written = self.setting.mobility, self.as_written
         return {"characteristic_length": self.length,
-                **self.setting.to_dict(),
+                **self.setting.to_dict(), "watched": self.setting.watched_dict(),
+                "mobility": {"total": generic.total, "idle": generic.idle,
+                             "as_written": written and {"total": written.total, "idle": written.idle}},
                 "configurations": [each.to_dict() for each in self.postures],
                 "redundant": [each.to_dict() for each in self.redundant],
                 "grid": self.grid and self.grid.to_dict()}

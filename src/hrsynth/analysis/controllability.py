@@ -7,12 +7,12 @@ from itertools import combinations
 from typing import TYPE_CHECKING, Any
 
 from ..mechanism.observation import labels_of
-from ..mechanism.pose import PoseLike
+from ..mechanism.pose import PoseLike, asked_pose
 from ..progress import tell
 from ..results import Result
-from .asked import observe
+from .asked import observe as observed
 from .exact import ExactVerdict, architecture
-from .observed import ObservedRobot, RobotLike, restricted
+from .observed import LegsLike, ObservedRobot, RobotLike, restricted
 from .question import question
 from .verdict import Verdict, verdict_of
 
@@ -37,6 +37,8 @@ class Legs(Result, shown_as="legs"):
     complete: bool
     """Whether all sets were tried."""
     minimal: tuple[tuple[str, ...], ...] = field(default=())
+    where: str = "the zero configuration"
+    """What took the place of the zero configuration, as it was asked for."""
 
     def headline(self) -> str:
         """The robot and the smallest sets that see most."""
@@ -52,20 +54,23 @@ class Legs(Result, shown_as="legs"):
         return {"robot": self.robot, "architecture_ascii": self.architecture, "dof": self.dof,
                 "sets": [{**each.to_dict(), "exact": exact.exact, "architecture": exact.to_dict()}
                          for each, exact in zip(self.sets, self.exact, strict=True)], "complete": self.complete,
-                "minimal": [list(each) for each in self.minimal], **self.setting.modes_dict()}
+                "watched": self.setting.watched_dict(), "minimal": [list(each) for each in self.minimal],
+                **self.setting.modes_dict()}
 
 
 @question()
-def legs(robot: RobotLike, camera: str | None = None, *, at: PoseLike | None = None, seed: int = 0) -> Legs:
-    """The verdict of every set of legs at their default segments (theory.md 6), on the branch of the zero
-    configuration, or of the pose ``at`` (``mode:2``: a mode with all legs watched).
+def legs(robot: RobotLike, camera: str | None = None, *, observe: LegsLike = None, at: PoseLike | None = None,
+         seed: int = 0) -> Legs:
+    """The verdict of every set of legs (theory.md 6), on the branch of the zero configuration, or of the pose ``at``
+    (``mode:2``: a mode with all legs watched): all legs at their default segments, or those of ``observe``, labels or
+    links.
 
     >>> hrsynth.legs("quattro").minimal
     (('1', '3'), ('1', '4'), ('2', '3'), ('2', '4'))
     """
-    setting = observe(robot, None, camera, at=at, seed=seed)
+    setting = observed(robot, observe, camera, at=at, seed=seed)
     anatomy = setting.anatomy
-    segments = setting.segments
+    segments = setting.segments if observe is None else setting.observed
     labels = labels_of(segments)
     sets, exact = list[Verdict](), list[ExactVerdict]()
     generic = architecture(setting)
@@ -73,13 +78,13 @@ def legs(robot: RobotLike, camera: str | None = None, *, at: PoseLike | None = N
     for size in range(1, len(labels) + 1):
         if not complete and 3 < size < len(labels):
             continue
-        for places in combinations(range(len(labels)), size):
-            samples = restricted(setting.everything, [segments[i] for i in places])
-            sets.append(verdict_of(setting, [labels[i] for i in places], samples))
+        for chosen in combinations(labels, size):
+            samples = restricted(setting.everything, [each for each in segments if each.leg in chosen])
+            sets.append(verdict_of(setting, chosen, samples))
             exact.append(generic.verdict(samples.question.observations))
             tell("sets of legs")
     best = max(each.rank for each in sets)
     smallest = min(len(each.legs) for each in sets if each.rank == best)
     minimal = tuple(each.legs for each in sets if each.rank == best and len(each.legs) == smallest)
     return Legs(setting, setting.robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), tuple(exact),
-                complete, minimal)
+                complete, minimal, **({} if at is None else {"where": str(asked_pose(at))}))

@@ -26,7 +26,7 @@ from ..mechanism.legs import LegDecomposition, decompose
 from ..mechanism.normal import NormalForm, normal_form
 from ..mechanism.observation import Direction, labels_of
 from ..mechanism.pose import RADIANS, ModeNumber, Pose, PoseForm
-from ..mechanism.sensors import default_observation, defaults_of, encoders, observation_of
+from ..mechanism.sensors import default_observation, defaults_of, encoders, observation_of, reason
 from ..progress import tell
 from ..results import Value, content
 
@@ -198,6 +198,15 @@ class ObservedRobot(Value):
         """What is observed, and from which link, as the records of the command line begin."""
         return {"observed": [{"leg": o.leg, "link": o.link} for o in self.observed],
                 "camera": self.mechanism.reference}
+
+    def watched(self) -> tuple[tuple[Observation, str], ...]:
+        """What is observed, and why it is that."""
+        return tuple((each, reason(self.anatomy, each)) for each in self.observed)
+
+    def watched_dict(self) -> list[dict[str, Any]]:
+        """The same as the records of the command line have it; axes in the frames of their links."""
+        return [{"leg": o.leg, "link": o.link, "axis": o.direction.tolist() if isinstance(o, Direction) else None,
+                 "why": why} for o, why in self.watched()]
 
     def modes_dict(self) -> dict[str, Any]:
         """The samples' operation mode and the others that were met, as the records of the command line have them."""

@@ -16,7 +16,6 @@ from ..progress import following
 from .colour import painted
 from .commands import add_command
 from .options import (
-    CAMERA,
     JSON,
     NEEDED,
     OUTPUT,
@@ -180,7 +179,7 @@ QUESTIONS = (
               "robot.urdf --platform plate --motors hip_1,hip_2,hip_3")),
     Question("legs", "Every set of observed legs: its verdict, the freedoms it loses, and the smallest sets that see "
              "most.",
-             (CAMERA, BEGIN), ("quattro", "quattro --camera platform")),
+             (*WATCHED, BEGIN), ("quattro", "quattro --observe arm_1,arm_2,rod_3a", "quattro --camera platform")),
     Question("check", "Mobility, ranks, singularities and redundant constraints at poses, and over a grid of poses.",
              (*WATCHED, Option("at", f"A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; {POSES}", "POSE", list[str]),
               Option("grid", "A line, plane or box of poses, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 "
@@ -250,7 +249,7 @@ QUESTIONS = (
              (START, _goal("Goal pose."),
               Option("cone", "Half-angle of the cone about each direction, or one a leg: 1=0.1deg,2=0.2deg,…", "ANGLE",
                      default="0.1deg"),
-              CAMERA, Option("size", "Legs of the largest sets.", None, int, 4, low=1),
+              *WATCHED, Option("size", "Legs of the largest sets.", None, int, 4, low=1),
               Option("runs", "How many sets must pass a simulated run, best first.", None, int, 3, low=0),
               Option("sight", "Pose of the camera on the link that carries it (x right, y down, z ahead), as "
                      "x=0,y=0,z=0.5,rpy=180deg/0/0; or auto.", "POSE"),

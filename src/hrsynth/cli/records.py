@@ -53,6 +53,13 @@ class Watched(TypedDict):
     link: str
 
 
+class WatchedAxis(Watched):
+    """A watched segment, its direction in the link's frame (null where no direction is watched), and why it is it."""
+
+    axis: list[float] | None
+    why: str
+
+
 class FreedomRecord(TypedDict):
     """A freedom of the platform."""
 
@@ -71,6 +78,12 @@ class MobilityWritten(MobilityRecord):
     """The same, and of the file as it is written."""
 
     as_written: MobilityRecord
+
+
+class MobilityMaybeWritten(MobilityRecord):
+    """The same, null where the file's own mechanism could not be sampled."""
+
+    as_written: MobilityRecord | None
 
 
 class MarginRecord(TypedDict):
@@ -216,6 +229,7 @@ class LegsAnswer(OfRobot, Modes):
     dof: int
     sets: list[LegSet]
     complete: bool
+    watched: list[WatchedAxis]
     minimal: list[list[str]]
 
 
@@ -328,6 +342,8 @@ class CheckAnswer(OfRobot, WrittenTo):
     characteristic_length: float
     observed: list[Watched]
     camera: str
+    watched: list[WatchedAxis]
+    mobility: MobilityMaybeWritten
     configurations: list[PostureRecord]
     redundant: list[RedundantRecord]
     grid: GridRecord | None

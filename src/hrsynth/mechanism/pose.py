@@ -19,7 +19,7 @@ from ..budgets import FARTHEST_POSE, LARGEST_GRID
 from ..errors import BadRequest
 from ..geometry.vectors import Array, rotation_from_rpy
 from ..results import Value
-from ..tolerances import AS_PRINTED
+from ..tolerances import AS_PRINTED, HALF_TURN
 
 SCALARS = ("x", "y", "z", "phi")
 PARTS = (*SCALARS, "rpy")
@@ -272,7 +272,9 @@ def rpy_of(R: Array) -> tuple[float, float, float]:
 
 
 def written(parts: Mapping[str, tuple[float, ...]], degrees: bool = False) -> str:
-    """Parts of a pose in one line, angles in radians or ``degrees``."""
+    """Parts of a pose in one line, angles in radians or ``degrees``; half a turn is told as a positive one."""
+    parts = {name: tuple(-v if name in ("phi", "rpy") and abs(v + math.pi) < HALF_TURN else v for v in values)
+             for name, values in parts.items()}
     return ",".join(f"{name}={'/'.join(_written(round(math.degrees(v), 6)) + 'deg' for v in values)}"
                     if degrees and name in ("phi", "rpy") else f"{name}={'/'.join(map(_written, values))}"
                     for name, values in parts.items())

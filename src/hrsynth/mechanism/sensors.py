@@ -22,19 +22,36 @@ TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 def default_observation(anatomy: LegDecomposition, leg: Leg) -> Direction:
     """The default segment of a leg (docs/pages/theory.md, section 2): the axis of a P that joins two moving links;
     else the last segment before the platform (of equal parallel rods the first)."""
+    return _default(anatomy, leg)[0]
+
+
+def _default(anatomy: LegDecomposition, leg: Leg) -> tuple[Direction, str]:
+    """The default segment of a leg, and why it is that one."""
     segments = _Segments(anatomy, leg)
     path, nodes, base = segments.path, segments.nodes, anatomy.mechanism.base
     for i, edge in enumerate(path):
         joint = segments.joint(edge)
         if joint is not None and joint.type is JointType.PRISMATIC and base not in (nodes[i], nodes[i + 1]):
-            return segments.along(nodes[i], joint, i)
+            return segments.along(nodes[i], joint, i), f"the axis of the slide {joint.name}"
     if leg.takes_platform:
-        return segments.binary(anatomy.mechanism.platform)
+        return segments.binary(anatomy.mechanism.platform), "the platform is the last segment of this leg"
     if path[-1].inside:
-        return segments.binary(path[-1].inside[0])
+        found = segments.binary(path[-1].inside[0])
+        return found, "the first of the parallel rods before the platform"
     if len(nodes) < 3:
         raise NoSegment(f"leg {leg.label} has no segment to observe: it is one joint", path[-1].joints[0])
-    return segments.at(len(nodes) - 2)
+    return segments.at(len(nodes) - 2), "the last segment before the platform"
+
+
+def reason(anatomy: LegDecomposition, seen: Observation) -> str:
+    """Why a segment is watched, in words."""
+    if any(each.key == seen.key for each in anatomy.mechanism.observations):
+        return "named in the file"
+    try:
+        default, why = _default(anatomy, anatomy.leg(seen.leg))
+    except HrsynthError:
+        return "asked for"
+    return why if default.key == seen.key else "asked for"
 
 
 def defaults_of(anatomy: LegDecomposition) -> dict[str, Observation]:

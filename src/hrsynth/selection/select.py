@@ -16,7 +16,7 @@ from ..analysis.accuracy.pose_errors import PoseErrors
 from ..analysis.asked import configurations_at
 from ..analysis.aspects.path import SEPARATED, Aspects
 from ..analysis.modes.modes import AssemblyModes, modes
-from ..analysis.observed import ObservedRobot, RobotLike
+from ..analysis.observed import LegsLike, ObservedRobot, RobotLike
 from ..analysis.posture import ConfigurationAnalysis, Posture
 from ..analysis.question import question
 from ..analysis.verdict import CONTROLLABLE, verdict_of
@@ -24,7 +24,7 @@ from ..budgets import AXIS_SEEN
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..mechanism.observation import Direction
+from ..mechanism.observation import Direction, labels_of
 from ..mechanism.pose import Pose, PoseLike, asked_pose
 from ..progress import tell
 from ..results import Compared, Result, Value, by_name
@@ -186,16 +186,17 @@ class Selection(Result, shown_as="select"):
 
 @question(cones="cone")
 @by_name(Criteria, "criteria")
-def select(robot: RobotLike, camera: str | None = None, *, start: PoseLike, goal: PoseLike, cone: Cones = "0.1deg",
-           criteria: Criteria, seed: int = 0) -> Selection:
+def select(robot: RobotLike, camera: str | None = None, *, observe: LegsLike = None, start: PoseLike, goal: PoseLike,
+           cone: Cones = "0.1deg", criteria: Criteria, seed: int = 0) -> Selection:
     """All sets of legs for the displacement from ``start`` to ``goal``, ranked by the largest position error at the
     goal for cones about the directions (``cone``: the half-angle of all, or one a leg; MMT A.2).
 
     The fields of :class:`Criteria` can be given by their names: ``size``, ``examine``, ``runs``, ``sight``, ``focal``,
-    ``seconds``. A set is discarded where it does not see every freedom, where an end is singular, where the camera
-    (``sight``) sees too little of a leg, where start and goal are proved to lie in different aspects, and where a
-    simulated run ends elsewhere. Modes and aspects are asked for the ``examine`` most accurate sets, the others are
-    neither kept nor discarded. Runs are made from the best set on, until ``runs`` of them ended at the goal.
+    ``seconds``. The sets are those of the legs or links ``observe``, by default of all legs. A set is
+    discarded where it does not see every freedom, where an end is singular, where the camera (``sight``) sees too
+    little of a leg, where start and goal are proved to lie in different aspects, and where a simulated run ends
+    elsewhere. Modes and aspects are asked for the ``examine`` most accurate sets, the others are neither kept nor
+    discarded. Runs are made from the best set on, until ``runs`` of them ended at the goal.
 
     Raises ``BadRequest``, ``PoseNotReached``.
 
@@ -203,15 +204,16 @@ def select(robot: RobotLike, camera: str | None = None, *, start: PoseLike, goal
     <Selection: 3rrr_m1: 7 sets, 1 kept, best 1, 2, 3>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    setting = ObservedRobot.of(robot, None, camera, seed=seed).telling(wanted)
-    directions = tuple(o for o in setting.segments if isinstance(o, Direction))
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed).telling(wanted)
+    segments = setting.segments if observe is None else setting.observed
+    directions = tuple(o for o in segments if isinstance(o, Direction))
     setting = replace(setting, observed=directions)
     half = half_angles(cone, directions)
     ends = configurations_at(setting, wanted)
     work = _Work(setting, ends[0], ends[1], half, _sight(setting, ends, criteria), criteria,
                  np.inf if criteria.seconds is None else time.monotonic() + criteria.seconds, seed)
-    sets = [legs for count in range(1, min(criteria.size, len(directions)) + 1)
-            for legs in combinations(directions, count)]
+    labels = labels_of(directions)
+    sets = [legs for count in range(1, min(criteria.size, len(labels)) + 1) for legs in combinations(labels, count)]
     found, left = work.examined(sorted((work.first(legs) for legs in sets), key=lambda each: each.order))
     found.sort(key=lambda each: (each.discarded is not None, not each.examined,
                                  each.order if each.discarded is None else (0, 0, 0)))
@@ -246,10 +248,9 @@ class _Work:
         """The setting with some legs watched."""
         return replace(self.setting, observed=tuple(o for o in self.setting.observed if o.leg in legs))
 
-    def first(self, observations: Sequence[Direction]) -> Candidate:
+    def first(self, legs: tuple[str, ...]) -> Candidate:
         """What is quickly said of a set: verdict, singular ends, sight, accuracy."""
         tell("sets of legs")
-        legs = tuple(o.leg for o in observations)
         setting = self.watching(legs)
         try:
             verdict = verdict_of(setting, legs, setting.samples)

@@ -15,7 +15,7 @@ from ...analysis.aspects.path import UNDECIDED as UNDECIDED_PAIR
 from ...analysis.posture import CONSTRAINT, REGULAR, UNDECIDED
 from ...tolerances import NOISE, RANK_GAP
 from .robots import NO_MATRIX
-from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, known, listing
+from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, known, listing, watched
 
 if TYPE_CHECKING:
     from ...analysis.aspects.atlas import Atlas, ModePair
@@ -33,7 +33,11 @@ _SINCE = {"hidden": "the observed directions", "real": "the motors' coordinates"
 
 def check(found: Check) -> str:
     """What is observed, a block for each pose, then redundant constraints and the grid in numbers."""
-    rows = [*head(found.setting), *camera(found.setting),
+    seen = [f"{leg} ({', '.join(each)})" for leg, each in watched(found.setting).items()]
+    generic, written = found.setting.mobility, found.as_written
+    rows = [head(found.setting)[0], ("observed", seen), *camera(found.setting),
+            *known("mobility", None if written in (None, generic) else
+                   f"{written.total} as the file is written, {generic.total} in normal form"),
             ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians")]
     for posture in found.postures:
         rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture, found.length)]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ...analysis.exact import ExactVerdict, power_above
 from ...errors import HrsynthError
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
-from .tables import Rows, camera, head, known, listing, sets, table
+from .tables import Rows, camera, head, known, listing, sets, table, watched
 
 if TYPE_CHECKING:
     from ...analysis.advice import Advice, FurtherMeasurement
@@ -129,8 +129,10 @@ def legs(found: Legs) -> str:
     rows = [(", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", exact_cell(exact, each.rank),
              "; ".join(freedom.name for freedom in each.lost))
             for each, exact in zip(found.sets, found.exact, strict=True)]
+    lost = "lost" if any("platform at (" in row[-1] for row in rows) else f"lost (at {found.where})"
     lines = [f"{found.robot}   {found.architecture}   {found.dof} dof", "",
-             table(rows, ("legs", "verdict", "rank", "exact", "lost (at the zero configuration)")), "",
+             table(rows, ("legs", "verdict", "rank", "exact", lost)), "",
+             *(f"leg {leg}: {', '.join(seen)}" for leg, seen in watched(found.setting).items()), "",
              f"smallest sets of the best rank: {found.smallest}"]
     lines += [f"not decided in exact arithmetic: {reason}"
               for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)]

@@ -59,6 +59,18 @@ def head(found: ObservedRobot) -> Rows:
             ("observed", ", ".join(f"{o.leg} ({o.link})" for o in found.observed))]
 
 
+def watched(found: ObservedRobot) -> dict[str, list[str]]:
+    """What is watched of each leg: the link, the axis in its frame, and why it is that."""
+    from ...analysis.freedoms import point_text
+    from ...mechanism.observation import Direction
+
+    told: dict[str, list[str]] = {}
+    for o, why in found.watched():
+        axis = f" along {point_text(o.direction)} of its frame" if isinstance(o, Direction) else ""
+        told.setdefault(o.leg, []).append(f"{o.link}{axis}, {why}")
+    return told
+
+
 def camera(found: ObservedRobot) -> Rows:
     """What carries the camera, where it is not the base."""
     reference = found.mechanism.reference

@@ -1,0 +1,75 @@
+"""What is watched and why, sets of what is asked for, mobility as written, half turns in print."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from hrsynth import check, legs, select
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.description import load
+from hrsynth.mechanism.pose import Pose
+from oracle import Oracle
+
+WHY = {"quattro": "the first of the parallel rods before the platform", "3rrr_m1": "the last segment before the platform",
+       "gough_stewart": "the axis of the slide"}
+
+
+@pytest.mark.parametrize("name", WHY)
+def test_the_watched_axis_is_told_with_its_reason(name: str):
+    found = check(name)
+    for (seen, why), record in zip(found.setting.watched(), found.to_dict()["watched"], strict=True):
+        assert why.startswith(WHY[name])
+        assert (record["leg"], record["link"], record["why"]) == (seen.leg, seen.link, why)
+        assert np.allclose(record["axis"], seen.direction)
+        assert f"{seen.link} along (" in str(found)
+        assert why in str(found)
+
+
+def test_sets_of_links_that_are_asked_for():
+    found = legs("delta", observe="arm_1,rod_2a")
+    assert [why for _, why in found.setting.watched()] == ["asked for", WHY["quattro"]]
+    assert [each.legs for each in found.sets] == [("1",), ("2",), ("1", "2")]
+    single = [check("delta", observe=link).postures[0].hidden.rank for link in ("arm_1", "rod_2a")]
+    assert [each.rank for each in found.sets[:2]] == single
+    both = legs("delta", observe=["rod_1a", "arm_1"])
+    assert [(each.legs, each.rank) for each in both.sets] == [(("1",), 3)]
+    assert check("delta", observe=["rod_1a", "arm_1"]).postures[0].hidden.rank == 3
+    assert len(legs("delta", observe="all").sets) == 7
+
+
+def test_a_report_of_few_legs_still_knows_all_sets():
+    assert len(legs(ObservedRobot.of("delta", "1,2")).sets) == 7
+
+
+def test_sets_for_a_displacement_are_those_asked_for():
+    found = select("delta", observe="1,2", start="x=0.05", goal="x=-0.05", runs=0, examine=1)
+    assert {each.legs for each in found.candidates} == {("1",), ("2",), ("1", "2")}
+
+
+def test_mobility_is_that_of_the_normal_form_and_that_of_the_file(tmp_path):
+    text = ('<robot name="arm"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>'
+            + "".join(f'<joint name="{j}" type="continuous"><parent link="{p}"/><child link="{c}"/>'
+                      f'<origin xyz="{x} 0 0"/><axis xyz="{axis}"/></joint>'
+                      for j, p, c, x, axis in (("p", "base", "a", 0, "0 0 1"), ("q", "a", "b", 0, "0 0 1"),
+                                               ("r", "b", "c", 1, "0 1 0"))) + "</robot>")
+    (tmp_path / "arm.urdf").write_text(text)
+    found = check(load(tmp_path / "arm.urdf", platform="c"))
+    oracle = Oracle(found.setting.robot)
+    written = oracle.mobility(oracle.zero())
+    assert (found.setting.mobility.total, found.as_written.total) == (2, written) == (2, 3)
+    assert found.to_dict()["mobility"]["as_written"]["total"] == 3
+    assert "3 as the file is written, 2 in normal form" in str(found)
+
+
+def test_the_table_of_legs_says_where_freedoms_are_lost():
+    assert "lost (at mode:2)" in str(legs("3rrr_m1", at="mode:2"))
+    assert "lost (at the zero configuration)" in str(legs("3rrr_m1"))
+
+
+def test_half_a_turn_is_printed_as_a_positive_one():
+    assert str(Pose(0.0, 0.0, 0.0, rpy=(0.0, 0.0, -math.pi + 1e-9))) == "x=0,y=0,z=0,rpy=0/0/3.141593"
+    assert str(Pose(phi=-3.14)) == "phi=-3.14"
+    assert str(Pose(phi=-math.pi - 0.1)) == f"phi={round(-math.pi - 0.1, 6)}"
