@@ -81,10 +81,10 @@ def _read(source: dict[str, Any], observe: str | None, *, tell: bool) -> Mechani
 
 def _segments(mechanism: Mechanism) -> dict[str, Observation]:
     """The observed segment of each leg that has one."""
-    from ..analysis.observed import defaults_of
     from ..errors import HrsynthError
     from ..mechanism.legs import decompose
     from ..mechanism.normal import normal_form
+    from ..mechanism.sensors import defaults_of
 
     try:
         return defaults_of(decompose(normal_form(mechanism).mechanism))

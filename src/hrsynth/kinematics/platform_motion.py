@@ -15,7 +15,7 @@ from ..geometry.ranks import range_basis
 from ..geometry.screws import point_velocity
 from ..geometry.so3 import between, exponential, logarithm, turn_about, wrap_angle
 from ..geometry.vectors import Array, oriented, transform
-from ..mechanism.pose import RADIANS, Pose, PoseForm, written
+from ..mechanism.pose import RADIANS, Pose, PoseForm, positive_half_turn, written
 from ..results import Value
 from ..tolerances import AS_PRINTED, RANK_CUTOFF
 from .configuration import ClosedConfiguration
@@ -178,7 +178,7 @@ class PlatformMotion(Value):
             return found
         parts, turn = found.given, X[:3, :3] @ self.home[:3, :3].T
         if self.form.phi and np.linalg.norm(turn @ self.normal - self.normal) <= AS_PRINTED:
-            parts["phi"] = (turn_about(self.normal, turn)[0],)
+            parts["phi"] = (positive_half_turn(turn_about(self.normal, turn)[0]),)
             del parts["rpy"]
         return replace(found, shown=written(parts, self.form.degrees))
 

@@ -61,7 +61,10 @@ class Pose:
         """The pose of a homogeneous matrix X_BP (4, 4); of a point body the position of ``point`` (in the platform's
         frame) alone."""
         x, y, z = map(float, X[:3, 3] if point is None else X[:3, :3] @ point + X[:3, 3])
-        return cls(x, y, z, rpy=rpy_of(X[:3, :3]) if point is None else None)
+        if point is not None:
+            return cls(x, y, z)
+        roll, pitch, yaw = map(positive_half_turn, rpy_of(X[:3, :3]))
+        return cls(x, y, z, rpy=(roll, pitch, yaw))
 
     @property
     def given(self) -> dict[str, tuple[float, ...]]:
@@ -271,10 +274,13 @@ def rpy_of(R: Array) -> tuple[float, float, float]:
     return math.atan2(s * R[0, 2] - c * R[1, 2], c * R[1, 1] - s * R[0, 1]), pitch, yaw
 
 
+def positive_half_turn(angle: float) -> float:
+    """An angle that was computed; half a turn, which has no sense, is a positive one."""
+    return -angle if abs(angle + math.pi) < HALF_TURN else angle
+
+
 def written(parts: Mapping[str, tuple[float, ...]], degrees: bool = False) -> str:
-    """Parts of a pose in one line, angles in radians or ``degrees``; half a turn is told as a positive one."""
-    parts = {name: tuple(-v if name in ("phi", "rpy") and abs(v + math.pi) < HALF_TURN else v for v in values)
-             for name, values in parts.items()}
+    """Parts of a pose in one line, angles in radians or ``degrees``."""
     return ",".join(f"{name}={'/'.join(_written(round(math.degrees(v), 6)) + 'deg' for v in values)}"
                     if degrees and name in ("phi", "rpy") else f"{name}={'/'.join(map(_written, values))}"
                     for name, values in parts.items())
