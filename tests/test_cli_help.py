@@ -17,11 +17,13 @@ from typing import Any
 import pytest
 import typer
 
+import hrsynth
 from hrsynth.cli import app, execute
 from hrsynth.cli.completion import candidates
 from hrsynth.cli.options import OUTPUT, READING, WATCHING
 from hrsynth.cli.questions import QUESTIONS
 from hrsynth.description import shipped
+from hrsynth.errors import MissingExtra
 
 ROOT: Any = typer.main.get_command(app)
 LEAVES = [(name,) for name, each in ROOT.commands.items() if not hasattr(each, "commands")] + [
@@ -137,8 +139,32 @@ def test_completion_knows_robots_and_every_option():
         assert {*offered} - {"--help"} == {name for name in known if name.startswith("--")} - old
 
 
+def test_completion_knows_the_examples_once_they_are_begun():
+    try:
+        known = [f"example:{name}" for name in hrsynth.examples()]
+    except MissingExtra:
+        pytest.skip("example-robot-data is not installed")
+    assert candidates(ROOT, ["derive", "exa"]) == candidates(ROOT, ["verify", "c.json", "--robot", "example:"]) == known
+    assert candidates(ROOT, ["derive", "example:cassie"])[0].startswith("example:cassie")
+
+
+def test_bash_replaces_what_stands_after_the_colon(capsys, tmp_path: Path):
+    """Bash takes ``example:cas`` as three words and puts what is offered in the place of the last."""
+    if shutil.which("bash") is None:
+        pytest.skip("no bash here")
+    offered = "example:cassie example:cast"
+    (tmp_path / "hrsynth").write_text(f'#!/bin/sh\n[ "$5" = example:cas ] && printf "%s\\n" {offered}\n')
+    (tmp_path / "hrsynth").chmod(0o755)
+    (tmp_path / "script").write_text(called(capsys, "completion", "bash"))
+    line = "hrsynth derive example:cas"
+    asked = f'source {tmp_path}/script; COMP_WORDBREAKS=" :="; COMP_LINE="{line}"; COMP_POINT={len(line)}; _hrsynth; '
+    done = subprocess.run(["bash", "-c", asked + 'echo "${COMPREPLY[@]}"'], capture_output=True, text=True,
+                          env={**os.environ, "PATH": f"{tmp_path}:{os.environ['PATH']}"})
+    assert done.stdout.split() == ["cassie", "cast"], done.stderr
+
+
 INTERACTIVE = {
-    "bash": 'source {script}; COMP_WORDS=(hrsynth derive qua); COMP_CWORD=2; _hrsynth; echo "${{COMPREPLY[@]}}"',
+    "bash": 'source {script}; COMP_LINE="hrsynth derive qua"; COMP_POINT=18; _hrsynth; echo "${{COMPREPLY[@]}}"',
     "zsh": 'autoload -Uz compinit; compinit -u -D; compadd() {{ print -r -- ${{(P)@[-1]}} }}; _files() {{ : }}; '
            'source {script}; words=(hrsynth derive qua); CURRENT=3; _hrsynth',
     "fish": 'source {script}; complete -C "hrsynth derive qua"',

@@ -5,13 +5,15 @@ from __future__ import annotations
 
 import doctest
 import re
+import subprocess
+import sys
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 import hrsynth
-from hrsynth.errors import BadRequest, MissingExtra
+from hrsynth.errors import BadRequest, CertificateRefused, MissingExtra
 
 FUNCTIONS = sorted({*hrsynth.__all__} - {"__version__", "catalog"})
 SLOW = {"atlas", "draw", "select"}
@@ -59,6 +61,23 @@ def test_legs_in_any_form_are_one_question():
     for forms in (("1,2", "1, 2", ["1", "2"], [1, 2], (1, "2"), {1, 2}), (None, "all", ["all"])):
         answers = {id(hrsynth.derive("rrrrr_m1", form)) for form in forms}
         assert len(answers) == 1, forms
+
+
+def test_a_certificate_is_about_its_robot_alone():
+    record = hrsynth.certificate(hrsynth.modes("rrrrr_m1"))
+    hrsynth.verify(record, "rrrrr_m1")
+    for other in ("delta", "3rrr_m1"):
+        with pytest.raises(CertificateRefused, match=f"it is not about {other}"):
+            hrsynth.verify(record, other)
+
+
+def test_a_family_is_written_with_a_sentence_a_file(tmp_path: Path):
+    ask = [sys.executable, "-m", "hrsynth.families", str(tmp_path)]
+    done = subprocess.run([*ask, "bennett", "six_poses"], capture_output=True, text=True, check=True)
+    assert done.stdout.splitlines() == [f"The robot {name} is written to {tmp_path}/{name}.urdf."
+                                        for name in ("bennett", "six_poses")]
+    wrong = subprocess.run([*ask, "nothing"], capture_output=True, text=True)
+    assert (wrong.returncode, len(wrong.stderr.splitlines())) == (2, 1)
 
 
 def test_a_picture_is_written_in_any_kind_of_file(tmp_path: Path):

@@ -53,7 +53,8 @@ class Catalog(Value):
         ``group``, ``dof``, ``motion`` ("3T", "2T1R"), ``verdict``, ``base_motors``, ``fewest`` (legs of the smallest
         set that sees all that can be seen) and ``modes`` (complex ones of such a set) have to be equal. ``legs`` is
         their number, or a pattern of ``*`` and ``?`` for the notation or for the chain of one leg, with or without the
-        marks of motors. ``text`` has to occur in some field. Several values in a tuple: one of them.
+        marks of motors. ``text`` has to occur in some field, or in a name
+        under which the robot is known. Several values in a tuple: one of them.
         """
         require_askable(asked)
         return Catalog(tuple(each for each in self.records if fits(each, asked)))
@@ -116,7 +117,10 @@ def _one(record: Record, name: str, value: Any) -> bool:
         case "modes":
             return bool(record.get("modes_bound") == value)
         case "text":
-            return any(str(value).casefold() in str(each).casefold() for each in record.values())
+            from .site.known import is_called
+
+            return is_called(record, str(value)) or any(
+                str(value).casefold() in str(each).casefold() for each in record.values())
         case _:
             return name in record and bool(record[name] == value)
 

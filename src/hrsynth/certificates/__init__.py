@@ -10,7 +10,8 @@ from typing import Any
 
 from ..analysis.derive import Derivation
 from ..analysis.modes.modes import AssemblyModes
-from ..errors import BadRequest, CertificateRefused
+from ..description import load
+from ..errors import BadRequest, CertificateRefused, PoseNotReached
 from ..mechanism import Mechanism
 from ..tolerances import SAME_RELATION
 from . import modes, ranks
@@ -37,7 +38,7 @@ def written(found: AssemblyModes | Derivation) -> bytes:
     return (json.dumps(certificate(found), indent=1) + "\n").encode()
 
 
-def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | None = None) -> str:
+def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path | None = None) -> str:
     """What a certificate, or the file of one, proves, in words, by the checker's own computation; with ``robot`` also
     that its geometry is that robot's, to ``SAME_RELATION`` of its size.
 
@@ -63,8 +64,11 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | None = Non
     except NotAccepted as reason:
         raise CertificateRefused(name, str(reason)) from None
     if robot is not None:
+        robot = load(robot)
         try:
             own = (modes if record["claim"] == "modes" else ranks).again(record, robot)
+        except (BadRequest, PoseNotReached) as error:
+            raise CertificateRefused(name, f"it is not about {robot.name}: {error}") from None
         except (KeyError, TypeError, ValueError, AttributeError) as error:
             raise CertificateRefused(name, f"it does not say which legs and pose it is about ({error!r})") from None
         if not _same(record, own):

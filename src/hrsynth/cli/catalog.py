@@ -26,14 +26,14 @@ WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=
 ANEW = flag("anew", "Discard the results of an interrupted build.")
 FILTER = (
     Option("legs", "Number of legs, or a pattern of the notation or of one leg's chain: 3-R*, PUS.", "LEGS"),
-    Option("dof", "Freedoms of the platform.", kind=int),
+    Option("dof", "Freedoms of the platform.", kind=int, low=0),
     Option("motion", "Its translations and rotations, as 3T or 2T1R."),
     Option("verdict", f"{', '.join(VERDICTS)}.", words=VERDICTS),
     Option("group", "planar, pods, deltas, spatial.", words=("planar", "pods", "deltas", "spatial")),
     Option("base_motors", "All motors on the base, or not.", kind=bool, flags=("--base-motors/--moving-motors",)),
-    Option("fewest", "Number of legs that must be watched.", kind=int),
-    Option("modes", "Number of assembly modes, complex ones too.", kind=int),
-    Option("text", "Text that occurs in any field."),
+    Option("fewest", "Number of legs that must be watched.", kind=int, low=0),
+    Option("modes", "Number of assembly modes, complex ones too.", kind=int, low=0),
+    Option("text", "Text that occurs in any field, or a name: Delta."),
 )
 """Which architectures are asked for."""
 
@@ -104,11 +104,13 @@ def show(word: str, output: str | None, kept: str | None, json: bool) -> None:
     from ..description import save, targets
     from ..present.text.catalog import entry
 
-    architecture = parse(word)
     if output is not None:
         targets(output)
     with Progress():
+        word, others = _word(word, kept)
+        architecture = parse(word)
         record, note = _known(str(architecture), kept)
+    note = "; ".join(each for each in (note, others) if each)
     if output is not None:
         for warning in save(mechanism(architecture, record.get("attempt", 0)), output):
             warn(str(warning))
@@ -131,6 +133,24 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
         warn(f"{len(done.differ)} derivations do not end in what the catalog says, the first: {word}, "
              f"derived {derived}")
     _say("site", done.to_dict(), sited(done.to_dict()), json)
+
+
+def _word(text: str, kept: str | None) -> tuple[str, str]:
+    """The word of an architecture that is given by it, by a name or by its legs, and what else is called so."""
+    from ..catalog import load
+    from ..catalog.site.known import alias, named
+    from ..catalog.words import parse
+    from ..errors import BadRequest
+
+    try:
+        return str(parse(text)), ""
+    except BadRequest:
+        found = named(load(kept), text)
+        if not found:
+            raise
+    word = found[0]["word"]
+    more = [f"{len(found)} are called so: {', '.join(each['word'] for each in found[1:4])} …"] if found[1:] else []
+    return word, "; ".join([*filter(None, [alias(word)]), *more])
 
 
 def _known(word: str, kept: str | None) -> tuple[Any, str]:
@@ -177,12 +197,19 @@ COMMANDS = (
       Option("seed", "Seed of --sample.", None, int, 0, low=0))),
     ("list", "The architectures that fit.", entries, (*FILTER, KEPT, JSON)),
     ("show", "One architecture, drawn and in full; one that is not in the catalog is studied now.", show,
-     (Option("word", "An architecture, as '3(Rz*-Rz-Rz)'.", "WORD", default=NEEDED, argument=True),
+     (Option("word", "An architecture, as '3(Rz*-Rz-Rz)', or a name or legs: Delta, 3-RPS.", "WORD", default=NEEDED,
+             argument=True),
       output("Write a robot of this architecture (.urdf, or another dialect)."), KEPT, JSON)),
     ("site", "Pages of the architectures that fit: a list that filters, drawings, derivations, robot files; needs no "
      "server.", site,
      (output("A new or empty folder, or an older site, which is replaced.", "DIR", NEEDED), *FILTER, WORKERS, ANEW,
       KEPT, JSON)),
 )
+EXAMPLES = {
+    "build": ("planar -o mine.sqlite", "--check --sample 20"),
+    "list": ("--legs 3-R*RR --verdict controllable", "--motion 2T1R --base-motors --modes 6", "--text Hexaglide"),
+    "show": ("'3(Rz*-Rz-Rz)'", "Delta -o delta.urdf"),
+    "site": ("-o pages --group planar",),
+}
 for name, words, run, options in COMMANDS:
-    add_command(catalog, name, words, options, run)
+    add_command(catalog, name, words, options, run, EXAMPLES[name])

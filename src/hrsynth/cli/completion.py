@@ -3,19 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from typing import Any
 
 import typer
 
 from .commands import add_command
-from .options import NEEDED, Option
+from .options import NEEDED, Option, shipped
 
+EXAMPLE = "example:"
 WORDS = "words"
 """What a script asks for instead of the name of a shell, followed by the words typed so far."""
 SCRIPTS = {
     "bash": """_hrsynth() {
-    local IFS=$'\\n'
-    COMPREPLY=($(hrsynth completion words -- "${COMP_WORDS[@]:1:COMP_CWORD}" 2>/dev/null))
+    local typed last IFS=$' \\t\\n'
+    read -ra typed <<< "${COMP_LINE:0:COMP_POINT}"
+    [[ "${COMP_LINE:COMP_POINT-1:1}" == " " ]] && typed+=("")
+    IFS=$'\\n'
+    COMPREPLY=($(hrsynth completion words -- "${typed[@]:1}" 2>/dev/null))
+    last="${typed[${#typed[@]}-1]}"
+    [[ "$last" == *:* && "$COMP_WORDBREAKS" == *:* ]] && COMPREPLY=("${COMPREPLY[@]#"${last%:*}:"}")
 }
 complete -o default -o bashdefault -F _hrsynth hrsynth""",
     "zsh": """#compdef hrsynth
@@ -52,14 +59,22 @@ def _next(command: Any, before: Sequence[str], last: str) -> Iterable[str]:
     by_name = {name: each for each in options for name in each.names}
     named = by_name.get(before[-1]) if before else None
     if named is not None and named.kind is not bool:
-        return _words(named)
+        return _words(named, last)
     if last.startswith("-"):
         return ["--help", *(part for name in by_name for part in name.split("/") if part.startswith("--"))]
-    return [word for each in options if each.argument for word in _words(each)]
+    return [word for each in options if each.argument for word in _words(each, last)]
 
 
-def _words(option: Option) -> Iterable[str]:
-    return option.words() if callable(option.words) else option.words
+def _words(option: Option, last: str) -> Iterable[str]:
+    """Its values; of robots also ``example:NAME``, once that is begun."""
+    words = option.words() if callable(option.words) else option.words
+    if option.words is shipped and last and EXAMPLE.startswith(last[: len(EXAMPLE)]):
+        from ..description import examples
+        from ..errors import MissingExtra
+
+        with suppress(MissingExtra):
+            return [*words, *(f"{EXAMPLE}{name}" for name in examples())]
+    return words
 
 
 def add(app: typer.Typer) -> None:

@@ -6,6 +6,7 @@ from typing import Any
 
 import typer
 
+from . import options
 from .commands import add_command
 from .options import JSON, NEEDED, SOURCE, Option, flag, robot_of, warn
 from .progress import Progress
@@ -76,7 +77,8 @@ def add(app: typer.Typer) -> None:
     """Make them commands."""
     add_command(app, "verify", "Check a certificate that modes or derive wrote, with integers and fractions alone.",
                 (Option("certificate", "The certificate's file.", "FILE", default=NEEDED, argument=True),
-                 Option("robot", "See that its geometry is that of this robot.", "ROBOT"), JSON), verify,
+                 Option("robot", "See that its geometry is that of this robot.", "ROBOT", words=options.shipped),
+                 JSON), verify,
                 ("c.json", "c.json --robot quattro"))
     add_command(app, "robots", "The shipped robots.",
                 (flag("examples", "The robots of the package example-robot-data instead: legged robots, arms, hands."),

@@ -9,16 +9,16 @@ from functools import partial
 from pathlib import Path
 
 from .. import description
-from ..errors import BadRequest
+from ..errors import BadRequest, HrsynthError
 from ..mechanism import Mechanism
 from .linkages import LINKAGES
 from .planar import six_poses
 from .table import ROBOTS
 
 
-def main(folder: str = "robots", *names: str) -> None:
-    """Writes NAME.urdf for every robot of the table, or for those that are named; raises ``BadRequest`` for a name that
-    there is not."""
+def main(folder: str = "robots", *names: str) -> list[Path]:
+    """Writes NAME.urdf for every robot of the table, or for those that are named; the files. Raises ``BadRequest`` for
+    a name that there is not."""
     shipped, target = {robot.name: robot.make for robot in ROBOTS}, Path(folder)
     makers: dict[str, Callable[[], Mechanism]] = {
         **shipped, **{name: partial(_linkage, name) for name in LINKAGES}, "six_poses": six_poses}
@@ -26,8 +26,10 @@ def main(folder: str = "robots", *names: str) -> None:
         if name not in makers:
             raise BadRequest("a robot to write", name, sorted(makers))
     target.mkdir(parents=True, exist_ok=True)
-    for name in names or shipped:
-        description.save(makers[name](), target / f"{name}.urdf")
+    files = [target / f"{name}.urdf" for name in names or shipped]
+    for file in files:
+        description.save(makers[file.stem](), file)
+    return files
 
 
 def _linkage(name: str) -> Mechanism:
@@ -35,4 +37,8 @@ def _linkage(name: str) -> Mechanism:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    try:
+        print(*(f"The robot {file.stem} is written to {file}." for file in main(*sys.argv[1:])), sep="\n")
+    except HrsynthError as error:
+        print(f"hrsynth: {error}", file=sys.stderr)
+        sys.exit(2)

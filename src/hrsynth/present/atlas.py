@@ -61,7 +61,8 @@ def picture(found: Atlas, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
     count = 1 if drawn.found is None else 3
     columns = paper.columns(count, LEAST_PANEL)
     rows = -(-count // columns)
-    figure, axes = panels(rows, columns, 5.4 * columns, 5.4 * rows + 1.2, paper, (0.6 * columns, 0.6 * rows + 1.2))
+    figure, axes = panels(rows, columns, 5.4 * columns, 5.4 * rows + 1.2, paper, (0.6 * columns, 0.6 * rows + 1.2),
+                          LEAST_PANEL)
     for place in axes[count:]:
         place.set_visible(False)
     _table(axes[0], found)

@@ -101,7 +101,7 @@ def _distance_maps(grid: GridCheck, numbers: Array, states: NDArray[np.str_], mo
     size = 3.6 if columns > 1 else 5.6
     plane = MapPlane.of(grid.grid.axes, motion, 0.3, 2.0)
     figure, axes = panels(rows, columns, size * columns + 1.4, (size * plane.tall + 0.7) * rows + 0.8, paper,
-                          (1.5 + 0.2 * columns, 0.8 + 0.7 * rows))
+                          (1.5 + 0.2 * columns, 0.8 + 0.7 * rows), LEAST_MAP if columns > 1 else 0.0)
     low, high, ticks = _scale(numbers)
     norm = LogNorm(low, high)
     for k, place in enumerate(axes[: len(ps)]):
@@ -271,7 +271,8 @@ def _error_maps(field: ErrorField, shown: list[tuple[Array, str]], motion: Platf
     rows = -(-len(shown) // columns) if flat else len(shown) * each
     figure, axes = panels(rows, columns, size * columns + (1.4 * columns if flat else 1.4),
                           (size * plane.tall + 0.8) * rows + (0.5 if flat else 0.0), paper,
-                          (1.9 * columns if flat else 1.5 + 0.2 * columns, 0.8 * rows + 0.5))
+                          (1.9 * columns if flat else 1.5 + 0.2 * columns, 0.8 * rows + 0.5),
+                          LEAST_CURVE if flat else LEAST_MAP)
     locus = False
     for number, (values, label) in enumerate(shown):
         low, high = _ends(values)

@@ -180,7 +180,8 @@ def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> float:
     if drawn.rest:
         many += f"\nof the points where the curves meet, only these fit leg{'s' * (len(drawn.rest) > 1)} "
         many += ", ".join(drawn.rest) + " as well"
-    title = f"{setting.robot.name}   {setting.anatomy.architecture()}\nassembly modes with the same {held}: {many}"
+    title = (f"{setting.robot.name}   {setting.anatomy.architecture()}\nassembly modes with the same {held} as at "
+             f"{found.pose}: {many}")
     return settled(whole, whole.suptitle(title, fontsize=12, va="top"))
 
 

@@ -47,10 +47,11 @@ class Paper:
         text is asked for too."""
         return self.room if self.width is not None and self.size is not None else min(natural, self.room)
 
-    def axes(self, natural: float) -> float:
-        """The width (inches) of a layout without the legend that is to stand beside it, or below where it is narrow."""
+    def axes(self, natural: float, least: float = AXES) -> float:
+        """The width (inches) of a layout without the legend that is to stand beside it, or below where that would leave
+        less than ``least``."""
         rest = self.wide(natural + BESIDE) - BESIDE
-        return rest if rest >= AXES else self.wide(natural)
+        return rest if rest >= max(AXES, least) else self.wide(natural)
 
     def columns(self, most: int, side: float) -> int:
         """How many axes, of ``side`` inches at least, stand beside each other."""

@@ -68,10 +68,10 @@ def empty_figure(width: float, height: float, **style: Any) -> Any:
 
 
 def panels(rows: int, columns: int, width: float, height: float, paper: Paper = PNG,
-           around: tuple[float, float] = (1.2, 1.2)) -> tuple[Any, Any]:
+           around: tuple[float, float] = (1.2, 1.2), least: float = 0.0) -> tuple[Any, Any]:
     """A figure and its axes, row by row: ``width``, ``height`` (inches) where the paper has room, and else narrower
-    with axes of the same shape; ``around`` is what is not axes."""
-    wide = paper.axes(width)
+    with axes of the same shape; ``around`` is what is not axes, ``least`` the width that each needs."""
+    wide = paper.axes(width, least * columns)
     height = around[1] + (height - around[1]) * (wide - around[0]) / (width - around[0])
     figure = empty_figure(wide, height, layout="constrained")
     figure.get_layout_engine().set(w_pad=PAD, h_pad=PAD)

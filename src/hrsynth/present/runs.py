@@ -128,7 +128,7 @@ def _robots(figure: Any, found: Servo, above: float, panels: int) -> Box:
                entry("robot at the goal", color=GOAL[0], linestyle="dashed"),
                entry("way of the platform", color=COLOURS[0]), entry("joints of the base", **BASE)]
     inside = others[np.all((others >= every.min(axis=0) - 1e-9) & (others <= every.max(axis=0) + 1e-9), axis=1)]
-    marks = [(inside, "D", COLOURS[3], "other modes"), (path[-1:], "o", COLOURS[1], "")]
+    marks = [(inside, "D", COLOURS[3], "other modes of the goal"), (path[-1:], "o", COLOURS[1], "")]
     marks += [(path[each.place][None], "x", "crimson", "crossing a singularity" if each.kind == TYPE_2 else
                "crossing a limit") for each in found.track.passages or ()]
     looks = [(points, words, {"marker": mark, "color": colour, "markerfacecolor": "none", "linestyle": ""})

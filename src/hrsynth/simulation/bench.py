@@ -87,7 +87,7 @@ class Bench:
         times: list[float] = []
         states: list[tuple[ClosedConfiguration, Command]] = []
         while time < horizon:
-            tell("run of the mock-up")
+            tell(f"run of the mock-up, {time:.1f} s of {horizon:.3g} s at most")
             at_now = encoded(self.start, at, driven, data.qpos[places] / scale)
             if at_now is None:
                 stopped = OPEN

@@ -3,7 +3,9 @@ ones."""
 
 from __future__ import annotations
 
+import re
 import tomllib
+from collections.abc import Iterable
 from functools import cache
 from importlib import resources
 
@@ -23,6 +25,33 @@ def aliases() -> dict[str, str]:
 def alias(word: str) -> str | None:
     """Under which names a word's robot is known."""
     return aliases().get(bare(word))
+
+
+@cache
+def called(text: str) -> frozenset[frozenset[str]]:
+    """The kinds of legs, without motors and marks, of robots in whose names a text occurs."""
+    return frozenset(kinds(word) for word, names in aliases().items() if text.casefold() in names.casefold())
+
+
+def kinds(word: str) -> frozenset[str]:
+    """The legs of a word, without motors and marks of watched links, each once."""
+    return frozenset(re.findall(r"\(([^()]*)\)", re.sub("[*!]", "", word)))
+
+
+def is_called(record: Record, text: str) -> bool:
+    """Whether a text occurs in a name under which a record's robot is known; words with other legs are not read."""
+    word = record["word"]
+    return kinds(word) in called(text) and text.casefold() in (alias(word) or "").casefold()
+
+
+def named(records: Iterable[Record], text: str) -> list[Record]:
+    """The records of robots that are called so, or whose legs are, those first that a list shows first: names that
+    begin with the text before others."""
+    from ..query import fits
+
+    found = [each for each in records if is_called(each, text) or fits(each, {"legs": text})]
+    starts = f", {text}".casefold()
+    return sorted(found, key=lambda each: (starts not in f", {alias(each['word'])}".casefold(), *order(each)))
 
 
 def bare(word: str) -> str:

@@ -41,8 +41,9 @@ def servo(found: Servo) -> str:
     if found.ended != "goal":
         rows.append(("", f"{1e3 * off[0]:.4g} mm and {_degrees(off[1])} degrees from the goal"))
     if found.ending.modes is not None:
-        rows.append(("modes", [f"{i}: {mode.pose}" + ("   (the goal)" if mode.goal else "")
-                               for i, mode in enumerate(found.ending.modes.modes, 1)]))
+        rows.append(("modes", [*(f"{i}: {mode.pose}" + ("   (the goal)" if mode.goal else "")
+                                 for i, mode in enumerate(found.ending.modes.modes, 1)),
+                               "numbered as modes --at the goal lists them"]))
     if found.spread is not None:
         s = found.spread
         rows.append(("noise", f"keeps it within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} degrees of "
