@@ -33,11 +33,11 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: str | None = None, 
 
     Raises ``BadRequest`` for labels, links, parts of a pose and modes that there are not, ``PoseNotReached``.
 
-    >>> robot = hrsynth.observe("quattro", [1, 4])
+    >>> robot = hrsynth.observe("3rrr_m1", [1, 2])
     >>> robot
-    <ObservedRobot: quattro, watching 1, 4>
+    <ObservedRobot: 3rrr_m1, watching 1, 2>
     >>> hrsynth.derive(robot).verdict == "controllable"
-    True
+    False
     """
     robot = as_robot(robot)
     if at is None:

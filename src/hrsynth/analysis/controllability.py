@@ -65,8 +65,8 @@ def legs(robot: RobotLike, camera: str | None = None, *, observe: LegsLike = Non
     (``mode:2``: a mode with all legs watched): all legs at their default segments, or those of ``observe``, labels or
     links.
 
-    >>> hrsynth.legs("quattro").minimal
-    (('1', '3'), ('1', '4'), ('2', '3'), ('2', '4'))
+    >>> hrsynth.legs("3rrr_m1").minimal
+    (('1', '2', '3'),)
     """
     setting = observed(robot, observe, camera, at=at, seed=seed)
     anatomy = setting.anatomy

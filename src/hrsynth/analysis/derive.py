@@ -135,9 +135,9 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: str | None = None
     ``general``; ``paper``: with the paper's own form beside it. Raises ``BadRequest`` for unknown names,
     ``NotCertified`` if even the exact lift fails.
 
-    >>> found = hrsynth.derive("quattro", [1, 4])
+    >>> found = hrsynth.derive("3rrr_m1", [1, 2, 3])
     >>> found
-    <Derivation: quattro 4-R̲-{2-SS}, watching 1, 4: hidden robot 2-Π-{2-U̲U}, controllable>
+    <Derivation: 3rrr_m1 3-R̲RR, watching 1, 2, 3: hidden robot 3-ΠR̲R, controllable>
     >>> found.verdict == "controllable"
     True
     """

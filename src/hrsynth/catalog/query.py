@@ -59,6 +59,15 @@ class Catalog(Value):
         require_askable(asked)
         return Catalog(tuple(each for each in self.records if fits(each, asked)))
 
+    def named(self, text: str) -> list[Record]:
+        """The records of robots that are called so, or whose legs are, those first that a list shows first: names that
+        begin with the text before others."""
+        from .site.known import alias, is_called, order
+
+        found = [each for each in self if is_called(each, text) or fits(each, {"legs": text})]
+        starts = f", {text}".casefold()
+        return sorted(found, key=lambda each: (starts not in f", {alias(each['word'])}".casefold(), *order(each)))
+
     def count(self, *fields: str) -> dict[tuple[Any, ...], int]:
         """How many records have which values of the fields, sorted by these; None where a record has no such field."""
         counts = Counter(tuple(each.get(name) for name in fields) for each in self.records)

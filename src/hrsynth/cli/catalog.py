@@ -138,14 +138,14 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
 def _word(text: str, kept: str | None) -> tuple[str, str]:
     """The word of an architecture that is given by it, by a name or by its legs, and what else is called so."""
     from ..catalog import load
-    from ..catalog.site.known import alias, named
+    from ..catalog.site.known import alias
     from ..catalog.words import parse
     from ..errors import BadRequest
 
     try:
         return str(parse(text)), ""
     except BadRequest:
-        found = named(load(kept), text)
+        found = load(kept).named(text)
         if not found:
             raise
     word = found[0]["word"]

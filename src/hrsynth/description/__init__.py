@@ -26,7 +26,7 @@ __all__ = ["examples", "load", "native", "save", "shipped", "spanning", "targets
 def shipped() -> dict[str, Path]:
     """The robots that come with the package: name to file, sorted by name.
 
-    >>> "quattro" in hrsynth.shipped()
+    >>> "3rrr_m1" in hrsynth.shipped()
     True
     """
     packaged = Path(str(resources.files("hrsynth").joinpath("robots")))

@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterable
 from functools import cache
 from importlib import resources
 
@@ -42,16 +41,6 @@ def is_called(record: Record, text: str) -> bool:
     """Whether a text occurs in a name under which a record's robot is known; words with other legs are not read."""
     word = record["word"]
     return kinds(word) in called(text) and text.casefold() in (alias(word) or "").casefold()
-
-
-def named(records: Iterable[Record], text: str) -> list[Record]:
-    """The records of robots that are called so, or whose legs are, those first that a list shows first: names that
-    begin with the text before others."""
-    from ..query import fits
-
-    found = [each for each in records if is_called(each, text) or fits(each, {"legs": text})]
-    starts = f", {text}".casefold()
-    return sorted(found, key=lambda each: (starts not in f", {alias(each['word'])}".casefold(), *order(each)))
 
 
 def bare(word: str) -> str:
