@@ -7,7 +7,7 @@ write what :func:`content_of` finds in them. Metres, kilograms, radians; all pos
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -53,6 +53,27 @@ class Content:
     inertial: Inertial | None = None
     solids: tuple[Solid, ...] = ()
     rest: tuple[str, ...] = ()
+
+
+def scaled_shapes(link: Link, factor: float) -> Link:
+    """The link with the lengths of its shapes and of its mass's place multiplied; what is no number stays."""
+    found = []
+    for text in link.xml:
+        if not text.startswith(tuple(f"<{tag}" for tag in (*SHAPES, "inertial"))):
+            found.append(text)
+            continue
+        element = xml.parse_fragment(text)
+        for each in element.iter("origin", "mesh", *SIZES):
+            for key in ("xyz", "size", "radius", "length", *(("scale",) if each.tag == "mesh" else ())):
+                words = each.get(key, "1 1 1" if key == "scale" else "").split()
+                try:
+                    values = factor * numerals.parse(" ".join(words), len(words))
+                except ValueError:
+                    continue
+                if words:
+                    each.set(key, numerals.exact_vector(values))
+        found.append(xml.canonical(element))
+    return replace(link, xml=tuple(found))
 
 
 def content_of(link: Link, robot: Mechanism) -> Content:

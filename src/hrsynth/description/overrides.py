@@ -15,6 +15,7 @@ from ..mechanism.model import JointType, Mechanism, Motor
 from ..mechanism.normal import normal_form
 from ..mechanism.sensors import observation_of
 from . import numerals
+from .contents import scaled_shapes
 from .jointgraph import LOOP_TYPES, FrameSpec, JointGraph, comma_list
 
 CLOSURES = {"3d": JointType.SPHERICAL, "6d": JointType.FIXED, **LOOP_TYPES}
@@ -60,6 +61,9 @@ class Overrides:
             if self.unit not in UNITS:
                 raise BadRequest("--unit", self.unit, ", ".join(UNITS))
             graph.scale(UNITS[self.unit])
+            graph.links = {name: scaled_shapes(link, UNITS[self.unit]) for name, link in graph.links.items()}
+            if any("<inertial" in text for link in graph.links.values() for text in link.xml):
+                graph.note("open", f"inertias are taken as they are written, lengths of the file as {self.unit}")
         for closure in self.close:
             _close(graph, closure)
         for name in self.freeze:

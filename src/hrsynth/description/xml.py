@@ -16,7 +16,8 @@ from ..mechanism.model import Note
 
 Element: TypeAlias = etree._Element
 
-_COMMENT = re.compile(rb"<!--.*?-->", re.DOTALL)
+_COMMENT = re.compile(rb"<!--.*?-->|<\?.*?\?>", re.DOTALL)
+"""Comments and processing instructions: either may hold what looks like the other."""
 _PREFIX = re.compile(r"Namespace prefix (?P<prefix>[A-Za-z_][\w.-]*) (?:on|for) ", re.ASCII)
 _ROOT = re.compile(rb"(?:\xef\xbb\xbf)?(?:\s+|<\?.*?\?>|<!--.*?-->)*<[^\s/>]+", re.DOTALL)
 _DECLARATION = re.compile(rb"<!\s*(DOCTYPE|ENTITY)")
@@ -79,7 +80,10 @@ def document(text: bytes | str, file: str, notes: list[Note] | None = None) -> E
                       line=bare.count(b"\n", 0, declaration.start()) + 1)
     for _ in range(MOST_PREFIXES):
         try:
-            return etree.fromstring(data, _parser())
+            root = etree.fromstring(data, _parser())
+            if root.getroottree().docinfo.internalDTD is None:
+                return root
+            what, at = "a document type declaration, which is not allowed", 1
         except etree.XMLSyntaxError as error:
             what, at = (error.msg or "syntax error").split(", line ")[0], error.lineno or 1
         except (ValueError, LookupError) as error:
@@ -103,13 +107,18 @@ def _mended(data: bytes, what: str, notes: list[Note]) -> bytes:
         return data[: root.end()] + declared + data[root.end():]
     if "comment" not in what.lower():
         return data
-    wrong = [match for match in _COMMENT.finditer(data) if b"--" in match[0][4:-2]]
+    wrong = [match for match in _COMMENT.finditer(data) if _is_wrong(match[0])]
     if wrong:
         line = data.count(b"\n", 0, wrong[0].start()) + 1
         notes.append(Note("ignored", f"{len(wrong)} comments that hold '--', which XML does not allow, the first in "
                                      f"line {line}" if wrong[1:] else
                           f"a comment that holds '--', which XML does not allow, in line {line}"))
-    return _COMMENT.sub(lambda match: b"\n" * match[0].count(b"\n") if b"--" in match[0][4:-2] else match[0], data)
+    return _COMMENT.sub(lambda match: b"\n" * match[0].count(b"\n") if _is_wrong(match[0]) else match[0], data)
+
+
+def _is_wrong(comment: bytes) -> bool:
+    """Whether two hyphens follow each other in a comment, the last of them perhaps the first of its end."""
+    return comment.startswith(b"<!--") and b"--" in comment[4:-2]
 
 
 class SourceLine(int):

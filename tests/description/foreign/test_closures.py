@@ -125,11 +125,24 @@ PLUGIN = ('<plugin filename="libgz-sim-detachable-joint-system.so" name="gz::sim
           '<parent_link>{}</parent_link><child_model>{}</child_model><child_link>bar</child_link></plugin>')
 
 
-@pytest.mark.parametrize("model", ["four_bar", "name_it_was_spawned_with"])
+@pytest.mark.parametrize("model", ["four_bar", "", "name_it_was_spawned_with"])
 def test_a_detachable_joint_of_gazebo_holds_links_as_they_lie(model: str, tmp_path: Path):
-    robot = read(tmp_path, urdf(f"{PIN}<gazebo>{PLUGIN.format('pin', model)}</gazebo>"))
+    """Of a model of another name, which the robot may be when it is spawned, where the frames coincide."""
+    text = urdf(f"{PIN}<gazebo>{PLUGIN.format('pin', model)}</gazebo>")
+    robot = read(tmp_path, text, platform="bar")
+    if model.startswith("name"):
+        assert mobility(robot) == 4
+        assert any("--close pin:bar:TYPE" in each for each in notes(robot, "open"))
+        eye = (f'<link name="eye"/><joint name="eye_fixed" type="fixed"><parent link="bar"/><child link="eye"/>'
+               f'<origin xyz="{at("bar", C)}" rpy="{_rpy(X["bar"][:3, :3].T @ X["rocker"][:3, :3])}"/></joint>')
+        text = text.replace(PIN, PIN + eye).replace(">bar<", ">eye<")
+        robot = read(tmp_path, text)
     assert is_the_four_bar(robot)
     assert any("detachable joint" in each for each in notes(robot, "guess"))
+
+
+@pytest.mark.parametrize("model", ["four_bar", "__model__"])
+def test_so_does_one_in_sdf(model: str, tmp_path: Path):
     text = SDF["1.7"].replace('<joint name="d" type="revolute"><parent>rocker</parent><child>bar</child>',
                               '<joint name="d" type="revolute"><parent>rocker</parent><child>pin</child>')
     pin = f'<link name="pin"><pose>{words(X["bar"][:3, 3])} {_rpy(X["bar"][:3, :3])}</pose></link>'
@@ -308,6 +321,15 @@ def test_a_point_at_the_centre_stays_a_point(tmp_path: Path):
     assert [joint.type for joint in robot.joints.values() if not joint.in_tree] == [JointType.SPHERICAL]
 
 
+def test_a_point_that_is_not_active_is_told_with_what_would_close_it(tmp_path: Path):
+    off = MJCF["connect"].replace('<connect name="d"', '<connect name="d" active="false"')
+    (told,) = notes(read(tmp_path, off, "xml", platform="bar"), "ignored")
+    wish = told.partition("--close ")[2].partition(" to close")[0]
+    assert is_the_four_bar(read(tmp_path, off, "xml", close=wish))
+    unknown = off.replace('body2="bar"', 'body2="none"')
+    assert notes(read(tmp_path, unknown, "xml", platform="bar"), "ignored") == ["the equality 'd', which is not active"]
+
+
 def test_a_free_joint_is_no_bar(tmp_path: Path):
     text = MJCF["connect"].replace('<body name="base">', '<body name="base"><freejoint name="floats"/>')
     robot = read(tmp_path, text, "xml")
@@ -357,6 +379,23 @@ def test_slides_and_gears_are_scaled_with_the_lengths(tmp_path: Path):
     assert limits is not None
     assert (limits.lower, limits.upper, limits.velocity, limits.effort) == (-0.1, 0.3, 0.05, 7)
     assert [each.ratio for each in robot.couplings] == [10.0]
+
+
+def test_shapes_are_scaled_with_the_lengths(tmp_path: Path):
+    shapes = ('<visual><origin xyz="10 0 0" rpy="0 0 1"/><geometry><box size="100 200 300"/></geometry></visual>'
+              '<visual><geometry><mesh filename="a.stl"/></geometry></visual>'
+              '<inertial><origin xyz="5 0 0"/><mass value="2"/>'
+              '<inertia ixx="7" iyy="7" izz="7" ixy="0" ixz="0" iyz="0"/></inertial>')
+    robot = read(tmp_path, URDF["urdf+"].replace('<link name="crank"/>', f'<link name="crank">{shapes}</link>'),
+                 platform="bar", unit="mm")
+    box, mesh, inertial = robot.links["crank"].xml
+    assert 'xyz="0.01 0 0" rpy="0 0 1"' in box
+    assert 'size="0.1 0.2 0.3"' in box
+    assert 'scale="0.001 0.001 0.001"' in mesh
+    assert 'xyz="0.005 0 0"' in inertial
+    assert 'value="2"' in inertial
+    assert 'ixx="7"' in inertial
+    assert any("inertias are taken as they are written" in each for each in notes(robot, "open"))
 
 
 def test_what_was_read_is_written_and_read_back(tmp_path: Path):

@@ -206,3 +206,15 @@ def test_xacro_reads_nothing_elsewhere_and_comes_to_an_end(tmp_path: Path):
     endless = head + '<xacro:macro name="m"><xacro:m/></xacro:macro><xacro:m/></robot>'
     assert_refused(made(inner, endless, "robot.xacro"), "xacro")
     assert_refused(made(inner, head + "${(9**9**9)}</robot>", "robot.xacro"), "xacro")
+
+
+@pytest.mark.parametrize("dialect", ONE)
+@pytest.mark.parametrize("before", ["", "<!-- a -- b -->"])
+def test_no_instruction_or_comment_hides_a_declaration(dialect: str, before: str, tmp_path: Path):
+    """What looks like a comment inside a processing instruction is none, and the other way round."""
+    for start, end in (("<?x <!-- ?>", "<?y --> ?>"), ("<!-- <?x -->", "<!-- ?> -->"), ("<?x?><!-- ?> -->", "")):
+        for body in ('<!DOCTYPE x [<!ENTITY a "four_bar">]>', '<!DOCTYPE x SYSTEM "file:///etc/passwd">'):
+            text = before + start + body + end + ONE[dialect]
+            assert_refused(made(tmp_path, text), "a document type declaration", "not allowed")
+            if "ENTITY" in body:
+                assert_refused(made(tmp_path, text.replace('"four_bar"', '"&a;"', 1)), "not allowed")

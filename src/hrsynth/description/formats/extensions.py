@@ -13,6 +13,7 @@ from lxml import etree
 
 from ...geometry.vectors import Array, frozen, inverse, pose
 from ...mechanism.model import JointType
+from ...tolerances import NOISE
 from .. import xml
 from ..elements import XmlReader
 from ..jointgraph import FrameSpec, JointGraph
@@ -20,7 +21,9 @@ from ..jointgraph import FrameSpec, JointGraph
 Frames = Callable[[str], FrameSpec | None]
 """From the name of a link or frame to the link with the frame's pose in it; None where there is none."""
 
-_ATTACHER = re.compile(r"attach", re.IGNORECASE)
+_ATTACHER = re.compile(r"attach|clos\w*.?loop|loop.?clos", re.IGNORECASE)
+_ENDS = re.compile(r"link|parent|child|body", re.IGNORECASE)
+"""Elements of a plugin that may name what it holds together."""
 _DETACHABLE = re.compile(r"detachable.?joint", re.IGNORECASE)
 _BUSHING = "bushing_"
 DRAKE = ("ball_constraint", "linear_bushing_rpy")
@@ -115,11 +118,12 @@ def _vector(reader: XmlReader, element: xml.Element, tag: str) -> Array:
 
 def read_plugins(graph: JointGraph, plugins: list[xml.Element], poses: Mapping[str, Array], models: tuple[str, ...]
                  ) -> None:
-    """Gazebo's detachable joints hold two links as they lie at zero (``poses`` in the model's frame); plugins that
-    attach links while the simulation runs are told. ``models``: the other models of the file."""
+    """Gazebo's detachable joints hold two links as they lie at zero (``poses`` in the model's frame), to a model of
+    another name than the robot's only where their frames coincide; plugins that attach links while the simulation runs
+    are told. ``models``: the other models of the file."""
     for plugin in plugins:
         title = f"{plugin.get('name', '')} {plugin.get('filename', '')}"
-        named = [text for child in plugin.iter() if isinstance(child.tag, str) and "link" in child.tag.lower()
+        named = [text for child in plugin.iter() if isinstance(child.tag, str) and _ENDS.search(child.tag)
                  for text in [(child.text or "").strip()] if text in poses]
         if _DETACHABLE.search(title):
             _detachable(graph, plugin, poses, models)
@@ -128,18 +132,23 @@ def read_plugins(graph: JointGraph, plugins: list[xml.Element], poses: Mapping[s
             graph.note("open", f"the plugin {title.split()[0]!r} names two links; where it holds them together, "
                                f"--close {pair}:fixed (or another type) does so")
         elif _ATTACHER.search(title):
-            graph.note("open", f"the plugin {title.split()[0]!r} can attach links while the simulation runs; the file "
-                               "does not say which: --close A:B:TYPE where that closes a loop")
+            graph.note("open", f"the plugin {title.split()[0]!r} can hold links together while the simulation runs; "
+                               "the file does not say which: --close A:B:TYPE where that closes a loop")
 
 
 def _detachable(graph: JointGraph, plugin: xml.Element, poses: Mapping[str, Array], models: tuple[str, ...]) -> None:
     parent, child = ((plugin.findtext(f"{end}_link") or "").strip() for end in ("parent", "child"))
     model = (plugin.findtext("child_model") or "").strip()
-    if model in models or parent not in poses or child not in poses or parent == child:
+    X = inverse(poses[child]) @ poses[parent] if {parent, child} <= set(poses) and parent != child else None
+    if X is not None and model not in ("", "__model__", graph.name, *models) and np.max(np.abs(X - np.eye(4))) > NOISE:
+        graph.note("open", f"the detachable joint from {parent!r} to {child!r} of the model {model!r}, which may be "
+                           f"this robot or another: left out (--close {parent}:{child}:TYPE where it closes a loop)")
+        return
+    if X is None or model in models:
         graph.note("ignored", f"the detachable joint from {parent!r} to {child!r} of the model {model!r}, which are "
                               "not two links of this robot")
         return
-    ends = FrameSpec(parent), FrameSpec(child, frozen(inverse(poses[child]) @ poses[parent]))
+    ends = FrameSpec(parent), FrameSpec(child, frozen(X))
     graph.close(graph.fresh("detachable_joint"), JointType.FIXED, ends, line=xml.line(plugin))
     graph.note("guess", f"the detachable joint of Gazebo holds {parent!r} and {child!r} as they lie at zero: read as a "
                         "rigid closure")

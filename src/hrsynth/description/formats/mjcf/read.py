@@ -153,7 +153,7 @@ class _MjcfReader(XmlReader):
         graph, given = self.result, self.defaults.of(element, None, "equality")
         name = graph.fresh(element.get("name") or str(element.tag))
         if given.get("active", "true") == "false":
-            graph.note("ignored", f"the equality {name!r}, which is not active")
+            graph.note("ignored", f"the equality {name!r}, which is not active{self._wish(element, given)}")
         elif element.tag in ("connect", "weld"):
             ends = self._ends(element, given)
             if ends is not None and ends[0].link != ends[1].link:
@@ -165,6 +165,16 @@ class _MjcfReader(XmlReader):
             self._gear(element, given, name)
         else:
             graph.note("ignored", f"the equality {name!r} of type {element.tag}")
+
+    def _wish(self, element: xml.Element, given: dict[str, str]) -> str:
+        """What would close a point that is not active; nothing for what is no point between two bodies."""
+        sound = len(self.defects)
+        ends = self._ends(element, given) if element.tag == "connect" else None
+        del self.defects[sound:]
+        if ends is None or ends[0].link == ends[1].link:
+            return ""
+        return " (--close " + ":".join(f"{end.link}@{numerals.exact_vector(end.X[:3, 3]).replace(' ', ',')}"
+                                       for end in ends) + " to close it)"
 
     def _ends(self, element: xml.Element, given: dict[str, str]) -> tuple[FrameSpec, FrameSpec] | None:
         line = xml.line(element)
