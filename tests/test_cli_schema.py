@@ -34,6 +34,7 @@ QUICK = {
     "accuracy": ["delta --cone 0.1deg --at x=0.1", "rrrrr_m1 --cone 0.1deg --at x=0,y=0.3332050807568877",
                  "rrrrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0.2:0.22:2 --nonlinear 4"],
     "select": ["rrrrr_m1 --start x=0.05 --goal x=-0.01,y=0.03 --runs 1 --sight auto"],
+    "export": ["prrrp_m1 --box guide_1=-0.001:0.001,guide_2=-0.001:0.001 -o code.hpp"],
     "view": ["rrrrr_m1 --static view.html"],
     "verify": ["c.json"],
     "lint": ["quattro --reader mujoco --fail-on nothing", "delta --compare 3rrr_m1 --fail-on nothing"],

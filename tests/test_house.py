@@ -32,6 +32,7 @@ FOLDERS = [
     {"rewrite"},
     {"constraints"},
     {"analysis"},
+    {"codegen"},
     {"simulation"},
     {"selection"},
     {"certificates"},
@@ -42,7 +43,7 @@ FOLDERS = [
 LEVEL = {name: level for level, names in enumerate(FOLDERS) for name in names}
 
 ENGINE = {"geometry", "mechanism", "description", "linting", "kinematics", "closed_forms", "batch", "rewrite"} | {
-    "constraints", "analysis", "simulation", "selection", "certificates", "present"}
+    "constraints", "analysis", "codegen", "simulation", "selection", "certificates", "present"}
 ROBOTS = re.compile(
     r"(?<![a-z])(quattro|delta|orthoglide|gough|stewart|hexaglide|uranesx|i4l|tsai)(?![a-z])", re.IGNORECASE
 )

@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     from .analysis.singularity.singular import singular
     from .analysis.study import map
     from .certificates import certificate, verify
+    from .codegen.export import export
     from .description import examples, load, save, shipped
     from .linting.lint import lint
     from .present.show import draw, html, text
@@ -40,8 +41,8 @@ if TYPE_CHECKING:
 
 __version__ = "0.2.0"
 __all__ = ["__version__", "accuracy", "advise", "atlas", "catalog", "certificate", "check", "derive", "draw",
-           "examples", "following", "forget", "html", "legs", "lint", "load", "map", "modes", "observe", "path", "save",
-           "select", "servo", "shipped", "singular", "text", "verify", "view"]
+           "examples", "export", "following", "forget", "html", "legs", "lint", "load", "map", "modes", "observe",
+           "path", "save", "select", "servo", "shipped", "singular", "text", "verify", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
@@ -52,6 +53,7 @@ _HOME = {
     "derive": ".analysis.derive",
     "draw": ".present.show",
     "examples": ".description",
+    "export": ".codegen.export",
     "following": ".progress",
     "forget": ".analysis.question",
     "html": ".present.show",

@@ -224,3 +224,10 @@ REMEMBERED_ANSWERS = 64
 """Answers that are kept where the same is asked again."""
 REMEMBERED_GRIDS = 2
 """Answers over grids and planes of poses that are kept: they may be large."""
+
+# Generated programs
+
+NEWTON_STEPS_AT_RUN = 8
+"""Steps of Newton's method that a generated program takes at most in each part of the loops."""
+INVERSE_STEPS_AT_RUN = 20
+"""Steps from motors to motors that it takes at most towards a pose."""

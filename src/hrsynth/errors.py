@@ -153,11 +153,12 @@ class MeaningUndecided(Unanswered):
                          "numbers as they are")
 
 
-class NoMotorMap(HrsynthError):
-    """A robot whose motors do not determine its platform."""
+class NothingProved(Unanswered):
+    """A branch of which no cell at all is proved, for a reason: there is no function to write."""
 
-    def __init__(self, robot: str, reason: str) -> None:
-        super().__init__(f"{robot}: the motors do not determine the platform: {reason}")
+    def __init__(self, robot: str, motors: Iterable[str], reason: str) -> None:
+        super().__init__(f"{robot}: no code is written: around the zero configuration nothing is proved for "
+                         f"{', '.join(motors)}{': ' * bool(reason)}{reason}; try a smaller box (--box)")
 
 
 class PoseNotReached(Unanswered):

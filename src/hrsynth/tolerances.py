@@ -267,6 +267,17 @@ built."""
 
 ROUNDED_AXIS = 1e-15
 """Component of a unit vector below which it is zero but for rounding."""
+GENERATED_NEAR = 1e-7
+"""Step of Newton's method (characteristic lengths, radians) after which a generated program makes its last one: what is
+left is of the size of its square."""
+GENERATED_LAST_STEP = 3e-13
+"""Largest last step of an answer (characteristic lengths, radians)."""
+GENERATED_CLOSED = 1e-11
+"""What its loops' equations may be off (m, cosines) where it gives an answer."""
+GENERATED_REACHED = 1e-12
+"""Difference (m, rad) from a pose at which it has reached it."""
+GENERATED_SINGULAR = 1e-14
+"""Pivot of the normal equations, as part of the largest of the diagonal, below which it finds rates singular."""
 
 # Pictures and views
 

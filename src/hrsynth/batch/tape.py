@@ -13,7 +13,8 @@ from typing import Any
 LANES = 16
 """Poses that run through compiled code side by side; constant strides let the compiler use vector instructions."""
 UFUNCS = {"+": "add", "-": "subtract", "*": "multiply", "/": "divide", "<": "less", "<=": "less_equal",
-          "&": "logical_and", "sqrt": "sqrt", "abs": "absolute", "sin": "sin", "cos": "cos"}
+          "&": "logical_and", "sqrt": "sqrt", "abs": "absolute", "sin": "sin", "cos": "cos",
+          "atan2": "arctan2"}
 LOGICAL = ("<", "<=", "&")
 """Operations whose result is a condition."""
 Store = tuple[int, Any]
@@ -83,6 +84,10 @@ class Symbol:
     def cos(self) -> Any:
         """Its cosine."""
         return self.tape.make("cos", self)
+
+    def atan2(self, other: Any) -> Any:
+        """The angle whose sine and cosine are as this and another."""
+        return self.tape.make("atan2", self, other)
 
     def select(self, yes: Any, no: Any) -> Any:
         """``yes`` where this condition holds, ``no`` elsewhere."""
@@ -186,6 +191,17 @@ class Tape:
         lines += [f"m[{place}] = {value}" for (place, _), value in zip(stores, values, strict=True)]
         return lines, count
 
+    def statements(self, stores: Sequence[Store], places: Sequence[str]) -> list[tuple[str, str]]:
+        """Names and what they are set to, in the order of the operations, then of what is stored: for one pose, in any
+        language that writes sums and products as C does. ``places`` names what is loaded."""
+        found = []
+        for number in sorted(self.needed(stores)):
+            operation = self.code[number]
+            inputs = [f"t{each}" if isinstance(each, int) else repr(each) for each in operation[1:]]
+            text = places[operation[1]] if operation[0] == "load" else _scalar(operation, inputs)
+            found.append((f"t{number}", text))
+        return found
+
     def lanes(self, stores: Sequence[Store], live: int | None = None) -> list[str]:
         """Lines on ``LANES`` poses side by side: place p of lane i is ``m[LANES p + i]``. A lane in which place
         ``live`` is not positive keeps what it has."""
@@ -213,4 +229,6 @@ def _scalar(operation: tuple[Any, ...], inputs: Sequence[str]) -> str:
         return f"c[{operation[1]}]"
     if name == "?":
         return f"{inputs[1]} if {inputs[0]} else {inputs[2]}"
-    return f"{inputs[0]} {name} {inputs[1]}" if len(inputs) == 2 else f"{name}({inputs[0]})"
+    if name.isalnum():
+        return f"{name}({', '.join(inputs)})"
+    return f"{inputs[0]} {name} {inputs[1]}"

@@ -259,6 +259,15 @@ QUESTIONS = (
               Option("seconds", "Deprecated, as the answer then depends on the machine: time after which no further "
                      "set is examined.", None, float)),
              ("quattro --start x=0.1 --goal x=-0.05,phi=20deg",), after=_deprecated),
+    Question("export", "Code for a controller: motors to passive joints and platform, Jacobians, and back, on the "
+             "branch of the zero configuration.",
+             (*WATCHED, Option("lang", "c++ (one header, C++17, Eigen) or numpy (one module).", default="c++",
+                     words=("c++", "numpy")),
+              Option("box", "Intervals of motors (m, rad), as hip=-1:1,slide=0:0.2 (default: the file's limits, else a "
+                     "whole turn, or a characteristic length either way).", "BOX"),
+              _file("export")),
+             ("rrrrr_m1 --box shoulder_1=-0.1:0.1,shoulder_2=-0.1:0.1 -o five_bar.hpp",
+              "robot.urdf --lang numpy -o robot.py")),
     Question("view", "A 3D view in the browser: sliders that keep the loops closed, what is observed, assembly modes.",
              (*WATCHED, flag("hidden", "The hidden robot too, its virtual actuators highlighted."),
               _file("view", "static"),

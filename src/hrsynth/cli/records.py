@@ -586,6 +586,26 @@ class AspectsRecord(TypedDict):
     modes: list[list[int]]
 
 
+class ExportedPart(TypedDict):
+    """Motors with the passive coordinates that they decide alone: how much of the box is proved, a box that is."""
+
+    motors: list[str]
+    share: float
+    proved: Annotated[Array, "low and high of each motor (m, rad)"]
+
+
+class Exported(OfRobot, WrittenTo):
+    """What code was made of."""
+
+    lang: Literal["c++", "numpy"]
+    motors: list[str]
+    passive: list[str]
+    held: list[str]
+    legs: list[str]
+    cells: int
+    parts: list[ExportedPart]
+
+
 class AtlasAnswer(ListedModes):
     """Which modes can be led to each other; `table` is by their numbers."""
 
@@ -949,7 +969,7 @@ class LintAnswer(Head, WrittenTo):
 RECORDS: dict[str, Any] = {
     "derive": Derive, "legs": LegsAnswer, "check": CheckAnswer, "singular": Singular, "advise": Advise,
     "modes": AssemblyModesRecord, "atlas": AtlasAnswer, "path": Path, "servo": Servo, "accuracy": AccuracyAnswer,
-    "select": Select, "view": ViewAnswer, "verify": Verify, "robots": Robots, "convert": Convert,
+    "select": Select, "export": Exported, "view": ViewAnswer, "verify": Verify, "robots": Robots, "convert": Convert,
     "import": Import, "lint": LintAnswer,
     "catalog build": CatalogBuild, "catalog list": CatalogList, "catalog show": CatalogShow,
     "catalog site": CatalogSite}

@@ -29,6 +29,11 @@ def cosine(x: Any) -> Any:
     return x.cos() if hasattr(x, "cos") else np.cos(x)
 
 
+def arctan2(y: Any, x: Any) -> Any:
+    """The angle of (x, y)."""
+    return y.atan2(x) if hasattr(y, "atan2") else np.arctan2(y, x)
+
+
 def where(condition: Any, yes: Any, no: Any) -> Any:
     """``yes`` where a condition holds, ``no`` elsewhere."""
     return condition.select(yes, no) if hasattr(condition, "select") else np.where(condition, yes, no)

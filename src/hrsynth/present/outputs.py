@@ -143,6 +143,17 @@ class HiddenFile(File):
         return partial(save, found.hidden, path), {}
 
 
+class CodeFile(File):
+    """A program in the language that is asked for."""
+
+    def require(self, path: str | None, asked: Asked) -> None:
+        """Raise ``BadRequest`` for an ending of another language as well."""
+        super().require(path, asked)
+        endings = (".py",) if asked["lang"] == "numpy" else (".hpp", ".h")
+        if path is not None and Path(path).suffix.lower() not in endings:
+            raise BadRequest(f"{self.refusal} of --lang {asked['lang']}: extension", path, endings)
+
+
 def figures(maker: str) -> dict[str, str]:
     """One maker for all endings of a figure."""
     return dict.fromkeys(FIGURES, maker)
@@ -183,6 +194,9 @@ OUTPUTS = {
              "report_file", computed="report.parts:parts", plotted=HTML),
         CERTIFICATE,
         File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None, plotted=()))),
+    "export": Outputs("text.robots:exported", (
+        CodeFile("cannot write the code", dict.fromkeys((".hpp", ".h", ".py"), "text.robots:code"), "The code",
+             "Write the code: robot.hpp (C++), robot.py (NumPy).", plotted=()),)),
     "legs": Outputs("text.robots:legs"),
     "lint": Outputs("text.lint:lint"),
     "modes": Outputs("text.poses:modes", (

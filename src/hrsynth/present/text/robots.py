@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from ...analysis.derive import Derivation
     from ...analysis.observed import ObservedRobot
     from ...analysis.verdict import Verdict
+    from ...codegen.export import ExportedCode
     from ...kinematics.certificate import Certificate
     from ...mechanism import Mechanism
     from ..view.view import View
@@ -144,6 +145,24 @@ def legs(found: Legs) -> str:
     if not found.complete:
         lines.append("not all sets were tried: there are too many legs")
     return "\n".join(lines)
+
+
+def exported(found: ExportedCode) -> str:
+    """What the code is of, and where it answers."""
+    proof = found.proof
+    rows: Rows = [("robot", proof.robot.name), ("language", found.lang), ("motors", ", ".join(proof.motors)),
+                  ("joints", f"{len(proof.passive)} passive, {len(proof.held)} idle (held)"),
+                  ("directions", ", ".join(found.legs) or "none")]
+    for part in proof.parts:
+        rows.append(("answers for", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
+                                     zip(part.motors, *part.proved, strict=True)]
+                     + [f"and in all of {len(part.cells)} cells, {100 * part.share:.4g} % of the box"]))
+    return listing([*rows, ("size", f"{len(found.code.encode()) / 1024:.0f} kB")])
+
+
+def code(found: ExportedCode) -> bytes:
+    """The program itself."""
+    return found.code.encode()
 
 
 def advice(found: Advice) -> str:

@@ -1,65 +1,39 @@
-"""The loops of a mechanism as equations in the coordinates of a spanning tree's joints, on components: for numbers,
-arrays, balls, or symbols of a tape.
+"""The loops' equations of :mod:`..analysis.branch.loops` on components: numbers, arrays, or symbols of a tape.
 
-The tree is the file's, with the motors in it; a joint of several freedoms is the chain of single ones that files write
-(:mod:`..description.chains`). Each loop is cut at its joint: points coincide, axes stay perpendicular. Metres, radians,
-base axes; all coordinates are 0 at the zero configuration.
+Each loop is cut at its joint: points coincide, axes stay perpendicular. Metres, radians, base axes.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from ..description.chains import part_names, parts
-from ..errors import BadMechanism
-from ..geometry.components import Components, cosine, cross, dot, minus, plus, sine, transformed
-from ..geometry.vectors import Array, frozen
-from ..mechanism import Joint, JointType, Mechanism, graphs
+from ..analysis.branch.loops import LoopSystem, TreeCoordinate
+from ..geometry.components import Components, arctan2, cosine, cross, dot, minus, plus, sine, transformed
+from ..geometry.vectors import Array, frozen, perpendicular
+from ..mechanism import Joint, JointType, Mechanism
 from ..results import Value
 from ..tolerances import ROUNDED_AXIS
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TreeCoordinate(Value):
-    """A coordinate of a tree joint: its ``name`` in a file, whether it ``slides``; the link that it moves is on the
-    body that ``parent`` moves (−1: the base). At zero, ``axis`` and a ``point`` on it."""
-
-    name: str
-    joint: str
-    slides: bool
-    actuated: bool
-    parent: int
-    axis: Array
-    point: Array
-
-    @cached_property
-    def basis(self) -> Array:
-        """A right-handed triad with the axis as its third column, of base axes where it is one (3, 3)."""
-        place = int(np.argmin(np.abs(self.axis)))
-        first = np.cross(self.axis, np.eye(3)[place])
-        first /= np.linalg.norm(first)
-        return _sharpened(np.stack([first, np.cross(self.axis, first), self.axis], axis=1))
-
-
-@dataclass(frozen=True, eq=False, repr=False)
 class MovedBody:
-    """A body moved from zero: rotation (9 components, row by row) and origin; at zero those are ``basis``, ``centre``.
-    """
+    """A body moved from zero: rotation (9 components, row by row) and origin, at zero ``basis`` and ``centre``."""
 
     R: Components
     o: Components
     basis: Array
     centre: Array
 
-    def direction(self, d: Array) -> list[object]:
+    def direction(self, d: Array) -> list[Any]:
         """Where a direction of the body at zero points now."""
         return transformed(self.R, _sharpened(self.basis.T @ d))
 
-    def point(self, x: Array) -> list[object]:
+    def point(self, x: Array) -> list[Any]:
         """Where a point of the body at zero is now."""
         return plus(self.o, transformed(self.R, self.basis.T @ (x - self.centre)))
 
@@ -76,39 +50,30 @@ class TreeConfiguration:
 
 
 BASE = MovedBody(np.eye(3).ravel(), np.zeros(3), np.eye(3), np.zeros(3))
-Row = tuple[object, dict[int, object]]
+Row = tuple[Any, dict[int, Any]]
 """An equation's left side, and its derivatives by the coordinates that it depends on."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LoopEquations(Value):
-    """The coordinates of a mechanism's tree and the equations of its loops."""
+class LoopFormulas(Value):
+    """The coordinates of a mechanism's tree, parents first, and the joints at which its loops are cut; ``body[link]``
+    is the coordinate that carries a link, −1 for what stands still; ``gears``: one, the one it follows, ratio."""
 
     mechanism: Mechanism
     coordinates: tuple[TreeCoordinate, ...]
-    carriers: dict[str, int]
-    """The last coordinate that moves each link; −1 for what is fixed to the base."""
+    body: dict[str, int]
     loops: tuple[Joint, ...]
+    gears: tuple[tuple[int, int, float], ...]
 
     @classmethod
-    def of(cls, mechanism: Mechanism) -> LoopEquations:
-        """The tree of the file, but with every motor in it; raises ``BadMechanism`` for links that nothing holds."""
-        joints = [joint for joint in mechanism.joints.values() if joint.type is not JointType.FREE]
-        weights = [0.0 if joint.type is JointType.FIXED else 1.0 if joint.actuated else 2.0 if joint.in_tree else 3.0
-                   for joint in joints]
-        tree = graphs.outward(mechanism.base, graphs.spanning_forest(mechanism.links, joints, weights))
-        missing = sorted(set(mechanism.links) - {mechanism.base, *(far for _, _, far in tree)})
-        if missing:
-            raise BadMechanism(f"{mechanism.name}: links that no joint with limited freedoms holds", ", ".join(missing))
-        carriers, made = {mechanism.base: -1}, []
-        for joint, near, far in tree:
-            parent = carriers[near]
-            for name, slides, axis in _steps(mechanism, joint, near):
-                made.append(TreeCoordinate(name, joint.name, slides, joint.actuated, parent, frozen(axis), joint.point))
-                parent = len(made) - 1
-            carriers[far] = parent
-        used = {joint.name for joint, _, _ in tree}
-        return cls(mechanism, tuple(made), carriers, tuple(j for j in joints if j.name not in used))
+    def of(cls, system: LoopSystem) -> LoopFormulas:
+        """Those of a system, in metres."""
+        units = system.units
+        return cls(system.mechanism, tuple(replace(each, point=frozen(each.point * system.length))
+                                           for each in system.coordinates), dict(system.body),
+                   tuple(system.mechanism.joints[loop.name] for loop in system.loops),
+                   tuple((gear.second, gear.first, float(gear.ratio * units[gear.second] / units[gear.first]))
+                         for gear in system.gears))
 
     @cached_property
     def ways(self) -> dict[int, tuple[int, ...]]:
@@ -124,7 +89,7 @@ class LoopEquations(Value):
         for i, (coordinate, value) in enumerate(zip(self.coordinates, values, strict=True)):
             if coordinate.parent not in found.bodies:
                 continue
-            parent, B = found.bodies[coordinate.parent], coordinate.basis
+            parent, B = found.bodies[coordinate.parent], _basis(coordinate.axis)
             axis, origin = parent.direction(coordinate.axis), parent.point(coordinate.point)
             x, y = parent.direction(B[:, 0]), parent.direction(B[:, 1])
             if coordinate.slides:
@@ -138,9 +103,9 @@ class LoopEquations(Value):
             found.axes[i], found.points[i] = axis, origin
         return found
 
-    def pose(self, at: TreeConfiguration, link: str) -> tuple[list[object], list[object]]:
+    def pose(self, at: TreeConfiguration, link: str) -> tuple[list[Any], list[Any]]:
         """Rotation (9 components) and origin of a link's frame."""
-        body, X = at.bodies[self.carriers[link]], self.mechanism.links[link].pose
+        body, X = at.bodies[self.body[link]], self.mechanism.links[link].pose
         columns = [body.direction(X[:3, i]) for i in range(3)]
         return [each for row in zip(*columns, strict=True) for each in row], body.point(X[:3, 3])
 
@@ -157,28 +122,56 @@ class LoopEquations(Value):
         found: list[Row] = []
         seen: dict[int, TreeConfiguration] = {}
         for joint in self.loops:
-            one, other = (self.ways[self.carriers[link]] for link in joint.links)
+            one, other = (self.ways[self.body[link]] for link in joint.links)
             root = max({-1, *one} & {-1, *other})
             if root not in seen:
                 seen[root] = self.moved(values, root)
             found += self._of_loop(seen[root], joint)
-        for coupling in self.mechanism.couplings:
-            led, lead = (self._single(coupling.name, link) for link in (coupling.successor, coupling.predecessor))
-            found.append((values[led] - coupling.ratio * values[lead], {led: 1.0, lead: -coupling.ratio}))
+        for led, lead, ratio in self.gears:
+            found.append((values[led] - ratio * values[lead], {led: 1.0, lead: -ratio}))
         return found
 
-    def _single(self, name: str, link: str) -> int:
-        """The coordinate of the one joint that carries a link."""
-        for i, coordinate in enumerate(self.coordinates):
-            joint = self.mechanism.joints[coordinate.joint]
-            if joint.successor == link and joint.type.freedoms == 1:
-                return i
-        raise BadMechanism(f"coupling {name!r}: no single joint of the tree carries the link", link)
+    def cut(self) -> list[tuple[str, Joint, int]]:
+        """The coordinates of the cut joints that one or two axes give: name, joint, which."""
+        found = []
+        for joint in self.loops:
+            count = 0 if joint.type in (JointType.SPHERICAL, JointType.PLANAR) else joint.type.freedoms
+            found += [(joint.name if count == 1 else f"{joint.name}.{k + 1}", joint, k) for k in range(count)]
+        return found
+
+    def cut_coordinate(self, at: TreeConfiguration, joint: Joint, which: int) -> Row:
+        """A coordinate of a cut joint, turns between −π and π, with its derivatives."""
+        near, far = (self.body[link] for link in joint.links)
+        one, other = at.bodies[near], at.bodies[far]
+        A, B = one.point(joint.point), other.point(joint.point)
+        of_A, of_B = self.velocity(at, near, A), self.velocity(at, far, B)
+        still = ([0.0] * 3, [0.0] * 3)
+        twists = {i: (of_A.get(i, still), of_B.get(i, still)) for i in sorted({*of_A, *of_B})}
+        axis = one.direction(joint.axis)
+        if joint.type.slides and which == 0:
+            return dot(axis, minus(B, A)), {i: dot(axis, minus(v_B, v_A)) for i, ((v_A, _), (v_B, _)) in twists.items()}
+        if joint.type is JointType.UNIVERSAL:
+            first, second = joint.axes
+            if which == 1:
+                # seen from the second link, the first axis turns back about the second one
+                axis, start, moved, flat = (other.direction(second), other.direction(first), one.direction(first),
+                                            np.cross(first, second))
+                across = other.direction(flat)
+            else:
+                start, moved, across = one.direction(second), other.direction(second), one.direction(
+                    np.cross(first, second))
+        else:
+            normal = perpendicular(joint.axis)
+            start, moved, across = one.direction(normal), other.direction(normal), one.direction(
+                np.cross(joint.axis, normal))
+        # d(turn) = axis·(ω_B − ω_A), the other axis of a U being normal to this one
+        return arctan2(dot(across, moved), dot(start, moved)), {
+            i: dot(axis, minus(w_B, w_A)) for i, ((_, w_A), (_, w_B)) in twists.items()}
 
     def _of_loop(self, at: TreeConfiguration, joint: Joint) -> Iterator[Row]:
         """The equations of a cut joint: ``joint.point`` of both links along directions of the first, and directions of
         the first perpendicular to some of the second."""
-        near, far = (self.carriers[link] for link in joint.links)
+        near, far = (self.body[link] for link in joint.links)
         one, other = at.bodies[near], at.bodies[far]
         e = np.eye(3)
         across = [] if not joint.axes else list(np.linalg.svd(joint.axis[None])[2][1:])
@@ -216,14 +209,11 @@ class LoopEquations(Value):
                                       for i, ((_, w_A), (_, w_B)) in twists.items()}
 
 
-def _steps(mechanism: Mechanism, joint: Joint, near: str) -> list[tuple[str, bool, Array]]:
-    """The single joints of a joint from its near link on: name, whether it slides, axis at zero."""
-    R = mechanism.links[joint.predecessor].pose[:3, :3]
-    single = [(kind is JointType.PRISMATIC, R @ axis)
-              for kind, axis in parts(joint.type, [R.T @ axis for axis in joint.axes])]
-    found = [(name, slides, _sharpened(axis)) for name, (slides, axis) in
-             zip(part_names(joint.name, len(single)), single, strict=True)]
-    return found if near == joint.predecessor else [(name, slides, -axis) for name, slides, axis in reversed(found)]
+def _basis(axis: Array) -> Array:
+    """A right-handed triad with an axis as its third column, of base axes where it is one (3, 3)."""
+    first = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
+    first /= np.linalg.norm(first)
+    return _sharpened(np.stack([first, np.cross(axis, first), axis], axis=1))
 
 
 def _sharpened(directions: Array) -> Array:

@@ -1,0 +1,123 @@
+"""A branch as code for controllers: motors to passive joints and platform, and back, with all Jacobians."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+from ..analysis.branch.answer import BranchProof
+from ..analysis.branch.proof import BoxLike, branch
+from ..analysis.observed import LegsLike, ObservedRobot, RobotLike, as_robot
+from ..analysis.question import question
+from ..errors import BadRequest, HrsynthError
+from ..mechanism.observation import Direction
+from ..progress import tell
+from ..results import Result
+from ..tolerances import GENERATED_CLOSED, GENERATED_LAST_STEP
+from .languages import TEMPLATES, program
+from .source import Source
+from .tubes import TubedBranch
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class ExportedCode(Result, shown_as="export"):
+    """A program, its language, and the proof that it stands on; ``legs`` are those whose directions it gives."""
+
+    proof: BranchProof
+    lang: str
+    legs: tuple[str, ...]
+    code: str
+
+    @property
+    def robot(self) -> Any:
+        """The robot."""
+        return self.proof.robot
+
+    @property
+    def setting(self) -> Any:
+        """What is compared besides the record."""
+        return self.proof.robot
+
+    @cached_property
+    def cells(self) -> int:
+        """How many cells the program holds."""
+        return sum(len(part.cells) for part in self.proof.parts)
+
+    def headline(self) -> str:
+        """The robot, and how much is proved."""
+        return f"{self.lang} of {self.proof.headline()}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line, without the command's own fields."""
+        return {"lang": self.lang, "motors": list(self.proof.motors), "passive": list(self.proof.passive),
+                "held": list(self.proof.held), "legs": list(self.legs), "cells": self.cells,
+                "parts": [{"motors": list(part.motors), "share": part.share,
+                           "proved": [each.tolist() for each in part.proved]} for part in self.proof.parts]}
+
+
+@question()
+def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, observe: LegsLike = None,
+           camera: str | None = None) -> ExportedCode:
+    """A program for a controller, in C++ (one header, C++17, Eigen) or NumPy (one module): from the motors' coordinates
+    the passive joints and the platform's pose on the branch of the zero configuration, their Jacobians, the motors of a
+    pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
+
+    It answers where :func:`.branch` proves the branch (``box`` as there) and refuses elsewhere. The same robot gives
+    the same text. Raises what ``branch`` raises, ``NothingProved``, ``BadRequest`` for another language.
+    """
+    if lang not in TEMPLATES:
+        raise BadRequest("language", lang, tuple(TEMPLATES))
+    given = as_robot(robot)
+    proof = branch(given, box) if box is not None else branch(given)
+    tell("code")
+    watched = _watched(given, observe, camera)
+    source = Source.of(TubedBranch.of(proof), watched)
+    code = program(source, lang, _told(proof, source, lang, box))
+    return ExportedCode(proof, lang, tuple(each.leg for each in watched), code)
+
+
+def _watched(robot: Any, observe: LegsLike, camera: str | None) -> tuple[Direction, ...]:
+    """The watched directions that are seen from the base; by default none where a robot has no legs to watch."""
+    try:
+        observed = ObservedRobot.of(robot, observe, camera)
+    except HrsynthError:
+        if observe is not None or camera is not None:
+            raise
+        return ()
+    links, reference = observed.robot.links, observed.normal.mechanism.reference
+    if reference != observed.robot.base:
+        if camera is not None:
+            raise BadRequest("code for directions seen from a moving link", camera, "directions seen from the base")
+        return ()
+    return tuple(each for each in observed.observed if isinstance(each, Direction) and each.link in links
+                 and each.seen_from in (None, reference))
+
+
+def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None) -> list[str]:
+    """What the program says of itself."""
+    from .. import __version__
+
+    robot, branch_ = proof.robot, source.branch
+    pairs = {} if box is None or isinstance(box, str) else box
+    asked = box if isinstance(box, str) else ",".join(f"{name}={low}:{high}" for name, (low, high) in pairs.items())
+    file = Path(robot.file).name if robot.file else robot.name
+    legs = ",".join(each.leg for each in source.observed)
+    options = "".join(f" --{name} {value}" for name, value in (("observe", legs), ("box", asked)) if value)
+    lines = [f"Made by hrsynth {__version__}: hrsynth export {file} --lang {lang}{options}",
+             f"Robot {robot.name}: {len(proof.motors)} motors, {len(proof.passive)} passive coordinates; idle, held at "
+             f"0: {', '.join(proof.held) or 'none'}.", "Motors in their order, and what is refused beyond:"]
+    rows = zip(proof.motors, branch_.lower.tolist(), branch_.upper.tolist(), branch_.motors, strict=True)
+    lines += [f"  q[{k}] {name}: {low!r} to {high!r} {branch_.unit_name(i)}"
+              for k, (name, low, high, i) in enumerate(rows)]
+    for part in proof.parts:
+        low, high = (each.tolist() for each in part.proved)
+        lines.append(f"{len(part.cells)} cells, {100 * part.share:.4g} % of the box that was asked for; what no cell "
+                     "covers is refused. Wholly covered is")
+        lines += [f"  {name}: {a!r} to {b!r}" for name, a, b in zip(part.motors, low, high, strict=True)]
+    lines += [f"An answer is given where the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "
+              f"of {robot.length:.6g} m), all loops are", f"closed to {GENERATED_CLOSED:g}, and the joints are in the "
+              "cell's tube, in which the loops have one closure (proved).",
+              "The proof takes the robot's numbers as the file has them."]
+    return lines

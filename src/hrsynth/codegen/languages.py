@@ -1,0 +1,61 @@
+"""The text of a program in each language: templates filled with the formulas and cells of a branch."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from ..budgets import INVERSE_STEPS_AT_RUN, NEWTON_STEPS_AT_RUN
+from ..tolerances import (
+    GENERATED_CLOSED,
+    GENERATED_LAST_STEP,
+    GENERATED_NEAR,
+    GENERATED_REACHED,
+    GENERATED_SINGULAR,
+)
+from .source import Source
+
+if TYPE_CHECKING:
+    from jinja2 import Environment
+
+TEMPLATES = {"c++": "header.hpp.j2", "numpy": "module.py.j2"}
+"""The languages."""
+
+
+def program(source: Source, language: str, told: Sequence[str]) -> str:
+    """The program in a language, with lines ``told`` at its head; the same each time."""
+    branch, mechanism = source.branch, source.branch.equations.mechanism
+    arguments = "const Motors& q, const Unknowns& x, "
+    functions = [("platform", f"{arguments}Eigen::Matrix3d& R, Eigen::Vector3d& p", source.platform)]
+    if source.cut:
+        functions += [("cut", f"{arguments}Eigen::Matrix<double, CUT, 1>& O", source.cut_values),
+                      ("cut_slopes", f"{arguments}Eigen::Matrix<double, CUT, MOTORS + UNKNOWNS>& C", source.cut_slopes)]
+    d = len(source.observed)
+    moving = "Eigen::Matrix<double, 6, MOTORS + UNKNOWNS>& V"
+    if d:
+        moving += (", Eigen::Matrix<double, 3 * DIRECTIONS, 1>& u, "
+                   "Eigen::Matrix<double, 3 * DIRECTIONS, MOTORS + UNKNOWNS>& W")
+    functions.append(("rates", arguments + moving, source.rates))
+    values: dict[str, Any] = {
+        "robot": mechanism.name, "told": told, "name": re.sub(r"\W|^(?=\d)", "_", mechanism.name), "source": source,
+        "m": len(branch.motors), "p": len(branch.passive), "c": len(source.cut), "d": d, "steps": NEWTON_STEPS_AT_RUN,
+        "inverse": INVERSE_STEPS_AT_RUN, "parts": source.parts, "functions": functions,
+        "lower": [float(x) for x in branch.lower], "upper": [float(x) for x in branch.upper],
+        "motor_names": source.names(branch.motors), "passive_names": [*source.names(branch.passive), *source.cut],
+        "direction_names": [observation.leg for observation in source.observed],
+        "length": repr(float(mechanism.length)), "near": GENERATED_NEAR, "last_step": GENERATED_LAST_STEP,
+        "closed": GENERATED_CLOSED, "reached": GENERATED_REACHED, "singular": GENERATED_SINGULAR}
+    return _templates().get_template(TEMPLATES[language]).render(**values)
+
+
+@cache
+def _templates() -> Environment:
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    made = Environment(loader=PackageLoader("hrsynth.codegen", ""), undefined=StrictUndefined,
+                       keep_trailing_newline=True)
+    made.filters["quoted"] = lambda names: ", ".join(f'"{name}"' for name in names)
+    made.filters["name_of"] = lambda place, names: names[place]
+    return made

@@ -1,0 +1,112 @@
+"""What the text of a program is made of, for all languages: the parts of a branch with their formulas and cells."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..mechanism.observation import Direction
+from ..results import Value
+from .cell_tree import Node, cell_tree
+from .trace import FormulaTracer, TracedFunction
+from .tubes import TubedBranch, TubePart
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SourcePart(Value):
+    """A part: the places of its motors in q and of its unknowns in x; G, J and K of as many equations as unknowns, E of
+    all; the cells and the tree in which they are found; what counts as 1 of each unknown."""
+
+    motors: tuple[int, ...]
+    unknowns: tuple[int, ...]
+    equations: TracedFunction
+    slopes: TracedFunction
+    closure: TracedFunction
+    rows: tuple[int, ...]
+    """The places of G among E."""
+    count: int
+    """How many equations there are in all."""
+    root: int
+    nodes: tuple[Node, ...]
+    cells: tuple[tuple[tuple[float, ...], ...], ...]
+    """Centre, x there, slopes row by row, radius."""
+    units: tuple[float, ...]
+    lower: tuple[float, ...]
+    upper: tuple[float, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Source(Value):
+    """All that a program says of a branch."""
+
+    branch: TubedBranch
+    parts: tuple[SourcePart, ...]
+    platform: TracedFunction
+    cut: tuple[str, ...]
+    """Names of the coordinates of joints at which loops are cut."""
+    cut_values: TracedFunction
+    cut_slopes: TracedFunction
+    rates: TracedFunction
+    observed: tuple[Direction, ...]
+
+    @classmethod
+    def of(cls, branch: TubedBranch, observed: Sequence[Direction]) -> Source:
+        """The formulas of a branch, and those of observed directions."""
+        tracer = FormulaTracer(branch.equations, branch.motors, branch.passive)
+        parts = tuple(_part(branch, tracer, part) for part in branch.parts)
+        names, values, slopes = tracer.cut()
+        return cls(branch, parts, tracer.platform(), tuple(names), values, slopes, tracer.rates(observed),
+                   tuple(observed))
+
+    def names(self, places: Sequence[int]) -> list[str]:
+        """The names of coordinates."""
+        return [self.branch.equations.coordinates[i].name for i in places]
+
+
+def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourcePart:
+    driven = [branch.motors.index(i) for i in part.driven]
+    unknowns = [branch.passive.index(i) for i in part.unknowns]
+    rows, every = _rows(branch, part)
+    equations, slopes = tracer.loops(rows, part.unknowns, part.driven)
+    lower, upper = branch.lower[driven], branch.upper[driven]
+    root, nodes = cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in part.cells])
+    cells = tuple((tuple(cell.centre), tuple(cell.middle), tuple(cell.slopes.ravel()), tuple(cell.radius))
+                  for cell in part.cells)
+    return SourcePart(tuple(driven), tuple(unknowns), equations, slopes, tracer.closure(every),
+                      tuple(every.index(i) for i in rows), len(every), root,
+                      tuple(nodes), _floats(cells), tuple(branch.unit(i) for i in part.unknowns),
+                      tuple(map(float, lower)), tuple(map(float, upper)))
+
+
+def _floats(values: Any) -> Any:
+    return tuple(map(_floats, values)) if isinstance(values, tuple) else float(values)
+
+
+def _rows(branch: TubedBranch, part: TubePart) -> tuple[list[int], list[int]]:
+    """As many equations as unknowns, the firmest at the middles of the part's cells together; all that have to do with
+    the unknowns."""
+    from scipy.linalg import qr
+
+    units = np.array([branch.unit(i) for i in part.unknowns])
+    places = [branch.passive.index(i) for i in part.unknowns]
+    driven = [branch.motors.index(i) for i in part.driven]
+    stacked = []
+    step = max(1, len(part.cells) // 16)
+    for cell in part.cells[::step]:
+        q, x = np.zeros(len(branch.motors)), np.zeros(len(branch.passive))
+        q[driven], x[places] = cell.centre, cell.middle
+        stacked.append(branch.evaluate(q, x)[1][:, part.unknowns] * units)
+    every = [i for i in range(len(stacked[0])) if any(np.any(each[i]) for each in stacked)]
+    together = np.hstack(stacked)[every]
+    kept = qr(together.T, pivoting=True, mode="r")[1]
+    chosen: list[int] = []
+    for k in kept:  # independent at the first cell as well
+        trial = stacked[0][[every[i] for i in (*chosen, k)]]
+        if np.linalg.matrix_rank(trial, tol=1e-6 * np.linalg.norm(trial, 2)) == len(trial):
+            chosen.append(int(k))
+        if len(chosen) == len(part.unknowns):
+            break
+    return sorted(every[k] for k in chosen), every

@@ -1,0 +1,107 @@
+"""A proved branch as code needs it: independent parts, each with cells of motor coordinates and an affine tube in each,
+in metres and radians (docs/pages/theory.md, section 12)."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..analysis.branch.answer import BranchProof
+from ..errors import NothingProved
+from ..geometry.vectors import Array
+from ..results import Value
+from .formulas import LoopFormulas
+
+UNBOUNDED = 1e6
+"""Coordinate (m, rad) up to which a motor outside of all loops is taken where it has no limits."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TubeCell(Value):
+    """Where motors are between ``lower`` and ``upper`` (m,), the loops have one closure with
+    |x − middle − slopes (q − (lower + upper) / 2)| ≤ radius, (p,); slopes (p, m)."""
+
+    lower: Array
+    upper: Array
+    middle: Array
+    slopes: Array
+    radius: Array
+
+    @property
+    def centre(self) -> Array:
+        """The middle of the cell (m,)."""
+        return np.asarray((self.lower + self.upper) / 2)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TubePart(Value):
+    """Unknowns that ``driven`` coordinates decide, by their places among all coordinates, and the cells."""
+
+    driven: tuple[int, ...]
+    unknowns: tuple[int, ...]
+    cells: tuple[TubeCell, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TubedBranch(Value):
+    """The loops' equations, the motors' coordinates and the bounds (m,) of the proved box, the parts; coordinates in no
+    part are held at 0."""
+
+    equations: LoopFormulas
+    motors: tuple[int, ...]
+    lower: Array
+    upper: Array
+    parts: tuple[TubePart, ...]
+
+    @classmethod
+    def of(cls, proof: BranchProof) -> TubedBranch:
+        """The parts of a proof that have cells; raises ``NothingProved`` where one has none."""
+        system, table = proof.system, {name: i for i, name in enumerate(proof.system.names)}
+        equations = LoopFormulas.of(system)
+        motors = tuple(table[name] for name in proof.motors)
+        lower, upper = np.full(len(motors), -np.inf), np.full(len(motors), np.inf)
+        parts = []
+        for part in proof.parts:
+            if not part.cells:
+                raise NothingProved(proof.robot.name, part.motors, "; ".join(each.reason for each in part.toggles))
+            driven = tuple(table[name] for name in part.motors)
+            cells = tuple(TubeCell(each.low, each.high, each.centre, each.slopes, each.radius) for each in part.cells)
+            places = [motors.index(i) for i in driven]
+            lower[places] = np.maximum(lower[places], np.min([each.lower for each in cells], axis=0))
+            upper[places] = np.minimum(upper[places], np.max([each.upper for each in cells], axis=0))
+            parts.append(TubePart(driven, tuple(table[name] for name in part.passive), cells))
+        for place, i in enumerate(motors):
+            low, high = proof.robot.limited.get(system.coordinates[i].joint, (-np.inf, np.inf))
+            if not np.isfinite(lower[place]):  # in no loop
+                lower[place], upper[place] = max(low, -UNBOUNDED), min(high, UNBOUNDED)
+        return cls(equations, motors, lower, upper, tuple(parts))
+
+    @property
+    def passive(self) -> tuple[int, ...]:
+        """The passive coordinates that the loops decide."""
+        return tuple(sorted(i for part in self.parts for i in part.unknowns))
+
+    @property
+    def idle(self) -> tuple[int, ...]:
+        """The coordinates that are held."""
+        return tuple(i for i in range(len(self.equations.coordinates)) if i not in {*self.motors, *self.passive})
+
+    def unit(self, i: int) -> float:
+        """What counts as 1 of a coordinate: the characteristic length, or a radian."""
+        return self.equations.mechanism.length if self.equations.coordinates[i].slides else 1.0
+
+    def unit_name(self, i: int) -> str:
+        """Its unit's name."""
+        return "m" if self.equations.coordinates[i].slides else "rad"
+
+    def evaluate(self, q: Array, x: Array) -> tuple[Array, Array]:
+        """All equations (e,) and their derivatives (e, N) at q and x, in the order of ``motors`` and ``passive``."""
+        values = np.zeros(len(self.equations.coordinates))
+        values[list(self.motors)], values[list(self.passive)] = q, x
+        found = self.equations.rows(list(values))
+        J = np.zeros((len(found), len(values)))
+        for row, (_, slopes) in zip(J, found, strict=True):
+            for i, slope in slopes.items():
+                row[i] = slope
+        return np.array([float(value) for value, _ in found]), J

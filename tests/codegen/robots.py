@@ -1,0 +1,106 @@
+"""Robots for generated code, their code loaded or compiled, and the package's own way from motors to poses."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import sysconfig
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+from hrsynth.geometry.vectors import Array
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
+from hrsynth.kinematics.tasks import solve
+from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.builder import Builder
+
+BARS = (1.0, 0.5, 1.2, 0.8)
+"""A crank that turns all round."""
+FLAGS = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Werror", "-fno-exceptions"]
+
+
+def four_bar(start: float = 0.3, bars: tuple[float, ...] = BARS, side: float = 1.0) -> Mechanism:
+    """Ground along x, the crank at the origin with a motor, at the angle ``start``; the platform is the coupler."""
+    ground, crank, coupler, rocker = bars
+    A, B = np.array([np.cos(start), np.sin(start), 0]) * crank, np.array([ground, 0, 0])
+    gap = B - A
+    d = np.linalg.norm(gap)
+    along = (coupler**2 - rocker**2 + d**2) / (2 * d)
+    C = A + along * gap / d + side * np.sqrt(coupler**2 - along**2) * np.array([-gap[1], gap[0], 0]) / d
+    b = Builder("four_bar")
+    for name, at in (("base", (0, 0, 0)), ("crank", (0, 0, 0)), ("coupler", A), ("rocker", B)):
+        b.link(name, at=at)
+    b.joint("motor", "R", "base", "crank", (0, 0, 0), axis=(0, 0, 1), motor=True)
+    b.joint("knee", "R", "crank", "coupler", A, axis=(0, 0, 1))
+    b.joint("pivot", "R", "base", "rocker", B, axis=(0, 0, 1))
+    b.joint("tip", "R", "coupler", "rocker", C, axis=(0, 0, 1), loop=True)
+    return b.build(platform="coupler")
+
+
+@dataclass(frozen=True)
+class Motors:
+    """A task: motors at given coordinates."""
+
+    values: Mapping[str, float]
+
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+        """Error and Jacobian."""
+        step = twin.difference(twin.q0, q)
+        J, error = np.zeros((len(self.values), twin.nv)), np.zeros(len(self.values))
+        for k, (name, value) in enumerate(self.values.items()):
+            unit = twin.length if twin.mechanism.joints[name].type.slides else 1.0
+            (i,) = twin.coordinates[name]
+            J[k, i], error[k] = 1.0, step[i] - value / unit
+        return error, J
+
+
+def own_pose(twin: PinocchioModel, motors: Mapping[str, float], steps: int = 6) -> Array:
+    """The platform's pose (4, 4) by Pinocchio's model of the robot, led from zero in small steps."""
+    q = twin.q0
+    for s in np.linspace(0, 1, steps + 1)[1:]:
+        q, left = solve(twin, q, Motors({name: s * value for name, value in motors.items()}), tolerance=1e-14,
+                        iterations=60)
+        assert left < 1e-12
+    return twin.pose(q, twin.mechanism.platform)
+
+
+def module_of(code: str) -> ModuleType:
+    """A generated module, run."""
+    made = ModuleType("generated")
+    exec(compile(code, "generated.py", "exec"), made.__dict__)
+    return made
+
+
+@cache
+def eigen() -> Path:
+    """The folder of Eigen's headers; the test is skipped where there is none or no compiler."""
+    found = Path(sysconfig.get_paths()["purelib"]) / "cmeel.prefix" / "include" / "eigen3"
+    if shutil.which("g++") is None or not (found / "Eigen" / "Core").exists():
+        pytest.skip("needs g++ and Eigen's headers (the wheel cmeel-eigen)")
+    return found
+
+
+def compiled(folder: Path, code: str, main: str, *flags: str) -> Path:
+    """A program ``main`` with a generated header ``robot.hpp``, compiled; what the compiler says is an error."""
+    include = eigen()
+    (folder / "robot.hpp").write_text(code, encoding="utf-8")
+    (folder / "main.cpp").write_text(main, encoding="utf-8")
+    done = subprocess.run(["g++", *FLAGS, *flags, f"-isystem{include}", "main.cpp", "-o", "main"], cwd=folder,
+                          capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, done.stderr[:3000]
+    return folder / "main"
+
+
+def answered(program: Path, rows: Array) -> Array:
+    """What a program prints for rows of numbers that it reads."""
+    text = "\n".join(" ".join(map(repr, map(float, row))) for row in rows)
+    done = subprocess.run([program], input=f"{len(rows)}\n{text}\n", capture_output=True, text=True, timeout=300)
+    assert done.returncode == 0, (done.returncode, done.stderr[:2000], sys.platform)
+    return np.array([[float(x) for x in line.split()] for line in done.stdout.splitlines()])

@@ -1,0 +1,238 @@
+"""Generated code against the package's kinematics, closed forms and differences; what hand-written code gets wrong."""
+
+from __future__ import annotations
+
+import os
+import re
+import subprocess
+import sys
+from functools import cache
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+
+import hrsynth
+from codegen.robots import BARS, answered, compiled, four_bar, module_of, own_pose
+from hrsynth.codegen.export import ExportedCode, export
+from hrsynth.errors import BadRequest
+from hrsynth.geometry.vectors import Array
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
+from hrsynth.mechanism import Mechanism
+from strategies import planar, random_rotation, transformed
+
+MAIN = """
+#define EIGEN_RUNTIME_NO_MALLOC
+#include "robot.hpp"
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+static long allocations = 0;
+void* operator new(std::size_t size) { ++allocations; return std::malloc(size); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+using namespace NAME;
+template <class M> void print(const M& m) {
+  for (int i = 0; i < m.rows(); ++i)
+    for (int k = 0; k < m.cols(); ++k) std::printf("%.17g ", m(i, k));
+}
+int main() {
+  int n = 0;
+  if (std::scanf("%d", &n) != 1) return 2;
+  Eigen::internal::set_is_malloc_allowed(false);
+  long made = 0;
+  for (int row = 0; row < n; ++row) {
+    Motors q;
+    for (int i = 0; i < MOTORS; ++i) if (std::scanf("%lf", &q[i]) != 1) return 3;
+    Solution at;
+    Jacobians rates;
+    at.passive.setZero(); at.rotation.setZero(); at.position.setZero();
+    rates.passive.setZero(); rates.platform.setZero(); rates.motors.setZero();
+    const long before = allocations;
+    const Status status = jacobians(q, at, rates);
+    Motors back = q * 0.9;
+    const Status led = status == Status::ok ? inverse(at.rotation, at.position, back) : status;
+    made += allocations - before;
+    std::printf("%d %d ", int(status), int(led));
+    print(at.passive); print(at.position); print(at.rotation); print(rates.platform); print(rates.passive); print(back);
+    std::printf("\\n");
+  }
+  return made == 0 ? 0 : 4;
+}
+"""
+
+
+def box_of(robot: Mechanism, half: float) -> dict[str, tuple[float, float]]:
+    """A box of motors, half as wide as ``half`` rad or half characteristic lengths."""
+    return {name: ((-half, half) if not joint.type.slides else (-half * robot.length, half * robot.length))
+            for name, joint in robot.joints.items() if joint.actuated}
+
+
+@cache
+def exported(robot: Mechanism, half: float, lang: str = "numpy") -> ExportedCode:
+    return export(robot, lang, box_of(robot, half))
+
+
+def inside(found: ExportedCode, count: int, seed: int = 0) -> Array:
+    """Random motors in the proved box."""
+    rng = np.random.default_rng(seed)
+    q = np.zeros((count, len(found.proof.motors)))
+    for part in found.proof.parts:
+        q[:, [found.proof.motors.index(name) for name in part.motors]] = rng.uniform(*part.proved, (count,
+                                                                                                    len(part.motors)))
+    return q
+
+
+def assert_agrees(robot: Mechanism, found: ExportedCode, made: ModuleType, count: int) -> None:
+    """The pose is that of Pinocchio's model, closed to the last digits; derivatives are those of differences; a pose
+    leads back to its motors."""
+    q = inside(found, count)
+    status, _, R, p, rates = made.jacobians(q)
+    assert np.all(status == made.OK)
+    twin = PinocchioModel(robot)
+    for i in range(count):
+        X = own_pose(twin, dict(zip(found.proof.motors, q[i], strict=True)))
+        np.testing.assert_allclose(R[i], X[:3, :3], atol=1e-12)
+        np.testing.assert_allclose(p[i], X[:3, 3], atol=1e-12 * max(1.0, robot.length))
+    h = 1e-6
+    edge = np.all((q > made.LOWER + h) & (q < made.UPPER - h), axis=1)
+    for k in range(made.MOTORS):
+        step = h * np.eye(made.MOTORS)[k]
+        sides = [made.forward(q + sign * step) for sign in (1, -1)]
+        good = edge & (sides[0][0] == made.OK) & (sides[1][0] == made.OK)
+        assert good.sum() > count // 2
+        np.testing.assert_allclose(rates["passive"][good, :, k], ((sides[0][1] - sides[1][1]) / (2 * h))[good],
+                                   atol=1e-6)
+        np.testing.assert_allclose(rates["platform"][good, :3, k], ((sides[0][3] - sides[1][3]) / (2 * h))[good],
+                                   atol=1e-6)
+        turn = ((sides[0][2] - sides[1][2]) / (2 * h)) @ R.transpose(0, 2, 1)
+        np.testing.assert_allclose(rates["platform"][good, 3:, k], turn[good][:, [2, 0, 1], [1, 2, 0]], atol=1e-6)
+    np.testing.assert_allclose(rates["motors"] @ rates["platform"], np.broadcast_to(np.eye(made.MOTORS), (
+        count, made.MOTORS, made.MOTORS)), atol=1e-6)
+    led, back = made.inverse(R, p, 0.9 * q)
+    assert np.all(led == made.OK)
+    again = made.forward(back)
+    assert np.abs(again[3] - p).max() < 1e-11
+    assert np.abs(again[2] - R).max() < 1e-11
+
+
+def coupler(q: Array, start: float = 0.3) -> tuple[Array, Array]:
+    """Of the four-bar, in closed form: the tip and the coupler's angle, on the branch of the zero configuration."""
+    ground, crank, length, rocker = BARS
+    A = crank * np.stack([np.cos(start + q), np.sin(start + q)], axis=-1)
+    gap = np.array([ground, 0.0]) - A
+    d = np.linalg.norm(gap, axis=-1)
+    along = (length**2 - rocker**2 + d**2) / (2 * d)
+    across = np.sqrt(length**2 - along**2)
+    tip = A + (along / d)[:, None] * gap + (across / d)[:, None] * np.stack([-gap[:, 1], gap[:, 0]], axis=-1)
+    return tip, np.arctan2(*(tip - A).T[::-1])
+
+
+def test_a_four_bar_part_of_a_turn() -> None:
+    robot = four_bar()
+    found = exported(robot, 0.4)
+    made = module_of(found.code)
+    assert_agrees(robot, found, made, 12)
+    # outside nothing is computed, and no number at all is no place inside
+    status, x, R, p = made.forward([[0.5], [-0.4001], [np.nan], [np.inf], [0.0]])
+    assert status.tolist() == [made.OUTSIDE] * 4 + [made.OK]
+    assert np.isnan(x[:4]).all()
+    assert np.isnan(R[:4]).all()
+    assert np.isnan(p[:4]).all()
+
+
+@pytest.mark.slow
+def test_a_four_bar_stays_on_its_branch_all_round(tmp_path: Path) -> None:
+    robot = four_bar()
+    made = module_of(export(robot, "numpy").code)
+    q = np.linspace(-np.pi, np.pi, 100_001)
+    rng = np.random.default_rng(0)
+    rng.shuffle(q)  # motors that jump far
+    status, x, R, _ = made.forward(q[:, None])
+    assert np.all(status == made.OK)
+    _, angle = coupler(q)
+    zero = coupler(np.zeros(1))[1][0]
+    cosine, sine = np.cos(angle - zero), np.sin(angle - zero)
+    assert np.abs(R[:, 0, 0] - cosine).max() < 1e-12
+    assert np.abs(R[:, 1, 0] - sine).max() < 1e-12
+    knee = x[:, made.PASSIVE_NAMES.index("knee")]
+    np.testing.assert_allclose(np.cos(knee + q), cosine, atol=1e-12)
+    np.testing.assert_allclose(np.sin(knee + q), sine, atol=1e-12)
+    code = export(robot, "c++").code
+    rows = answered(compiled(tmp_path, code, MAIN, "-DNAME=four_bar"), q[:2000, None])
+    assert np.all(rows[:, 0] == 0)
+    np.testing.assert_allclose(rows[:, 2:5], x[:2000], atol=1e-12)
+
+
+@pytest.mark.slow
+def test_code_in_cpp_neither_allocates_nor_differs(tmp_path: Path) -> None:
+    robot = hrsynth.load("rrrrr_m1")
+    found = exported(robot, 0.1, "c++")
+    made = module_of(exported(robot, 0.1).code)
+    q = np.vstack([inside(found, 300), [[0.2, 0.0], [np.nan, 0.0], [1e300, -1e300]]])
+    rows = answered(compiled(tmp_path, found.code, MAIN, "-DNAME=rrrrr_m1"), q)
+    status, x, R, p, rates = made.jacobians(q)
+    np.testing.assert_array_equal(rows[:, 0], status)
+    good = status == made.OK
+    expected = np.hstack([x, p, R.reshape(-1, 9), rates["platform"].reshape(len(q), -1),
+                          rates["passive"].reshape(len(q), -1), q])
+    assert good.sum() == 300
+    assert np.all(rows[good, 1] == 0)
+    np.testing.assert_allclose(rows[good, 2:], expected[good], atol=1e-11)
+
+
+@pytest.mark.slow
+def test_the_same_bytes_each_time(tmp_path: Path) -> None:
+    hrsynth.save(four_bar(), tmp_path / "four_bar.urdf")
+    script = ("import sys; from hrsynth.codegen.export import export; "
+              "sys.stdout.write(export(sys.argv[1], box='motor=-0.1:0.1').code)")
+    texts = {subprocess.run([sys.executable, "-c", script, str(tmp_path / "four_bar.urdf")], capture_output=True,
+                            env={**os.environ, "PYTHONHASHSEED": seed}, text=True, check=True).stdout
+             for seed in ("1", "2")}
+    assert len(texts) == 1
+    (text,) = texts
+    assert re.search(r"hrsynth export four_bar.urdf --lang c\+\+ .*--box motor=-0.1:0.1\n", text)
+    assert str(tmp_path) not in text
+
+
+def test_what_is_refused() -> None:
+    with pytest.raises(BadRequest, match=r"language"):
+        export(four_bar(), "fortran")
+    with pytest.raises(BadRequest):
+        export(four_bar(), box="wheel=-1:1")
+
+
+SMALL = {"3rrr_m1": 0.02, "3prr_m1": 0.02, "rrrrr_m2": 0.05, "prrrp_m1": 0.05, "3rps": 0.01, "3rpr_m1": 0.02}
+"""Shipped robots, with boxes whose proof is quick."""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SMALL)
+def test_shipped_robots(name: str) -> None:
+    robot = hrsynth.load(name)
+    found = exported(robot, SMALL[name])
+    assert_agrees(robot, found, module_of(found.code), 20)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", range(4))
+def test_random_robots_in_tilted_bases(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    robot = transformed(planar(["RRR"] * 3, rng, [{0}] * 3), random_rotation(rng), rng.normal(size=3))
+    found = exported(robot, 0.01)
+    assert_agrees(robot, found, module_of(found.code), 10)
+
+
+@pytest.mark.slow
+def test_the_page_s_loop_runs(tmp_path: Path) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "pages" / "export.md").read_text(encoding="utf-8")
+    loop = page.split("```cpp\n")[1].split("```")[0]
+    assert sum(bool(line.strip()) for line in loop.splitlines()) < 25
+    robot = hrsynth.load("rrrrr_m1")
+    box = re.search(r"--box (\S+)", page)
+    assert box is not None
+    program = compiled(tmp_path, export(robot, box=box[1]).code, loop)
+    out = subprocess.run([program], capture_output=True, text=True, check=True).stdout
+    moved = [float(x) for x in out.split()] - robot.links[robot.platform].pose[:2, 3]
+    np.testing.assert_allclose(moved, [0.02 * 0.099, 0.01 * 0.099], atol=1e-5)
