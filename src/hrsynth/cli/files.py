@@ -8,7 +8,7 @@ import typer
 
 from . import options
 from .commands import add_command
-from .options import JSON, NEEDED, SOURCE, Option, flag, robot_of, warn
+from .options import JSON, NEEDED, OUTPUT, SOURCE, Option, flag, output, robot_of, warn
 from .progress import Progress
 
 
@@ -39,18 +39,24 @@ def robots(examples: bool, json: bool) -> None:
                          ("name", "architecture", "dof", "source")))
 
 
-def convert(target: str, to: str | None, json: bool, **source: Any) -> None:
+def convert(target: str | None, output: str | None, to: str | None, meshes: str, json: bool, **source: Any) -> None:
     """Write a robot in another dialect."""
     from ..description import save, targets
     from ..description.files import require_other
+    from ..errors import BadRequest
     from ..present.show import record
 
+    if (target is None) is (output is None):
+        raise BadRequest("convert writes one file", f"{target} and {output}" if target else None, "OUT, or -o OUT")
+    if meshes not in ("keep", "copy"):
+        raise BadRequest("--meshes", meshes, "keep, copy")
+    target = str(target or output)
     files, name = [str(file) for file in targets(target, to)], source["robot"]
     with Progress():
         mechanism = robot_of(source)
         for file in files:
             require_other(file, name, mechanism.file)
-        lost = [str(warning) for warning in save(mechanism, target, to)]
+        lost = [str(warning) for warning in save(mechanism, target, to, meshes=meshes)]
     for warning in lost:
         warn(warning)
     fields = {"file": target, "files": files, "links": len(mechanism.links), "joints": len(mechanism.joints),
@@ -85,8 +91,12 @@ def add(app: typer.Typer) -> None:
                  JSON), robots, ("", "--examples"))
     add_command(app, "convert", "Read a robot in any dialect and write it in another: .urdf native, .yaml Gepetto, "
                 ".xml MJCF, .sdf SDFormat, .usda, .usd or .usdc USD.",
-                (*SOURCE, Option("target", "The file to write; its extension says the dialect.", "OUT", default=NEEDED,
-                                 argument=True),
+                (*SOURCE,
+                 Option("target", "The file to write; its extension says the dialect.", "[OUT]", argument=True),
+                 output("The file to write, by option."),
+                 Option("meshes", "keep: meshes stay where they are, named from the new file; copy: into meshes/ "
+                        "beside it.", default="keep", words=("keep", "copy"), group=OUTPUT),
                  Option("to", "native, gepetto, mjcf, sdf or usd, whatever the ending.", "DIALECT",
                                        words=("native", "gepetto", "mjcf", "sdf", "usd")), JSON), convert,
-                ("quattro quattro.xml", "leg.urdf robot.yaml --to gepetto"))
+                ("quattro quattro.xml", "leg.urdf -o robot.usda --meshes copy",
+                 "leg.urdf robot.yaml --to gepetto"))

@@ -16,6 +16,7 @@ from .dialect import Dialect
 from .example_data import PREFIX, examples
 from .files import require_same, write_whole
 from .formats import native
+from .meshes import carried, taken_back, written
 from .overrides import Overrides
 from .reading import read
 from .tree import spanning
@@ -100,13 +101,16 @@ def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
     return _dialect(Path(path), dialect).files(Path(path))
 
 
-def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | None = None) -> tuple[Note, ...]:
+def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | None = None, *, meshes: str = "keep"
+         ) -> tuple[Note, ...]:
     """Write a robot file, whole or not at all, of a mechanism or of a robot by its file or name; what the dialect
     cannot say is returned as warnings.
 
     ``dialect`` is ``native``, ``gepetto``, ``mjcf``, ``sdf`` or ``usd``; without it the file's ending decides:
     ``.urdf`` native, ``.xml`` and ``.mjcf`` MJCF, ``.sdf`` SDFormat, ``.usda``, ``.usd`` and ``.usdc`` USD, ``.yaml``
     Gepetto (with a ``.urdf`` of the same name beside it). A file beside the one named is not replaced by other content.
+    Meshes stay where they are and are named from the new file's folder; with ``meshes="copy"`` they are copied into
+    ``meshes/`` beside it.
 
     Raises
     ------
@@ -117,16 +121,23 @@ def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | Non
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     notes = hrsynth.save(hrsynth.load("3rrr_m1"), f"{folder}/robot.urdf")
     """
-    chosen, mechanism = _dialect(Path(path), dialect), load(mechanism)
-    written = formats.writer(chosen.name)(mechanism)
-    files = chosen.files(Path(path))
-    contents = {file: chosen.packed(text, file) for file, text in zip(files, written.texts, strict=True)}
-    for file, content in contents.items():
-        if file != Path(path):
-            require_same(file, content)
-    for file, content in contents.items():
-        write_whole(file, content)
-    return written.lost
+    target = Path(path)
+    chosen, mechanism = _dialect(target, dialect), load(mechanism)
+    robot, copies, notes = carried(mechanism, target, chosen.meshes, copy=meshes == "copy")
+    new = written(copies)
+    try:
+        found = formats.writer(chosen.name)(robot)
+        texts = zip(chosen.files(target), found.texts, strict=True)
+        contents = {file: chosen.packed(text, file) for file, text in texts}
+        for file, content in contents.items():
+            if file != target:
+                require_same(file, content)
+        for file, content in contents.items():
+            write_whole(file, content)
+    except BaseException:
+        taken_back(new)
+        raise
+    return (*found.lost, *notes)
 
 
 def _dialect(target: Path, name: str | None) -> Dialect:

@@ -20,7 +20,7 @@ SIZES = {"box": ("size",), "sphere": ("radius",), "cylinder": ("radius", "length
          "mesh": ()}
 """The attributes of each kind of shape; cylinders and capsules lie along z, a capsule's length is without its caps."""
 SHAPES = ("visual", "collision")
-_INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
+INERTIA = ("ixx", "iyy", "izz", "ixy", "ixz", "iyz")
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,7 +114,7 @@ def _inertial(element: xml.Element) -> Inertial:
     tensor = element.find("inertia")
     if tensor is None:
         return Inertial(float(mass), _pose(element))
-    xx, yy, zz, xy, xz, yz = (float(_numbers(tensor, key, (0,))[0]) for key in _INERTIA)
+    xx, yy, zz, xy, xz, yz = (float(_numbers(tensor, key, (0,))[0]) for key in INERTIA)
     return Inertial(float(mass), _pose(element), frozen([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]))
 
 
@@ -154,7 +154,7 @@ def fragments(content: Content) -> tuple[str, ...]:
         mass, tensor = content.inertial.mass, content.inertial.inertia
         element = xml.new("inertial", *_origin(content.inertial.X), xml.new("mass", value=numerals.exact(mass)))
         if tensor is not None:
-            entries = zip(_INERTIA, (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]), strict=True)
+            entries = zip(INERTIA, (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]), strict=True)
             element.append(xml.new("inertia", **{key: numerals.exact(value) for key, value in entries}))
         found.append(xml.canonical(element))
     for solid in content.solids:

@@ -1,14 +1,26 @@
-"""The files of meshes that a robot names: found, carried along to where it is written, read as triangles."""
+"""The files of meshes that a robot names: found, carried along to where it is written, read as triangles.
+
+Their names are paths from the folder of the robot's own file, or addresses (``package://…``); a mesh that lies in a USD
+file is ``FILE#PRIM``.
+"""
 
 from __future__ import annotations
 
+import io
+import os
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from ..budgets import LARGEST_FILE
+from ..budgets import LARGEST_FILE, LARGEST_MESHES, MOST_MESHES
+from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
+from ..mechanism.model import Mechanism, Note
+from . import xml
+from .jointgraph import comma_list
 
 
 def located(name: str, folder: Path) -> Path | None:
@@ -32,14 +44,141 @@ def located(name: str, folder: Path) -> Path | None:
 
 def triangles(name: str, robot: str | None) -> tuple[Array, Any] | None:
     """The points (n, 3) and triangles (m, 3) of a mesh that the file of a robot names; None where it cannot be read."""
-    path = located(name, Path(robot).parent if robot else Path())
-    if path is None or path.stat().st_size > LARGEST_FILE:
-        return None
+    folder = Path(robot).parent if robot else Path()
+    path = located(name, folder)
     import trimesh
 
     try:
-        solid: Any = trimesh.load(path, force="mesh", process=False)
+        if path is None:
+            inner = _inner(name, folder)
+            if inner is None:
+                return None
+            solid: Any = trimesh.load(io.BytesIO(inner), file_type="obj", force="mesh", process=False)
+        elif path.stat().st_size > LARGEST_FILE:
+            return None
+        else:
+            solid = trimesh.load(path, force="mesh", process=False)
         points, faces = np.array(solid.vertices, dtype=float), np.array(solid.faces)
     except Exception:  # readers of many formats, each with errors of its own
         return None
     return (points, faces) if len(faces) and np.all(np.isfinite(points)) else None
+
+
+def _inner(name: str, folder: Path) -> bytes | None:
+    """A mesh that lies in a USD file, as the text of an ``.obj`` file."""
+    file, sign, prim = name.partition("#")
+    path = located(file, folder) if sign else None
+    if path is None:
+        return None
+    from .formats.usd.stage import mesh
+
+    return mesh(path, prim)
+
+
+def carried(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, copy: bool
+            ) -> tuple[Mechanism, dict[Path, Callable[[], bytes]], list[Note]]:
+    """A robot whose meshes are named from the folder of ``target``; what has to be written there for it (``copy``: all
+    meshes, into ``meshes/``); and notes.
+
+    A dialect that can name only files with certain ``endings`` gets no others, nor names of files that are not there.
+    """
+    if robot.file is None or not any("<mesh" in fragment for link in robot.links.values() for fragment in link.xml):
+        return replace(robot, file=str(target)), {}, []
+    source, folder = Path(robot.file), target.parent
+    source = source if source.is_dir() else source.parent
+    moved: dict[str, str | None] = {}
+    files: dict[Path, Callable[[], bytes]] = {}
+    missing, foreign, inside = [], [], []
+
+    def place(name: str) -> str | None:
+        """What the mesh is called in the new file; None where it has to be left out."""
+        path, (file, sign, prim) = located(name, source), name.partition("#")
+        inner = located(file, source) if path is None and sign else None
+        if path is None and inner is None:
+            missing.append(name)
+            return name if endings is None else None
+        ending = ".obj" if path is None else path.suffix.lower()
+        if endings is not None and (ending not in endings or (inner is not None and not copy) or _is_text(path)):
+            foreign.append(name)
+            return None
+        if copy:
+            stem = Path(prim).name if path is None else path.stem
+            new, number = folder / "meshes" / f"{stem}{ending}", 2
+            while new in files:
+                new, number = folder / "meshes" / f"{stem}_{number}{ending}", number + 1
+            files[new] = path.read_bytes if path is not None else lambda: _inner(name, source) or b""
+            return f"meshes/{new.name}"
+        there = path if path is not None else inner
+        if located(file, folder) is not None and there is not None and endings is None and os.path.samefile(
+                str(located(file, folder)), there):
+            return name
+        if inner is not None:
+            inside.append(name)
+        return os.path.relpath(str(there), folder) + (sign + prim if inner is not None else "")
+
+    links = {}
+    for title, link in robot.links.items():
+        kept = []
+        for fragment in link.xml:
+            element = None if "<mesh" not in fragment else xml.parse_fragment(fragment)
+            meshes = [] if element is None else [each for each in element.iter("mesh") if each.get("filename")]
+            for each in meshes:
+                name = str(each.get("filename"))
+                if name not in moved:
+                    moved[name] = place(name)
+                each.set("filename", moved[name] or "")
+            if not any(each.get("filename") == "" for each in meshes):
+                kept.append(fragment if element is None else xml.canonical(element))
+        links[title] = replace(link, xml=tuple(kept))
+    if len(files) > MOST_MESHES:
+        raise BadRequest(f"{robot.name}: files of meshes", len(files), f"up to {MOST_MESHES}")
+    notes = []
+    for names, what in ((missing, "meshes that are not there" + (" are not written" if endings else "")),
+                        (foreign, f"meshes are not written, as only binary files {', '.join(endings or ())} can be"),
+                        (inside, "meshes lie in the USD file (--meshes copy makes files of them)")):
+        if names:
+            notes.append(Note("warning", f"{what}: {comma_list(names, 4)}"))
+    return replace(robot, links=links, file=str(target)), files, notes
+
+
+def _is_text(path: Path | None) -> bool:
+    """Whether a file is an STL of the kind that is text."""
+    if path is None or path.suffix.lower() != ".stl":
+        return False
+    with path.open("rb") as file:
+        head = file.read(84)
+    return head.startswith(b"solid") and path.stat().st_size != 84 + 50 * int.from_bytes(head[80:84], "little")
+
+
+def written(files: dict[Path, Callable[[], bytes]]) -> list[Path]:
+    """Write them; those that are new. What is there with other content is not replaced; all or none are written."""
+    from .files import require_same, write_whole
+
+    new: list[Path] = []
+    size = 0
+    try:
+        for path, content in files.items():
+            data = content()
+            size += len(data)
+            if size > LARGEST_MESHES:
+                raise BadRequest("bytes of all meshes together", size, f"up to {LARGEST_MESHES}")
+            require_same(path, data)
+            if not path.exists():
+                path.parent.mkdir(exist_ok=True)
+                new.append(path)
+                write_whole(path, data)
+    except (OSError, HrsynthError) as error:
+        taken_back(new)
+        if isinstance(error, HrsynthError):
+            raise
+        raise BadRequest(f"cannot copy a mesh: {error.strerror}", str(error.filename)) from None
+    return new
+
+
+def taken_back(new: list[Path]) -> None:
+    """Remove what :func:`written` wrote."""
+    for path in new:
+        path.unlink(missing_ok=True)
+    for folder in {path.parent for path in new}:
+        if folder.is_dir() and not any(folder.iterdir()):
+            folder.rmdir()

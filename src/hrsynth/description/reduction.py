@@ -19,12 +19,11 @@ from .tree import is_connected, spanning
 
 
 def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[JointType],
-           driven: Collection[JointType] = (), *, content: bool = True) -> tuple[Mechanism, tuple[Note, ...]]:
+           driven: Collection[JointType] = ()) -> tuple[Mechanism, tuple[Note, ...]]:
     """The mechanism with tree joints of types ``tree`` and loops of types ``loops`` (with a motor: ``driven``) only;
     and what is lost.
 
-    ``content`` says whether the dialect keeps what links hold besides. Raises ``BadRequest`` where a link in between
-    would take the name of another.
+    Raises ``BadRequest`` where a link in between would take the name of another.
     """
     given = spanning(_without_idle_joints(mechanism) if JointType.FREE not in tree else mechanism)
     links, joints = dict(given.links), {}
@@ -61,7 +60,7 @@ def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[
         put(replace(joint, successor=name, in_tree=True))
         weld = Joint(joint.name + WELD, JointType.FIXED, name, joint.successor, joint.point, in_tree=False)
         joints[weld.name] = weld
-    return replace(given, links=links, joints=joints), tuple(_lost(given, content))
+    return replace(given, links=links, joints=joints), tuple(_lost(given))
 
 
 def _without_idle_joints(mechanism: Mechanism) -> Mechanism:
@@ -72,14 +71,11 @@ def _without_idle_joints(mechanism: Mechanism) -> Mechanism:
     return mechanism
 
 
-def _lost(mechanism: Mechanism, content: bool) -> list[Note]:
+def _lost(mechanism: Mechanism) -> list[Note]:
     found = []
     other = [o.leg for o in mechanism.observations if type(o) is not Direction]
     if other:
         found.append(Note("warning", "observations that are not directions are not written: legs " + ", ".join(other)))
-    if not content and (mechanism.xml or any(link.xml for link in mechanism.links.values())
-                        or any(joint.xml for joint in mechanism.joints.values())):
-        found.append(Note("warning", "geometry, inertia and other content of links and joints is not written"))
     return found
 
 

@@ -4,4 +4,4 @@ from __future__ import annotations
 
 from ...dialect import Dialect
 
-DIALECT = Dialect("mjcf", lambda file: file.tag == "mujoco", (".xml", ".mjcf"))
+DIALECT = Dialect("mjcf", lambda file: file.tag == "mujoco", (".xml", ".mjcf"), meshes=(".stl", ".obj", ".msh"))

@@ -15,6 +15,7 @@ from ...elements import XmlReader
 from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec
 from ...postures import from_keyframe
 from ..paired import onshape_pairs, other_pairs
+from .content import BodyContents
 from .defaults import Compiler, Defaults, with_includes
 
 WORLD = "world"
@@ -43,6 +44,7 @@ class _MjcfReader(XmlReader):
         root = self.root
         self.compiler = Compiler.of(self)
         self.defaults = Defaults(self)
+        self.contents = BodyContents(self, self.compiler, self.defaults)
         graph = self.result = JointGraph(root.get("model") or "robot", self.file, "MJCF")
         graph.links[WORLD] = Link(WORLD)
         graph.base = WORLD
@@ -90,7 +92,7 @@ class _MjcfReader(XmlReader):
         if name in graph.links:
             self.defect(xml.line(element), "second body of the same name", name)
             return
-        graph.links[name] = Link(name, line=xml.line(element))
+        graph.links[name] = Link(name, xml=self.contents.of(element, childclass), line=xml.line(element))
         self.placed[name] = self.placed[parent] @ X_PB
         joints = [child for child in xml.children(element) if child.tag in ("joint", "freejoint")]
         if not joints:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 from lxml import etree
 
@@ -11,10 +13,12 @@ from ....mechanism.model import Joint, JointType, Mechanism, Note
 from ... import numerals, xml
 from ...annotations import PREFIX, annotations_of
 from ...chains import SECOND
+from ...contents import SIZES, unsaid
 from ...dialect import Written
 from ...jointgraph import comma_list
 from ...reduction import reduce, require_free_world
 from ...tree import outward
+from .content import elements
 
 _TREE = (JointType.REVOLUTE, JointType.PRISMATIC, JointType.SPHERICAL, JointType.FIXED)
 _LOOPS = (JointType.SPHERICAL, JointType.FIXED, JointType.REVOLUTE)
@@ -30,17 +34,19 @@ def write(mechanism: Mechanism) -> Written:
     """
     floats = all(joint.predecessor == mechanism.base for joint in mechanism.joints.values()
                  if joint.type is JointType.FREE)
-    robot, lost = reduce(mechanism, (*_TREE, JointType.FREE) if floats else _TREE, _LOOPS, content=False)
+    robot, lost = reduce(mechanism, (*_TREE, JointType.FREE) if floats else _TREE, _LOOPS)
     require_free_world(robot, WORLD, "MJCF")
     custom = [xml.new("text", name=f"{PREFIX}_{key}_{number}", data=text)
               for number, (key, text) in enumerate(annotations_of(robot), 1)]
     loops = [element for joint in robot.joints.values() if not joint.in_tree for element in _closure(robot, joint)]
     motors = [xml.new("motor", name=joint.motor.name, joint=joint.name) for joint in robot.joints.values()
               if joint.motor is not None and joint.type is not JointType.FIXED]
-    sections = {"custom": custom, "worldbody": _bodies(robot), "equality": [*loops, *_gears(robot)], "actuator": motors}
+    inner, assets, odd = elements(robot)
+    sections = {"custom": custom, "asset": assets, "worldbody": _bodies(robot, inner),
+                "equality": [*loops, *_gears(robot)], "actuator": motors}
     root = xml.new("mujoco", xml.new("compiler", angle="radian", boundmass="0.001", boundinertia="0.000001"),
                    *(xml.new(tag, *elements) for tag, elements in sections.items() if elements), model=robot.name)
-    return Written((xml.text_of(root),), (*lost, *_lost(robot)))
+    return Written((xml.text_of(root),), (*lost, *_lost(robot), *odd, *unsaid(robot, SIZES, dialect="MJCF")))
 
 
 def _lost(robot: Mechanism) -> list[Note]:
@@ -58,12 +64,13 @@ def _lost(robot: Mechanism) -> list[Note]:
     return found
 
 
-def _bodies(robot: Mechanism) -> list[xml.Element]:
-    """The bodies that hang on the world, each holding those that hang on it."""
+def _bodies(robot: Mechanism, inner: Mapping[str, list[xml.Element]]) -> list[xml.Element]:
+    """The bodies that hang on the world, each holding what is its own and those that hang on it."""
     world = xml.new("worldbody")
-    elements = {robot.base: world}
+    bodies = {robot.base: world}
     if robot.base != WORLD:
-        elements[robot.base] = etree.SubElement(world, "body", name=robot.base)
+        bodies[robot.base] = etree.SubElement(world, "body", name=robot.base)
+    bodies[robot.base].extend(each for each in inner[robot.base] if robot.base != WORLD or each.tag == "geom")
     for joint in outward(robot):
         X = inverse(robot.links[joint.predecessor].pose) @ robot.links[joint.successor].pose
         body = xml.new("body", name=joint.successor)
@@ -73,8 +80,9 @@ def _bodies(robot: Mechanism) -> list[xml.Element]:
             body.set("quat", numerals.exact_vector(quaternions(X[:3, :3])))
         if joint.type is not JointType.FIXED:
             body.append(_joint(robot, joint))
-        (world if joint.type is JointType.FREE else elements[joint.predecessor]).append(body)
-        elements[joint.successor] = body
+        body.extend(inner[joint.successor])
+        (world if joint.type is JointType.FREE else bodies[joint.predecessor]).append(body)
+        bodies[joint.successor] = body
     return list(world)
 
 

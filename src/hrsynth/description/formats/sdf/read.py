@@ -19,6 +19,7 @@ from ...jointgraph import ORIGIN, FrameSpec, JointGraph
 from ...postures import value_of
 from ..extensions import read_drake, read_plugins
 from ..paired import onshape_pairs, other_pairs
+from .content import read_content
 from .joint import JointFrames, add, guess_motors, name_gears, numbers, pose_of, text
 
 MODEL, WORLD = "__model__", "world"
@@ -160,7 +161,7 @@ class _SdfReader(XmlReader):
                 self.defect(xml.line(element), f"second <{element.tag}> of the same name", name)
                 continue
             if element.tag == "link":
-                self.result.links[name] = Link(name, line=xml.line(element))
+                self.result.links[name] = Link(name, xml=read_content(self, element), line=xml.line(element))
             if element.tag == "model":
                 self.frames[name + "::" + MODEL] = frame
                 self._collect(element, name + "::", depth + 1)

@@ -6,13 +6,14 @@ import numpy as np
 from lxml import etree
 
 from ....errors import BadRequest
-from ....geometry.so3 import quaternions
-from ....geometry.vectors import Array, inverse, pose
+from ....geometry.vectors import inverse, pose
 from ....mechanism.model import Joint, JointType, Mechanism, Note
 from ... import numerals, xml
 from ...annotations import NAMESPACE, PREFIX, annotations_of
+from ...contents import SIZES, content_of, unsaid
 from ...dialect import Written
 from ...reduction import reduce, require_free_world
+from .content import write_content, write_pose
 
 _NAMES = {JointType.REVOLUTE: "revolute", JointType.PRISMATIC: "prismatic", JointType.SPHERICAL: "ball",
          JointType.UNIVERSAL: "universal", JointType.FIXED: "fixed"}
@@ -21,7 +22,7 @@ WORLD = "world"
 
 def write(mechanism: Mechanism) -> Written:
     """The SDFormat text of a mechanism, and warnings of what is lost."""
-    robot, lost = reduce(mechanism, tuple(_NAMES), tuple(_NAMES), tuple(_NAMES), content=False)
+    robot, lost = reduce(mechanism, tuple(_NAMES), tuple(_NAMES), tuple(_NAMES))
     require_free_world(robot, WORLD, "SDFormat")
     if robot.couplings:
         lost = (*lost, Note("warning", "SDFormat has no coupling of joints on different bodies; not written: "
@@ -31,7 +32,8 @@ def write(mechanism: Mechanism) -> Written:
     for link in robot.links.values():
         if link.name != WORLD:
             element = etree.SubElement(model, "link", name=link.name)
-            _pose(element, link.pose)
+            write_pose(element, link.pose)
+            write_content(element, content_of(link, robot))
     if robot.base != WORLD:
         weld = etree.SubElement(model, "joint", name=robot.fresh("to_world"), type="fixed")
         etree.SubElement(weld, "parent").text = WORLD
@@ -40,17 +42,7 @@ def write(mechanism: Mechanism) -> Written:
         _joint(model, robot, joint)
     for key, text in annotations_of(robot, motors=True):
         etree.SubElement(model, f"{{{NAMESPACE}}}{key}").text = text
-    return Written((xml.text_of(root),), lost)
-
-
-def _pose(parent: xml.Element, X: Array) -> None:
-    """Append a ``<pose>`` unless it says nothing."""
-    position = numerals.exact_vector(X[:3, 3])
-    if not np.array_equal(X[:3, :3], np.eye(3)):
-        turn = numerals.exact_vector(quaternions(X[:3, :3])[[1, 2, 3, 0]])
-        etree.SubElement(parent, "pose", rotation_format="quat_xyzw").text = f"{position} {turn}"
-    elif np.any(X[:3, 3]):
-        etree.SubElement(parent, "pose").text = f"{position} 0 0 0"
+    return Written((xml.text_of(root),), (*lost, *unsaid(robot, SIZES, dialect="SDFormat")))
 
 
 def _joint(model: xml.Element, robot: Mechanism, joint: Joint) -> None:
@@ -61,7 +53,7 @@ def _joint(model: xml.Element, robot: Mechanism, joint: Joint) -> None:
     if joint.successor == WORLD:
         raise BadRequest(f"{robot.name}: joint {joint.name!r} has the world for its successor", WORLD, "a link")
     etree.SubElement(element, "child").text = joint.successor
-    _pose(element, pose((inverse(robot.links[joint.successor].pose) @ np.append(joint.point, 1.0))[:3]))
+    write_pose(element, pose((inverse(robot.links[joint.successor].pose) @ np.append(joint.point, 1.0))[:3]))
     for tag, axis in zip(("axis", "axis2"), joint.axes, strict=False):
         part = etree.SubElement(element, tag)
         etree.SubElement(part, "xyz", expressed_in="__model__").text = numerals.axis(axis)

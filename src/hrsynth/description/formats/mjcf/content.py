@@ -1,0 +1,192 @@
+"""Masses and shapes of MJCF's bodies, and the files of their meshes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path, PurePosixPath
+
+import numpy as np
+
+from ....geometry.so3 import quaternions
+from ....geometry.vectors import Array, frozen, pose
+from ....mechanism.model import Mechanism, Note
+from ... import numerals, xml
+from ...contents import Content, Inertial, Solid, along_z, content_of, fragments, principal
+from ...elements import XmlReader
+from ...jointgraph import comma_list
+from .defaults import Compiler, Defaults
+
+_NAMES = {"box": "box", "sphere": "sphere", "cylinder": "cylinder", "capsule": "capsule"}
+
+
+@dataclass
+class BodyContents:
+    """What a document says of its bodies' masses and shapes; what is not right in it is left out."""
+
+    reader: XmlReader
+    compiler: Compiler
+    defaults: Defaults
+    meshes: dict[str, tuple[str, tuple[float, ...]]] = field(default_factory=dict)
+    """File and scale of each mesh, by its name."""
+    colours: dict[str, str] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        root, folder = self.reader.root, ""
+        for each in root.findall("compiler"):
+            folder = each.get("meshdir", each.get("assetdir", folder))
+        for each in root.iterfind("asset/material"):
+            self.colours[each.get("name", "")] = self.defaults.of(each, None).get("rgba", "")
+        for each in root.iterfind("asset/mesh"):
+            given = self.defaults.of(each, None)
+            if file := given.get("file"):
+                scale = _numbers(given.get("scale"), (1.0, 1.0, 1.0))
+                self.meshes[given.get("name") or PurePosixPath(file).stem] = (
+                    str(PurePosixPath(folder) / file), scale or (1.0, 1.0, 1.0))
+
+    def of(self, body: xml.Element, childclass: str | None) -> tuple[str, ...]:
+        """The content of a body, as URDF has it: a shape that both is seen and collides is two."""
+        inertial, solids, before = None, list[Solid](), len(self.reader.defects)
+        for element in xml.children(body):
+            if element.tag == "inertial" and inertial is None:
+                inertial = self._inertial(element)
+            elif element.tag == "geom":
+                solids += self._solids(element, self.defaults.of(element, childclass))
+        del self.reader.defects[before:]
+        return fragments(Content(inertial, tuple(solids)))
+
+    def _place(self, element: xml.Element) -> Array | None:
+        before = len(self.reader.defects)
+        X = self.compiler.pose(element)
+        return None if len(self.reader.defects) > before else frozen(X)
+
+    def _inertial(self, element: xml.Element) -> Inertial | None:
+        mass, X = _numbers(element.get("mass"), (0.0,)), self._place(element)
+        six, three = _numbers(element.get("fullinertia"), (0.0,) * 6), _numbers(element.get("diaginertia"), (0.0,) * 3)
+        if mass is None or X is None or six is None or three is None:
+            return None
+        a, b, c, d, e, f = six if element.get("fullinertia") else (*three, 0.0, 0.0, 0.0)
+        inertia = frozen([[a, d, e], [d, b, f], [e, f, c]])
+        return Inertial(mass[0], X, inertia if np.any(inertia) else None)
+
+    def _solids(self, element: xml.Element, given: Mapping[str, str]) -> list[Solid]:
+        kind, X = given.get("type", "mesh" if "mesh" in given else "sphere"), self._place(element)
+        group = given.get("group", "0")
+        roles = ["visual"] if given.get("contype") == given.get("conaffinity") == "0" else (
+            ["collision"] if group.isdecimal() and int(group) >= 3 else ["visual", "collision"])
+        colour = _numbers(given.get("rgba", self.colours.get(given.get("material", "")) or None), (0.0,) * 4)
+        shown = given.get("rgba") or self.colours.get(given.get("material", ""))
+        sizes = _sizes(given.get("size", ""))
+        ends = _numbers(given.get("fromto"), (0.0,) * 6) if "fromto" in given else None
+        if X is None or (kind != "mesh" and kind not in _NAMES):
+            return []
+        if ends is not None and kind in ("cylinder", "capsule") and sizes:
+            a, b = np.array(ends[:3]), np.array(ends[3:])
+            if not np.linalg.norm(b - a) > 0:
+                return []
+            X, sizes = frozen(pose((a + b) / 2, along_z(b - a))), (sizes[0], float(np.linalg.norm(b - a)) / 2)
+        if kind == "mesh":
+            if given.get("mesh") not in self.meshes:
+                return []
+            file, scale = self.meshes[given["mesh"]]
+            return [Solid(kind, (), X, role, given.get("name"), colour if shown and role == "visual" else None, file,
+                          scale) for role in roles]
+        count = {"box": 3, "sphere": 1}.get(kind, 2)
+        if len(sizes) < count or not all(size > 0 for size in sizes[:count]):
+            return []
+        whole = {"box": tuple(2 * size for size in sizes[:3]), "sphere": sizes[:1]}.get(
+            kind, (sizes[0], 2 * sizes[-1 if count == 1 else 1]))
+        return [Solid(kind, whole, X, role, given.get("name"), colour if shown and role == "visual" else None)
+                for role in roles]
+
+
+def _sizes(text: str) -> tuple[float, ...]:
+    try:
+        return tuple(float(v) for v in numerals.parse(text, len(text.split())))
+    except ValueError:
+        return ()
+
+
+def _numbers(text: str | None, default: tuple[float, ...]) -> tuple[float, ...] | None:
+    """The numbers of a text, the default where there is none, None where it is not right."""
+    if text is None:
+        return default
+    try:
+        return tuple(float(v) for v in numerals.parse(text, len(default)))
+    except ValueError:
+        return None
+
+
+def elements(robot: Mechanism) -> tuple[dict[str, list[xml.Element]], list[xml.Element], list[Note]]:
+    """The elements of each body, the meshes as assets, and notes of what MuJoCo does not take."""
+    assets: dict[tuple[str, tuple[float, ...]], str] = {}
+    found: dict[str, list[xml.Element]] = {}
+    names: set[str] = set()
+    odd = []
+    for link in robot.links.values():
+        content, own = content_of(link, robot), []
+        if content.inertial is not None:
+            element = _inertial_element(content.inertial)
+            if element is None:
+                odd.append(link.name)
+            else:
+                own.append(element)
+        for solid in content.solids:
+            own.append(_geom(solid, assets, names))
+        found[link.name] = own
+    notes = [Note("warning", "masses and inertias that no body can have are not written: " + comma_list(odd))] if odd \
+        else []
+    meshes = [xml.new("mesh", name=name, file=file) if scale == (1.0, 1.0, 1.0) else
+              xml.new("mesh", name=name, file=file, scale=numerals.exact_vector(scale))
+              for (file, scale), name in assets.items()]
+    return found, meshes, notes
+
+
+def _inertial_element(inertial: Inertial) -> xml.Element | None:
+    """MuJoCo takes positive masses, and moments that each are no more than the two others together."""
+    if not inertial.mass > 0:
+        return None
+    element = xml.new("inertial", pos=numerals.exact_vector(inertial.X[:3, 3]), mass=numerals.exact(inertial.mass))
+    if inertial.inertia is None:
+        element.set("diaginertia", "0 0 0")
+        return element
+    moments, _ = principal(inertial.inertia)
+    least, middle, most = sorted(moments)
+    if not (least > 0 and least + middle >= most):
+        return None
+    if not np.array_equal(inertial.X[:3, :3], np.eye(3)):
+        R = inertial.X[:3, :3]
+        tensor = R @ inertial.inertia @ R.T
+    else:
+        tensor = inertial.inertia
+    six = (*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2])
+    element.set("fullinertia", numerals.exact_vector(six))
+    return element
+
+
+def _geom(solid: Solid, assets: dict[tuple[str, tuple[float, ...]], str], names: set[str]) -> xml.Element:
+    element = xml.new("geom", type=solid.kind, mass="0")
+    if solid.name and solid.name not in names:
+        names.add(solid.name)
+        element.set("name", solid.name)
+    if solid.file is not None:
+        stem, number, key = Path(solid.file).stem, 2, (solid.file, solid.scale)
+        name = assets.get(key, stem)
+        while key not in assets and name in assets.values():
+            name, number = f"{stem}_{number}", number + 1
+        element.set("mesh", assets.setdefault(key, name))
+    else:
+        sizes = solid.sizes
+        half = {"box": tuple(size / 2 for size in sizes), "sphere": sizes}.get(solid.kind, (sizes[0], sizes[-1] / 2))
+        element.set("size", numerals.exact_vector(half))
+    if np.any(solid.X[:3, 3]):
+        element.set("pos", numerals.exact_vector(solid.X[:3, 3]))
+    if not np.array_equal(solid.X[:3, :3], np.eye(3)):
+        element.set("quat", numerals.exact_vector(quaternions(solid.X[:3, :3])))
+    if solid.role == "visual":
+        element.set("contype", "0")
+        element.set("conaffinity", "0")
+        if solid.colour is not None:
+            element.set("rgba", numerals.exact_vector(solid.colour))
+    element.set("group", "2" if solid.role == "visual" else "3")
+    return element
