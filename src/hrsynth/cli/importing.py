@@ -135,6 +135,8 @@ class _Dialog:
         mechanism = self._mechanism()
         if mechanism is None:
             return None
+        if self.source["unit"] is None and any("--unit" in note.text for note in mechanism.notes):
+            mechanism = self._ask_unit(mechanism)
         self._show_robot(mechanism)
         if self.observe is None and (seen := self._ask_segments(mechanism)) is not None:
             self.observe = seen
@@ -147,8 +149,9 @@ class _Dialog:
 
         given = self.source
         with Progress():
-            return choices(self.path, Overrides(None, None, names(given["motors"]), tuple(given["close"] or ()),
-                                                tuple(name for name in given["freeze"].split(",") if name)))
+            return choices(self.path, Overrides(
+                given["base"], None, names(given["motors"]), tuple(given["close"] or ()),
+                tuple(name for name in given["freeze"].split(",") if name), unit=given["unit"]))
 
     def _mechanism(self) -> Mechanism | None:
         """The robot as answered; what is wrong is said, and there is none."""
@@ -174,6 +177,8 @@ class _Dialog:
 
     def _ask_closures(self, found: ImportChoices) -> None:
         """Frames to join, on top of what the file closes."""
+        from ..description.overrides import closures
+
         closing, near = found.closing, found.candidates
         typer.echo(f"\nLoops: {len(closing) or 'none'} closed by the file")
         _list([f"{joint.name}: {joint.links[0]} to {joint.links[1]}, {_word(joint)}" for joint in closing], "-")
@@ -185,7 +190,7 @@ class _Dialog:
 
         def chosen(text: str) -> list[str]:
             wishes = []
-            for word in _words(text):
+            for word in _words(text) if "@" not in text else closures(text):
                 number, _, kind = word.partition(":")
                 if number.isdecimal():
                     wishes.append(near[_number(number, len(near)) - 1].wish + (f":{kind}" if kind else ""))
@@ -195,8 +200,9 @@ class _Dialog:
             self._found()
             return wishes
 
-        self.source["close"] = _answer("Which are to be closed? Numbers, 2:revolute for a hinge about z, A:B[:TYPE] "
-                                       "for others", "none", lambda text: [] if text == "none" else chosen(text))
+        self.source["close"] = _answer(
+            "Which are to be closed? Numbers, 2:revolute for a hinge about z, A:B[:TYPE] or A@x,y,z:B for others",
+            "none", lambda text: [] if text == "none" else chosen(text))
 
     def _ask_base(self, found: ImportChoices) -> None:
         typer.echo(f"\nBase: {found.bases[0]}" + (f", of {len(found.bases)} that no joint carries"
@@ -238,6 +244,19 @@ class _Dialog:
                    f"span {span:.4g} m")
         for note in mechanism.notes:
             typer.echo(f"  {note}")
+
+    def _ask_unit(self, mechanism: Mechanism) -> Mechanism:
+        from ..description.overrides import UNITS
+
+        def meant(text: str) -> str:
+            if text not in UNITS:
+                raise ValueError(", ".join(UNITS))
+            return text
+
+        typer.echo(f"\nLengths: the robot's characteristic length would be {mechanism.length:.3g} m")
+        unit = _answer(f"In which unit is the file? {', '.join(UNITS)}", "m", meant)
+        self.source["unit"] = None if unit == "m" else unit
+        return mechanism if unit == "m" else self._mechanism() or mechanism
 
     def _ask_segments(self, mechanism: Mechanism) -> str | None:
         segments = _segments(mechanism)

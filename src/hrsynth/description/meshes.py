@@ -171,7 +171,7 @@ def written(files: dict[Path, Callable[[], bytes]]) -> list[Path]:
         taken_back(new)
         if isinstance(error, HrsynthError):
             raise
-        raise BadRequest(f"cannot copy a mesh: {error.strerror}", str(error.filename)) from None
+        raise BadRequest(f"a mesh is not copied: {error.strerror}", str(error.filename)) from None
     return new
 
 

@@ -193,3 +193,17 @@ def test_a_half_written_robot_leaves_no_meshes(tmp_path: Path, monkeypatch: pyte
     with pytest.raises(BadRequest, match="no room"):
         save(robot, tmp_path / "out" / "robot.sdf", meshes="copy")
     assert list((tmp_path / "out").iterdir()) == []
+
+
+def test_a_unit_is_that_of_shapes_too_and_inertias_stay_as_told(tmp_path: Path):
+    robot = filled(tmp_path)
+    small = load(tmp_path / "src" / "robot.urdf", unit="mm")
+    assert any("inertias" in note.text for note in small.notes)
+    for name, link in robot.links.items():
+        one, two = content_of(link, robot), content_of(small.links[name], small)
+        assert two.inertial.mass == one.inertial.mass
+        assert two.inertial.X[:3, 3] == pytest.approx(one.inertial.X[:3, 3] / 1000)
+        assert np.array_equal(two.inertial.inertia, one.inertial.inertia)
+        for a, b in zip(one.solids, two.solids, strict=True):
+            assert b.sizes == pytest.approx(np.array(a.sizes) / 1000)
+            assert b.scale == pytest.approx(np.array(a.scale) / (1000 if a.file else 1))

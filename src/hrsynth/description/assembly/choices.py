@@ -51,7 +51,7 @@ def choices(path: Path, overrides: Overrides) -> ImportChoices:
     closures.join_halves(graph)
     overrides.apply(graph)
     closures.merge_points(graph)
-    base = graph.base or guess.base(graph)
+    base = guess.standing(graph, graph.base or guess.base(graph), overrides.base)
     graph.prune(base)
     carried = {joint.links[1] for joint in graph.joints.values() if joint.in_tree}
     bases = dict.fromkeys([base, *(link for link in graph.links if link not in carried)])
