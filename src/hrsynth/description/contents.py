@@ -6,7 +6,7 @@ write what :func:`content_of` finds in them. Metres, kilograms, radians; all pos
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -208,10 +208,13 @@ def along_z(direction: Array) -> Array:
     return np.column_stack((x, np.cross(z, x), z))
 
 
-def unsaid(robot: Mechanism, kinds: Iterable[str], *, dialect: str) -> list[Note]:
-    """A note for each sort of content that a dialect has no words for; ``kinds`` are the shapes that it has."""
+def unsaid(robot: Mechanism, kinds: Collection[str], *, dialect: str) -> list[Note]:
+    """A note of all the content that a dialect has no words for; ``kinds`` are the shapes that it has (none: no masses
+    either)."""
     found = []
     contents = {name: content_of(link, robot) for name, link in robot.links.items()}
+    if not kinds and any(content.inertial is not None for content in contents.values()):
+        found.append("masses and inertias")
     other = sorted({_tag(each) for content in contents.values() for each in content.rest})
     if other:
         found.append(f"{', '.join(other)} of links")
