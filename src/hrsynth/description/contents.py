@@ -6,7 +6,7 @@ write what :func:`content_of` finds in them. Metres, kilograms, radians; all pos
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
