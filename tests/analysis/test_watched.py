@@ -11,7 +11,10 @@ from hrsynth import check, legs, select
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.description import load
 from hrsynth.geometry.so3 import exponential
+from hrsynth.mechanism.legs import decompose
+from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.pose import Pose
+from hrsynth.mechanism.sensors import defaults_of
 from oracle import Oracle
 
 WHY = {"quattro": "the first of the parallel rods before the platform",
@@ -79,3 +82,37 @@ def test_half_a_turn_is_printed_as_a_positive_one():
         motion = ObservedRobot.of("3rrr_m1").telling([Pose.parse("phi=10deg")]).motion
         assert str(motion.pose(turned @ motion.home)).endswith("phi=180deg")
     assert Pose.parse("phi=-180deg").phi == -math.pi
+
+
+def with_connectors(skew: float, short: float, seed: int) -> str:
+    """A translating robot on three legs R-U-U, each U two hinges at a connector of length ``short``, its axes ``skew``
+    off a right angle, in a turned base."""
+    rng = np.random.default_rng(seed)
+    q = rng.normal(size=4)
+    arm, rod = rng.uniform(0.2, 0.3, 3), rng.uniform(0.3, 0.5, 3)
+    legs = []
+    for k in range(3):
+        a = math.pi * k / 3
+        cross = f"{math.cos(skew)} {math.sin(skew)} 0"
+        legs.append(f"""<body quat="{math.cos(a)} 0 0 {math.sin(a)}"><body name="arm{k}" pos="0.2 0 0">
+ <joint name="m{k}" axis="0 1 0"/><body name="c{k}" pos="{arm[0]} 0 {-arm[1]}"><joint name="u{k}" axis="0 1 0"/>
+ <body name="rod{k}" pos="{short} 0 0"><joint name="v{k}" axis="{cross}"/>
+ <body name="d{k}" pos="{-rod[0]} 0.02 {-rod[1]}"><joint name="w{k}" axis="{cross}"/>
+ <body name="e{k}" pos="{short} 0 0"><joint name="x{k}" axis="0 1 0"/></body></body></body></body></body></body>""")
+    welds = "".join(f'<weld body1="e{k}" body2="plate"/>' for k in range(3))
+    motors = "".join(f'<motor joint="m{k}"/>' for k in range(3))
+    return f"""<mujoco model="hinges"><compiler angle="radian"/><worldbody><body name="frame" quat="{q[0]} {q[1]} {q[2]}
+ {q[3]}">{"".join(legs)}<body name="plate"><freejoint/></body></body></worldbody><equality>{welds}</equality>
+ <actuator>{motors}</actuator></mujoco>"""
+
+
+@pytest.mark.parametrize(("skew", "short"), [(0.0, 0.0), (0.0, 1e-6), (0.3, 0.0), (0.3, 1e-6), (-0.5, 1e-7)])
+def test_a_connector_of_no_length_is_never_watched(skew: float, short: float, tmp_path):
+    (tmp_path / "robot.xml").write_text(with_connectors(skew, short, 5))
+    robot = load(tmp_path / "robot.xml", platform="plate")
+    for number, leg in enumerate(decompose(normal_form(robot).mechanism).legs):
+        seen = defaults_of(decompose(normal_form(robot).mechanism))[leg.label]
+        assert seen.link == f"rod{number}"
+        origins = [robot.links[link].pose for link in (f"rod{number}", f"e{number}")]
+        along = origins[0][:3, :3].T @ (origins[1][:3, 3] - origins[0][:3, 3])
+        assert np.allclose(seen.direction, along / np.linalg.norm(along), atol=1e-4)  # from U to U, as a camera sees it

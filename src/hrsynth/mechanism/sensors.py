@@ -3,12 +3,15 @@ joint."""
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
 import numpy as np
 
 from ..errors import BadRequest, HrsynthError, NoSegment
 from ..geometry import lines
 from ..geometry.vectors import Array, frozen, perpendicular, unit
-from ..tolerances import SAME_POINT
+from ..tolerances import NOISE, SAME_POINT
 from . import graphs
 from .composites import WordEdge
 from .legs import Leg, LegDecomposition
@@ -16,6 +19,7 @@ from .model import Joint, JointType, Mechanism
 from .normal import centre_pair
 from .observation import AngleEncoder, Direction, Encoder, LinePosition, Observation, SlideEncoder
 
+Place = TypeVar("Place")
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 
 
@@ -27,7 +31,7 @@ def default_observation(anatomy: LegDecomposition, leg: Leg) -> Direction:
 
 def _default(anatomy: LegDecomposition, leg: Leg) -> tuple[Direction, str]:
     """The default segment of a leg, and why it is that one."""
-    segments = _Segments(anatomy, leg)
+    segments = _Segments(anatomy, leg, NOISE)
     path, nodes, base = segments.path, segments.nodes, anatomy.mechanism.base
     for i, edge in enumerate(path):
         joint = segments.joint(edge)
@@ -36,11 +40,26 @@ def _default(anatomy: LegDecomposition, leg: Leg) -> tuple[Direction, str]:
     if leg.takes_platform:
         return segments.binary(anatomy.mechanism.platform), "the platform is the last segment of this leg"
     if path[-1].inside:
-        found = segments.binary(path[-1].inside[0])
-        return found, "the first of the parallel rods before the platform"
+        rod = _first(segments.binary, path[-1].inside)
+        return rod, "the first of the parallel rods before the platform"
     if len(nodes) < 3:
         raise NoSegment(f"leg {leg.label} has no segment to observe: it is one joint", path[-1].joints[0])
-    return segments.at(len(nodes) - 2), "the last segment before the platform"
+    found = _first(segments.at, range(len(nodes) - 2, 0, -1))
+    short = "" if found.link == nodes[-2] else " that has a length"
+    return found, f"the last segment before the platform{short}"
+
+
+def _first(segment: Callable[[Place], Direction], places: Sequence[Place]) -> Direction:
+    """The first of some segments that has a length: what joins the two R of a U, oblique ones too, has none; raises
+    ``NoSegment`` for the first where none has."""
+    refused: NoSegment | None = None
+    for place in places:
+        try:
+            return segment(place)
+        except NoSegment as error:
+            refused = refused or error
+    assert refused is not None
+    raise refused
 
 
 def reason(anatomy: LegDecomposition, seen: Observation) -> str:
@@ -82,7 +101,9 @@ def observation_of(anatomy: LegDecomposition, link: str) -> Direction:
 class _Segments:
     """The directions of a leg's segments: links on its ``path``, between ``nodes``."""
 
-    def __init__(self, anatomy: LegDecomposition, leg: Leg) -> None:
+    def __init__(self, anatomy: LegDecomposition, leg: Leg, least: float = SAME_POINT) -> None:
+        """``least`` is the length (characteristic lengths) up to which a segment has none."""
+        self.least = least
         self.mechanism, self.leg, self.path = anatomy.mechanism, leg, anatomy.path(leg)
         self.nodes = [self.mechanism.base]
         for edge in self.path:
@@ -95,9 +116,21 @@ class _Segments:
             if joint is not None and joint.type.slides:
                 return self.along(self.nodes[place], joint, i)
         link = self.nodes[place]
-        a, b = (self._end(self.path[i], link) for i in (place - 1, place))
+        a, b = self._centre(place - 1, link, place - 2), self._centre(place, link, place + 1)
         start, end = centre_pair(a, b) if isinstance(a, Joint) and isinstance(b, Joint) else (_foot(a, b), _foot(b, a))
         return self._direction(link, end - start)
+
+    def _centre(self, place: int, link: str, beyond: int) -> Joint | Array:
+        """The end of a link at a place of the path; the point where two passive R meet (a U that is oblique or of
+        rounded numbers), where the connector between them has no length. ``beyond`` is the place of the second."""
+        end = self._end(self.path[place], link)
+        other = self.joint(self.path[beyond]) if 0 <= beyond < len(self.path) else None
+        pair = [each for each in (end, other) if isinstance(each, Joint) and each.type is JointType.REVOLUTE
+                and not each.actuated]
+        if len(pair) < 2:
+            return end
+        meeting = lines.meeting_point([(each.point, each.axis) for each in pair], NOISE * self.mechanism.length)
+        return end if meeting is None else meeting
 
     def binary(self, link: str) -> Direction:
         """That of a binary link: from the joint nearer to the base to the other."""
@@ -133,7 +166,7 @@ class _Segments:
         return self.joint(edge) or np.mean([joints[n].point for n in edge.joints if link in joints[n].links], axis=0)
 
     def _direction(self, link: str, vector: Array) -> Direction:
-        if np.linalg.norm(vector) <= SAME_POINT * self.mechanism.length:
+        if np.linalg.norm(vector) <= self.least * self.mechanism.length:
             raise NoSegment(f"the observed segment {link!r} of leg {self.leg.label} has no length",
                             float(np.linalg.norm(vector)), "two joint centres apart from each other")
         return Direction(self.leg.label, link, self.mechanism.links[link].pose[:3, :3].T @ unit(vector))
