@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -186,3 +187,59 @@ def test_postures_of_srdf_and_sdf(tmp_path: Path):
     assert np.allclose(other.links["upper"].pose[:3, 0], exponential(np.array([0, -0.5, 0]))[:, 0])
     with pytest.raises(BadRequest, match="ready"):
         load(elsewhere, keyframe="sleep")
+
+
+def five_bar(bearer: str, *, seed: int = 0, more: str = "") -> str:
+    """A five-bar in a turned plane on a carriage that ``bearer`` bears."""
+    rng = np.random.default_rng(seed)
+    turned = numbers(*quaternions(exponential(rng.normal(size=3))))
+    return f"""<mujoco model="cart"><compiler angle="radian"/><worldbody><body name="stand" quat="{turned}">
+ <body name="carriage">{bearer}
+  <body name="a1"><joint name="a1" axis="0 0 1"/><body name="b1" pos="0.1 0.3 0"><joint name="b1" axis="0 0 1"/></body>
+  </body>
+  <body name="a2" pos="0.4 0 0"><joint name="a2" axis="0 0 1"/>
+   <body name="b2" pos="0.05 0.25 0"><joint name="b2" axis="0 0 1"/></body></body></body></body>{more}</worldbody>
+ <equality><connect body1="b1" body2="b2" anchor="0.15 0.2 0"/></equality>
+ <actuator><motor joint="a1"/><motor joint="a2"/></actuator></mujoco>"""
+
+
+RAIL = '<joint name="rail" type="slide" axis="0 0 1"/>'
+
+
+@pytest.mark.parametrize("bearer", [RAIL, "<freejoint name='rail'/>",
+                                    RAIL + '<joint name="up" type="slide" axis="0 1 0"/>'])
+def test_what_bears_the_base_is_no_leg(bearer: str, tmp_path: Path):
+    robot = read(tmp_path, five_bar(bearer), "xml", platform="b2")
+    assert robot.base == "carriage"
+    assert "rail" not in robot.joints
+    assert any("it is the base" in note.text and "rail" in note.text for note in robot.notes)
+    fixed = read(tmp_path, five_bar(""), "xml", platform="b2", base="carriage")
+    assert [each.rank for each in legs(robot).sets] == [each.rank for each in legs(fixed).sets]
+    assert legs(robot).dof == legs(fixed).dof == 2
+
+
+def test_a_rail_is_kept_where_it_is_asked_for_or_a_part_of_a_loop(tmp_path: Path):
+    kept = read(tmp_path, five_bar(RAIL), "xml", platform="b2", base="stand")
+    assert ("rail" in kept.joints, legs(kept).dof) == (True, 3)
+    held = five_bar(RAIL, more='<body name="strut"><joint name="s" axis="1 0 0"/></body>').replace(
+        "<equality>", '<equality><connect body1="strut" body2="carriage" anchor="0 0.1 0"/>')
+    assert "rail" in read(tmp_path, held, "xml", platform="b2").joints
+    carried = five_bar("").replace('<body name="stand"', '<body name="stage"><joint name="rail" type="slide"/></body>'
+                                                         '<body name="stand"')
+    assert read(tmp_path, carried, "xml", platform="b2", base="carriage").base == "carriage"
+
+
+def test_feet_are_offered_as_platforms(tmp_path: Path):
+    text = leg(0)
+    body, closures = text.partition("  <body")[1:][0] + text.partition("  <body")[2], text.partition("<equality>")[2]
+    body, closures = body.partition("</body></worldbody>")[0], closures.partition("</equality>")[0]
+    sides = [[re.sub(r'\b(name|body1|body2)="', rf'\1="{side}_', part) for part in (body, closures)] for side in "lr"]
+    walker = ('<mujoco><compiler angle="radian"/><worldbody><body name="pelvis"><freejoint/>' + sides[0][0]
+              + sides[1][0] + "</body></worldbody><equality>" + sides[0][1] + sides[1][1] + "</equality></mujoco>")
+    with pytest.raises(BadRequest) as caught:
+        read(tmp_path, walker, "xml")
+    offered = str(caught.value).partition("such as ")[2].split(", ")
+    assert offered[:2] == ["l_foot", "r_foot"]
+    assert {"l_crank", "l_link", "r_crank", "r_link"} <= set(offered)
+    for name in offered[:3]:
+        assert read(tmp_path, walker, "xml", platform=name).platform == name

@@ -35,7 +35,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     closures.join_halves(graph)
     overrides.apply(graph)
     closures.merge_points(graph)
-    base = guess.standing(graph, graph.base or guess.base(graph), overrides.base)
+    base = guess.standing(graph, graph.base or guess.base(graph), overrides.base, overrides.platform)
     graph.prune(base)
     for role, link in (("base", overrides.base), ("platform", overrides.platform)):
         if link is not None and link not in graph.links:

@@ -1,7 +1,9 @@
-"""What a file leaves open, guessed by structure where that is safe: the base and the platform. Never by names."""
+"""What a file leaves open, guessed by structure where that is safe: the base and the platform. Never by names, which
+only order what is offered."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 
 from ...budgets import LARGEST_GUESSED
@@ -9,6 +11,8 @@ from ...errors import BadRequest
 from ...mechanism import graphs
 from ...mechanism.model import JointType
 from ..jointgraph import JointGraph, JointSpec
+
+_FOOT = re.compile("foot|toe|sole|tool|flange|hand|plat", re.IGNORECASE)
 
 
 def base(graph: JointGraph) -> str:
@@ -21,25 +25,51 @@ def base(graph: JointGraph) -> str:
     return free[0]
 
 
-def standing(graph: JointGraph, base: str, wanted: str | None) -> str:
+def standing(graph: JointGraph, base: str, wanted: str | None, platform: str | None = None) -> str:
     """The link from which a robot is read: its base; where the ``wanted`` one hangs on something else, the root of
-    that; of a robot with loops that only a free joint holds (``<freejoint>``), the link that floats."""
+    that; of a robot with loops that only a free joint holds (``<freejoint>``), the link that floats; where all hangs on
+    one slide and the loops begin at what slides, that link: a rail is no leg. ``platform`` is the one that is given."""
     bonds = graphs.adjacency(graph.links, (joint.links for joint in graph.joints.values()))
     if wanted is not None and wanted in graph.links and wanted not in graphs.component(bonds, base):
         base = wanted
         carriers = {joint.links[1]: joint.links[0] for joint in graph.joints.values() if joint.in_tree}
         for _ in carriers:
             base = carriers.get(base, base)
-    held = [joint for joint in graph.joints.values() if base in joint.links]
-    chain = all(joint.in_tree for joint in graph.joints.values())
-    if wanted == base or chain or len(held) != 1 or held[0].type is not JointType.FREE:
+    if all(joint.in_tree for joint in graph.joints.values()):
         return base
-    (free,) = held
-    trunk = next(link for link in free.links if link != base)
-    graph.note("guess", f"{trunk!r} floats on the free joint {free.name!r}: it is the base, and what it floats in is "
-                        "left out")
-    del graph.joints[free.name], graph.links[base]
-    return trunk
+    while wanted != base:
+        held = [joint for joint in graph.joints.values() if base in joint.links]
+        if len(held) != 1:
+            break
+        (bearer,) = held
+        trunk = next(link for link in bearer.links if link != base)
+        if bearer.type is JointType.FREE:
+            how = f"floats on the free joint {bearer.name!r}: it is the base, and what it floats in is left out"
+        elif bearer.type is JointType.PRISMATIC and _is_rail(graph, bearer, trunk, platform):
+            how = (f"slides on the rail {bearer.name!r}: it is the base, and what it slides on is left out "
+                   f"(--base {base} to keep it)")
+        else:
+            break
+        graph.note("guess", f"{trunk!r} {how}")
+        del graph.joints[bearer.name], graph.links[base]
+        base = trunk
+    return base
+
+
+def _is_rail(graph: JointGraph, slide: JointSpec, trunk: str, platform: str | None) -> bool:
+    """Whether the loops begin at what slides, or at what slides on that; a file that names its platform, and gears, are
+    taken at their word."""
+    if graph.platform is not None or platform == trunk or any(slide.name in (g.driver, g.driven) for g in graph.gears):
+        return False
+    import networkx as nx
+
+    on = [joint for joint in graph.joints.values() if trunk in joint.links and joint is not slide]
+    if len(on) == 1 and on[0].type is JointType.PRISMATIC:
+        return _is_rail(graph, on[0], next(link for link in on[0].links if link != trunk), platform)
+    bodies = _RigidBodies(graph, trunk)
+    rest: nx.Graph[str] = nx.Graph((a, b) for a, ends in bodies.near.items() for b in ends)
+    loops: list[set[str]] = list(map(set, nx.biconnected_components(rest)))  # type: ignore[arg-type]
+    return any(bodies.base in loop for loop in loops if len(loop) > 2)
 
 
 def platform(graph: JointGraph, base: str) -> str:
@@ -52,7 +82,7 @@ def platform(graph: JointGraph, base: str) -> str:
         raise BadRequest(f"{graph.file}: no link moves relative to the base", base, "a joint that is not fixed")
     body, why, rivals = bodies.platform()
     if body is None:
-        names = [bodies.title(each) for each in rivals]
+        names = bodies.offered(rivals)
         chain = "".join(f"; {note.text}" for note in graph.notes if note.kind == "open")
         raise BadRequest(f"{graph.file}: the file does not say which link is the platform, and several could be{chain}",
                          None, "--platform LINK, such as " + ", ".join(names[:12]) + (" …" if names[12:] else ""))
@@ -65,7 +95,7 @@ def platforms(graph: JointGraph, base: str) -> tuple[list[str], str]:
     """The link that is guessed and why, or the links among which nothing decides, and no reason."""
     bodies = _RigidBodies(graph, base)
     body, why, rivals = bodies.platform()
-    return [bodies.title(each) for each in (rivals if body is None else (body,))], why
+    return bodies.offered(rivals) if body is None else [bodies.title(body)], why
 
 
 class _RigidBodies:
@@ -107,6 +137,21 @@ class _RigidBodies:
         distance = graphs.distances(self.near, self.base)
         ends = [body for body in others if distance[body] == max(distance.values())]
         return (ends[0], "the farthest from the base", ()) if len(ends) == 1 else (None, "", ends)
+
+    def offered(self, rivals: Sequence[str]) -> list[str]:
+        """The links that may be the platform where nothing decides: open ends and what ends in a loop beside the
+        ``rivals``; those first whose names are those of feet and tools."""
+        import networkx as nx
+
+        found = [self.title(each) for each in rivals]
+        if len(self.near) <= LARGEST_GUESSED:
+            graph: nx.Graph[str] = nx.Graph((a, b) for a, ends in self.near.items() for b in ends)
+            joints = set(nx.articulation_points(graph))
+            parts: list[set[str]] = list(map(set, nx.biconnected_components(graph)))  # type: ignore[arg-type]
+            last = [part - joints for part in parts if len(part & joints) == 1 and self.base not in part]
+            found += [self.title(body) for body in self.near if any(body in part for part in last)]
+        names = dict.fromkeys(found)
+        return sorted(names, key=lambda name: (0, len(name)) if _FOOT.search(name) else (1, 0))
 
     def title(self, body: str) -> str:
         """The link that stands for a body: its only frame, else the link with most joints."""
