@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import re
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -12,6 +13,8 @@ import pytest
 
 import hrsynth
 from browser import Tab
+from hrsynth.cli import execute
+from hrsynth.errors import MissingExtra
 
 ROOT = Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "docs"))
@@ -38,6 +41,20 @@ def test_every_picture_has_its_command_and_is_shown():
     assert kept == set(pictures.PICTURES)
     shown = "\n".join(page.read_text(encoding="utf-8") for page in (*PAGES, ROOT / "README.md"))
     assert [name for name in kept if f"pictures/{name}" not in shown] == []
+
+
+EXAMPLES = sorted({line for page in PAGES
+                   for line in re.findall(r"`hrsynth ([^`]*\bexample:[^`]*)`", page.read_text(encoding="utf-8"))})
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("line", EXAMPLES)
+def test_commands_on_robots_of_example_robot_data_work(line: str, capsys):
+    try:
+        hrsynth.examples()
+    except MissingExtra:
+        pytest.skip("example-robot-data is not installed")
+    assert execute(shlex.split(line)) == 0, capsys.readouterr().err
 
 
 @pytest.fixture(scope="module")
