@@ -46,6 +46,8 @@ WIDEST_BODY = 20.0
 """Characteristic lengths that the body of an inertia may be wide."""
 LINTED_POSES = 3
 """Configurations near the zero one at which a rank must be the same before lint says anything of it."""
+SLIDES = 300
+"""Times that hinges' centres are slid along their axes to where two files agree."""
 MOST_MENDING = 8
 """Rounds in which what a mend uncovers is mended too."""
 LOOP_STRIDE = 0.4

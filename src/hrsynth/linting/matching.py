@@ -9,9 +9,10 @@ from functools import cached_property
 
 import numpy as np
 
+from ..budgets import SLIDES
 from ..geometry.vectors import Array, pose
 from ..mechanism.model import Joint, JointType, Mechanism
-from ..tolerances import NOISE, TURNING_ARM
+from ..tolerances import EXACT, NOISE, SAME_ROBOT, TURNING_ARM
 
 _ALONG = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 _ACROSS = (JointType.PRISMATIC, JointType.PLANAR)
@@ -91,34 +92,49 @@ class RobotMatch:
                  and self.links.get(link) in other.links]
         if not pairs:
             return None
-        length = self.one.length
-        shift = np.zeros(len(pairs))
-        X = np.eye(4)
-        only = False
-        for _ in range(20):  # the centre of a hinge is any point of its axis: slid to where both files agree most
-            points = [(mine.point, their.point + s * _slide(their))
-                      for (mine, their), s in zip(pairs, shift, strict=True)]
-            axes = [(mine, their) for pair in pairs for mine, their in zip(pair[0].axes, pair[1].axes, strict=True)]
-            X, only = _fitted(points, axes, length)
-            for number, (mine, their) in enumerate(pairs):
-                if their.type in _ALONG:
-                    moved = X[:3, :3] @ their.point + X[:3, 3]
-                    shift[number] = float((mine.point - moved) @ (X[:3, :3] @ their.axis))
-        return LinkFit(X, {mine.name: _miss(mine, their, X, length) for mine, their in pairs}, only)
+        upright = np.eye(3) if link == self.one.base else self._upright
+        # axes have no sense of their own: as both files give them, or as they lie in the robot as a whole
+        found = [_fit(pairs, self.one.length, signs) for signs in (None, upright)]
+        best = min(max(each.misses.values()) for each in found)
+        good = [each for each in found if max(each.misses.values()) <= best + NOISE * SAME_ROBOT]
+        return max(good, key=lambda each: float(np.trace(upright.T @ each.X[:3, :3])))
+
+    @cached_property
+    def _upright(self) -> Array:
+        """How the other robot's base is turned, (3, 3)."""
+        found = self.fit(self.one.base)
+        return np.eye(3) if found is None else found.X[:3, :3]
+
+
+def _fit(pairs: Sequence[tuple[Joint, Joint]], length: float, upright: Array | None) -> LinkFit:
+    """The best fit of a link's joints; the centre of a hinge is any point of its axis, slid to where both agree."""
+    shift, X, only = np.zeros(len(pairs)), np.eye(4), False
+    for _ in range(SLIDES):
+        points = [(mine.point, their.point + s * _slide(their)) for (mine, their), s in zip(pairs, shift, strict=True)]
+        axes = [(mine, their) for pair in pairs for mine, their in zip(pair[0].axes, pair[1].axes, strict=True)]
+        X, only = _fitted(points, axes, length, upright)
+        before = shift.copy()
+        for number, (mine, their) in enumerate(pairs):
+            if their.type in _ALONG:
+                moved = X[:3, :3] @ their.point + X[:3, 3]
+                shift[number] = float((mine.point - moved) @ (X[:3, :3] @ their.axis))
+        if np.max(np.abs(shift - before)) <= EXACT * length:
+            break
+    return LinkFit(X, {mine.name: _miss(mine, their, X, length) for mine, their in pairs}, only)
 
 
 def _slide(joint: Joint) -> Array:
     return np.asarray(joint.axis if joint.type in _ALONG else np.zeros(3))
 
 
-def _fitted(points: Sequence[tuple[Array, Array]], axes: Sequence[tuple[Array, Array]], length: float
-            ) -> tuple[Array, bool]:
-    """The rigid motion that brings the second of each pair nearest to the first (Kabsch); whether no other does."""
+def _fitted(points: Sequence[tuple[Array, Array]], axes: Sequence[tuple[Array, Array]], length: float,
+            upright: Array | None) -> tuple[Array, bool]:
+    """The rigid motion that brings the second of each pair nearest to the first (Kabsch); whether no other does. Axes
+    have the sense that they have after the turn ``upright``, or their own at first."""
     mine, theirs = (np.array([pair[k] for pair in points]) for k in (0, 1))
     H = (theirs - theirs.mean(axis=0)).T @ (mine - mine.mean(axis=0)) / length**2
-    R = _rotation(H + sum((np.outer(b, a) for a, b in axes), np.zeros((3, 3))))
-    signed = [(a, b if a @ R @ b >= 0 else -b) for a, b in axes]
-    H = H + sum((np.outer(b, a) for a, b in signed), np.zeros((3, 3)))
+    R = upright if upright is not None else _rotation(H + sum((np.outer(b, a) for a, b in axes), np.zeros((3, 3))))
+    H = H + sum((np.outer(b if a @ R @ b >= 0 else -b, a) for a, b in axes), np.zeros((3, 3)))
     R = _rotation(H)
     sizes = np.linalg.svd(H, compute_uv=False)
     return pose(mine.mean(axis=0) - R @ theirs.mean(axis=0), R), bool(sizes[1] > TURNING_ARM**2)

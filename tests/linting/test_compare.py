@@ -1,0 +1,194 @@
+"""Two files of one robot: the same in any dialect, frame, zero and names; each difference is found by its rule."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from lxml import etree
+
+import hrsynth
+from hrsynth.description import load, save
+from hrsynth.geometry.vectors import rotation_about, unit
+from hrsynth.linting.matching import RobotMatch
+from hrsynth.mechanism import JointType, Mechanism
+from hrsynth.mechanism.model import Limits, Motor
+from linting.defects import damaged, put, sound
+from strategies import random_rotation
+
+ROBOTS = ("3rrr_m1", "quattro", "3rps")
+Change = Callable[[Mechanism], Mechanism]
+
+
+def differs(one: Path, other: Path) -> Counter[str]:
+    """The rules that say that two files differ."""
+    found = hrsynth.lint(one, compare=other, ignore=("constraint-dead", "constraint-redundant", "motors-few"))
+    return Counter(each.rule for each in found.findings if each.rule.startswith("differs-"))
+
+
+def written(folder: Path, name: str, robot: Mechanism) -> Path:
+    save(robot, folder / name)
+    return folder / name
+
+
+def joint(name: str, **fields: object) -> Change:
+    return lambda robot: robot.changed(joints=[replace(robot.joints[name], **fields)])
+
+
+def moved(robot: Mechanism) -> Mechanism:
+    """A rod a little longer: one wrist's centre elsewhere on both of its links."""
+    found = robot.joints["wrist_2"]
+    return robot.changed(joints=[replace(found, point=found.point + 1e-3 * np.array([1.0, 2.0, 0.0]))])
+
+
+def turned_axis(robot: Mechanism) -> Mechanism:
+    found = robot.joints["elbow_1"]
+    return robot.changed(joints=[replace(found, axes=(unit(found.axis + np.array([1e-3, 0, 0])),))])
+
+
+CHANGES: dict[str, tuple[Change, set[str]]] = {
+    "motor": (joint("shoulder_1", motor=None), {"differs-motor"}),
+    "another motor": (joint("elbow_1", motor=Motor("m")), {"differs-motor"}),
+    "limit": (joint("shoulder_1", limits=Limits(-1.0, 1.0)), {"differs-limit"}),
+    "rod": (moved, {"differs-geometry"}),
+    "axis": (turned_axis, {"differs-geometry"}),
+    "type": (joint("wrist_3", type=JointType.SPHERICAL, axes=()), {"differs-type"}),
+    "closure": (lambda robot: robot.changed(remove_joints=["wrist_3"]), {"differs-joint"}),
+    "sense": (lambda robot: robot.changed(joints=[replace(robot.joints["shoulder_1"],
+                                                          axes=(-robot.joints["shoulder_1"].axis,))]),
+              {"differs-sense"}),
+    "platform": (lambda robot: replace(robot, platform="dist_1"), {"differs-ends"}),
+}
+
+
+@pytest.mark.parametrize("name", CHANGES)
+def test_each_difference_is_found_from_both_sides(name: str, tmp_path: Path):
+    change, rules = CHANGES[name]
+    robot = load("3rrr_m1")
+    one = written(tmp_path, "one.urdf", robot)
+    other = written(tmp_path, "other.urdf", change(robot))
+    assert set(differs(one, other)) == rules
+    assert set(differs(other, one)) == rules
+    assert differs(one, one) == Counter()
+
+
+@pytest.mark.parametrize("ending", [".xml", ".sdf", ".yaml"])
+def test_a_difference_is_found_between_dialects(ending: str, tmp_path: Path):
+    robot = load("3rrr_m1")
+    one = written(tmp_path, "one.urdf", robot)
+    assert differs(one, written(tmp_path, f"same{ending}", robot)) == Counter()
+    other = written(tmp_path, f"other{ending}", moved(robot))
+    assert set(differs(one, other)) == {"differs-geometry"}
+
+
+def test_masses_and_inertias_are_compared_in_any_frame(tmp_path: Path):
+    one, other, third = tmp_path / "one.urdf", tmp_path / "other.urdf", tmp_path / "third.urdf"
+    one.write_text(sound())
+    other.write_text(damaged(sound(), put("link/inertial/mass", value="2.5")))
+    third.write_text(damaged(sound(), put("link/inertial/inertia", ixx="0.03", iyy="0.02", izz="0.04")))
+    assert set(differs(one, other)) == {"differs-mass"}
+    assert set(differs(one, third)) == set()  # the same body, its frame turned by a quarter about z
+    third.write_text(damaged(sound(), put("link/inertial/inertia", ixx="0.021")))
+    assert set(differs(one, third)) == {"differs-mass"}
+
+
+def test_another_zero_is_told_as_that_and_as_nothing_else(tmp_path: Path):
+    """The same robot, counted from another closed pose."""
+    robot = load("3rrr_m1")
+    at = hrsynth.check(robot, at="x=0.02,y=0.01,phi=5deg").postures[0].configuration
+    poses = {name: at.pose(name) for name in robot.links}
+    there = with_zero(robot, poses)
+    one, other = written(tmp_path, "one.urdf", robot), written(tmp_path, "other.urdf", there)
+    assert set(differs(one, other)) == {"differs-zero"}
+
+
+def with_zero(robot: Mechanism, poses: dict[str, np.ndarray]) -> Mechanism:
+    """The robot with its links at other closed poses for its zero."""
+    motion = {name: poses[name] @ np.linalg.inv(link.pose) for name, link in robot.links.items()}
+    joints = {}
+    for each in robot.joints.values():
+        X = motion[each.predecessor]
+        joints[each.name] = replace(each, point=X[:3, :3] @ each.point + X[:3, 3],
+                                    axes=tuple(X[:3, :3] @ axis for axis in each.axes))
+    links = {name: replace(link, pose=poses[name]) for name, link in robot.links.items()}
+    return replace(robot, links=links, joints=joints)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize("seed", [0, 1])
+def test_names_and_frames_do_not_matter(name: str, seed: int):
+    """Renamed links and joints, turned link frames: every joint is matched by its place, and what is matched fits."""
+    rng = np.random.default_rng(seed)
+    robot = load(name)
+    joints = {f"j{number}": replace(each, name=f"j{number}", predecessor=f"l_{each.predecessor}",
+                                    successor=f"l_{each.successor}")
+              for number, each in enumerate(robot.joints.values())}
+    links = {}
+    for link in robot.links.values():
+        X = link.pose.copy()
+        if link.name != robot.base:
+            X[:3, :3] = X[:3, :3] @ random_rotation(rng)
+        links[f"l_{link.name}"] = replace(link, name=f"l_{link.name}", pose=X)
+    other = replace(robot, joints=joints, links=links, base=f"l_{robot.base}", platform=f"l_{robot.platform}",
+                    observations=(), couplings=())
+    match = RobotMatch(robot, other)
+    numbers = {each: f"j{number}" for number, each in enumerate(robot.joints)}
+    assert match.joints == numbers
+    for link in robot.links:
+        fit = match.fit(link)
+        assert match.links[link] == f"l_{link}"
+        assert fit is not None
+        assert max(fit.misses.values()) < 1e-9
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_link_is_fitted_wherever_it_is_and_where_on_its_axes_hinges_have_their_centres(seed: int):
+    """One link with joints of several types, moved rigidly, its hinges slid along their axes: nothing is missed; a
+    centre off by 1e-3 is, by as much."""
+    rng = np.random.default_rng(seed)
+    robot = load("quattro")
+    R, p = rotation_about(unit(rng.normal(size=3)), 2.0), rng.normal(size=3)
+    joints = {}
+    for each in robot.joints.values():
+        slide = rng.normal() * each.axis if each.type is JointType.REVOLUTE else 0.0
+        joints[each.name] = replace(each, point=R @ (each.point + slide) + p,
+                                    axes=tuple(R @ axis for axis in each.axes))
+    other = replace(robot, joints=joints)
+    match = RobotMatch(robot, other)
+    for link in robot.links:
+        fit = match.fit(link)
+        assert fit is not None
+        assert max(fit.misses.values()) < 1e-7, link
+    bent = other.joints["wrist_1a"]
+    off = unit(rng.normal(size=3)) * 1e-3 * robot.length
+    match = RobotMatch(robot, other.changed(joints=[replace(bent, point=bent.point + off)]))
+    missed = [max(fit.misses.values()) for link in bent.links if (fit := match.fit(link))]
+    assert 1e-5 < max(missed) < 1.1e-3
+
+
+def test_gears_are_compared(tmp_path: Path):
+    gear = ('<robot name="g"><link name="a"/><link name="b"/><link name="c"/><joint name="j" type="continuous">'
+            '<parent link="a"/><child link="b"/></joint><joint name="k" type="continuous"><parent link="a"/>'
+            '<child link="c"/><origin xyz="1 0 0"/></joint><coupling name="t"><predecessor link="b"/>'
+            '<successor link="c"/><ratio value="{}"/></coupling></robot>')
+    for name, ratio in (("one", "2"), ("other", "3")):
+        (tmp_path / f"{name}.urdf").write_text(gear.format(ratio))
+    found = hrsynth.lint(tmp_path / "one.urdf", compare=tmp_path / "other.urdf", platform="c")
+    (said,) = [each.message for each in found.findings if each.rule.startswith("differs-")]
+    assert said == "'t' with the ratio 2 here, 't' with the ratio 3 there"
+
+
+def test_one_line_files_keep_their_names(tmp_path: Path):
+    """Elements in one line are told apart by their names."""
+    root = etree.fromstring(sound(), etree.XMLParser(remove_blank_text=True))
+    path = tmp_path / "robot.urdf"
+    path.write_text(etree.tostring(root, encoding="unicode"))
+    twin = damaged(path.read_text(), put('link[@name="prox_1"]/inertial/mass', value="-1.5"))
+    path.write_text(twin.replace("\n", ""))
+    found = hrsynth.lint(path, fix=True)
+    assert [each.rule for each in found.mended] == ["mass-negative"]
+    assert not found.reaches("warning")
