@@ -68,6 +68,8 @@ class _StageReader:
     defects: list[Defect] = field(default_factory=list)
     bodies: dict[str, str] = field(default_factory=dict)
     """The link of each rigid body, by the path of its prim."""
+    titles: dict[str, list[str]] = field(default_factory=dict)
+    """The joints that each joint is read as, by the path of its prim."""
 
     def defect(self, path: str, what: str, value: object = None, allowed: str | None = None) -> None:
         found = None if value is None else str(value)
@@ -90,6 +92,8 @@ class _StageReader:
         graph = self.result = JointGraph(str(name or told["name"] or "robot"), self.file, "USD")
         if not told["metres_told"]:
             graph.note("guess", "lengths are in centimetres, as USD has it where no metersPerUnit stands")
+        if told["missing"]:
+            graph.note("ignored", f"what other files hold that are not there: {comma_list(told['missing'])}")
         for prim in self.prims.values():
             if prim.has("PhysicsRigidBodyAPI"):
                 self._body(prim)
@@ -269,7 +273,9 @@ class _StageReader:
             name = graph.fresh(name)
         free = self._freedoms(prim)
         excluded = values.get("physics:excludeFromArticulation") is True and len(free) < 6
+        before = set(graph.joints)
         self._add(name, prim, (one, two), free, in_tree=not excluded)
+        self.titles[prim.path] = [each for each in graph.joints if each not in before]
 
     def _end(self, prim: _Prim, side: int) -> FrameSpec | None:
         """The joint's frame on one of its bodies (on the world where none is named)."""
@@ -396,17 +402,15 @@ class _StageReader:
 
     def _mimics(self, joints: list[_Prim]) -> None:
         """PhysX's mimic joints: q + gearing × q of the reference + offset = 0."""
-        titles = {prim.path: prim.name for prim in joints}
         for prim in joints:
             for key, gearing in prim.values.items():
                 match = _MIMIC.fullmatch(key)
                 stem = key.removesuffix("gearing")
                 targets = prim.relations.get(f"{stem}referenceJoint", [])
-                if match is None or len(targets) != 1 or targets[0] not in titles:
+                ends = [self.titles.get(path, []) for path in (*targets, prim.path)]
+                if match is None or len(targets) != 1 or any(len(end) != 1 for end in ends):
                     continue
-                names = titles[targets[0]], prim.name
-                if not all(name in self.result.joints for name in names):
-                    continue
+                names = ends[0][0], ends[1][0]
                 types = {self.result.joints[name].type for name in names}
                 turns = types == {JointType.REVOLUTE}
                 if not turns and types != {JointType.PRISMATIC}:
@@ -462,25 +466,29 @@ class _StageReader:
                 self.defect(prim.path, wrong, str(text)[:80])
 
     def _drives(self, joints: list[_Prim]) -> None:
-        """Joints whose drives have gains are driven; where none has, all that have drives."""
+        """Joints whose drives have gains are driven; where none has, all that have drives. MuJoCo's actuators name
+        theirs."""
         gains: dict[str, bool] = {}
         for prim in joints:
-            names = [each for each in (prim.name, *(part(prim.name, k) for k in range(1, 7)))
-                     if each in self.result.joints and self.result.joints[each].kind.freedoms]
-            if prim.has("PhysicsDriveAPI") and names:
+            names = [each for each in self.titles.get(prim.path, []) if self.result.joints[each].kind.freedoms]
+            if prim.has("PhysicsDriveAPI"):
                 drives = [value for key, value in prim.values.items()
                           if re.fullmatch(r"drive:\w+:physics:(stiffness|damping)", key)]
                 limp = any(value == 0 for key, value in prim.values.items()
                            if re.fullmatch(r"drive:\w+:physics:maxForce", key))
-                gains[prim.name] = any(_number(value) > 0 for value in drives) and not limp
-                for name in names:
-                    gains[name] = gains[prim.name]
+                gains |= dict.fromkeys(names, any(_number(value) > 0 for value in drives) and not limp)
+        actuators = [prim for prim in self.prims.values() if prim.kind == "MjcActuator"]
+        for prim in actuators:
+            targets = [each for path in prim.relations.get("mjc:target", []) for each in self.titles.get(path, [])]
+            gains |= dict.fromkeys(targets, True)
+            if not targets:
+                self.result.note("ignored", f"the actuator {prim.name!r}, which drives no joint")
         driven = [name for name in gains if gains[name] or not any(gains.values())]
-        for name in [each for each in driven if each in self.result.joints]:
+        for name in driven:
             self.result.joints[name] = replace(self.result.joints[name], motor=Motor(f"motor_{name}"))
         if len(driven) < len(gains):
-            self.result.note("guess", f"the motors are {comma_list(driven)}: the joints whose drives have gains "
-                                      "(--motors to change them)")
+            what = f"the motors are {comma_list(driven)}: the joints whose drives have gains (--motors to change them)"
+            self.result.note("guess", what)
 
 
 def _locked(values: Mapping[str, Any], freedom: str) -> bool:

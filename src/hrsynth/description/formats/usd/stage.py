@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import json
+import os
 import subprocess
 import sys
 import tempfile
@@ -43,7 +44,8 @@ def _run(path: Path, *arguments: str) -> bytes:
         raise MissingExtra(f"{path}: USD", "usd")
     command = [sys.executable, "-P", str(PROCESS), str(LARGEST_FILE), str(MOST_INCLUDES), *arguments]
     try:
-        run = subprocess.run(command, capture_output=True, timeout=USD_SECONDS, check=False)
+        own = {key: value for key, value in os.environ.items() if key != "PXR_AR_DEFAULT_SEARCH_PATH"}
+        run = subprocess.run(command, capture_output=True, timeout=USD_SECONDS, check=False, env=own)
     except (subprocess.TimeoutExpired, ValueError):
         raise xml.refusal(path, "OpenUSD does not come to an end", f"{USD_SECONDS} seconds") from None
     if run.returncode:

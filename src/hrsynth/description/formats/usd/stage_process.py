@@ -10,8 +10,8 @@ import sys
 from pathlib import Path
 from typing import Any
 
-MEMORY = 6_000_000_000
-SECONDS = 20
+MEMORY = 2_000_000_000
+SECONDS = 10
 LISTED = 64
 """Entries of an array beyond which only their number is told."""
 MOST_PRIMS = 50_000
@@ -24,11 +24,13 @@ def refuse(what: str) -> None:
     os._exit(2)
 
 
-def require_inside(start: Path, largest: int, most: int) -> None:
-    """Refuse a stage whose layers lie elsewhere than in its folder and below, are too many or too large."""
+def require_inside(start: Path, largest: int, most: int) -> list[str]:
+    """Refuse a stage whose layers lie elsewhere than in its folder and below, are too many or too large; those that are
+    not there are given back."""
     from pxr import Sdf  # type: ignore[import-untyped]
 
     folder, pending, seen, size = start.resolve().parent, [Path(os.path.abspath(start))], set(), 0
+    missing = []
     while pending:
         path = pending.pop()
         if path in seen:
@@ -58,10 +60,11 @@ def require_inside(start: Path, largest: int, most: int) -> None:
                 refuse(f"a layer outside of the file's folder, found {asset}, {cure}")
             elif other.suffix.lower() not in ENDINGS:
                 refuse(f"a layer that is no USD file, found {asset}, allowed: {', '.join(ENDINGS)}")
-            elif not other.is_file():
-                refuse(f"a layer that is not there, found {asset}, {cure}")
-            else:
+            elif other.is_file():
                 pending.append(other)
+            else:
+                missing.append(asset)
+    return missing
 
 
 def plain(value: Any) -> Any:
@@ -148,12 +151,13 @@ def main(largest: str, most: str, task: str, name: str, *rest: str) -> None:
     except ImportError as error:
         refuse(f"OpenUSD's package does not load: {error}")
     try:
-        require_inside(Path(name), int(largest), int(most))
+        missing = require_inside(Path(name), int(largest), int(most))
         stage = Usd.Stage.Open(name)
         if task == "binary":
             stage.GetRootLayer().Export(rest[0])
         else:
-            sys.stdout.write(json.dumps(told(stage)) if task == "prims" else obj(stage, rest[0]))
+            found = json.dumps({**told(stage), "missing": missing}) if task == "prims" else obj(stage, rest[0])
+            sys.stdout.write(found)
         sys.stdout.flush()
     except (Tf.ErrorException, RuntimeError, OSError, MemoryError, RecursionError) as error:
         text = " ".join(str(error).split())
