@@ -72,6 +72,16 @@ LARGEST_YAML = 1_000_000
 """Bytes of a YAML file above which it is not read."""
 LARGEST_GUESSED = 150
 """Bodies of a foreign file above which ways to the base are not counted to guess the platform."""
+FINER_TRIES = 5
+"""How often the tolerance for relations of rounded numbers is halved where they contradict each other."""
+FEWEST_DECIMALS = 3
+"""Decimals from which a file's numbers can be rounded ones: with fewer they are typed."""
+FEWEST_ROUNDED = 5
+"""How many such numbers a file must have to show how it rounds."""
+SURELY_ROUNDED = 4
+"""Decimals from which they are, whatever else shows it."""
+MOST_DECIMALS = 11
+"""Decimals up to which they can be."""
 LARGEST_RELATED = 120
 """Joints of a foreign file above which relations that are meant are not looked for."""
 

@@ -124,6 +124,16 @@ class RankUndecided(Unanswered):
         super().__init__(f"{what}: the singular values leave a gap of {gap:.3g}, needed: {needed:.3g}")
 
 
+class StructureUndecided(Unanswered):
+    """Rounded numbers that are as near to one structure as to another."""
+
+    def __init__(self, robot: str, tolerance: float, one: str, other: str) -> None:
+        self.robot, self.tolerance, self.one, self.other = robot, tolerance, one, other
+        super().__init__(f"{robot}: the numbers are rounded and near to two robots, to {tolerance:.1g} (characteristic "
+                         f"lengths, radians): that with {one}, or {other}; give more decimals, another --tolerance, or "
+                         "--as-written")
+
+
 class NotSampled(Unanswered):
     """Too few closed configurations could be reached from the zero configuration."""
 

@@ -90,15 +90,26 @@ TURNING_ARM = 1e-3
 
 NOISE = 1e-4
 """Deviation (characteristic lengths, radians) up to which a relation in a foreign file (axes parallel or perpendicular,
-points that coincide, equal rods) counts as meant and is made exact: printed digits and CAD stay below."""
+points that coincide, equal rods) counts as meant and is made exact: CAD stays below, whatever the digits."""
 MAY_MEET = 2e-2
 """Distance (characteristic lengths) up to which two frames of a foreign file are told as ones that a closure may hold
 together."""
 SINGLE = 1e-6
 """Difference (relative, of numbers above one) up to which a number of single precision is one of double precision that
 stands beside it, and shapes are stretched alike."""
+LARGEST_NOISE = 0.1
+"""Largest deviation up to which a user can have such relations made exact."""
+ROUNDED = 2.5
+"""Deviation of such a relation, as a multiple of the last decimal (a length of it, an angle of it) that a file's
+numbers have: the half decimals of the frames on the way from joint to joint, with their levers."""
+NO_FINER = 3.0
+"""Factor around the tolerance for such relations within which none may lie that would change what the robot is."""
 EXACT = 1e-11
 """Deviation (characteristic lengths, radians) below which such a relation holds as well as numbers allow."""
+NEARLY_ONE = 2e-3
+"""By how much a rounded unit vector can miss its length, or an angle (rad) a simple one, to show that it is rounded."""
+OBLIQUE = 0.1
+"""Sine of the angle between two axes below which where they meet is not looked at."""
 FAINT = 1e-3
 """Singular value of a file's loops, as part of the largest, below which a direction is held by rounding alone."""
 NEARLY_SINGULAR = 5e-3

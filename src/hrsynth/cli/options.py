@@ -111,6 +111,10 @@ SOURCE = (
            "NAME", group=READING),
     Option("unit", "The unit of the file's lengths: m, mm, cm or in.", "UNIT", group=READING,
            words=("m", "mm", "cm", "in")),
+    Option("tolerance", "Up to where axes and centres count as meant to be parallel, to meet and so on, and are made "
+           "so (characteristic lengths, radians; default: by the digits of its numbers).", None, float, group=READING),
+    flag("as_written", "Take its numbers as they are: what is parallel, or meets, but for rounding is not made so.",
+         READING),
 )
 """A robot as the command line names it, with what its file does not say."""
 
@@ -130,6 +134,7 @@ def quiet_robot_of(values: dict[str, Any]) -> Mechanism:
 
     given = {option.name: values.pop(option.name) for option in SOURCE}
     given["freeze"] = [name for name in given["freeze"].split(",") if name]
+    values["as_written"] = given["as_written"]  # `modes` asks again
     return load(given.pop("robot"), **{**given, "close": given["close"] or ()})
 
 

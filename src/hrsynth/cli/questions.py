@@ -201,8 +201,6 @@ QUESTIONS = (
              (Option("at", "Pose whose directions are held, as x=0.02,y=0.1,z=-0.7 (default: the zero "
                      "configuration's).", "POSE"),
               *WATCHED, flag("real", "The real robot with its own motors held instead."),
-              flag("as_written", "Take the file's numbers as they are: joint centres that coincide but for rounding "
-                   "stay apart."),
               Option("effort", "Seconds of one core that a list may need, by its size; what needs more is left out "
                      "and told.", "SECONDS", float, EFFORT, low=0),
               _file("modes"), _file("modes", "certificate")),

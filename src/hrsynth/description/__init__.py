@@ -38,7 +38,7 @@ def shipped() -> dict[str, Path]:
 def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: str | None = None,
          motors: Iterable[str] | str | None = None, observe: Iterable[str] | str | None = None,
          close: Iterable[str] | str = (), freeze: Iterable[str] | str = (), keyframe: str | None = None,
-         unit: str | None = None) -> Mechanism:
+         unit: str | None = None, tolerance: float | None = None, as_written: bool = False) -> Mechanism:
     """The mechanism of a robot file in any dialect, of a shipped robot given by its name, or of one of the package
     example-robot-data (``example:cassie``); a mechanism is given back as it is.
 
@@ -49,6 +49,10 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
     only what lies between base and platform remains. Lists may be texts with commas. What was guessed or solved is told
     in the mechanism's ``notes``.
 
+    Numbers of few decimals are read as they are meant: relations of joints (axes parallel, perpendicular, through one
+    point; equal rods …) that hold to ``tolerance`` (characteristic lengths, radians; None: by the file's digits) are
+    made exact with the least change, and told; with ``as_written`` none is.
+
     Raises
     ------
     BadRequest
@@ -56,16 +60,17 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
         the file does not have.
     BadRobotFile
         With every defect of the file and its line.
-    LoopsNotClosed, RankUndecided
-        For a file whose loops stay open, or in which rounded numbers leave no gap between free and held.
+    LoopsNotClosed, RankUndecided, StructureUndecided
+        For a file whose loops stay open, or in which rounded numbers leave no gap between free and held, or are as near
+        to another robot.
 
     >>> hrsynth.load("3rrr_m1")
     <Mechanism: 3rrr_m1, 8 links, 9 joints, 3 motors>
     """
     overrides = Overrides.said(base=base, platform=platform, motors=motors, close=close, freeze=freeze, observe=observe,
-                               keyframe=keyframe, unit=unit)
+                               keyframe=keyframe, unit=unit, tolerance=tolerance, as_written=as_written)
     if isinstance(robot, Mechanism):
-        if overrides.any or base is not None or observe is not None:
+        if overrides.any or tolerance is not None or base is not None or observe is not None:
             raise BadRequest("what a file does not say is given for a robot that was read", robot.name,
                              "the file of a robot, or its name")
         return robot

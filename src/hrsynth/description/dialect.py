@@ -15,13 +15,16 @@ from .jointgraph import JointGraph
 @dataclass(frozen=True, eq=False)
 class RobotFile:
     """A file that was opened: its place, its document (None where it is no XML), whether what it says of itself stands,
-    as nothing was given that changes it, what it begins with, and what was left out of its text."""
+    as nothing was given that changes it, what it begins with, and what was left out of its text; up to what
+    ``tolerance`` relations of its joints are made exact (None: as its digits say), or that they stay ``as_written``."""
 
     path: Path
     root: xml.Element | None
     strict: bool = True
     start: bytes = b""
     notes: tuple[Note, ...] = ()
+    tolerance: float | None = None
+    as_written: bool = False
 
     @property
     def document(self) -> xml.Element:

@@ -25,6 +25,7 @@ class XmlReader:
     file: str
     root: xml.Element
     defects: list[Defect] = field(default_factory=list)
+    digits: numerals.Digits = field(default_factory=numerals.Digits)
 
     def defect(self, line: int | None, what: str, value: str | None = None, allowed: str | None = None) -> None:
         """Record what is wrong in a line of the file (or of one that it includes)."""
@@ -52,7 +53,9 @@ class XmlReader:
         if text is None:
             return fallback
         try:
-            return numerals.parse(text, len(fallback))
+            found = numerals.parse(text, len(fallback))
+            self.digits.read(text)
+            return found
         except ValueError as error:
             self.defect(line, what, text, str(error))
             return fallback
@@ -72,7 +75,9 @@ class XmlReader:
         """The pose (4, 4) that the attributes ``xyz`` and ``rpy`` of an element give."""
         if element is None:
             return ORIGIN
-        return numerals.from_origin(self.numbers(element, "xyz", (0, 0, 0)), self.numbers(element, "rpy", (0, 0, 0)))
+        angles = self.numbers(element, "rpy", (0, 0, 0))
+        self.digits.angles(angles)
+        return numerals.from_origin(self.numbers(element, "xyz", (0, 0, 0)), angles)
 
     def origin(self, element: xml.Element) -> Array:
         """The pose that the ``<origin>`` of an element gives."""
@@ -80,7 +85,8 @@ class XmlReader:
 
     def unit(self, values: Array, line: int | None, what: str, given: str | None = None, default: Array = Z) -> Array:
         """The unit vector along ``values``; a zero vector is a defect."""
-        if np.linalg.norm(values) > WITHOUT_DIRECTION:
+        if (size := float(np.linalg.norm(values))) > WITHOUT_DIRECTION:
+            self.digits.length(size)
             return unit(values)
         self.defect(line, what, given, "a non-zero vector")
         return default
@@ -96,6 +102,7 @@ class XmlReader:
         if not size > WITHOUT_DIRECTION:
             self.defect(xml.line(element), "a quaternion of length zero")
             return np.eye(3)
+        self.digits.length(size)
         return rotation_of(quaternion / size)
 
     def axes(self, element: xml.Element, type_: JointType | None) -> tuple[Array, ...]:

@@ -11,6 +11,7 @@ from ..geometry.vectors import Array, frozen, inverse
 from ..mechanism import graphs
 from ..mechanism.model import JointType, Limits, Link, Motor, Note
 from ..mechanism.observation import Direction
+from .numerals import Digits
 
 ORIGIN = frozen(np.eye(4))
 Z = frozen([0.0, 0.0, 1.0])
@@ -99,6 +100,7 @@ class JointGraph:
     observations: list[Direction] = field(default_factory=list)
     rest: list[str] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
+    digits: Digits = field(default_factory=Digits)
     closing: set[str] = field(default_factory=set)
     """Frames that only tell where a loop closes."""
     assumed: dict[str, list[str]] = field(default_factory=dict)

@@ -8,17 +8,58 @@ from __future__ import annotations
 
 import math
 import re
+from collections import Counter
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..budgets import LARGEST_NUMBER
+from ..budgets import FEWEST_DECIMALS, FEWEST_ROUNDED, LARGEST_NUMBER, MOST_DECIMALS, SURELY_ROUNDED
 from ..geometry.vectors import Array, pose, rotation_about, rotation_from_rpy
+from ..tolerances import EXACT, NEARLY_ONE
 
 ANGLE_DECIMALS = 13
 """Decimals of angles and of the components of axes."""
 
+SIMPLE_ANGLE = math.pi / 12
+"""Angles that are typed are multiples of this one."""
 _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
+
+
+@dataclass
+class Digits:
+    """What the numbers of a file tell of their own accuracy."""
+
+    decimals: Counter[int] = field(default_factory=Counter)
+    """How many numbers have so many decimals."""
+    rounded: bool = False
+    """Whether a unit vector has not quite length one, or an angle is not quite a simple part of a turn."""
+
+    def read(self, text: str) -> None:
+        """Take numbers into account as they are written."""
+        for word in text.split():
+            number, _, exponent = word.lower().partition("e")
+            self.decimals[len(number.partition(".")[2]) - int(exponent or 0)] += 1
+
+    def length(self, size: float) -> None:
+        """The length of a vector that should have length one."""
+        self.rounded |= EXACT < abs(size - 1) < NEARLY_ONE
+
+    def angles(self, values: Array) -> None:
+        """Angles (rad): simple parts of a turn are seldom meant to be missed by little."""
+        steps = np.round(values / SIMPLE_ANGLE)
+        misses = np.abs(values - steps * SIMPLE_ANGLE)[steps != 0]
+        self.rounded |= bool(np.any((misses > EXACT) & (misses < NEARLY_ONE)))
+
+    @property
+    def last_place(self) -> float:
+        """One in the last decimal, that one in five of the longer numbers reach; 0 where none are rounded."""
+        longer = sorted(count for count in self.decimals.elements() if count >= FEWEST_DECIMALS)
+        if len(longer) < FEWEST_ROUNDED:
+            return 0.0
+        decimals = longer[(4 * len(longer)) // 5]
+        self.rounded |= decimals >= SURELY_ROUNDED
+        return 10.0**-decimals if decimals <= MOST_DECIMALS else 0.0
 
 
 def parse(text: str, count: int) -> Array:

@@ -14,6 +14,7 @@ from ..mechanism.legs import decompose
 from ..mechanism.model import JointType, Mechanism, Motor
 from ..mechanism.normal import normal_form
 from ..mechanism.sensors import observation_of
+from ..tolerances import EXACT, LARGEST_NOISE
 from . import numerals
 from .contents import scaled_shapes
 from .jointgraph import LOOP_TYPES, FrameSpec, JointGraph, comma_list
@@ -30,7 +31,8 @@ _CLOSURE = re.compile(rf"(?P<one>{_END}):(?P<two>{_END})(?::(?P<kind>\w+))?")
 class Overrides:
     """Base, platform, the motors' joints, closures ``A:B[:type]`` (A, B links, or points ``A@x,y,z`` in them), joints
     to freeze, links to observe, the posture that is the zero pose, the unit of the file's lengths; None or empty where
-    the file (or a guess) decides."""
+    the file (or a guess) decides. Up to which ``tolerance`` relations of joints are made exact, or that they stay
+    ``as_written``."""
 
     base: str | None = None
     platform: str | None = None
@@ -40,14 +42,19 @@ class Overrides:
     observe: tuple[str, ...] | None = None
     keyframe: str | None = None
     unit: str | None = None
+    tolerance: float | None = None
+    as_written: bool = False
 
     @classmethod
     def said(cls, *, motors: str | Iterable[str] | None = None, close: str | Iterable[str] = (),
-             freeze: str | Iterable[str] = (), observe: str | Iterable[str] | None = None, **more: str | None
-             ) -> Overrides:
+             freeze: str | Iterable[str] = (), observe: str | Iterable[str] | None = None,
+             tolerance: float | None = None, as_written: bool = False, **more: str | None) -> Overrides:
         """What a user says, lists also as texts with commas."""
+        if tolerance is not None and not EXACT < tolerance <= LARGEST_NOISE:
+            raise BadRequest("tolerance", f"{tolerance:g}",
+                             f"{EXACT:g} to {LARGEST_NOISE:g} (characteristic lengths, radians)")
         return cls(motors=names(motors), close=closures(close), freeze=names(freeze or ()) or (),
-                   observe=names(observe), **more)
+                   observe=names(observe), tolerance=tolerance, as_written=as_written, **more)
 
     @property
     def any(self) -> bool:

@@ -16,6 +16,9 @@ from .jointgraph import JointGraph
 from .overrides import Overrides, observe_links
 from .tree import spanning
 
+AS_IT_IS = Overrides()
+"""Nothing is given."""
+
 
 def read(path: Path, overrides: Overrides) -> Mechanism:
     """The mechanism of a file in any dialect, or of a folder with a URDF and a YAML file.
@@ -23,7 +26,7 @@ def read(path: Path, overrides: Overrides) -> Mechanism:
     Raises ``BadRobotFile`` for what is no robot, ``BadRequest`` for what has to be given, ``LoopsNotClosed`` and
     ``RankUndecided`` where its loops stay open or undecided.
     """
-    return understood(robot_file(path, strict=not overrides.any), overrides)
+    return understood(robot_file(path, overrides), overrides)
 
 
 def understood(file: RobotFile, overrides: Overrides) -> Mechanism:
@@ -51,20 +54,22 @@ def _part(robot: Mechanism, overrides: Overrides) -> Mechanism:
     return robot if overrides.observe is None else observe_links(robot, overrides.observe)
 
 
-def robot_file(path: Path, *, strict: bool = True) -> RobotFile:
-    """A file, opened (a folder's robot.urdf, or its only robot file); ``strict``: nothing is given that changes it."""
+def robot_file(path: Path, given: Overrides = AS_IT_IS, *, strict: bool | None = None) -> RobotFile:
+    """A file, opened (a folder's robot.urdf, or its only robot file), and what is ``given`` for it."""
+    strict = not given.any if strict is None else strict
     if os.path.isdir(path):
         path = _in_folder(path)
     data = xml.content(path)
     if data.startswith(tuple(each for dialect in formats.dialects().values() for each in dialect.begins)):
         return RobotFile(path, None, strict, data[:8])
     if path.suffix.lower() in (".yaml", ".yml") and not data.lstrip().startswith(b"<"):
-        return RobotFile(path, None, strict)
+        return RobotFile(path, None, strict, tolerance=given.tolerance, as_written=given.as_written)
     notes: list[Note] = []
     root = xml.document(data, str(path), notes)
     if not (strict and root.find("hrsynth") is not None):
         _require_few(path, root)
-    return RobotFile(path, xacro.expand(path) if xacro.is_needed(root) else root, strict, notes=tuple(notes))
+    return RobotFile(path, xacro.expand(path) if xacro.is_needed(root) else root, strict, b"", tuple(notes),
+                     given.tolerance, given.as_written)
 
 
 def _require_few(path: Path, root: xml.Element) -> None:

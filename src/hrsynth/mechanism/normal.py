@@ -102,7 +102,9 @@ def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
 
 
 def _next_merge(mechanism: Mechanism) -> tuple[list[str], list[Joint], Joint] | None:
-    """The links between, the joints that go, and the joint that takes their place."""
+    """The links between, the joints that go, and the joint that takes their place; a U of two R with centres apart only
+    where nothing else merges, as axes of two balls on one rod may meet as well."""
+    far: tuple[list[str], list[Joint], Joint] | None = None
     held = _protected(mechanism) | {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
     free = [name for name in mechanism.links if name not in held and len(mechanism.joints_of(name)) == 2]
     for x in free:
@@ -113,12 +115,16 @@ def _next_merge(mechanism: Mechanism) -> tuple[list[str], list[Joint], Joint] | 
         b = second if second.predecessor == x else second.turned()
         merged = _pair(mechanism, a, b)
         if merged is not None:
+            if a.type is b.type is JointType.REVOLUTE and merged.type is JointType.UNIVERSAL and \
+                    np.linalg.norm(b.point - a.point) > SAME_POINT * mechanism.length:
+                far = far or ([x], [first, second], merged)
+                continue
             return [x], [first, second], merged
     for chain in _chains_of_three(mechanism, set(free)):
         merged = _triple(mechanism, *chain)
         if merged is not None:
             return [chain[0].successor, chain[1].successor], list(chain), merged
-    return None
+    return far
 
 
 def _pair(mechanism: Mechanism, a: Joint, b: Joint) -> Joint | None:

@@ -9,16 +9,17 @@ from ...budgets import MOST_LOOP_COORDINATES
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array, unit
 from ...mechanism.model import Coupling, Joint, JointType, Mechanism, Note
-from ...tolerances import NOISE, SAME_GEOMETRY
+from ...tolerances import NO_FINER, NOISE, ROUNDED, SAME_GEOMETRY
 from ..jointgraph import JointGraph, JointSpec, comma_list
+from ..numerals import Digits
 from ..overrides import Overrides
 from ..postures import posture
 from ..tree import spanning
 from . import closures, guess
 from .candidates import without_loop
 from .coordinates import with_weighed_motors, without_coordinates
+from .idealise import as_meant
 from .loops import LoopAssembly, LoopSolution, Values, regular_values, solve
-from .relations import as_meant
 from .zero import moves, with_limits, with_zero_at
 
 
@@ -50,16 +51,43 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     if assembly.size > MOST_LOOP_COORDINATES or len(assembly.loops) > MOST_LOOP_COORDINATES:
         raise BadRequest(f"{graph.file}: {len(assembly.loops)} loops through joints with {assembly.size} coordinates",
                          None, f"up to {MOST_LOOP_COORDINATES} of each")
-    solution = solve(assembly)
-    if not solution.residual <= NOISE:
-        raise LoopsNotClosed(graph.file, solution.residual, NOISE, assembly.worst(solution.values)[0])
+    open_at_zero = assembly.worst(assembly.zero())[1]
+    length = assembly.length / graph.unit
+    rounded = 0.0 if overrides.as_written else overrides.tolerance or rounding(graph.digits, length, open_at_zero)
+    tolerance = overrides.tolerance or max(NOISE, rounded)
+    assembly.noise = max(NOISE, NO_FINER * rounded)
+    if open_at_zero <= NO_FINER * rounded:
+        solution = LoopSolution(assembly.zero(), open_at_zero)
+    else:
+        solution = solve(assembly)
+    if not solution.residual <= assembly.noise:
+        raise LoopsNotClosed(graph.file, solution.residual, assembly.noise, assembly.worst(solution.values)[0])
     _note_solution(graph, assembly, solution, overrides.keyframe)
-    mechanism = closures.points_as_hinges(_mechanism(graph, base, platform, assembly, solution.values))
+    mechanism = _mechanism(graph, base, platform, assembly, solution.values)
+    mechanism = closures.points_as_hinges(mechanism, tolerance)
     if not all(joint.in_tree for joint in mechanism.joints.values()):
-        mechanism = _away_from_singular(as_meant(mechanism, solution.residual))
+        if not overrides.as_written:
+            possible = 0.0 if overrides.tolerance else deviation(graph.digits, length)
+            mechanism = as_meant(mechanism, solution.residual, tolerance, possible)
+        elif solution.residual > SAME_GEOMETRY:
+            raise LoopsNotClosed(graph.file, solution.residual, SAME_GEOMETRY, assembly.worst(solution.values)[0])
+        mechanism = _away_from_singular(spanning(mechanism))
     if graph.platform is None:
         mechanism = without_coordinates(mechanism)
     return with_weighed_motors(mechanism)
+
+
+def deviation(digits: Digits, length: float) -> float:
+    """By how much the decimals of a file's numbers let miss what is meant to be exact (characteristic lengths, radians);
+    ``length`` is the characteristic length, in the file's unit."""
+    return ROUNDED * digits.last_place * max(1.0, 1 / length)
+
+
+def rounding(digits: Digits, length: float, opening: float) -> float:
+    """That deviation; 0 where nothing shows that the numbers are rounded: neither vectors and angles, nor what is open
+    at zero."""
+    found = deviation(digits, length)
+    return found if digits.rounded or SAME_GEOMETRY < opening <= NO_FINER * found else 0.0
 
 
 def _note_solution(graph: JointGraph, assembly: LoopAssembly, solution: LoopSolution, keyframe: str | None) -> None:
@@ -75,7 +103,7 @@ def _note_solution(graph: JointGraph, assembly: LoopAssembly, solution: LoopSolu
 def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssembly, values: Values) -> Mechanism:
     poses = assembly.poses(values)
     tree = {joint.name for joint, _, _ in assembly.tree}
-    joints = {name: _joint(joint, poses, name in tree) for name, joint in graph.joints.items()}
+    joints = {name: joint_at(joint, poses, name in tree) for name, joint in graph.joints.items()}
     links = {name: replace(link, pose=poses[name]) for name, link in graph.links.items()}
     mechanism = Mechanism(graph.name, links, with_limits(joints, assembly, values), base, platform,
                           tuple(graph.observations), (), graph.camera, tuple(graph.rest), graph.file,
@@ -84,7 +112,8 @@ def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssemb
     return replace(mechanism, couplings=tuple(_couplings(graph, mechanism)))
 
 
-def _joint(joint: JointSpec, poses: Mapping[str, Array], in_tree: bool) -> Joint:
+def joint_at(joint: JointSpec, poses: Mapping[str, Array], in_tree: bool) -> Joint:
+    """A joint where its links have ``poses``; one that closes a loop in the middle of its two frames."""
     kind = joint.kind
     X_P, X_S = joint.frames(poses)
     axes: tuple[Array, ...] = ()

@@ -45,7 +45,7 @@ class ImportChoices:
 def choices(path: Path, overrides: Overrides) -> ImportChoices:
     """What the file at ``path`` leaves open once closures, motors and frozen joints are given; raises as reading it
     does."""
-    graph = formats.read(robot_file(path, strict=False))
+    graph = formats.read(robot_file(path, overrides, strict=False))
     if isinstance(graph, Mechanism):
         raise BadRequest(f"{path}: nothing is left open in it", graph.name)
     closures.join_halves(graph)

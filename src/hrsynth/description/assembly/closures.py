@@ -12,19 +12,20 @@ from ...geometry import lines
 from ...geometry.vectors import Array, frozen, inverse, perpendicular, pose, unit
 from ...mechanism import graphs
 from ...mechanism.model import Joint, JointType, Mechanism, Motor, Note
-from ...tolerances import NOISE
+from ...tolerances import NOISE, ROUNDED
 from ..chains import CUT, END, SECOND, WHOLES, part
 from ..jointgraph import FrameSpec, JointGraph, JointSpec, Z
 
 
 def merge_points(graph: JointGraph) -> None:
     """Two points in which the same two links are held together are a revolute joint through both; three are rigid."""
+    noise = ROUNDED * graph.digits.last_place * graph.unit
     table: dict[frozenset[str], list[JointSpec]] = defaultdict(list)
     for joint in graph.joints.values():
         if joint.type is JointType.SPHERICAL and not joint.in_tree:
             table[frozenset(joint.links)].append(joint)
     for joints in table.values():
-        merged = _joint_through(joints) if len(joints) > 1 else None
+        merged = _joint_through(joints, noise) if len(joints) > 1 else None
         if merged is None:
             continue
         for joint in joints:
@@ -37,17 +38,18 @@ def merge_points(graph: JointGraph) -> None:
                              f"together and are read as one {what}")
 
 
-def _joint_through(joints: list[JointSpec]) -> JointSpec | None:
+def _joint_through(joints: list[JointSpec], noise: float) -> JointSpec | None:
+    """The joint that points held together are; ``noise`` (m) is by how much the file's decimals let them miss."""
     first = joints[0]
     points = np.array([[joint.ends[joint.links.index(link)].X[:3, 3] for joint in joints] for link in first.links])
     arms = points[:, 1:] - points[:, :1]
     sizes = np.linalg.norm(arms, axis=2)
     size = float(np.max(sizes))
-    if size <= 0 or np.max(np.abs(sizes[0] - sizes[1])) > NOISE * size:
+    if size <= 0 or np.max(np.abs(sizes[0] - sizes[1])) > NOISE * size + noise:
         return None
     k = int(np.argmax(sizes[0]))
     far = [np.linalg.norm(np.cross(arm, arm[k]), axis=1) for arm in arms]
-    m = None if max(each.max() for each in far) <= NOISE * size**2 else int(np.argmax(far[0]))
+    m = None if max(each.max() for each in far) <= (NOISE * size + noise) * size else int(np.argmax(far[0]))
     kind = JointType.REVOLUTE if m is None else JointType.FIXED
     one, two = (FrameSpec(end.link, pose(point[0], _frame(arm[k], None if m is None else arm[m])), end.line)
                 for end, point, arm in zip(first.ends, points, arms, strict=True))
@@ -59,25 +61,27 @@ def _frame(z: Array, near: Array | None) -> Array:
     return np.column_stack((x, np.cross(unit(z), x), unit(z)))
 
 
-def points_as_hinges(mechanism: Mechanism) -> Mechanism:
+def points_as_hinges(mechanism: Mechanism, within: float) -> Mechanism:
     """A point closure between two links that can only move in a plane is a revolute joint normal to it; one between two
-    links that can only turn about a common centre is a revolute joint through that centre."""
+    links that can only turn about a common centre is a revolute joint through that centre; both to ``within``
+    (characteristic lengths, radians)."""
     joints, notes = dict(mechanism.joints), list(mechanism.notes)
     for joint in [j for j in joints.values() if j.type is JointType.SPHERICAL and not j.in_tree]:
-        axis, what = _plane_of(joint, list(joints.values())), "planar"
+        axis, what = _plane_of(joint, list(joints.values()), within), "planar"
         if axis is None:
-            axis, what = _spoke_of(joint, list(joints.values()), NOISE * mechanism.length), "spherical"
+            axis, what = _spoke_of(joint, list(joints.values()), within * mechanism.length), "spherical"
         if axis is not None:
             joints[joint.name] = replace(joint, type=JointType.REVOLUTE, axes=(axis,))
             notes.append(Note("merged", f"the point {joint.name!r} closes a {what} loop: read as a revolute joint"))
     return replace(mechanism, joints=joints, notes=tuple(notes))
 
 
-def _plane_of(joint: Joint, joints: list[Joint]) -> Array | None:
+def _plane_of(joint: Joint, joints: list[Joint], within: float) -> Array | None:
     """The normal of the plane in which the joint's two links move relative to each other, or None."""
     for candidate in _hinges_on(joint, joints):
         normal = candidate.axis
-        flat = graphs.adjacency(joint.links, (j.links for j in joints if j.name != joint.name and _flat(j, normal)))
+        flat = graphs.adjacency(joint.links, (j.links for j in joints
+                                              if j.name != joint.name and _flat(j, normal, within)))
         if joint.links[1] in graphs.component(flat, joint.links[0]):
             return normal
     return None
@@ -117,12 +121,12 @@ def _keeps(joint: Joint, centre: Array, tolerance: float) -> bool:
     return joint.type is JointType.FIXED
 
 
-def _flat(joint: Joint, normal: Array) -> bool:
+def _flat(joint: Joint, normal: Array, within: float) -> bool:
     match joint.type:
         case JointType.REVOLUTE | JointType.PLANAR:
-            return lines.parallel(joint.axis, normal)
+            return bool(np.linalg.norm(np.cross(joint.axis, normal)) <= within)
         case JointType.PRISMATIC:
-            return lines.perpendicular(joint.axis, normal)
+            return abs(float(joint.axis @ normal)) <= within
     return joint.type is JointType.FIXED
 
 

@@ -26,11 +26,12 @@ Values = dict[str, Array]
 
 
 class LoopAssembly:
-    """Tree, loops and gears of a joint graph, in which tree joints take values; their zero pose may be a posture."""
+    """Tree, loops and gears of a joint graph, in which tree joints take values; their zero pose may be a posture. Below
+    ``noise`` an opening may be that of rounded numbers."""
 
     def __init__(self, base: str, joints: Sequence[JointSpec], gears: Sequence[GearSpec] = (),
                  start: Posture | None = None) -> None:
-        self.base = base
+        self.base, self.noise = base, NOISE
         self._start = start or {}
         tree = spanning_tree(base, joints)
         self.length = _spread(base, tree)
@@ -159,14 +160,14 @@ class LoopAssembly:
         def content(at: Residual) -> bool:
             nonlocal before
             gain, before = before - at.size, at.size
-            stalled = 0 < gain < 1e-6 * at.size and at.size < NOISE
+            stalled = 0 < gain < 1e-6 * at.size and at.size < self.noise
             return at.size <= SOLVED or stalled or not self.size or self._spent > LOOP_EFFORT
 
         def propose(values: Values, at: Residual, factor: float) -> Values:
             return self.step(values, self._damped(at, factor))
 
         values, left = descend(values, self.system, propose, DAMPING, iterations, content)
-        return self._polish(values, left) if SOLVED < left.size < NOISE else (values, left.size)
+        return self._polish(values, left) if SOLVED < left.size < self.noise else (values, left.size)
 
     def _polish(self, values: Values, at: Residual) -> tuple[Values, float]:
         """Plain Newton steps, faint directions too, as long as they are short for the residual that they remove."""
@@ -184,7 +185,7 @@ class LoopAssembly:
     def _damped(self, at: Residual, factor: float) -> Array:
         """The damped step, no longer than ``LOOP_STRIDE``; near the solution the plain one without faint directions."""
         U, s, Vt = np.linalg.svd(at.J, full_matrices=False)
-        if at.size < NOISE and factor <= 1.0:
+        if at.size < self.noise and factor <= 1.0:
             kept = s > FAINT * s[0]
             step = -(Vt[kept].T @ ((U.T @ at.error)[kept] / s[kept]))
         else:
@@ -249,7 +250,7 @@ def solve(assembly: LoopAssembly, seed: int = 0) -> LoopSolution:
     best = LoopSolution(*assembly.close(assembly.zero()))
     rng = np.random.default_rng(seed)
     for number in range(LOOP_TRIES):
-        if best.residual <= NOISE:
+        if best.residual <= assembly.noise:
             break
         amplitude = (0.1, 0.3, 0.6, 1.0)[min(3, number // 6)]
         start = assembly.step(assembly.zero(), amplitude * rng.normal(size=assembly.size))

@@ -1,14 +1,15 @@
-"""Geometry that is meant but rounded: relations that nearly hold within a link are made exact.
+"""Relations that joints nearly have: axes parallel, perpendicular, coaxial, through one point; centres in a plane, in
+line with an axis; rods equal.
 
-Printed digits and CAD leave axes parallel to 1e-6 and rods equal to 1e-7 m. Such noise changes ranks (a loop with
-redundant constraints becomes rigid) and hides what a link is (a U, two equal rods). The least change of joint centres
-and axes that satisfies every relation that holds to ``tolerances.NOISE`` is found by Gauss-Newton.
+All axes that are nearly parallel are one direction, all lines and balls that nearly meet share one point (a *place*):
+so spherical and planar loops, U joints and balls of several R need no relation of their own. Lengths in characteristic
+lengths; a *defect* is by how much a relation misses (characteristic lengths, radians).
 """
 
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -16,37 +17,29 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...budgets import LARGEST_RELATED, MOST_RELATED_ON_LINK
-from ...errors import LoopsNotClosed, RankUndecided
-from ...geometry.vectors import Array
+from ...budgets import MOST_RELATED_ON_LINK
+from ...geometry import lines
+from ...geometry.vectors import Array, unit
 from ...mechanism import graphs
-from ...mechanism.model import Joint, JointType, Mechanism, Note
-from ...tolerances import COMPLEX_STEP, EXACT, FAINT, NOISE, RANK_GAP, SAME_GEOMETRY
-from .loops import LoopAssembly
+from ...mechanism.model import Joint, JointType, Mechanism
+from ...tolerances import COMPLEX_STEP, OBLIQUE
 
-_LINES = (JointType.REVOLUTE, JointType.CYLINDRICAL)
-_BALLS = (JointType.SPHERICAL, JointType.UNIVERSAL)
-
+LINES = (JointType.REVOLUTE, JointType.CYLINDRICAL)
+BALLS = (JointType.SPHERICAL, JointType.UNIVERSAL)
 Vectors = NDArray[Any]
 """Vectors (..., 3), real or complex."""
 
 
 @dataclass(frozen=True, eq=False)
-class ExactGeometry:
-    """The mechanism with exact relations, how many of them held only nearly, and the largest change (characteristic
-    lengths, pure numbers)."""
-
-    mechanism: Mechanism
-    mended: int
-    change: float
-
-
 class GeometricRelation:
-    """An equation f(v₁, v₂, …) = 0 of centres and axes; f is a polynomial, (..., 3) → (..., m), real or complex."""
+    """An equation f(v₁, v₂, …) = 0 of points and directions; f is a polynomial, (..., 3) → (..., m), real or complex.
+    ``at`` is the first coordinate of each of its vectors; ``kind`` and ``of`` say it in words."""
 
-    def __init__(self, function: Callable[..., Vectors], *at: int) -> None:
-        self.function, self.at = function, at
-        """``at``: the first coordinate of each of its vectors."""
+    kind: str
+    of: tuple[str, ...]
+    function: Callable[..., Vectors]
+    at: tuple[int, ...]
+    defect: float
 
     def value(self, x: Array) -> Array:
         """f, shape (m,)."""
@@ -71,16 +64,16 @@ def _length(u: Vectors) -> Vectors:
     return (_normal(u, u) - 1) / 2
 
 
-def _along(p: Vectors, q: Vectors, a: Vectors) -> Vectors:
+def _on_line(p: Vectors, q: Vectors, a: Vectors) -> Vectors:
     return np.cross(p - q, a)
 
 
-def _coaxial(p: Vectors, q: Vectors, a: Vectors, b: Vectors) -> Vectors:
-    return np.concatenate([np.cross(p - q, a), np.cross(a, b)], axis=-1)
+def _across(p: Vectors, q: Vectors, a: Vectors) -> Vectors:
+    return _normal(p - q, a)
 
 
-def _meeting(p: Vectors, q: Vectors, a: Vectors, b: Vectors) -> Vectors:
-    return _normal(p - q, np.cross(a, b))
+def _coplanar(p: Vectors, q: Vectors, r: Vectors, s: Vectors) -> Vectors:
+    return _normal(p - s, np.cross(q - s, r - s))
 
 
 def _equal(p: Vectors, q: Vectors, r: Vectors, s: Vectors) -> Vectors:
@@ -91,128 +84,245 @@ def _equal_across(p: Vectors, q: Vectors, r: Vectors, s: Vectors, a: Vectors) ->
     return np.cross(q - p - s + r, a)
 
 
-class _JointCoordinates:
-    """Centres and axes of all joints in one vector; centres in characteristic lengths."""
+class Bodies:
+    """Links held together by fixed joints are one body; ``on`` are the joints on each."""
 
     def __init__(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
-        self.point: dict[str, int] = {}
-        self.axes: dict[str, list[int]] = {}
-        values: list[Array] = []
+        fixed = (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED)
+        groups = graphs.components(graphs.adjacency(mechanism.links, fixed))
+        self.of = {link: number for number, group in enumerate(groups) for link in group}
+        self.on: dict[int, list[Joint]] = defaultdict(list)
         for joint in mechanism.joints.values():
-            self.point[joint.name] = 3 * len(values)
-            values.append(joint.point / mechanism.length)
-            self.axes[joint.name] = [3 * (len(values) + k) for k in range(len(joint.axes))]
-            values.extend(joint.axes)
-        self.values = np.concatenate(values)
+            if joint.type not in (JointType.FIXED, JointType.FREE):
+                for body in {self.of[link] for link in joint.links}:
+                    self.on[body].append(joint)
+
+    def pairs(self) -> Iterator[tuple[Joint, Joint]]:
+        """Two joints on one body, of bodies with not too many."""
+        for joints in self.on.values():
+            if len(joints) <= MOST_RELATED_ON_LINK:
+                yield from combinations(joints, 2)
+
+
+class JointCoordinates:
+    """Directions, centres and places of a mechanism in one vector ``start``, each with its weight; what two places or
+    axes ``within`` each other are is one."""
+
+    def __init__(self, mechanism: Mechanism, bodies: Bodies, within: float) -> None:
+        self.mechanism, self.within = mechanism, within
+        joints = list(mechanism.joints.values())
+        self._vectors: list[Array] = []
+        self.weights: list[float] = []
+        axes = [(joint.name, k) for joint in joints for k in range(len(joint.axes))]
+        vectors = np.array([mechanism.joints[name].axes[k] for name, k in axes]).reshape(-1, 3)
+        self.direction: dict[tuple[str, int], tuple[int, float]] = {}
+        """Of each axis the coordinate of its direction, and its sense along it."""
+        self.members: dict[int, list[tuple[str, int]]] = {}
+        for group in _clusters(np.linalg.norm(np.cross(vectors[:, None], vectors[None]), axis=2), within):
+            senses = [1.0 if vectors[i] @ vectors[group[0]] > 0 else -1.0 for i in group]
+            at = self._add(unit(np.sum([s * vectors[i] for s, i in zip(senses, group, strict=True)], axis=0)),
+                           len(group) ** 0.5)
+            self.members[at] = [axes[i] for i in group]
+            self.direction.update({axes[i]: (at, s) for s, i in zip(senses, group, strict=True)})
+        self.point = {joint.name: self._add(joint.point / mechanism.length) for joint in joints}
+        self.places: dict[int, list[str]] = {}
+        """Of each place its coordinate and the joints whose lines or centres it is on."""
+        self._find_places(bodies)
+
+    @property
+    def start(self) -> Array:
+        """The coordinates of the mechanism as it is, directions those in the middle."""
+        return np.concatenate(self._vectors)
+
+    @property
+    def scale(self) -> Array:
+        """How much each coordinate weighs."""
+        return np.repeat(self.weights, 3)
+
+    def _add(self, vector: Array, weight: float = 1.0) -> int:
+        self._vectors.append(vector)
+        self.weights.append(weight)
+        return 3 * len(self._vectors) - 3
+
+    def axis_of(self, joint: Joint) -> int:
+        """The coordinate of the direction of a joint's axis."""
+        return self.direction[joint.name, 0][0]
+
+    def _find_places(self, bodies: Bodies) -> None:
+        """Where axes on one body meet, and balls; those that are close are one place, with all axes through it."""
+        length = self.mechanism.length
+        found: list[Array] = []
+        for one, two in bodies.pairs():
+            if one.type in LINES and two.type in LINES and self.axis_of(one) != self.axis_of(two) and \
+                    float(np.linalg.norm(np.cross(one.axis, two.axis))) > OBLIQUE:
+                ends = lines.common_perpendicular(one.point, one.axis, two.point, two.axis)
+                if float(np.linalg.norm(ends[1] - ends[0])) <= self.within * length:
+                    found.append((ends[0] + ends[1]) / 2 / length)
+        balls = [joint for joint in self.mechanism.joints.values() if joint.type in BALLS]
+        straight = [joint for joint in self.mechanism.joints.values() if joint.type in LINES]
+        points = np.array([*(ball.point / length for ball in balls), *found]).reshape(-1, 3)
+        apart = np.linalg.norm(points[:, None] - points[None], axis=2)
+        for group in _clusters(apart, 2 * self.within):
+            centres = [balls[i] for i in group if i < len(balls)]
+            middle = np.mean(points[group], axis=0)
+            through = [j for j in straight if lines.distance(length * middle, j.point, j.axis) <= self.within * length]
+            if len(centres) + len(through) > 1:
+                at = self.point[centres[0].name] if centres else self._add(middle, 0.1)
+                self.places[at] = [joint.name for joint in (*centres, *through)]
 
     def mechanism_of(self, x: Array) -> Mechanism:
         """The mechanism with other centres and axes."""
-        joints = {}
+        joints, centre = {}, dict(self.point)
+        for place, names in self.places.items():
+            centre.update({name: place for name in names if np.linalg.norm(
+                self.start[place : place + 3] - self.mechanism.joints[name].point / self.mechanism.length)
+                <= self.within})
         for name, joint in self.mechanism.joints.items():
-            axes = tuple(x[i : i + 3] for i in self.axes[name])
-            at = self.point[name]
+            axes = tuple(sense * x[at : at + 3] for at, sense in
+                         (self.direction[name, k] for k in range(len(joint.axes))))
+            at = centre[name]
             joints[name] = replace(joint, point=x[at : at + 3] * self.mechanism.length, axes=axes)
         return replace(self.mechanism, joints=joints)
 
 
-def as_meant(mechanism: Mechanism, residual: float) -> Mechanism:
-    """The mechanism, its loops open by ``residual``, with exact relations in place of nearly held ones; the gap of the
-    singular values is the evidence. Raises ``LoopsNotClosed`` or ``RankUndecided`` where it is none."""
-    written = LoopAssembly.of(mechanism)
-    found = exact_geometry(mechanism)
-    if found is None:
-        if residual > SAME_GEOMETRY:
-            raise LoopsNotClosed(str(mechanism.file), residual, SAME_GEOMETRY, written.worst(written.zero())[0])
-        return mechanism
-    meant = LoopAssembly.of(found.mechanism)
-    rank = meant.rank(meant.zero())
-    before, loose = written.rank(written.zero()), written.rank(written.zero(), FAINT)
-    text = (f"{found.mended} relations of joints (parallel, perpendicular, meeting, equal) that hold to {NOISE:g} are "
-            f"made exact, largest change {found.change:.1e}")
-    if before.value != rank.value or residual > SAME_GEOMETRY:
-        if loose.value != rank.value or loose.gap < RANK_GAP:
-            raise RankUndecided(f"{mechanism.file}: loops with rounded numbers", loose.gap, RANK_GAP)
-        text += f"; the loops' singular values as written leave a gap of {loose.gap:.1e} (needed {RANK_GAP:g})"
-    return replace(found.mechanism, notes=(*mechanism.notes, Note("merged", text)))
+def _clusters(apart: Array, within: float) -> list[list[int]]:
+    """Groups of numbers that are joined by distances (n, n) up to ``within``."""
+    if not len(apart):
+        return []
+    from scipy.sparse.csgraph import connected_components
+
+    count, label = connected_components(apart <= within, directed=False)
+    return [np.flatnonzero(label == k).tolist() for k in range(count)]
 
 
-def exact_geometry(mechanism: Mechanism) -> ExactGeometry | None:
-    """Make nearly held relations exact; None where there are none, or where they contradict each other."""
-    if not 1 < len(mechanism.joints) <= LARGEST_RELATED:
-        return None
-    coordinates = _JointCoordinates(mechanism)
-    x = start = coordinates.values
-    misses = [(relation, float(np.max(np.abs(relation.value(start)))))
-              for relation in _relations(mechanism, coordinates)]
-    held = [relation for relation, miss in misses if miss <= NOISE]
-    mended = sum(EXACT < miss <= NOISE for _, miss in misses)
-    if not mended:
-        return None
-    held += [GeometricRelation(_length, i) for own in coordinates.axes.values() for i in own]
-    for _ in range(8):
-        error = np.concatenate([relation.value(x) for relation in held])
-        if np.max(np.abs(error)) <= 1e-15:
-            break
-        J = np.vstack([relation.gradient(x) for relation in held])
-        x = x - np.linalg.lstsq(J, error, rcond=1e-9)[0]
-    change = float(np.max(np.abs(x - start)))
-    if max(np.max(np.abs(relation.value(x))) for relation in held) > EXACT or change > 3 * NOISE:
-        return None
-    return ExactGeometry(coordinates.mechanism_of(x), mended, change)
-
-
-def _relations(mechanism: Mechanism, at: _JointCoordinates) -> Iterator[GeometricRelation]:
-    """Relations that links could be meant to have, held or not."""
-    bonds = graphs.adjacency(mechanism.links, (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED))
-    body = {link: number for number, group in enumerate(graphs.components(bonds)) for link in group}
-    on: dict[int, list[Joint]] = defaultdict(list)
-    for joint in mechanism.joints.values():
-        if joint.type not in (JointType.FIXED, JointType.FREE):
-            for link in joint.links:
-                on[body[link]].append(joint)
-    for joint in mechanism.joints.values():
+def certain(at: JointCoordinates) -> Iterator[GeometricRelation]:
+    """What holds by definition: directions have length one, the axes of a U are at right angles."""
+    for i in at.members:
+        yield GeometricRelation("unit", (), _length, (i,), 0.0)
+    for joint in at.mechanism.joints.values():
         if joint.type is JointType.UNIVERSAL:
-            yield GeometricRelation(_normal, *at.axes[joint.name])
-    for joints in on.values():
-        if len(joints) <= MOST_RELATED_ON_LINK:
-            yield from _within(joints, at)
-    yield from _rods(body, on, at)
+            yield _perpendicular(at, joint.name, joint.name, at.direction[joint.name, 0][0],
+                                 at.direction[joint.name, 1][0])
 
 
-def _within(joints: list[Joint], at: _JointCoordinates) -> Iterator[GeometricRelation]:
-    for one, two in combinations(joints, 2):
-        centres = at.point[one.name], at.point[two.name]
-        for a in at.axes[one.name]:
-            for b in at.axes[two.name]:
-                yield GeometricRelation(np.cross, a, b)
-                yield GeometricRelation(_normal, a, b)
-        if one.type in _BALLS and two.type in _BALLS:
-            yield GeometricRelation(np.subtract, *centres)
-            for other in joints:
-                for axis in at.axes[other.name]:
-                    yield GeometricRelation(_along, *centres, axis)
-        elif one.type in _LINES and two.type in _LINES:
-            yield GeometricRelation(_meeting, *centres, at.axes[one.name][0], at.axes[two.name][0])
-            yield GeometricRelation(_coaxial, *centres, at.axes[one.name][0], at.axes[two.name][0])
-        elif {one.type, two.type} <= {*_LINES, *_BALLS}:
-            line = one if one.type in _LINES else two
-            yield GeometricRelation(_along, *centres, at.axes[line.name][0])
+def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]:
+    """Candidates among axes and centres: parallel, perpendicular on a body, coaxial on a body, through a place."""
+    x, length = at.start, at.mechanism.length
+    for i, members in at.members.items():
+        if len(members) > 1:
+            worst = max(float(np.linalg.norm(np.cross(at.mechanism.joints[name].axes[k], x[i : i + 3])))
+                        for name, k in members)
+            yield GeometricRelation("parallel", tuple(dict.fromkeys(name for name, _ in members)), _length, (i,), worst)
+    seen = set()
+    for one, two in bodies.pairs():
+        for k in range(len(one.axes)):
+            for m in range(len(two.axes)):
+                i, j = sorted((at.direction[one.name, k][0], at.direction[two.name, m][0]))
+                if i != j and (i, j) not in seen:
+                    seen.add((i, j))
+                    yield _perpendicular(at, one.name, two.name, i, j)
+        if one.type in LINES and two.type in LINES and at.axis_of(one) == at.axis_of(two):
+            miss = lines.distance(one.point, two.point, two.axis) / length
+            yield GeometricRelation("coaxial", (one.name, two.name), _on_line,
+                                    (at.point[one.name], at.point[two.name], at.axis_of(one)), miss)
+    for i, names in at.places.items():
+        for name in names:
+            joint, place = at.mechanism.joints[name], x[i : i + 3]
+            if joint.type in LINES:
+                miss = lines.distance(place, joint.point / length, joint.axis)
+                yield GeometricRelation("through one point", tuple(names), _on_line,
+                                        (i, at.point[name], at.axis_of(joint)), miss)
+            elif at.point[name] != i:
+                miss = float(np.linalg.norm(place - joint.point / length))
+                yield GeometricRelation("through one point", tuple(names), np.subtract, (i, at.point[name]), miss)
 
 
-def _rods(body: dict[str, int], on: dict[int, list[Joint]], at: _JointCoordinates) -> Iterator[GeometricRelation]:
+def _perpendicular(at: JointCoordinates, one: str, two: str, i: int, j: int) -> GeometricRelation:
+    x = at.start
+    return GeometricRelation("perpendicular", tuple(dict.fromkeys((one, two))), _normal, (i, j),
+                             abs(float(x[i : i + 3] @ x[j : j + 3])))
+
+
+def of_centres(at: JointCoordinates, normal: Mechanism, x: Array) -> Iterator[GeometricRelation]:
+    """Candidates among the balls of the ``normal`` form of a mechanism with coordinates ``x``: in line with an axis or
+    square to it, in one plane; rods between the same bodies equal."""
+    bodies = Bodies(normal)
+    balls_of_one = [at.point[joint.name] for joint in at.mechanism.joints.values() if joint.type in BALLS]
+    spots = list(dict.fromkeys((*at.places, *balls_of_one)))
+    points, ways = (np.array([x[i : i + 3] for i in each]) for each in (spots, list(at.members)))
+
+    def spot(joint: Joint) -> int:
+        """The coordinate of a joint's centre."""
+        if joint.type not in BALLS:
+            return at.point[joint.name]
+        return spots[int(np.argmin(np.linalg.norm(points - joint.point / at.mechanism.length, axis=1)))]
+
+    def way(axis: Array) -> int:
+        """The coordinate of an axis."""
+        return list(at.members)[int(np.argmin(np.linalg.norm(np.cross(ways, axis), axis=1)))]
+
+    def vector(i: int) -> Array:
+        return start[i : i + 3]
+
+    start = at.start
+    for joints in bodies.on.values():
+        if len(joints) > MOST_RELATED_ON_LINK:
+            continue
+        balls = [joint for joint in joints if joint.type in BALLS]
+        axes = {way(axis): joint.name for joint in joints for axis in joint.axes}
+        for one, two in combinations(balls, 2):
+            i, j = spot(one), spot(two)
+            arm = vector(i) - vector(j)
+            size = float(np.linalg.norm(arm))
+            if size <= at.within / OBLIQUE:
+                continue
+            for a, name in axes.items():
+                names = (one.name, two.name, name)
+                yield GeometricRelation("in line with an axis", names, _on_line, (i, j, a),
+                                        float(np.linalg.norm(np.cross(arm, vector(a)))))
+                yield GeometricRelation("square to an axis", names, _across, (i, j, a), abs(float(arm @ vector(a))))
+        yield from _flat([(joint.name, spot(joint)) for joint in balls], vector, at.within)
+    yield from _rods(bodies, spot, at, vector)
+
+
+def _flat(balls: Sequence[tuple[str, int]], vector: Callable[[int], Array], within: float
+          ) -> Iterator[GeometricRelation]:
+    """All centres of a body in one plane with the three that span the largest triangle."""
+    def area(three: Iterable[tuple[str, int]]) -> float:
+        p, q, r = (vector(i) for _, i in three)
+        return float(np.linalg.norm(np.cross(q - p, r - p)))
+
+    if len(balls) < 4:
+        return
+    three = max(combinations(balls, 3), key=area)
+    size = area(three)
+    if size <= (within / OBLIQUE) ** 2:
+        return
+    corners = [i for _, i in three]
+    for name, i in balls:
+        if i not in corners:
+            miss = abs(float(_coplanar(*(vector(j) for j in (*corners, i)))[0])) / size
+            yield GeometricRelation("in one plane", (*(other for other, _ in three), name), _coplanar, (*corners, i),
+                                    miss)
+
+
+def _rods(bodies: Bodies, spot: Callable[[Joint], int], at: JointCoordinates, vector: Callable[[int], Array]
+          ) -> Iterator[GeometricRelation]:
     """Two links of two joints each between the same two bodies: equal from centre to centre."""
     table: dict[frozenset[int], list[Sequence[Joint]]] = defaultdict(list)
-    for own, joints in on.items():
+    for own, joints in bodies.on.items():
         if len(joints) == 2:
-            far = [next((body[x] for x in j.links if body[x] != own), own) for j in joints]
+            far = [next((bodies.of[x] for x in j.links if bodies.of[x] != own), own) for j in joints]
             if far[0] != far[1]:
                 table[frozenset(far)].append(joints if far[0] < far[1] else joints[::-1])
     for rods in table.values():
         for one, two in combinations(rods, 2):
             joints = [*one, *two]
-            points = [at.point[joint.name] for joint in joints]
-            if all(joint.type in _BALLS for joint in joints):
-                yield GeometricRelation(_equal, *points)
+            names, points = tuple(j.name for j in joints), tuple(spot(joint) for joint in joints)
+            if all(joint.type in BALLS for joint in joints):
+                miss = float(np.linalg.norm(_equal(*(vector(i) for i in points))))
+                yield GeometricRelation("equal rods", names, _equal, points, miss)
             elif all(joint.type is JointType.REVOLUTE for joint in joints):
-                yield GeometricRelation(_equal_across, *points, at.axes[joints[0].name][0])
+                at_all = (*points, at.axis_of(joints[0]))
+                miss = float(np.linalg.norm(_equal_across(*(vector(i) for i in at_all))))
+                yield GeometricRelation("equal rods", names, _equal_across, at_all, miss)

@@ -45,7 +45,7 @@ class _MjcfReader(XmlReader):
         self.compiler = Compiler.of(self)
         self.defaults = Defaults(self)
         self.contents = BodyContents(self, self.compiler, self.defaults)
-        graph = self.result = JointGraph(root.get("model") or "robot", self.file, "MJCF")
+        graph = self.result = JointGraph(root.get("model") or "robot", self.file, "MJCF", digits=self.digits)
         graph.links[WORLD] = Link(WORLD)
         graph.base = WORLD
         self.placed[WORLD] = ORIGIN

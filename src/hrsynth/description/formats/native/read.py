@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import difflib
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from lxml import etree
 
 from ....errors import BadRobotFile
+from ....geometry.vectors import Array
 from ....mechanism import graphs
 from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
 from ....mechanism.observation import Direction
-from ....tolerances import SAME_DIRECTION, SAME_GEOMETRY
+from ....tolerances import NO_FINER, SAME_DIRECTION, SAME_GEOMETRY
 from ... import chains, xml
 from ...dialect import RobotFile
 from ...elements import LIMITS
 from ...jointgraph import JointSpec, TreeJoint, zero_poses
-from ...jointmotion import require_closed
+from ...jointmotion import require_closed, residual
 from ..urdf.elements import INTERFACE, UrdfReader, simple_transmission
 
 OWN_TAGS = ("platform", "camera", "observe")
@@ -36,7 +38,8 @@ def read(file: RobotFile) -> Mechanism:
     LoopsNotClosed
         Where a loop is open at the zero configuration.
     """
-    return _NativeReader(str(file.path), file.document).mechanism()
+    return _NativeReader(str(file.path), file.document, tolerance=file.tolerance,
+                         as_written=file.as_written).mechanism()
 
 
 def parse(text: bytes | str, file: str = "<text>") -> Mechanism:
@@ -51,6 +54,8 @@ class _NativeReader(UrdfReader):
     camera: str | None = None
     serial: bool = False
     rest: list[str] = field(default_factory=list)
+    tolerance: float | None = None
+    as_written: bool = False
 
     def mechanism(self) -> Mechanism:
         root = self.root
@@ -215,6 +220,9 @@ class _NativeReader(UrdfReader):
         links = {key: replace(link, pose=poses[key]) for key, link in self.links.items()}
         mechanism = Mechanism(name, links, joints, base, platform, tuple(self.observations), tuple(self.couplings),
                               self.camera, tuple(self.rest), self.file)
+        found = None if self.as_written or not loops else self.rounded(mechanism, loops, poses)
+        if found is not None:
+            return found
         for joint, X_P, X_S in loops:
             if joint.type is JointType.UNIVERSAL:
                 cosine = float(X_P[:3, :3] @ joint.axes[0] @ (X_S[:3, :3] @ joint.axes[1]))
@@ -225,3 +233,19 @@ class _NativeReader(UrdfReader):
         self.require_sound()
         require_closed(self.file, loops, mechanism.length)
         return chains.merge(mechanism)
+
+    def rounded(self, mechanism: Mechanism, loops: Sequence[tuple[JointSpec, Array, Array]], poses: Mapping[str, Array]
+                ) -> Mechanism | None:
+        """The mechanism as it is meant, where its numbers are rounded; None where they are not, or not to blame."""
+        if not (self.tolerance or self.digits.last_place):
+            return None
+        from ...assembly.build import joint_at, rounding
+        from ...assembly.idealise import as_meant
+
+        opening = max(residual(joint, X_P, X_S, mechanism.length) for joint, X_P, X_S in loops)
+        tolerance = self.tolerance or rounding(self.digits, mechanism.length, opening)
+        if not (tolerance and opening <= NO_FINER * tolerance):
+            return None
+        self.require_sound()
+        between = [replace(joint_at(joint, poses, False), motor=self.motors.get(joint.name)) for joint, _, _ in loops]
+        return as_meant(chains.merge(mechanism.changed(joints=between)), opening, tolerance)

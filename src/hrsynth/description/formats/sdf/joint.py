@@ -41,6 +41,7 @@ def pose_of(reader: XmlReader, element: xml.Element | None) -> Array:
         return pose(values[:3], reader.rotation(element, np.roll(values[3:], 1)))
     values = numbers(reader, element, (0,) * 6)
     angles = np.radians(values[3:]) if element.get("degrees") in ("true", "1") else values[3:]
+    reader.digits.angles(angles)
     return pose(values[:3], rotation_from_rpy(*angles)) if np.any(angles) else pose(values[:3])
 
 

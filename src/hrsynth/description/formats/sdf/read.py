@@ -54,7 +54,7 @@ class _SdfReader(XmlReader):
         """The joint graph of the document's model."""
         self.version = self._version()
         model = self._model()
-        graph = self.result = JointGraph(model.get("name") or "robot", self.file, "SDF")
+        graph = self.result = JointGraph(model.get("name") or "robot", self.file, "SDF", digits=self.digits)
         self.frames[MODEL] = _FrameElement(model.find("pose"), WORLD, WORLD, "model")
         self._collect(model, "", 0)
         if not graph.links:

@@ -42,7 +42,7 @@ class _TolerantReader(UrdfReader):
         """All links, joints and closures."""
         self.elements()
         self.check_structure()
-        graph = JointGraph(self.root.get("name") or "robot", self.file, "URDF", self.links)
+        graph = JointGraph(self.root.get("name") or "robot", self.file, "URDF", self.links, digits=self.digits)
         for kind, text in self.notes:
             graph.note(kind, text)
         graph.joints = {name: replace(joint, motor=self.motors.get(name)) for name, joint in self.joints.items()}

@@ -1,0 +1,193 @@
+"""What is rounded is read as it was meant, or refused: the same robot, whatever dialect, decimals, joints and units."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import product
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from description.foreign.rounded import ENDINGS, exported, in_millimetres, of_hinges
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.description import load, save, shipped
+from hrsynth.description.assembly.idealise import as_meant, nearest
+from hrsynth.description.numerals import Digits
+from hrsynth.errors import BadRequest, LoopsNotClosed, StructureUndecided
+from hrsynth.geometry.vectors import pose, rotation_about, unit
+from hrsynth.mechanism import JointType, Mechanism
+from hrsynth.mechanism.normal import normal_form
+from hrsynth.tolerances import NOISE
+
+SOME = ("3rps", "delta", "3upu", "3rrr_m1", "prrrp_m1")
+DECIMALS = (14, 9, 7, 6, 5, 4, 3)
+
+
+def answer(robot: Mechanism) -> tuple[object, ...]:
+    """What must not depend on the digits."""
+    found = ObservedRobot.of(robot, samples=3)
+    return found.anatomy.architecture(), found.dof, found.mobility
+
+
+def again(robot: Mechanism, path: Path, decimals: int, **given: object) -> Mechanism:
+    """The robot written with so many decimals, and read."""
+    own = {} if path.suffix == ".urdf" else {"platform": robot.platform}
+    return load(exported(robot, path, decimals), **own, **given)  # type: ignore[arg-type]
+
+
+def variants(robot: Mechanism) -> dict[str, Mechanism]:
+    """Balls and U joints as such, as R in any directions, as R along the base's axes; in metres and in millimetres."""
+    found = {"plain": robot}
+    if any(joint.type in (JointType.SPHERICAL, JointType.UNIVERSAL) for joint in robot.joints.values()):
+        found |= {"hinges": of_hinges(robot), "aligned": of_hinges(robot, aligned=True)}
+    return found | {f"{name}, mm": in_millimetres(each) for name, each in found.items()}
+
+
+@pytest.mark.parametrize("decimals", [7, 5, 4])
+@pytest.mark.parametrize(("name", "ending"), list(zip(SOME, (".urdf", ".xml", ".sdf", ".yaml", ".urdf"), strict=True)))
+def test_a_rounded_robot_is_the_same(name: str, ending: str, decimals: int, tmp_path: Path):
+    robot = of_hinges(load(name))
+    assert answer(again(robot, tmp_path / f"robot{ending}", decimals)) == answer(load(name))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped())
+def test_every_rounded_robot_is_the_same_or_refused(name: str, tmp_path: Path):
+    meant = answer(load(name))
+    for (variant, robot), (dialect, ending), decimals in product(variants(load(name)).items(), ENDINGS.items(), (4,)):
+        folder = tmp_path / f"{variant} {dialect} {decimals}"
+        folder.mkdir()
+        assert answer(again(robot, folder / f"robot{ending}", decimals)) == meant, folder.name
+
+
+@pytest.mark.long
+@pytest.mark.timeout(3600)
+@pytest.mark.parametrize("decimals", DECIMALS)
+def test_the_whole_table(decimals: int, tmp_path: Path):
+    """docs/pages/files.md, "Rounded numbers": all down to four decimals; with three the same, or refused."""
+    refused = 0
+    for name in shipped():
+        meant = answer(load(name))
+        for (variant, robot), (dialect, ending) in product(variants(load(name)).items(), ENDINGS.items()):
+            folder = tmp_path / f"{name} {variant} {dialect}"
+            folder.mkdir()
+            try:
+                found = again(robot, folder / f"robot{ending}", decimals)
+            except StructureUndecided:
+                refused += 1
+                continue
+            assert answer(found) == meant, folder.name
+    assert decimals == 3 or not refused
+
+
+@pytest.mark.parametrize("name", shipped())
+def test_what_is_not_rounded_stays_as_it_is(name: str):
+    robot = load(name)
+    assert as_meant(robot, 0.0, NOISE) is robot
+
+
+@pytest.mark.parametrize("decimals", [6, 4])
+def test_a_tilted_robot_of_no_round_numbers_is_the_same(decimals: int, tmp_path: Path):
+    """No axis along a base axis, no length of few digits: nothing is found by its numbers."""
+    robot, X = load("linear_delta"), pose((0.123, -0.377, 0.219), rotation_about(unit([1.0, 2.0, 0.5]), 0.7))
+    moved = {name: replace(link, pose=link.pose if name == robot.base else X @ link.pose)
+             for name, link in robot.links.items()}
+    joints = {name: replace(joint, point=X[:3, :3] @ joint.point + X[:3, 3],
+                            axes=tuple(X[:3, :3] @ axis for axis in joint.axes))
+              for name, joint in robot.joints.items()}
+    tilted = of_hinges(replace(robot, links=moved, joints=joints))
+    assert answer(again(tilted, tmp_path / "robot.xml", decimals)) == answer(robot)
+
+
+def test_what_was_made_exact_is_exact_and_told(tmp_path: Path):
+    robot = again(of_hinges(load("delta")), tmp_path / "robot.xml", 4)
+    balls = [j for j in normal_form(robot).mechanism.joints.values() if j.type is JointType.SPHERICAL]
+    assert len(balls) == 12
+    (told,) = [note.text for note in robot.notes if "are made exact" in note.text]
+    shift = float(told.split("moved by up to ")[1].split(" mm")[0])
+    assert 0 < shift < 0.5
+    kinds = [note.text.removeprefix("made to be ").split(":")[0] for note in robot.notes if "made to be" in note.text]
+    assert {"perpendicular", "in line with an axis"} <= set(kinds)
+    exact = nearest(robot, NOISE)
+    assert exact is not None
+    assert exact.mended == ()
+
+
+def test_the_nearest_mechanism_is_not_farther_than_the_one_that_was_rounded(tmp_path: Path):
+    """Least squares: centres of the balls move less, in the mean, than rounding moved them."""
+    robot = load("delta")
+    path = exported(robot, tmp_path / "robot.sdf", 4)
+    found, written = load(path, platform="platform"), load(path, platform="platform", tolerance=1.1e-11)
+    names = [name for name, joint in robot.joints.items() if joint.type is JointType.SPHERICAL]
+
+    def apart(one: Mechanism, other: Mechanism) -> float:
+        return float(np.sum([np.sum((one.joints[n].point - other.joints[n].point) ** 2) for n in names]))
+
+    assert 0 < apart(found, written) <= apart(robot, written)
+
+
+def test_two_structures_equally_near_are_refused_with_advice(tmp_path: Path):
+    """A U whose axes miss each other by somewhat more than the decimals explain."""
+    robot = of_hinges(load("3upu"))
+    name = next(name for name in robot.joints if name.endswith("hinge1"))
+    joint = robot.joints[name]
+    other = next(j for j in robot.joints.values() if j.name == name.replace("hinge1", "hinge0"))
+    shifted = joint.point + 3.5e-4 * np.cross(joint.axis, other.axis)
+    path = exported(robot.changed(joints=[replace(joint, point=shifted)]), tmp_path / "robot.xml", 4)
+    with pytest.raises(StructureUndecided, match=r"--tolerance, or --as-written") as caught:
+        load(path, platform=robot.platform)
+    assert caught.value.exit_status == 3
+    assert "6 U" in str(caught.value)
+    coarse = normal_form(load(path, platform=robot.platform, tolerance=5e-3)).mechanism
+    assert sum(j.type is JointType.UNIVERSAL for j in coarse.joints.values()) == 6
+
+
+def test_as_written_nothing_is_made_exact(tmp_path: Path):
+    path = exported(of_hinges(load("delta")), tmp_path / "robot.xml", 5)
+    robot = load(path, platform="platform", as_written=True)
+    assert not any("made exact" in note.text for note in robot.notes)
+    path = exported(load("delta"), tmp_path / "robot.urdf", 5)
+    with pytest.raises(LoopsNotClosed):
+        load(path, as_written=True)
+    assert answer(load(path)) == answer(load("delta"))
+
+
+@pytest.mark.parametrize("tolerance", [-1.0, 0.0, 0.5, float("nan")])
+def test_a_tolerance_has_a_range(tolerance: float):
+    with pytest.raises(BadRequest, match="tolerance"):
+        load("delta", tolerance=tolerance)
+
+
+@pytest.mark.parametrize(("decimals", "expected"), [(14, 0.0), (9, 1e-9), (6, 1e-6), (3, 1e-3), (2, 0.0)])
+def test_a_file_tells_its_last_decimal(decimals: int, expected: float):
+    digits = Digits()
+    for number in np.random.default_rng(decimals).uniform(-1, 1, 100):
+        digits.read(f"{number:.{decimals}f}".rstrip("0") + " 0.5 0")
+    assert digits.last_place == pytest.approx(expected)
+
+
+@pytest.mark.parametrize(("angle", "rounded"), [(np.pi / 2, False), (1.5708, True), (2.0944, True), (0.3, False),
+                                                (1.57, True), (0.0, False), (1.0, False)])
+def test_a_file_tells_that_its_angles_are_rounded(angle: float, rounded: bool):
+    digits = Digits()
+    digits.angles(np.array([0.0, angle, 0.0]))
+    assert digits.rounded is rounded
+
+
+def test_small_features_that_are_typed_stay(tmp_path: Path):
+    """A native file of three decimals that closes exactly is not rounded: axes 2 mm apart are meant."""
+    text = '<robot name="r"><link name="base"/><link name="a"/><link name="b"/><link name="c"/>'
+    joint = ('<joint name="{}" type="continuous"><parent link="{}"/><child link="{}"/><origin xyz="{}"/>'
+             '<axis xyz="{}"/></joint>').format
+    text += joint("p", "base", "a", "0.125 0 0", "0 0 1") + joint("q", "a", "b", "0.002 0.375 0", "0 0 1")
+    text += joint("r", "base", "c", "0.625 0.125 0.375", "0 0 1")
+    text += ('<loop name="s" type="revolute"><predecessor link="b"><origin xyz="0.498 -0.125 0"/></predecessor>'
+             '<successor link="c"><origin xyz="0 0.125 -0.375"/></successor><axis xyz="0 0 1"/></loop>'
+             '<hrsynth><platform link="b"/></hrsynth></robot>')
+    (tmp_path / "typed.urdf").write_text(text)
+    robot = load(tmp_path / "typed.urdf")
+    assert robot.notes == ()
+    assert robot.joints["q"].point.tolist() == [0.127, 0.375, 0.0]
+    save(robot, tmp_path / "again.urdf")
+    assert load(tmp_path / "again.urdf").differences(robot) == []
