@@ -78,8 +78,8 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
 
 
 def deviation(digits: Digits, length: float) -> float:
-    """By how much the decimals of a file's numbers let miss what is meant to be exact (characteristic lengths, radians);
-    ``length`` is the characteristic length, in the file's unit."""
+    """By how much the decimals of a file's numbers let miss what is meant to be exact (characteristic lengths,
+    radians); ``length`` is the characteristic length, in the file's unit."""
     return ROUNDED * digits.last_place * max(1.0, 1 / length)
 
 
