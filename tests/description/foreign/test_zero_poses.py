@@ -243,3 +243,14 @@ def test_feet_are_offered_as_platforms(tmp_path: Path):
     assert {"l_crank", "l_link", "r_crank", "r_link"} <= set(offered)
     for name in offered[:3]:
         assert read(tmp_path, walker, "xml", platform=name).platform == name
+
+
+def test_a_zero_pose_that_loses_a_freedom_is_called_singular(tmp_path: Path):
+    flat = five_bar("").replace('"0.1 0.3 0"', '"0 0.3 0"').replace('"0.05 0.25 0"', '"0 0.3 0"')
+    flat = flat.replace('anchor="0.15 0.2 0"', 'anchor="0.15 0 0"')
+    stays = read(tmp_path, flat, "xml", platform="b1", base="carriage", keyframe="zero")
+    left = read(tmp_path, flat, "xml", platform="b1", base="carriage")
+    assert check(stays).postures[0].hidden.classes.type2
+    assert any("the zero pose is a Type 2 singularity of all legs together" in note.text for note in left.notes)
+    assert not check(left).postures[0].hidden.classes.type2
+    assert [each.rank for each in legs(stays).sets] == [each.rank for each in legs(left).sets]

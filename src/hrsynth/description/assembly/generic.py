@@ -37,11 +37,11 @@ class _Ranks:
 
     def beside(self, other: _Ranks, labels: tuple[str, ...]) -> str:
         """Where this and another differ, in words."""
-        for label, one, two in zip((f"legs {', '.join(labels)}" if len(labels) > 1 else f"leg {labels[0]}",
-                                    *(f"leg {each}" for each in labels)), self.seen, other.seen, strict=True):
+        single = [f"leg {each} sees" for each in labels]
+        names = [f"legs {', '.join(labels)} see", *single] if len(labels) > 1 else single
+        for name, one, two in zip(names, self.seen, other.seen, strict=True):
             if (one, self.dof) != (two, other.dof):
-                sees = "see" if label.startswith("legs") else "sees"
-                return (f"there {label} {sees} {one} of the platform's {self.dof} freedoms, nearby {two}"
+                return (f"there {name} {one} of the platform's {self.dof} freedoms, nearby {two}"
                         + (f" of {other.dof}" if self.dof != other.dof else ""))
         return f"there platform and segments move together in {self.dimension} ways, nearby in {other.dimension}"
 
@@ -84,7 +84,9 @@ def with_generic_zero(mechanism: Mechanism) -> Mechanism:
         return mechanism
     there = min(found, key=lambda each: each[:2])[2]
     labels = tuple(dict.fromkeys(each.leg for each in segments))
-    note = Note("solved", f"the zero pose is special ({here.beside(generic, labels)}): moved to "
+    lost = here.dof - here.seen[0] > generic.dof - generic.seen[0]
+    kind = "a Type 2 singularity of all legs together" if lost else "special"
+    note = Note("solved", f"the zero pose is {kind} ({here.beside(generic, labels)}): moved to "
                           f"{moves(assembly, there)} (--keyframe {STAY} to stay)")
     return replace(with_zero_at(mechanism, assembly, there), notes=(*mechanism.notes, note))
 
@@ -94,10 +96,11 @@ def _ranks(mechanism: Mechanism, point: Array | None, segments: list[Direction],
     """The ranks at closed values, and whether their gaps leave no doubt."""
     poses = assembly.scaled_poses(values)
     X = poses[mechanism.platform]
-    V = assembly.velocity(values, mechanism.platform)
-    platform = V if point is None else point_velocity(V, transform(X, point / assembly.length))
-    seen_from = assembly.velocity(values, mechanism.reference)[3:]
-    rates = [-hat(poses[each.link][:3, :3] @ each.direction) @ (assembly.velocity(values, each.link)[3:] - seen_from)
+    links = {mechanism.platform, mechanism.reference, *(each.link for each in segments)}
+    V = assembly.velocities(values, links)
+    platform = V[mechanism.platform] if point is None else point_velocity(V[mechanism.platform],
+                                                                          transform(X, point / assembly.length))
+    rates = [-hat(poses[each.link][:3, :3] @ each.direction) @ (V[each.link] - V[mechanism.reference])[3:]
              for each in segments]
     basis, whole = range_basis(np.vstack([platform, *rates]))
     rows = len(platform)

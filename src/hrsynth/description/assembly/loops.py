@@ -6,7 +6,7 @@ resist (redundant constraints, disturbed by rounded numbers) are not followed. L
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -122,23 +122,25 @@ class LoopAssembly:
             rows.append(row)
         return np.concatenate(errors), np.vstack(rows)
 
-    def velocity(self, values: Values, link: str) -> Array:
-        """The twists (6, n) of a link (linear at the base origin, angular) for a basis of the velocities that keep the
+    def velocities(self, values: Values, links: Iterable[str]) -> dict[str, Array]:
+        """The twists (6, n) of links (linear at the base origin, angular) for a basis of the velocities that keep the
         loops closed, joints in no loop last; lengths in characteristic lengths."""
         X, kernel = self.scaled_poses(values), self.kernel(values)
-        loose = [joint for joint, _, _ in self.tree if joint.name not in self._columns]
-        inside = np.zeros((6, self.size))
-        outside = {joint.name: np.zeros((6, joint.kind.freedoms)) for joint in loose}
-        while link != self.base:
-            joint, parent = self._parent[link]
-            sign = 1.0 if joint.links[0] == parent else -1.0
-            twists = sign * np.array(screws(joint, *joint.frames(X))).reshape(-1, 6).T
-            if joint.name in outside:
-                outside[joint.name] = twists
-            else:
-                inside[:, self._columns[joint.name]] = twists
-            link = parent
-        return np.hstack([inside @ kernel, *outside.values()])
+        columns, size = dict(self._columns), self.size
+        for joint, _, _ in self.tree:
+            if joint.name not in columns:
+                columns[joint.name] = slice(size, size + joint.kind.freedoms)
+                size += joint.kind.freedoms
+        found = {}
+        for name in links:
+            link, twists = name, np.zeros((6, size))
+            while link != self.base:
+                joint, parent = self._parent[link]
+                sign = 1.0 if joint.links[0] == parent else -1.0
+                twists[:, columns[joint.name]] = sign * np.array(screws(joint, *joint.frames(X))).reshape(-1, 6).T
+                link = parent
+            found[name] = np.hstack([twists[:, : self.size] @ kernel, twists[:, self.size :]])
+        return found
 
     def apart(self, one: Values, other: Values) -> float:
         """The largest difference of the links' poses, lengths in characteristic lengths."""
