@@ -85,6 +85,9 @@ def test_a_dead_point_below_further_joints_is_no_meeting_of_modes(hips: int, tmp
     robot = read(tmp_path, leg(0, hips=hips), "xml", base="pelvis", platform="foot", keyframe="zero")
     answer = legs(robot)
     assert {each.legs: each.rank for each in answer.sets} == seen(robot, np.random.default_rng(hips))
+    left = read(tmp_path, leg(0, hips=hips), "xml", base="pelvis", platform="foot")
+    assert any("the zero pose is" in note.text for note in left.notes)
+    assert [each.rank for each in legs(left).sets] == [each.rank for each in answer.sets]
 
 
 def test_every_question_is_answered_at_a_dead_point(tmp_path: Path):
