@@ -22,6 +22,7 @@ FIELDS = {
                "hidden_file", "report_file", "architecture"},
     "legs": {"sets", "minimal"},
     "advise": {"verdict", "rank", "dof", "lost", "nothing_missing", "sets", "size", "tried", "complete"},
+    "branch": {"motors", "passive", "held", "box", "tried", "parts"},
     "check": {"characteristic_length", "observed", "camera", "configurations", "redundant", "grid"},
     "singular": {"measured", "dof", "verdict", "lost", "always", "never", "words", "expression", "where", "factors",
                  "characteristic_length", "checked", "examples", "locus", "file"},

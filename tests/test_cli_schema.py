@@ -25,6 +25,7 @@ QUICK = {
               "rrrrr_m1 --at x=0,y=0.3332050807568877 --grid x=-0.4:0.4:3,y=0.25:0.41:3 -o map.csv"],
     "singular": ["rrrrr_m1 --points 30", "uranesx --points 5", "hexaglide --points 5"],
     "advise": ["uranesx", "quattro --observe 1,4", "gough_stewart --observe 1"],
+    "branch": ["rrrrr_m1 --box shoulder_1=-0.05:0.05,shoulder_2=-0.05:0.05"],
     "modes": ["3rrr_m1", "delta --observe 1", "3rps", "quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7,phi=10deg",
               "3rrr_m1 --real --at x=0.02,phi=5deg"],
     "atlas": ["3rrr_m1 --observe 2,1,3"],

@@ -32,6 +32,7 @@ ASKED = {
     "singular": lambda: hrsynth.singular(hrsynth.load("quattro"), LEGS, points=50),
     "advise": lambda: hrsynth.advise(hrsynth.load("quattro"), ["1"]),
     "accuracy": lambda: hrsynth.accuracy(hrsynth.load("quattro"), LEGS, cone="0.1deg", plane="z=-0.7", steps=5),
+    "branch": lambda: hrsynth.branch(hrsynth.load("rrrrr_m1"), "shoulder_1=-0.05:0.05,shoulder_2=-0.05:0.05"),
     "modes": lambda: hrsynth.modes(hrsynth.load("quattro"), LEGS, at=GOAL),
     "modes planar": lambda: hrsynth.modes(hrsynth.load("3rrr_m1")),
     "atlas": lambda: hrsynth.atlas(hrsynth.load("3rrr_m1")),

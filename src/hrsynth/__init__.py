@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from .analysis.asked import observe
     from .analysis.aspects.atlas import atlas
     from .analysis.aspects.path import path
+    from .analysis.branch.proof import branch
     from .analysis.check import check
     from .analysis.controllability import legs
     from .analysis.derive import derive
@@ -40,7 +41,7 @@ if TYPE_CHECKING:
     from .simulation.servo import servo
 
 __version__ = "0.2.0"
-__all__ = ["__version__", "accuracy", "advise", "atlas", "catalog", "certificate", "check", "derive", "draw",
+__all__ = ["__version__", "accuracy", "advise", "atlas", "branch", "catalog", "certificate", "check", "derive", "draw",
            "examples", "export", "following", "forget", "html", "legs", "lint", "load", "map", "modes", "observe",
            "path", "save", "select", "servo", "shipped", "singular", "text", "verify", "view"]
 
@@ -48,6 +49,7 @@ _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
     "advise": ".analysis.advice",
     "atlas": ".analysis.aspects.atlas",
+    "branch": ".analysis.branch.proof",
     "certificate": ".certificates",
     "check": ".analysis.check",
     "derive": ".analysis.derive",

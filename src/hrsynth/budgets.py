@@ -190,12 +190,12 @@ LARGEST_RANDOM = 10**9
 """Range of the random whole numbers of exact instances, of either sign: the larger, the smaller the chance of an
 accident."""
 
-BRANCH_CELLS = 2000
+BRANCH_CELLS = 1000
 """Cells of motor coordinates that are tried at most where a branch is proved, for each part of the loops."""
 FINEST_BRANCH_CELL = 40
 """Halvings of a side of the box that the whole numbers that count them can tell."""
-BRANCH_DEPTH = 9
-"""How often each side of the box of motor coordinates may be halved there, on average."""
+BRANCH_DEPTH = 10
+"""How often a cell of a branch is halved at most, and four times more for each motor."""
 
 # Accuracy
 

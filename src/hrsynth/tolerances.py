@@ -211,6 +211,12 @@ it, as part of the largest, is left out on the way there."""
 BALL_ZERO = 2.0 ** -256
 """Radius of a ball that holds zero at which the number in it counts as zero."""
 
+AFFINE_ROUNDING = 2.0 ** -46
+"""What sixty-four roundings make of numbers, relative to their size: more than one operation on affine forms has."""
+TOGGLE = 0.03
+"""Weakest singular value of the loops, as part of that at zero, below which a way along a branch ends at a toggle."""
+TOGGLE_JOINT = 0.05
+"""Part of the largest rate at a toggle from which a joint is one of those that move."""
 THINNEST_TUBE = 1e-13
 """Radius of a tube about a branch (characteristic lengths, radians) below which none is tried: rounding decides."""
 

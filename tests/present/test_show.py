@@ -21,12 +21,14 @@ from hrsynth.present.outputs import OUTPUTS, function
 from hrsynth.results import Result
 
 GOAL, OTHER = "x=0.05,y=0.3", "x=0.06,y=0.3"
+BOX = "shoulder_1=-0.05:0.05,shoulder_2=-0.05:0.05"
 ASKED = {
     "derive": (lambda robot: hrsynth.derive(robot), []),
     "legs": (lambda robot: hrsynth.legs(robot), []),
     "check": (lambda robot: hrsynth.check(robot, at=[GOAL]), ["--at", GOAL]),
     "singular": (lambda robot: hrsynth.singular(robot, points=50), ["--points", "50"]),
     "advise": (lambda robot: hrsynth.advise(robot), []),
+    "branch": (lambda robot: hrsynth.branch(robot, BOX), ["--box", BOX]),
     "modes": (lambda robot: hrsynth.modes(robot, at=GOAL), ["--at", GOAL]),
     "path": (lambda robot: hrsynth.path(robot, start=GOAL, goal=OTHER), ["--start", GOAL, "--goal", OTHER]),
     "servo": (lambda robot: hrsynth.servo(robot, start=OTHER, goal=GOAL), ["--start", OTHER, "--goal", GOAL]),

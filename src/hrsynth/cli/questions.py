@@ -10,7 +10,7 @@ from typing import Any
 
 import typer
 
-from ..budgets import EFFORT
+from ..budgets import BRANCH_CELLS, EFFORT
 from ..present.outputs import OUTPUTS
 from ..progress import following
 from .colour import painted
@@ -197,6 +197,13 @@ QUESTIONS = (
              ("quattro --observe 1,4", "quattro --observe 1,4 --plane z=-0.7,phi=0 -o locus.png")),
     Question("advise", "What is missing: the smallest sets of further measurements that make a robot controllable.",
              WATCHED, ("uranesx", "quattro --observe 1")),
+    Question("branch", "Where the joints are proved to be one function of the motors, on the branch of the zero "
+             "configuration, and what ends that.",
+             (Option("box", "Intervals of motors, as hip=-1:1,slide=0:0.2 (m, rad; default: the file's limits).",
+                     "INTERVALS"),
+              Option("effort", "Cells that are tried at most, for each part of the loops.", "COUNT", int, BRANCH_CELLS,
+                     low=1)),
+             ("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",)),
     Question("modes", "All assembly modes: every pose of the platform with the same directions.",
              (Option("at", "Pose whose directions are held, as x=0.02,y=0.1,z=-0.7 (default: the zero "
                      "configuration's).", "POSE"),

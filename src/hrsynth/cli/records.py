@@ -453,6 +453,56 @@ class Advise(OfRobot):
     undecided: int
 
 
+class BranchCellRecord(TypedDict):
+    """A cell of motor coordinates and its tube, (m, rad): |x - centre - slopes (q - middle)| <= radius."""
+
+    low: list[float]
+    high: list[float]
+    centre: list[float]
+    slopes: Annotated[Array, "a row a passive coordinate, a column a motor"]
+    radius: list[float]
+    weakest: Annotated[float, "a lower bound of the smallest singular value of the loops' Jacobian over the tube"]
+    neighbours: Annotated[list[int], "cells with a common face, proved to hold the same closure there"]
+
+
+class ToggleRecord(TypedDict):
+    """Where a proof ends; joints that can move there while all motors rest, as far as numbers tell."""
+
+    motors: list[float]
+    joints: list[str]
+    loops: list[str]
+    reason: str
+
+
+class BranchPartRecord(TypedDict):
+    """Motors and the passive coordinates that follow from them."""
+
+    motors: list[str]
+    passive: list[str]
+    q0: list[float]
+    x0: list[float]
+    asked: Annotated[Array, "low and high of the box that was asked for"]
+    proved: Annotated[Array, "low and high of a box about the zero configuration in the union of the cells"]
+    share: Annotated[float, "volume of all cells, as part of the box"]
+    box_share: float
+    cells: list[BranchCellRecord]
+    toggles: list[ToggleRecord]
+    turns: Annotated[dict[str, bool], "whether the closure after a whole turn is that before it"]
+    closed_to: Annotated[float, "bound of the equations left out (characteristic lengths, pure numbers)"]
+    redundant: str
+
+
+class Branch(OfRobot):
+    """The branch of the zero configuration, from motors to passive joints."""
+
+    motors: list[str]
+    passive: list[str]
+    held: list[str]
+    box: str
+    tried: int
+    parts: list[BranchPartRecord]
+
+
 class MissRecord(TypedDict):
     """Why a leg of the real robot does not reach a mode, and by how much."""
 
@@ -968,9 +1018,9 @@ class LintAnswer(Head, WrittenTo):
 
 RECORDS: dict[str, Any] = {
     "derive": Derive, "legs": LegsAnswer, "check": CheckAnswer, "singular": Singular, "advise": Advise,
-    "modes": AssemblyModesRecord, "atlas": AtlasAnswer, "path": Path, "servo": Servo, "accuracy": AccuracyAnswer,
-    "select": Select, "export": Exported, "view": ViewAnswer, "verify": Verify, "robots": Robots, "convert": Convert,
-    "import": Import, "lint": LintAnswer,
+    "branch": Branch, "modes": AssemblyModesRecord, "atlas": AtlasAnswer, "path": Path, "servo": Servo,
+    "accuracy": AccuracyAnswer, "select": Select, "export": Exported, "view": ViewAnswer, "verify": Verify,
+    "robots": Robots, "convert": Convert, "import": Import, "lint": LintAnswer,
     "catalog build": CatalogBuild, "catalog list": CatalogList, "catalog show": CatalogShow,
     "catalog site": CatalogSite}
 """The type of each command's record."""

@@ -182,6 +182,7 @@ OUTPUTS = {
         File("cannot draw the atlas", figures("atlas:picture"), "The picture of the atlas",
              "Draw the table and, of three rods on cranks in a plane, the singular curve with the modes: atlas.png, "
              ".pdf, .svg.", computed="atlas:section", record="section", nothing="atlas:undrawn", drawn=True),)),
+    "branch": Outputs("text.branches:branch"),
     "certificate": Outputs("text.robots:certificate"),
     "check": Outputs("text.poses:check", (
         File("cannot write the grid", {**figures("maps:distance_map"), CSV: "maps:check_table"}, "The grid",

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
-from ...results import Value
+from ...results import Result, Value
 from .loops import LoopSystem
 
 
@@ -107,7 +107,7 @@ class BranchPart(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class BranchProof(Value):
+class BranchProof(Result, shown_as="branch"):
     """The branch of the zero configuration: q ↦ x from motors to passive coordinates, part by part.
 
     ``system`` has the coordinates (name, axis, point, parent: the tree in order) and the loops' equations; lengths in
@@ -124,10 +124,15 @@ class BranchProof(Value):
     tried: int
     """Cells that were tried."""
 
+    @property
+    def setting(self) -> Mechanism:
+        """The robot: what is compared besides the record."""
+        return self.robot
+
     def headline(self) -> str:
         """The robot, and how much of the box is proved."""
         return f"{self.robot.name}, {len(self.motors)} motors, {len(self.passive)} passive coordinates: " + "; ".join(
-            f"{', '.join(each.motors)}: {100 * each.share:.3g} % of the box, {len(each.cells)} cells"
+            f"{', '.join(each.motors)}: {100 * each.share:.3g} % of the box proved, {len(each.cells)} cells"
             for each in self.parts)
 
     def to_dict(self) -> dict[str, Any]:

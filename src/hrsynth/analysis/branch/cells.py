@@ -1,13 +1,14 @@
-"""One cell of motor coordinates: an affine tube in which the loops are proved to have exactly one closure each.
+"""Cells of motor coordinates, with affine tubes in which the loops are proved to have exactly one closure each.
 
-For q in the cell, |q − q_c| ≤ h, and x in the tube, |x − x_c − S (q − q_c)| ≤ r, let A hold D_xG and B the slope
-D_qG + D_xG S of G along the tube. With Y about A⁻¹ Krawczyk's operator is, in the mean value form,
+For q in a cell, |q − q_c| ≤ h, let x̃(q) = x_c + S (q − q_c). The derivatives of the equations G, by a block's own
+unknowns (A), by those of the blocks before it, |δ| ≤ r' (D), and along x̃ (B), are enclosed over the tube |x − x̃(q)| ≤ r
+by affine forms in the noise symbols ε = (q − q_c) / h. With Y about A⁻¹ Krawczyk's operator is, in mean value form,
 
-    K = −Y (G(q_c, x_c) + B [−h, h] + D [−s, s]) + (1 − Y A) [−r, r],
+    K = −Y (G(q_c, x_c) + ∫₀¹ B(tε) ε dt + D [−r', r']) + (1 − Y A) [−r, r]:
 
-D the derivatives by the unknowns of the blocks before and s their radii. If K lies inside [−r, r] there is, for every q
-of the cell, exactly one zero in the tube, it depends analytically on q, and A is regular. Source: docs/pages/theory.md
-(branches), A. Neumaier, Interval Methods for Systems of Equations, 1990, theorem 5.4.2.
+if it lies inside [−r, r] for all ε, there is for each q exactly one zero in the tube, analytic in q, and every matrix
+in A is regular. Source: A. Neumaier, Interval Methods for Systems of Equations, 1990, section 5.2; docs/pages/theory.md
+(branches).
 """
 
 from __future__ import annotations
@@ -17,23 +18,24 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ...geometry.balls import Field
-from ...geometry.vectors import Array, dot
-from ...tolerances import THINNEST_TUBE
-from .loops import GearEquation, Swept, residuals
-from .part import LoopBlock, LoopEquation, LoopPart, tangents
+from ...geometry.affine import AffineForms, affine, combined, dotted, stacked
+from ...geometry.vectors import Array
+from ...tolerances import AFFINE_ROUNDING, THINNEST_TUBE
+from .loops import GearEquation, JointLoop, LoopRow, residuals, rod_ends
+from .part import LoopBlock, LoopEquation, LoopPart
 
 TUBES = 4
 """Radii of a tube that are tried, each after the one before was too narrow."""
-WIDER = 1.25
+WIDER = 1.2
 """How much wider than what a linear estimate asks for a tube is tried."""
 
 
 @dataclass(frozen=True, eq=False)
 class BranchTube:
-    """A proved tube: half widths h (n,), x_c (p,), S (p, n), r (p,), and a lower bound of the smallest singular value
-    of D_xG, of the distances' block by block (characteristic lengths, radians)."""
+    """A proved tube: q_c, h (n,), x_c (p,), S (p, n), r (p,), and a lower bound of the smallest singular value of each
+    block of D_xG (characteristic lengths, radians), of the blocks that turn rods apart."""
 
     centre: Array
     half: Array
@@ -47,9 +49,9 @@ class BranchTube:
         return np.asarray(self.x + self.slopes @ (q - self.centre))
 
 
-@dataclass(frozen=True, eq=False)
-class _Trial:
-    """The tube of a cell while it is proved: radii of the unknowns so far."""
+@dataclass(eq=False)
+class TubeTrial:
+    """Tubes over c cells while they are proved: ``alive`` (c,), radii (c, p) of the unknowns so far."""
 
     part: LoopPart
     centre: Array
@@ -57,154 +59,235 @@ class _Trial:
     x: Array
     slopes: Array
     radius: Array
+    weakest: Array
+    alive: NDArray[np.bool_]
 
-    def boxes(self, radius: Array, spread: bool = True) -> list[Any]:
-        """All coordinates as balls: over the tube, or at its middle."""
-        from flint import arb
+    def kept(self, which: Any) -> TubeTrial:
+        """Some of the cells."""
+        return TubeTrial(self.part, *(each[which] for each in (
+            self.centre, self.half, self.x, self.slopes, self.radius, self.weakest, self.alive)))
 
-        found: list[Any] = [arb(0)] * len(self.part.system.coordinates)
-        for i, c, h in zip(self.part.driven, self.centre.tolist(), self.half.tolist(), strict=True):
-            found[i] = arb(c, h) if spread else arb(c)
-        reach = np.abs(self.slopes) @ self.half + radius
-        reach *= 1 + 1e-12
-        for i, c, r in zip(self.part.unknowns, self.x.tolist(), reach.tolist(), strict=True):
-            found[i] = arb(c, r) if spread else arb(c)
+    @property
+    def symbols(self) -> tuple[int, int]:
+        """The number of motors, and of all noise symbols: one more for each angle of them and of the first blocks."""
+        return len(self.part.driven), len(self.part.driven) + len(self.part.bent)
+
+    def forms(self, radius: Array) -> list[AffineForms | None]:
+        """All coordinates over the tubes; None for those that are held."""
+        n, count = self.symbols
+        found: list[AffineForms | None] = [None] * len(self.part.system.coordinates)
+        spread = np.zeros((*self.x.shape, count))
+        spread[..., :n] = self.slopes * self.half[:, None, :]
+        rounding = AFFINE_ROUNDING * np.abs(spread).sum(axis=-1)
+        bend = {i: n + k + 1 for k, i in enumerate(self.part.bent)}
+        for k, i in enumerate(self.part.driven):
+            own = np.zeros((len(self.x), count))
+            own[:, k] = self.half[:, k]
+            found[i] = affine(self.centre[:, k], own, np.zeros(len(own)), bend.get(i))
+        for k, i in enumerate(self.part.unknowns):
+            found[i] = affine(self.x[:, k], spread[:, k], radius[:, k] + rounding[:, k], bend.get(i))
         return found
 
 
 def prove_all(part: LoopPart, centres: Array, halves: Array, xs: Array) -> list[BranchTube | None]:
     """Tubes over cells (c, n) about closed configurations (c, p); None where the proof fails."""
-    return [prove(part, centre, half, x) for centre, half, x in zip(centres, halves, xs, strict=True)]
+    count, p = xs.shape
+    trial = TubeTrial(part, centres, halves, xs, part.slopes(centres, xs), np.zeros((count, p)),
+                      np.full(count, np.inf), np.ones(count, dtype=bool))
+    for layer in layers(part.blocks):
+        _prove_layer(trial, layer)
+        if not trial.alive.any():
+            break
+    return [BranchTube(centres[k], halves[k], xs[k], trial.slopes[k], trial.radius[k], float(trial.weakest[k]))
+            if trial.alive[k] else None for k in range(count)]
 
 
-def prove(part: LoopPart, centre: Array, half: Array, x: Array) -> BranchTube | None:
-    """A tube over a cell about a closed configuration (``centre``, ``x``), or None where the proof fails."""
-    slopes = part.slopes(centre, x)
-    trial = _Trial(part, centre, half, x, slopes, np.zeros(len(x)))
-    weakest = np.inf
-    for block in part.blocks:
-        bound = _block(trial, block)
-        if bound is None:
-            return None
-        weakest = min(weakest, bound) if block.loop is None else weakest
-    return BranchTube(centre, half, x, slopes, trial.radius.copy(), weakest)
+def trial_of(part: LoopPart, tubes: Sequence[BranchTube]) -> TubeTrial:
+    """Proved tubes together."""
+    centre, half, x, slopes, radius = (np.array([getattr(tube, name) for tube in tubes])
+                                       for name in ("centre", "half", "x", "slopes", "radius"))
+    weakest = np.array([tube.weakest for tube in tubes])
+    return TubeTrial(part, centre, half, x, slopes, radius, weakest, np.ones(len(tubes), dtype=bool))
 
 
-def _block(trial: _Trial, block: LoopBlock) -> float | None:
-    """Widen the tube in the unknowns of a block until Krawczyk's condition holds; a lower bound of the smallest
-    singular value of the block, None where it fails."""
-    part = trial.part
-    own = [part.place[i] for i in block.unknowns]
+def layers(blocks: Sequence[LoopBlock]) -> list[list[LoopBlock]]:
+    """Blocks in order; those that turn rods, which need not know of each other, together."""
+    return [*([block] for block in blocks if block.loop is None), *([block] for block in blocks if block.loop)]
+
+
+def _prove_layer(trial: TubeTrial, layer: Sequence[LoopBlock]) -> None:
+    """Widen the tubes in the unknowns of blocks until Krawczyk's condition holds, or give the cells up."""
+    for block in layer:
+        which = np.flatnonzero(trial.alive)
+        if not len(which):
+            return
+        part = trial.kept(which)
+        with np.errstate(all="ignore"):
+            _prove_block(part, block)
+        trial.radius[which], trial.weakest[which], trial.alive[which] = part.radius, part.weakest, part.alive
+
+
+def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
+    """As above for one block."""
+    own = [trial.part.place[i] for i in block.unknowns]
     equations = block.equations if block.loop is None else _turning(trial, block)
-    residual, A_c, *_ = _matrices(trial, equations, own, trial.boxes(trial.radius, spread=False))
-    A = np.array([[float(v) for v in row] for row in A_c])
-    if not np.all(np.isfinite(A)):
-        return None
+    at = derivatives(trial, equations, own, trial.radius)
+    A = at.by_own
     try:
-        inverse = np.linalg.inv(A)
+        Y = np.linalg.inv(A.v[0])
     except np.linalg.LinAlgError:
-        return None
-    Y = _exact(inverse)
-    step = Y @ residual
+        Y = np.linalg.pinv(A.v[0])
+    # Y G along x̃, as a whole and in mean value form: both hold, the sharper one counts
+    e = (combined(Y, residual(trial, equations)).size + _drift(combined(Y, at.along))
+         + _times(combined(Y, at.by_others).size, trial.radius))
+    e = np.fmin(e, combined(Y, at.values).size)
+    one = np.eye(len(own))
+    done = np.zeros(len(e), dtype=bool)
     radius = trial.radius.copy()
     for attempt in range(TUBES):
-        boxes = trial.boxes(radius)
-        _, A_x, B, D = _matrices(trial, equations, own, boxes)
-        M = _sizes(np.eye(len(own), dtype=int) - Y @ A_x)
-        drift = _sizes(Y @ B) @ trial.half + _sizes(Y @ D) @ trial.radius if len(own) else np.zeros(0)
-        e = (drift + _sizes(step)) * (1 + 1e-12)
-        r = radius[own]
-        if not (np.all(np.isfinite(M)) and np.all(np.isfinite(e))):
-            return None
-        if attempt and np.all((e + M @ r) * (1 + 1e-12) < r):
-            trial.radius[own] = r
-            if block.loop is not None and not _same_side(trial, block):
-                return None
-            beta = float(np.max((M @ r) / r))
-            norm = float(np.max(np.abs(inverse).sum(axis=1) / r)) * float(np.max(r)) * np.sqrt(len(own))
-            return (1 - beta) / norm * (1 - 1e-12)
-        if np.max(np.abs(np.linalg.eigvals(M)), initial=0.0) >= 1:
-            return None
-        wanted = np.linalg.solve(np.eye(len(own)) - M, e)
-        radius[own] = np.maximum(WIDER * wanted, THINNEST_TUBE)
-    return None
+        if attempt:
+            at = derivatives(trial, equations, own, radius)
+        M = (one - combined(Y, at.by_own)).size
+        r = radius[:, own]
+        Mr = _times(M, r)
+        fits = np.all((e + Mr) * (1 + AFFINE_ROUNDING) < r, axis=-1) & ~done
+        if fits.any():
+            beta = (Mr / r).max(axis=-1)
+            norm = (np.abs(Y).sum(axis=-1) / r).max(axis=-1) * r.max(axis=-1) * np.sqrt(len(own))
+            bound = (1 - beta) / norm * (1 - AFFINE_ROUNDING)
+            trial.radius[np.ix_(fits, own)] = r[fits]
+            if block.loop is None:
+                trial.weakest[fits] = np.minimum(trial.weakest[fits], bound[fits])
+            done |= fits
+        good = np.all(np.isfinite(M), axis=(-1, -2)) & np.all(np.isfinite(e), axis=-1) & ~done
+        possible = good & (np.abs(np.linalg.eigvals(np.where(good[:, None, None], M, one))).max(axis=-1) < 1)
+        if not possible.any():
+            break
+        wanted = np.linalg.solve(one - M[possible], e[possible][..., None])[..., 0]
+        radius[np.ix_(possible, own)] = np.maximum(WIDER * wanted, THINNEST_TUBE)
+    trial.alive &= done
+    if block.loop is not None:
+        trial.alive &= _same_side(trial, block)
 
 
-def _matrices(trial: _Trial, equations: Sequence[LoopEquation], own: Sequence[int], boxes: Sequence[Any]
-              ) -> tuple[Field, Field, Field, Field]:
-    """G (k,), D_xG by a block's own unknowns (k, k), its slope along the tube (k, n), D_xG by the unknowns of the part
-    that are not its own (k, p)."""
-    part, n = trial.part, len(trial.half)
-    values: list[Any] = [0] * len(equations)
+def _times(M: Array, r: Array) -> Array:
+    """M r for matrices (c, k, p) and vectors (c, p)."""
+    return np.asarray((M @ r[..., None])[..., 0])
+
+
+def _drift(B: AffineForms) -> Array:
+    """A bound (c, k) of ∫₀¹ B(tε) ε dt for forms B (c, k, n): of Σ (b_i + ½ Σ s_ij ε_j) ε_i ± r_i, j ≤ n; r_i holds
+    the other symbols."""
+    s = np.moveaxis(B.v[1 : 1 + B.r.shape[-1]], 0, -1)
+    curved = np.abs(s + np.swapaxes(s, -1, -2)).sum(axis=(-1, -2)) / 4
+    rest = np.abs(B.v[1 + B.r.shape[-1] :]).sum(axis=(0, -1)) + B.r.sum(axis=-1)
+    return np.asarray((np.abs(B.v[0]).sum(axis=-1) + curved + rest) * (1 + AFFINE_ROUNDING))
+
+
+@dataclass(frozen=True, eq=False)
+class TubeDerivatives:
+    """Of k equations over tubes: the values (c, k), the derivatives by own unknowns (c, k, k), by the others of the
+    part (c, k, p), and along the tube by the noise symbols (c, k, n)."""
+
+    values: AffineForms
+    by_own: AffineForms
+    by_others: AffineForms
+    along: AffineForms
+
+
+def evaluated(part: LoopPart, equations: Sequence[LoopEquation], forms: Sequence[AffineForms | None]
+              ) -> tuple[list[Any], list[dict[int, Any]]]:
+    """The values of equations, and their derivatives by the coordinates that are not held."""
+    values: list[Any] = [0.0] * len(equations)
     slopes: list[dict[int, Any]] = [{} for _ in equations]
     groups: dict[int, list[int]] = {}
     for k, each in enumerate(equations):
         if isinstance(each.of, GearEquation):
-            values[k] = boxes[each.of.second] - boxes[each.of.first] * each.of.ratio
-            slopes[k] = {each.of.second: 1, each.of.first: -each.of.ratio}
+            for i, rate in ((each.of.second, 1.0), (each.of.first, -each.of.ratio)):
+                form = forms[i]
+                if form is not None:
+                    values[k], slopes[k][i] = values[k] + form * rate, slopes[k].get(i, 0.0) + rate
         else:
             groups.setdefault(id(each.of), []).append(k)
     for members in groups.values():
         loop = equations[members[0]].of
-        rows = [equations[k].row for k in members]
-        found = residuals(part.system, loop, boxes, rows, True)  # type: ignore[arg-type]
+        rows = [row for row in (equations[k].row for k in members) if row is not None]
+        assert isinstance(loop, JointLoop)
+        found = residuals(part.system, loop, forms, rows)
         for k, value, slope in zip(members, *found, strict=True):
             values[k], slopes[k] = value, slope
-    A = np.zeros((len(equations), len(own)), dtype=object)
-    B = np.zeros((len(equations), n), dtype=object)
-    D = np.zeros((len(equations), len(part.unknowns)), dtype=object)
-    column = {part.unknowns[k]: place for place, k in enumerate(own)}
-    place_q = {i: k for k, i in enumerate(part.driven)}
-    for k, slope in enumerate(slopes):
-        for i, value in slope.items():
-            if i in place_q:
-                B[k, place_q[i]] = B[k, place_q[i]] + value
-            elif i in part.place:
-                along = trial.slopes[part.place[i]]
-                B[k] = B[k] + value * _exact(along)
-                if i in column:
-                    A[k, column[i]] = A[k, column[i]] + value
-                else:
-                    D[k, part.place[i]] = D[k, part.place[i]] + value
-    return np.array(values, dtype=object), A, B, D
+    return values, slopes
 
 
-def _exact(x: Array) -> Field:
-    """Floats as exact balls."""
-    from flint import arb
-
-    found = np.empty(np.shape(x), dtype=object)
-    found.ravel()[:] = [arb(v) for v in np.ravel(x).tolist()]
-    return found
-
-
-def _sizes(v: Field) -> Array:
-    """Upper bounds of |v|."""
-    found = [float(x.abs_upper()) if hasattr(x, "abs_upper") else abs(float(x)) for x in v.flat]
-    return np.nextafter(np.array(found), np.inf).reshape(v.shape)
+def residual(trial: TubeTrial, equations: Sequence[LoopEquation]) -> AffineForms:
+    """G(q_c, x_c), (c, k)."""
+    still = trial.kept(slice(None))
+    still.half = 0.0 * still.half
+    return stacked([_constant(trial, 0.0) + each for each in
+                    evaluated(trial.part, equations, still.forms(0.0 * trial.radius))[0]])
 
 
-def _ends(trial: _Trial, block: LoopBlock, boxes: Any, balls: bool) -> tuple[Field, Field, Field]:
-    """Where the ends a, b of a rod's loop are, and the centre A of the joint that turns the rod."""
-    loop, system = block.loop, trial.part.system
-    assert loop is not None
-    assert loop.swung is not None
-    one, two = (system.displacement(chain, boxes, balls) for chain in loop.chains)
-    before: Swept = system.displacement(loop.chains[1][: loop.swung], boxes, balls)
-    return one.at(loop.point), two.at(loop.point), before.at(system.coordinates[loop.chains[1][loop.swung]].point)
+def derivatives(trial: TubeTrial, equations: Sequence[LoopEquation], own: Sequence[int], radius: Array
+                ) -> TubeDerivatives:
+    """The derivatives of equations over tubes with radii (c, p)."""
+    part = trial.part
+    zero = _constant(trial, 0.0)
+    values, slopes = evaluated(part, equations, trial.forms(radius))
+    by_own = [stacked([zero + slope.get(part.unknowns[k], 0.0) for k in own]) for slope in slopes]
+    others = [i for k, i in enumerate(part.unknowns) if k not in own]
+    by_others, along = [], []
+    spread = trial.slopes * trial.half[:, None, :]
+    for slope in slopes:
+        row = [zero] * len(part.unknowns)
+        drift = stacked([zero] * trial.half.shape[1])
+        for i, rate in slope.items():
+            if i in part.place:
+                # along the tube x_i moves by S_i h ε
+                drift = drift + (zero + rate)[..., None] * spread[:, part.place[i]]
+                if i in others:
+                    row[part.place[i]] = zero + rate
+            elif i in part.driven:
+                k = part.driven.index(i)
+                drift = drift + (zero + rate)[..., None] * (np.eye(trial.half.shape[1])[k] * trial.half[:, k : k + 1])
+        by_others.append(stacked(row))
+        along.append(drift)
+    made = stacked([zero + each for each in values])
+    return TubeDerivatives(made, _matrix(by_own), _matrix(by_others), _matrix(along))
 
 
-def _turning(trial: _Trial, block: LoopBlock) -> tuple[LoopEquation, ...]:
+def _constant(trial: TubeTrial, value: float) -> AffineForms:
+    """A number for all cells."""
+    return affine(np.full(len(trial.x), value), np.zeros((len(trial.x), trial.symbols[1])), np.zeros(len(trial.x)))
+
+
+def _matrix(rows: Sequence[AffineForms]) -> AffineForms:
+    """Rows (c, n) as matrices (c, k, n)."""
+    return AffineForms(np.stack([row.v for row in rows], axis=-2), np.stack([row.r for row in rows], axis=-2))
+
+
+def _turning(trial: TubeTrial, block: LoopBlock) -> tuple[LoopEquation, ...]:
     """The equations that turn a rod to where its loop closes: none across its direction at the cell's middle."""
-    a, _, A = _ends(trial, block, trial.part.values(trial.centre, trial.x), False)
+    loop = block.loop
+    assert loop is not None
+    a, _, A = rod_ends(trial.part.system, loop, trial.part.values(trial.centre, trial.x))
+    direction = np.broadcast_to(a - A, (len(trial.x), 3))
+    if len(block.unknowns) == 1:
+        axis = trial.part.system.coordinates[block.unknowns[0]].axis
+        return (LoopEquation(loop, LoopRow("point", np.cross(axis, direction)), swings=True),)
+    across = np.linalg.svd(direction[:, None, :])[2]
+    return tuple(LoopEquation(loop, LoopRow("point", across[:, k]), swings=True) for k in (1, 2))
+
+
+def _same_side(trial: TubeTrial, block: LoopBlock) -> NDArray[np.bool_]:
+    """Whether (c,) both ends of a rod's loop lie on one side of its centre over the tube: two points equally far from
+    it and equal across one direction are then the same."""
     assert block.loop is not None
-    return tuple(LoopEquation(block.loop, row, swings=True) for row in tangents(a - A))
-
-
-def _same_side(trial: _Trial, block: LoopBlock) -> bool:
-    """Whether both ends of a rod's loop lie on one side of its centre over the tube: two points equally far from it and
-    equal across one direction are then the same."""
-    middle = _ends(trial, block, trial.part.values(trial.centre, trial.x), False)
-    a, b, A = _ends(trial, block, trial.boxes(trial.radius), True)
-    direction = _exact(middle[0] - middle[2])
-    return bool(dot(direction, a - A) > 0 and dot(direction, b - A) > 0)
+    system = trial.part.system
+    a, _, A = rod_ends(system, block.loop, trial.part.values(trial.centre, trial.x))
+    direction = a - A
+    ends = rod_ends(system, block.loop, trial.forms(trial.radius))
+    found = np.ones(len(trial.x), dtype=bool)
+    for end in ends[:2]:
+        along = dotted(end - ends[2], direction)
+        found &= along.v[0] - along.spread > 0
+    return found

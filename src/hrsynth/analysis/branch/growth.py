@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from ...budgets import FINEST_BRANCH_CELL
 from ...geometry.vectors import Array
+from ...tolerances import AFFINE_ROUNDING
 from .cells import BranchTube, prove_all
 from .part import LoopPart
 
@@ -76,6 +77,8 @@ class Growth:
     x0: Array
     depth: int
     most: int
+    coarsest: float
+    """Part of a side of the box above which a cell is halved without a trial."""
     leaves: list[GrownCell] = field(default_factory=list)
     proved: list[GrownCell] = field(default_factory=list)
     endings: list[BranchEnd] = field(default_factory=list)
@@ -91,11 +94,18 @@ class Growth:
         while waiting and self.tried < self.most:
             waiting.sort(key=lambda each: (each[0].depth, each[0].low.tolist()))
             batch, waiting = waiting[:AT_ONCE], waiting[AT_ONCE:]
+            coarse = [each for each in batch if self._coarse(each[0])]
+            if coarse:
+                waiting += [each for each in batch if not self._coarse(each[0])]
+                waiting += [half for each in coarse for half in self._cut(*each)]
+                continue
             self.tried += len(batch)
-            for (leaf, q, x), tube in zip(batch, self._tubes(batch), strict=True):
-                if tube is not None and self._joined(leaf, tube, q, x):
+            tubes = self._tubes(batch)
+            joined = self._joined(batch, tubes)
+            for (leaf, q, x), tube in zip(batch, tubes, strict=True):
+                if tube is not None and leaf in joined:
                     waiting += self._around(leaf)
-                elif leaf.depth >= self.depth * n:
+                elif leaf.depth >= self.depth:
                     leaf.failed = True
                     self.endings.append(BranchEnd(leaf, q, x))
                 else:
@@ -103,57 +113,92 @@ class Growth:
         self.endings += [BranchEnd(leaf, q, x) for leaf, q, x in waiting]
         return self
 
+    def _coarse(self, leaf: GrownCell) -> bool:
+        return bool(np.max(leaf.high - leaf.low) / self.whole > self.coarsest) and leaf.depth < self.depth
+
     def _tubes(self, batch: Sequence[tuple[GrownCell, Array, Array]]) -> list[BranchTube | None]:
         """The tubes of cells, each about the closure at its middle that its start leads to."""
         low = np.array([self.grid.point(leaf.low) for leaf, *_ in batch])
         high = np.array([self.grid.point(leaf.high) for leaf, *_ in batch])
         centre = (low + high) / 2
-        starts = [self.part.followed(q, x, goal) for (_, q, x), goal in zip(batch, centre, strict=True)]
-        there = [k for k, x in enumerate(starts) if x is not None]
-        found: list[BranchTube | None] = [None] * len(batch)
-        if there:
-            half = np.maximum(high - centre, centre - low)[there]
-            half = half + np.spacing(np.abs(centre[there]) + half) * (half > 0)
-            tubes = prove_all(self.part, centre[there], half, np.array([starts[k] for k in there]))
-            for k, tube in zip(there, tubes, strict=True):
+        q = np.array([q for _, q, _ in batch])
+        x, closed = self.part.closed(q, np.array([x for *_, x in batch]))
+        starts, good = self.part.followed(q, x, centre)
+        half = np.maximum(high - centre, centre - low)
+        half = half + 2 * np.spacing(np.abs(centre) + half)
+        return self._proved(centre, half, starts, np.logical_and(good, closed))
+
+    def _proved(self, centre: Array, half: Array, x: Array, which: Array) -> list[BranchTube | None]:
+        """The tubes over those cells (c, n) for which there is a closed configuration (c, p)."""
+        found: list[BranchTube | None] = [None] * len(centre)
+        there = np.flatnonzero(which)
+        if len(there):
+            for k, tube in zip(there, prove_all(self.part, centre[there], half[there], x[there]), strict=True):
                 found[k] = tube
         return found
 
-    def _joined(self, leaf: GrownCell, tube: BranchTube, q: Array, x: Array) -> bool:
-        """Number a cell if its tube holds the closure near ``x`` at its start ``q``, and agrees with every proved cell
-        beside it."""
-        if not self._same([(q, x, tube, None)])[0]:
-            return False
-        beside = [each for each in self._beside(leaf) if each.tube is not None]
+    def _joined(self, batch: Sequence[tuple[GrownCell, Array, Array]], tubes: Sequence[BranchTube | None]
+                ) -> set[GrownCell]:
+        """Number those cells whose tubes hold the closure at their starts, and agree with every numbered cell beside
+        them; these cells."""
+        own = [(leaf, q, x, tube) for (leaf, q, x), tube in zip(batch, tubes, strict=True) if tube is not None]
+        at_start = self._same([(q, x, tube, None) for _, q, x, tube in own])
+        own = [each for each, same in zip(own, at_start, strict=True) if same]
+        for leaf, _, _, tube in own:
+            leaf.tube = tube
+        pairs = []
+        for place, (leaf, *_) in enumerate(own):
+            later = {id(each[0]) for each in own[place + 1 :]}
+            pairs += [(leaf, other) for other in self._beside(leaf)
+                      if other.tube is not None and id(other) not in later]
         asked = []
-        for other in beside:
-            face = self._face(leaf, other)
+        for one, other in pairs:
+            assert one.tube is not None
             assert other.tube is not None
-            asked.append((face, other.tube.at(face), tube, other.tube))
-        if not all(self._same(asked)):
-            return False
-        leaf.tube, leaf.number = tube, len(self.proved)
-        self.proved.append(leaf)
-        for other in beside:
-            leaf.neighbours.add(other.number)
-            other.neighbours.add(leaf.number)
-        return True
+            face = self._face(one, other)
+            asked.append((face, other.tube.at(face), one.tube, other.tube))
+        beside: dict[int, list[tuple[GrownCell, bool]]] = {}
+        for (one, other), same in zip(pairs, self._same(asked), strict=True):
+            beside.setdefault(id(one), []).append((other, same))
+        found = set()
+        for leaf, *_ in own:
+            others = [(other, same) for other, same in beside.get(id(leaf), []) if other.tube is not None]
+            if not all(same for _, same in others):
+                leaf.tube = None
+                continue
+            leaf.number = len(self.proved)
+            self.proved.append(leaf)
+            found.add(leaf)
+            for other, _ in others:
+                leaf.neighbours.add(other.number)
+                other.neighbours.add(leaf.number)
+        return found
 
     def _same(self, asked: Sequence[tuple[Array, Array, BranchTube, BranchTube | None]]) -> list[bool]:
         """Whether at a point q the zero near x is enclosed, and its enclosure lies in the interior of one tube (or of
         both): it is then the only zero in them."""
-        closed = [self.part.closed(q, x) for q, x, *_ in asked]
-        there = [k for k, x in enumerate(closed) if x is not None]
-        found = [False] * len(asked)
-        if not there:
-            return found
-        points = np.array([asked[k][0] for k in there])
-        tubes = prove_all(self.part, points, np.zeros(points.shape), np.array([closed[k] for k in there]))
-        for k, point in zip(there, tubes, strict=True):
-            found[k] = point is not None and all(
-                each is None or bool(np.all(np.abs(point.x - each.at(point.centre)) + point.radius
-                                            < each.radius * (1 - 1e-9))) for each in asked[k][2:])
-        return found
+        if not asked:
+            return []
+        q = np.array([each[0] for each in asked])
+        x, good = self.part.closed(q, np.array([each[1] for each in asked]))
+        points = self._proved(q, np.zeros(q.shape), x, good)
+        return [point is not None and all(
+            each is None or bool(np.all(np.abs(point.x - each.at(point.centre)) + point.radius
+                                        < each.radius * (1 - AFFINE_ROUNDING))) for each in tubes)
+                for point, (_, _, *tubes) in zip(points, asked, strict=True)]
+
+    @property
+    def whole(self) -> int:
+        """The side of the box in whole numbers."""
+        return int(2**FINEST_BRANCH_CELL)
+
+    def opposite(self, k: int, one: GrownCell, other: GrownCell) -> list[Array]:
+        """The middle of what the far face of one cell and the near face of another have in common a whole turn apart,
+        on the far face; none where that is nothing."""
+        low, high = np.maximum(one.low, other.low), np.minimum(one.high, other.high)
+        low[k] = high[k] = self.whole
+        sides = np.delete(high - low, k)
+        return [self.grid.point((low + high) / 2)] if np.all(sides > 0) else []
 
     def _face(self, one: GrownCell, other: GrownCell) -> Array:
         """The middle of what two cells have in common."""
@@ -180,8 +225,7 @@ class Growth:
         """A cell with a point of its face to a proved one and the closure there."""
         assert leaf.tube is not None
         face = self._face(leaf, other)
-        x = self.part.closed(face, leaf.tube.at(face))
-        return other, face, leaf.tube.at(face) if x is None else x
+        return other, face, leaf.tube.at(face)
 
     def _cut(self, leaf: GrownCell, q: Array, x: Array) -> list[tuple[GrownCell, Array, Array]]:
         """Halve a cell where the loops change most; the halves that can be started are."""

@@ -1,4 +1,5 @@
-"""The loops of a mechanism as equations in joint coordinates: for floats and for balls, with their derivatives.
+"""The loops of a mechanism as equations in joint coordinates, with derivatives: for many floats or affine forms at
+once.
 
 Every joint of the spanning tree is cut into coordinates of one axis each, in the order of the file: U its two axes, C
 slide then turn, planar two slides then the turn, spherical turns about the base's axes x, y, z (as they lie at zero).
@@ -11,24 +12,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...errors import BadMechanism
-from ...geometry.balls import Field, around
-from ...geometry.vectors import Array, cross, dot, frozen, hat, perpendicular
+from ...geometry import lines
+from ...geometry.affine import crossed, dotted
+from ...geometry.vectors import Array, cross, frozen, hat, perpendicular
 from ...mechanism import Joint, JointType, Mechanism, graphs
 from ...results import Value
-from ...tolerances import CHAIN_ROUNDING, SAME_POINT
+from ...tolerances import SAME_POINT
 
 _PREFERRED = {"F": 0, "6": 1, "P": 2, "R": 3, "C": 4, "U": 5, "E": 6, "S": 7}
 """Which joints the spanning tree takes first."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class TreeCoordinate(Value):
+class LoopCoordinate(Value):
     """One coordinate of a joint: a turn (rad) about, or a slide (characteristic lengths) along an ``axis`` (3,) through
     ``point`` (3,), both as they lie at zero; ``parent`` is the coordinate before it, −1 at the base."""
 
@@ -39,18 +40,6 @@ class TreeCoordinate(Value):
     point: Array
     parent: int
     driven: bool = False
-
-    @cached_property
-    def turning(self) -> tuple[Array, Array]:
-        """[a]ₓ and [a]ₓ²: the turn by θ is I + sin θ [a]ₓ + (1 − cos θ) [a]ₓ²."""
-        K = hat(self.axis)
-        return K, K @ K
-
-    @cached_property
-    def balls(self) -> tuple[Field, Field, tuple[Field, Field]]:
-        """Axis, point and turning in balls that hold what the file's decimals mean."""
-        K, K2 = self.turning
-        return thick(self.axis), thick(self.point), (thick(K), thick(K2))
 
 
 @dataclass(frozen=True)
@@ -78,6 +67,8 @@ class JointLoop(Value):
     rows: tuple[LoopRow, ...]
     swung: int | None = None
     swings: int = 0
+    planar: bool = False
+    """Whether all its links move in a plane, so that three equations at most are not met of themselves."""
 
     @property
     def coordinates(self) -> tuple[int, ...]:
@@ -95,15 +86,6 @@ class GearEquation(Value):
     ratio: float
 
 
-def thick(x: Any) -> Field:
-    """Balls around numbers that were computed from a file's decimals."""
-    found = np.empty(np.shape(x), dtype=object)
-    for place, value in np.ndenumerate(x):
-        exact = value in (0.0, 1.0, -1.0)
-        found[place] = around(np.array(value), 0.0 if exact else CHAIN_ROUNDING * (1 + abs(float(value))))
-    return found
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class LoopSystem(Value):
     """The coordinates of a mechanism's spanning tree, parents first, the loops between them and the gears;
@@ -111,7 +93,7 @@ class LoopSystem(Value):
 
     mechanism: Mechanism
     length: float
-    coordinates: tuple[TreeCoordinate, ...]
+    coordinates: tuple[LoopCoordinate, ...]
     body: Mapping[str, int]
     loops: tuple[JointLoop, ...]
     gears: tuple[GearEquation, ...]
@@ -139,13 +121,13 @@ class LoopSystem(Value):
             body = self.coordinates[body].parent
         return tuple(reversed(found))
 
-    def displacement(self, chain: Sequence[int], values: Sequence[Any], balls: bool) -> Swept:
-        """What a chain of coordinates does: see :class:`Swept`; ``values`` are those of all coordinates."""
-        return Swept.of([self.coordinates[i] for i in chain], [values[i] for i in chain], balls)
+    def displacement(self, chain: Sequence[int], values: Any) -> Swept:
+        """What a chain of coordinates does: see :class:`Swept`; ``values`` are those of all, None for those at zero."""
+        return Swept.of([self.coordinates[i] for i in chain], [values[i] for i in chain])
 
     def pose(self, link: str, values: Sequence[float]) -> Array:
         """X_BL (4, 4), m, of a link for coordinates (N,)."""
-        swept = self.displacement(self.way(self.body[link]), values, False)
+        swept = self.displacement(self.way(self.body[link]), np.asarray(values, dtype=float))
         X = np.eye(4)
         X[:3, :3], X[:3, 3] = swept.R, swept.at(np.zeros(3)) * self.length
         return np.asarray(X @ self.mechanism.links[link].pose)
@@ -154,116 +136,149 @@ class LoopSystem(Value):
 @dataclass(frozen=True, eq=False)
 class Swept:
     """The displacement p ↦ o + R (p − c) behind a chain of coordinates, c the last point that it turned about, and the
-    places of their axes, (k, 3) each: the direction, and a point of it (of a slide none)."""
+    places of their axes: the direction, and a point of it (of a slide none)."""
 
-    R: Field
-    o: Field
+    R: Any
+    o: Any
     c: Array
-    axes: list[Field]
-    points: list[Field | None]
-    balls: bool
+    axes: list[Any]
+    points: list[Any]
 
     @classmethod
-    def of(cls, chain: Sequence[TreeCoordinate], values: Sequence[Any], balls: bool) -> Swept:
-        """The product of the exponentials of coordinates with ``values``."""
-        R: Field = np.eye(3, dtype=int if balls else float).astype(object if balls else float)
+    def of(cls, chain: Sequence[LoopCoordinate], values: Sequence[Any]) -> Swept:
+        """The product of the exponentials of coordinates with ``values`` (…), floats or forms."""
+        R: Any = np.eye(3)
         c = chain[0].point if chain else np.zeros(3)
-        o: Field = thick(c) if balls else c
-        axes: list[Field] = []
-        points: list[Field | None] = []
+        o: Any = c
+        axes: list[Any] = []
+        points: list[Any] = []
+        # turns about parallel axes add up: R = R_before exp([a]ₓ (θ_k + …)), enclosed more sharply than their product
+        before, about, angle = R, None, None
         for each, value in zip(chain, values, strict=True):
-            axis, _, (K, K2) = each.balls if balls else (each.axis, each.point, each.turning)
             if np.any(each.point != c):
-                o = o + R @ (thick(each.point - c) if balls else each.point - c)
+                o = o + mapped(R, each.point - c)
                 c = each.point
-            axes.append(R @ axis)
+            axes.append(mapped(R, each.axis))
             points.append(None if each.slides else o)
-            if each.slides:
-                o = o + axes[-1] * value
+            if value is None:
                 continue
-            sine, cosine = value.sin_cos() if balls else (np.sin(value), np.cos(value))
-            R = R @ (np.eye(3, dtype=int) + K * sine + K2 * (1 - cosine))
-        return cls(R, o, c, axes, points, balls)
+            if each.slides:
+                o = o + axes[-1] * value[..., None]
+                continue
+            along = 0.0 if about is None else float(about @ each.axis)
+            if about is not None and abs(along) == 1.0 and np.array_equal(each.axis, along * about):
+                angle = angle + value if along > 0 else angle - value
+            else:
+                before, about, angle = R, each.axis, value
+            R = _turned(before, about, angle)
+        return cls(R, o, c, axes, points)
 
-    def at(self, p: Array) -> Field:
+    def at(self, p: Array) -> Any:
         """Where a point (3,) of the end, as it lies at zero, is."""
-        return np.asarray(self.o + self.R @ (thick(p - self.c) if self.balls else p - self.c))
+        return self.o + mapped(self.R, p - self.c)
 
-    def rate(self, k: int, p: Field) -> Field:
-        """The velocity (3,) of a place p with the k-th coordinate."""
+    def rate(self, k: int, p: Any) -> Any:
+        """The velocity (…, 3) of a place p with the k-th coordinate."""
         at = self.points[k]
-        return self.axes[k] if at is None else cross(self.axes[k], p - at)
+        return self.axes[k] if at is None else crossed(self.axes[k], p - at)
 
-    def turned(self, k: int, v: Field) -> Field | None:
-        """The rate (3,) of a direction v with the k-th coordinate, None where it is zero."""
-        return None if self.points[k] is None else cross(self.axes[k], v)
+    def turned(self, k: int, v: Any) -> Any:
+        """The rate (…, 3) of a direction v with the k-th coordinate, None where it is zero."""
+        return None if self.points[k] is None else crossed(self.axes[k], v)
 
 
-def residuals(system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[LoopRow], balls: bool
+def mapped(R: Any, p: Any) -> Any:
+    """R p (…, 3)."""
+    return (R * p[..., None, :]).sum(-1)
+
+
+def _turned(R: Any, axis: Array, angle: Any) -> Any:
+    """R exp([a]ₓ θ) = R + R [a]ₓ sin θ + R [a]ₓ² (1 − cos θ)."""
+    sine, cosine = angle.sines() if hasattr(angle, "sines") else (np.sin(angle), np.cos(angle))
+    K = hat(axis)
+    once = _product(R, K)
+    return R + once * sine[..., None, None] + _product(R, K @ K) * (1 - cosine)[..., None, None]
+
+
+def _product(R: Any, K: Array) -> Any:
+    """R K for a matrix of numbers (3, 3)."""
+    return (R[..., :, :, None] * K).sum(-2)
+
+
+def residuals(system: LoopSystem, loop: JointLoop, values: Any, rows: Sequence[LoopRow]
               ) -> tuple[list[Any], list[dict[int, Any]]]:
-    """The values of some equations of a loop, and of each the derivatives by the coordinates of its chains."""
-    one, two = (system.displacement(chain, values, balls) for chain in loop.chains)
-    fixed = thick if balls else np.asarray
+    """The values (…) of some equations of a loop, and of each the derivatives by the coordinates of its chains that are
+    not None."""
+    one, two = (system.displacement(chain, values) for chain in loop.chains)
+    moving = [[(place, i) for place, i in enumerate(chain) if values[i] is not None] for chain in loop.chains]
     a, b = one.at(loop.point), two.at(loop.point)
     found: list[Any] = []
     slopes: list[dict[int, Any]] = []
     for row in rows:
         slope: dict[int, Any] = {}
         if row.kind == "point":
-            k = fixed(row.one) if not row.carried else one.R @ fixed(row.one)
-            found.append(dot(k, b - a))
-            for place, i in enumerate(loop.chains[0]):
-                slope[i] = -dot(k, one.rate(place, a))
+            assert row.one is not None
+            k = mapped(one.R, row.one) if row.carried else row.one
+            found.append(dotted(b - a, k))
+            for place, i in moving[0]:
+                slope[i] = -dotted(one.rate(place, a), k)
                 turned = one.turned(place, k) if row.carried else None
                 if turned is not None:
-                    slope[i] = slope[i] + dot(turned, b - a)
-            for place, i in enumerate(loop.chains[1]):
-                slope[i] = dot(k, two.rate(place, b))
+                    slope[i] = slope[i] + dotted(turned, b - a)
+            for place, i in moving[1]:
+                slope[i] = dotted(two.rate(place, b), k)
         elif row.kind == "direction":
-            u, v = one.R @ fixed(row.one), two.R @ fixed(row.other)
-            found.append(dot(u, v) - dot(fixed(row.one), fixed(row.other)))
-            for chain, swept, own, far in ((loop.chains[0], one, u, v), (loop.chains[1], two, v, u)):
-                for place, i in enumerate(chain):
+            u, v = mapped(one.R, row.one), mapped(two.R, row.other)
+            found.append(dotted(u, v) - np.asarray(row.one @ row.other))  # type: ignore[operator]
+            for chain, swept, own, far in ((moving[0], one, u, v), (moving[1], two, v, u)):
+                for place, i in chain:
                     turned = swept.turned(place, own)
-                    slope[i] = dot(turned, far) if turned is not None else 0
+                    slope[i] = dotted(turned, far) if turned is not None else 0.0
         else:
-            found.append(_distance(system, loop, values, balls, one, a, slope))
+            found.append(_distance(system, loop, values, one, a, slope))
         slopes.append(slope)
     return found, slopes
 
 
-def _distance(system: LoopSystem, loop: JointLoop, values: Sequence[Any], balls: bool, one: Swept, a: Field,
-              slope: dict[int, Any]) -> Any:
+def rod_ends(system: LoopSystem, loop: JointLoop, values: Any) -> tuple[Any, Any, Any]:
+    """Of a loop with a joint that is left out: where its ends a and b are, and the centre A of that joint (…, 3)."""
+    assert loop.swung is not None
+    one, two = (system.displacement(chain, values) for chain in loop.chains)
+    before = system.displacement(loop.chains[1][: loop.swung], values)
+    return one.at(loop.point), two.at(loop.point), before.at(system.coordinates[loop.chains[1][loop.swung]].point)
+
+
+def _distance(system: LoopSystem, loop: JointLoop, values: Any, one: Swept, a: Any, slope: dict[int, Any]) -> Any:
     """(|a − A|² − |b − A|²) / 2 and its derivatives: A and b are seen without the joint that is left out."""
-    fixed = thick if balls else np.asarray
     assert loop.swung is not None
     before, after = loop.chains[1][: loop.swung], loop.chains[1][loop.swung + loop.swings :]
     centre = system.coordinates[loop.chains[1][loop.swung]].point
-    near = system.displacement(before, values, balls)
-    far = system.displacement(after, values, balls)
-    A = near.at(centre)
-    reach, b = a - A, far.at(loop.point)
-    rod = b - fixed(centre)
-    for place, i in enumerate(loop.chains[0]):
-        slope[i] = dot(reach, one.rate(place, a))
-    for place, i in enumerate(before):
-        slope[i] = -dot(reach, near.rate(place, A))
-    for place, i in enumerate(after):
-        slope[i] = -dot(rod, far.rate(place, b))
-    return ((dot(reach, reach) - dot(rod, rod)) / 2)
+    near, far = system.displacement(before, values), system.displacement(after, values)
+    A, b = near.at(centre), far.at(loop.point)
+    reach, rod = a - A, b - centre
+    for chain, swept, v, p, sign in ((loop.chains[0], one, reach, a, 1), (before, near, reach, A, -1),
+                                     (after, far, rod, b, -1)):
+        for place, i in enumerate(chain):
+            if values[i] is not None:
+                slope[i] = dotted(swept.rate(place, p), v) * sign
+    return (dotted(reach, reach) - dotted(rod, rod)) * 0.5
 
 
-def loop_system(mechanism: Mechanism, driven: Sequence[str]) -> LoopSystem:
-    """The loops of a mechanism, the coordinates of the joints ``driven`` given.
+def loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False) -> LoopSystem:
+    """The loops of a mechanism, the coordinates of the joints ``driven`` given; ``free``: the pose of the platform is
+    part of the coordinates, so that all its legs are loops.
 
     Raises ``BadMechanism`` where a joint that is driven cannot be part of the tree.
     """
     length = mechanism.length
     joints = list(mechanism.joints.values())
+    normal = plane_of(joints)
+    if free:
+        joints = [_free(mechanism, normal), *joints]
     geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
-    weights = [_weight(joint, mechanism, driven, geared) for joint in joints]
+    weights = [-2.0 if free and not k else _weight(joint, mechanism, driven, geared) for k, joint in enumerate(joints)]
     tree = graphs.spanning_forest(mechanism.links, joints, weights)
-    coordinates: list[TreeCoordinate] = []
+    coordinates: list[LoopCoordinate] = []
     body = {mechanism.base: -1}
     for joint, near, far in graphs.outward(mechanism.base, tree):
         own = joint if joint.predecessor == near else joint.turned()
@@ -272,7 +287,7 @@ def loop_system(mechanism: Mechanism, driven: Sequence[str]) -> LoopSystem:
         if own is not joint and joint.type is JointType.UNIVERSAL:
             cut = [(other[0], each[1], each[2]) for other, each in zip(reversed(cut), cut, strict=True)]
         for name, slides, axis in cut:
-            coordinates.append(TreeCoordinate(name, joint.name, slides, frozen(axis), frozen(own.point / length),
+            coordinates.append(LoopCoordinate(name, joint.name, slides, frozen(axis), frozen(own.point / length),
                                               parent, joint.name in driven))
             parent = len(coordinates) - 1
         body[far] = parent
@@ -281,8 +296,34 @@ def loop_system(mechanism: Mechanism, driven: Sequence[str]) -> LoopSystem:
     if missing:
         raise BadMechanism(f"{mechanism.name}: driven joints that close a loop among themselves", ", ".join(missing))
     system = LoopSystem(mechanism, length, tuple(coordinates), body, (), _gears(mechanism, coordinates, length))
-    loops = [_loop(system, joint) for joint in joints if joint.name not in kept and joint.type is not JointType.FREE]
+    loops = [_loop(system, joint, normal) for joint in joints
+             if joint.name not in kept and joint.type is not JointType.FREE]
     return replace(system, loops=tuple(_shortened(system, loops, loop) for loop in loops))
+
+
+def plane_of(joints: Sequence[Joint]) -> Array | None:
+    """The normal of the plane in which all of a robot's links move, as its joints are directed; None where there is
+    none."""
+    turning = [joint.axis for joint in joints if joint.type in (JointType.REVOLUTE, JointType.PLANAR)]
+    allowed = (JointType.REVOLUTE, JointType.PLANAR, JointType.PRISMATIC, JointType.FIXED)
+    if not turning or any(joint.type not in allowed for joint in joints):
+        return None
+    normal = turning[0]
+    sliding = [joint.axis for joint in joints if joint.type is JointType.PRISMATIC]
+    planar = (all(lines.parallel(normal, axis) for axis in turning)
+              and all(lines.perpendicular(normal, axis) for axis in sliding))
+    return normal if planar else None
+
+
+def _free(mechanism: Mechanism, normal: Array | None) -> Joint:
+    """A joint that lets the platform go where it likes, in its plane where there is one, about the middle of its own
+    joints."""
+    centre = np.mean([joint.point for joint in mechanism.joints_of(mechanism.platform)], axis=0)
+    name = mechanism.platform
+    while name in mechanism.joints:
+        name += "_pose"
+    kind = JointType.FREE if normal is None else JointType.PLANAR
+    return Joint(name, kind, mechanism.base, mechanism.platform, centre, () if normal is None else (normal,))
 
 
 def _weight(joint: Joint, mechanism: Mechanism, driven: Sequence[str], geared: set[str]) -> float:
@@ -315,7 +356,7 @@ def parts(joint: Joint) -> list[tuple[str, bool, Array]]:
             return []
 
 
-def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: float) -> tuple[GearEquation, ...]:
+def _gears(mechanism: Mechanism, coordinates: Sequence[LoopCoordinate], length: float) -> tuple[GearEquation, ...]:
     found = []
     for coupling in mechanism.couplings:
         pair = []
@@ -332,30 +373,33 @@ def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: 
     return tuple(found)
 
 
-def _loop(system: LoopSystem, joint: Joint) -> JointLoop:
+def _loop(system: LoopSystem, joint: Joint, normal: Array | None) -> JointLoop:
     """The loop that a cut joint closes, its equations as its type has them."""
     a, b = (system.way(system.body[link]) for link in joint.links)
     shared = sum(1 for i, k in zip(a, b, strict=False) if i == k)
     point = joint.point / system.length
-    return JointLoop(joint.name, joint.links, (a[shared:], b[shared:]), frozen(point), tuple(equations(joint)))
+    return JointLoop(joint.name, joint.links, (a[shared:], b[shared:]), frozen(point),
+                     tuple(equations(joint)), planar=normal is not None)
 
 
 def _shortened(system: LoopSystem, loops: Sequence[JointLoop], loop: JointLoop) -> JointLoop:
     """The loop without a joint that only it has, where it is closed in a point: that the distance of the ball that is
     cut from this joint's centre is right is all that the others have to do with it (a rod)."""
-    if [row.kind for row in loop.rows] != ["point"] * 3:
+    joints = system.mechanism.joints
+    if joints[loop.name].type is not (JointType.REVOLUTE if loop.planar else JointType.SPHERICAL):
         return loop
+    turning = (JointType.REVOLUTE,) if loop.planar else (JointType.UNIVERSAL, JointType.SPHERICAL)
     others = {i for each in loops if each is not loop for i in each.coordinates}
     others |= {i for gear in system.gears for i in (gear.first, gear.second)}
-    joints = system.mechanism.joints
     for side in (0, 1):
         chain = loop.chains[side]
         for place, i in enumerate(chain):
             own = system.coordinates[i]
-            if joints[own.joint].type not in (JointType.UNIVERSAL, JointType.SPHERICAL) or own.driven or i in others:
+            if own.joint not in joints or joints[own.joint].type not in turning or own.driven or i in others:
                 continue
             swings = sum(system.coordinates[k].joint == own.joint for k in chain)
-            rod = np.linalg.norm(loop.point - own.point)
+            reach = loop.point - own.point
+            rod = np.linalg.norm(cross(own.axis, reach) if loop.planar else reach)
             if rod < SAME_POINT or sum(system.coordinates[k].joint == own.joint for k in chain[place:]) < swings:
                 continue
             ends, chains = (loop.ends, loop.chains) if side else (loop.ends[::-1], loop.chains[::-1])

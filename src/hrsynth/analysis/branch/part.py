@@ -6,12 +6,13 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
-from ...errors import MotorsNotEnough
+from ...errors import BadRequest, MotorsNotEnough
 from ...geometry.ranks import spectrum
-from ...geometry.vectors import Array, perpendicular
+from ...geometry.vectors import Array
 from ...results import Value
 from ...tolerances import NAMED, RANK_CUTOFF, SOLVED
 from .loops import GearEquation, JointLoop, LoopRow, LoopSystem, residuals
@@ -63,83 +64,99 @@ class LoopPart(Value):
     loops: tuple[JointLoop, ...]
     gears: tuple[GearEquation, ...]
     left_out: tuple[LoopEquation, ...] = ()
-    proved_redundant: bool = True
+    """Equations that depend on the others at zero."""
 
     @cached_property
     def place(self) -> dict[int, int]:
         """Where an unknown stands in this part."""
         return {i: k for k, i in enumerate(self.unknowns)}
 
-    def values(self, q: Array, x: Array) -> Array:
-        """All coordinates (N,), held ones zero, for those that drive this part (n,) and its unknowns (p,)."""
-        found = np.zeros(len(self.system.coordinates))
-        found[list(self.driven)], found[list(self.unknowns)] = q, x
+    @cached_property
+    def bent(self) -> tuple[int, ...]:
+        """The angles among its motors and the unknowns of its first blocks."""
+        first = {i for block in self.blocks if block.loop is None for i in block.unknowns}
+        return tuple(i for i, each in enumerate(self.system.coordinates)
+                     if not each.slides and (i in first or i in self.driven))
+
+    def values(self, q: Array, x: Array) -> list[Array | None]:
+        """All coordinates, held ones None, for those that drive this part (…, n) and its unknowns (…, p)."""
+        found: list[Array | None] = [None] * len(self.system.coordinates)
+        for places, given in ((self.driven, q), (self.unknowns, x)):
+            for k, i in enumerate(places):
+                found[i] = given[..., k]
         return found
 
     def closure(self, q: Array, x: Array) -> tuple[Array, Array, Array]:
-        """All equations of its loops (m,), and their derivatives by the unknowns (m, p) and by what drives it (m,
-        n)."""
-        values = self.values(q, x)
-        errors, rates = whole(self.system, self.loops, self.gears, values)
-        return errors, rates[:, list(self.unknowns)], rates[:, list(self.driven)]
+        """All equations of its loops (…, m), and their derivatives by the unknowns (…, m, p) and by what drives it
+        (…, m, n)."""
+        errors, rates = whole(self.system, self.loops, self.gears, self.values(q, x), q.shape[:-1])
+        return errors, rates[..., list(self.unknowns)], rates[..., list(self.driven)]
 
-    def closed(self, q: Array, x: Array) -> Array | None:
-        """The unknowns (p,) near ``x`` at which the loops are closed, by Newton's method; None where it does not
-        end."""
+    def closed(self, q: Array, x: Array) -> tuple[Array, Array]:
+        """The unknowns (c, p) near ``x`` at which the loops are closed, by Newton's method, and which (c,) are."""
+        x = x.copy()
         for _ in range(NEWTON_STEPS):
             errors, A, _ = self.closure(q, x)
-            if not len(errors) or np.linalg.norm(errors) < SOLVED:
-                return x
-            step = np.linalg.lstsq(A, errors, rcond=RANK_CUTOFF)[0]
-            x = x - step * min(1.0, 0.5 / max(np.abs(step).max(), 1e-300))
-            if not np.all(np.isfinite(x)):
-                return None
-        return x if np.linalg.norm(self.closure(q, x)[0]) < 100 * SOLVED else None
+            far = np.linalg.norm(errors, axis=-1) >= SOLVED
+            if not far.any() or not np.all(np.isfinite(x)):
+                break
+            step = _solved(A[far], errors[far][..., None])[..., 0]
+            x[far] -= step * np.minimum(1.0, 0.5 / np.maximum(np.abs(step).max(axis=-1, initial=0.0), 0.5))[..., None]
+        done = np.linalg.norm(self.closure(q, x)[0], axis=-1) < 100 * SOLVED
+        return x, done & np.all(np.isfinite(x), axis=-1)
 
     def slopes(self, q: Array, x: Array) -> Array:
-        """dx/dq (p, n) at a closed configuration."""
+        """dx/dq (…, p, n) at closed configurations."""
         _, A, B = self.closure(q, x)
-        return np.asarray(-np.linalg.lstsq(A, B, rcond=RANK_CUTOFF)[0])
+        return -_solved(A, B)
 
-    def followed(self, q: Array, x: Array, goal: Array, step: float = 0.1) -> Array | None:
-        """The unknowns (p,) at ``goal`` (n,), reached by short steps from a closed configuration; None where a step is
-        corrected by more than it was long."""
+    def followed(self, q: Array, x: Array, goal: Array, step: float = 0.1) -> tuple[Array, Array]:
+        """The unknowns (c, p) at ``goal`` (c, n), reached by short steps from closed configurations, and which (c,) are
+        reached without a correction that is longer than the step."""
         count = max(1, int(np.ceil(np.abs(goal - q).max(initial=0.0) / step)))
+        good = np.ones(len(q), dtype=bool)
         for k in range(count):
-            here, there = q + (goal - q) * k / count, q + (goal - q) * (k + 1) / count
-            ahead = x + self.slopes(here, x) @ (there - here)
-            found = self.closed(there, ahead)
-            if found is None or np.abs(found - ahead).max(initial=0.0) > step + np.abs(ahead - x).max(initial=0.0):
-                return None
-            x = found
-        return x
+            here, there = q + (goal - q) * (k / count), q + (goal - q) * ((k + 1) / count)
+            ahead = (self.slopes(here, x) @ (there - here)[..., None])[..., 0]
+            found, done = self.closed(there, x + ahead)
+            off = np.abs(found - x - ahead).max(axis=-1, initial=0.0)
+            good &= done & (off <= step + np.abs(ahead).max(axis=-1, initial=0.0))
+            x = np.where(good[:, None], found, x)
+        return x, good
 
 
-def whole(system: LoopSystem, loops: Sequence[JointLoop], gears: Sequence[GearEquation], values: Array
-          ) -> tuple[Array, Array]:
-    """All equations of loops and gears (m,) and their derivatives by all coordinates (m, N)."""
-    errors: list[float] = []
-    rates: list[Array] = []
+def _solved(A: Array, B: Array) -> Array:
+    """The least squares solutions (…, p, k) of A X = B, (…, m, p) and (…, m, k)."""
+    return np.asarray(np.linalg.pinv(A, rcond=RANK_CUTOFF) @ B)
+
+
+def whole(system: LoopSystem, loops: Sequence[JointLoop], gears: Sequence[GearEquation], values: Any,
+          shape: tuple[int, ...] = ()) -> tuple[Array, Array]:
+    """All equations of loops and gears (…, m) and their derivatives by all coordinates (…, m, N), at values of a
+    ``shape``, None for those at zero."""
+    count = sum(len(loop.rows) for loop in loops) + len(gears)
+    errors, rates = np.zeros((*shape, count)), np.zeros((*shape, count, len(values)))
+    place = 0
     for loop in loops:
-        found, slopes = residuals(system, loop, values, loop.rows, False)
-        errors += found
-        for slope in slopes:
-            row = np.zeros(len(values))
-            row[list(slope)] = list(slope.values())
-            rates.append(row)
+        for value, slope in zip(*residuals(system, loop, values, loop.rows), strict=True):
+            errors[..., place] = value
+            for i, rate in slope.items():
+                rates[..., place, i] = rate
+            place += 1
     for gear in gears:
-        errors.append(values[gear.second] - gear.ratio * values[gear.first])
-        row = np.zeros(len(values))
-        row[gear.second] += 1.0
-        row[gear.first] -= gear.ratio
-        rates.append(row)
-    return np.array(errors), np.array(rates).reshape(len(errors), len(values))
+        for i, rate in ((gear.second, 1.0), (gear.first, -gear.ratio)):
+            rates[..., place, i] += rate
+            if values[i] is not None:
+                errors[..., place] += values[i] * rate
+        place += 1
+    return errors, rates
 
 
 def parts_of(system: LoopSystem) -> tuple[tuple[LoopPart, ...], tuple[int, ...]]:
     """The parts of a system, and the coordinates that are held: those that turn nothing but themselves (idle).
 
-    Raises ``MotorsNotEnough`` where the platform can move while all that is driven rests.
+    Raises ``MotorsNotEnough`` where the platform can move while all that is driven rests, ``BadRequest`` where what is
+    driven depends on each other.
     """
     held = _idle(system)
     unknowns = [i for i, each in enumerate(system.coordinates) if not each.driven and i not in held]
@@ -149,10 +166,12 @@ def parts_of(system: LoopSystem) -> tuple[tuple[LoopPart, ...], tuple[int, ...]]
 
 def _idle(system: LoopSystem) -> set[int]:
     """Coordinates to hold, one for each motion at zero that leaves the platform and what is driven at rest: of each
-    the one that takes the largest part in it."""
+    the one that takes the largest part in it.
+
+    Raises ``BadRequest`` where what is driven is not independent at zero.
+    """
     held: set[int] = set()
-    zero = np.zeros(len(system.coordinates))
-    _, rates = whole(system, system.loops, system.gears, zero)
+    _, rates = whole(system, system.loops, system.gears, np.zeros(len(system.coordinates)))
     looped = {i for loop in system.loops for i in loop.coordinates}
     looped |= {i for gear in system.gears for i in (gear.first, gear.second)}
     # a ball on a rod spins about it
@@ -167,6 +186,12 @@ def _idle(system: LoopSystem) -> set[int]:
     if loose:
         raise MotorsNotEnough(system.mechanism.name, loose)
     held |= {i for i, each in enumerate(system.coordinates) if not each.driven and i not in looped}
+    every = [i for i, each in enumerate(system.coordinates) if i in looped and (each.driven or i in free)]
+    count = sum(system.coordinates[i].driven for i in every)
+    dependent = spectrum(rates[:, every]).rank.value - spectrum(rates[:, free]).rank.value
+    if dependent:
+        raise BadRequest(f"{system.mechanism.name}: coordinates of motors that depend on each other at the zero "
+                         f"configuration", count, f"{count - dependent}: name fewer of them with --motors")
     while free:
         kernel = spectrum(rates[:, free]).kernel
         if not kernel.shape[1]:
@@ -254,7 +279,7 @@ def _slope(system: LoopSystem, equation: LoopEquation, values: Array) -> Array:
         row[equation.of.second], row[equation.of.first] = 1.0, -equation.of.ratio
         return row
     assert equation.row is not None
-    (slope,) = residuals(system, equation.of, values, [equation.row], False)[1]
+    (slope,) = residuals(system, equation.of, values, [equation.row])[1]
     row[list(slope)] = list(slope.values())
     return row
 
@@ -285,9 +310,3 @@ def _triangular(system: LoopSystem, unknowns: Sequence[int], equations: Sequence
         members = sorted(merged.nodes[node]["members"])
         found.append(LoopBlock(tuple(sorted(match[rows[k]] for k in members)), tuple(equations[k] for k in members)))
     return found
-
-
-def tangents(direction: Array) -> tuple[LoopRow, LoopRow]:
-    """The two equations that turn a rod into a direction (3,), beside its length."""
-    e = perpendicular(direction)
-    return LoopRow("point", e), LoopRow("point", np.cross(direction / np.linalg.norm(direction), e))

@@ -10,14 +10,22 @@ from ...budgets import BRANCH_CELLS, BRANCH_DEPTH
 from ...errors import BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
+from ...progress import tell
 from ...tolerances import CLOSED
 from ..observed import RobotLike, as_robot
 from ..question import question
-from .answer import BranchCell, BranchPart, BranchProof, Toggle
-from .growth import BranchEnd, CellGrid, Growth, largest_box
+from .answer import BranchCell, BranchPart, BranchProof
+from .cells import prove_all
+from .ends import toggles, turns
+from .growth import CellGrid, Growth, largest_box
 from .loops import LoopSystem, loop_system
 from .part import LoopPart, parts_of, whole
+from .redundant import closed_to, unexplained
 
+GROUPS = "the loops' links move in groups of fewer dimensions"
+BOUNDED = "bounded over the tubes"
+COARSEST = 4.0
+"""How much larger a cell may be than the largest about zero that is proved at once, to be tried."""
 BoxLike = Mapping[str, Sequence[float]] | str
 
 
@@ -38,25 +46,58 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
     if not motors:
         raise BadRequest(f"{mechanism.name}: motors", 0, "one or more: --motors names them")
-    system = loop_system(mechanism, motors)
-    errors, _ = whole(system, system.loops, system.gears, np.zeros(len(system.coordinates)))
-    if len(errors) and np.linalg.norm(errors) > CLOSED:
-        raise LoopsNotClosed(mechanism.name, float(np.linalg.norm(errors)), CLOSED, system.loops[0].name)
-    parts, held = parts_of(system)
+    system, parts, held = _shaped(mechanism, motors, box)
     intervals, source = _box(system, box)
-    found = []
-    tried = 0
+    found, tried = [], 0
     for part in parts:
-        own = [intervals[i] for i in part.driven]
-        grid = CellGrid(np.array([low for low, _ in own]), np.array([high for _, high in own]))
-        n = len(own)
-        growth = Growth(part, grid, np.zeros(n), np.zeros(len(part.unknowns)), BRANCH_DEPTH, effort).run()
+        growth = Growth(part, _grid(part, intervals), np.zeros(len(part.driven)), np.zeros(len(part.unknowns)),
+                        _depth(part), effort, COARSEST * _reach(part, intervals)).run()
         tried += growth.tried
         found.append(_answer(part, growth))
+        tell("parts")
     names = system.names
     passive = tuple(names[i] for part in parts for i in part.unknowns)
     return BranchProof(mechanism, system, tuple(names[i] for i in system.driven), passive,
                        tuple(names[i] for i in held), tuple(found), source, tried)
+
+
+Shaped = tuple[LoopSystem, tuple[LoopPart, ...], tuple[int, ...]]
+
+
+def _shaped(mechanism: Mechanism, motors: Sequence[str], box: BoxLike | None) -> Shaped:
+    """The loops in the coordinates in which the larger cell about zero is proved: those of the joints alone, or with
+    the pose of the platform, seen from which all legs are alike."""
+    system = loop_system(mechanism, motors)
+    errors, _ = whole(system, system.loops, system.gears, np.zeros(len(system.coordinates)))
+    if len(errors) and np.linalg.norm(errors) > CLOSED:
+        raise LoopsNotClosed(mechanism.name, float(np.linalg.norm(errors)), CLOSED, system.loops[0].name)
+    joints: Shaped = (system, *parts_of(system))
+    if len(joints[1]) != 1 or mechanism.base == mechanism.platform:
+        return joints
+    other = loop_system(mechanism, motors, free=True)
+    posed: Shaped = (other, *parts_of(other))
+    if len(posed[1]) != 1:
+        return joints
+    return max((joints, posed), key=lambda each: _reach(each[1][0], _box(each[0], box)[0]))
+
+
+def _reach(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> float:
+    """The size of the largest cell about zero that is proved at once, as part of the box: by half as often as needed,
+    or two thirds of that."""
+    grid = _grid(part, intervals)
+    sizes = np.array([scale * 2.0**-k for k in range(BRANCH_DEPTH) for scale in (1.0, 0.7)])
+    half = np.minimum(grid.high - grid.low, 2 * np.pi)[None] / 2 * sizes[:, None]
+    tubes = prove_all(part, np.zeros(half.shape), half, np.zeros((len(half), len(part.unknowns))))
+    return max((float(size) for size, tube in zip(sizes, tubes, strict=True) if tube is not None), default=0.0)
+
+
+def _depth(part: LoopPart) -> int:
+    return BRANCH_DEPTH + 4 * len(part.driven)
+
+
+def _grid(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> CellGrid:
+    own = [intervals[i] for i in part.driven]
+    return CellGrid(np.array([low for low, _ in own]), np.array([high for _, high in own]))
 
 
 def _box(system: LoopSystem, box: BoxLike | None) -> tuple[dict[int, tuple[float, float]], str]:
@@ -121,14 +162,11 @@ def _answer(part: LoopPart, growth: Growth) -> BranchPart:
         corners = largest_box(growth)
         box = growth.grid.point(corners[0]), growth.grid.point(corners[1])
     names = system.names
+    loose = unexplained(part)
+    tubes = [leaf.tube for leaf in growth.proved if leaf.tube is not None]
+    redundant = "" if not part.left_out else GROUPS if not loose else BOUNDED
     return BranchPart(
         tuple(names[i] for i in part.driven), tuple(names[i] for i in part.unknowns), growth.q0 * unit_q,
         growth.x0 * unit_x, (low * unit_q, high * unit_q), (box[0] * unit_q, box[1] * unit_q),
         sum(leaf.volume for leaf in growth.proved), float(np.prod((box[1] - box[0]) / (high - low))), tuple(cells),
-        tuple(_toggle(part, each) for each in growth.endings[:1]), (), 0.0, "")
-
-
-def _toggle(part: LoopPart, ending: BranchEnd) -> Toggle:
-    """Where and why the proof ends."""
-    unit: Array = part.system.units[list(part.driven)]
-    return Toggle(ending.q * unit, (), tuple(loop.name for loop in part.loops), "the cells would have to be smaller")
+        toggles(growth), turns(growth), closed_to(part, tubes, loose), redundant)

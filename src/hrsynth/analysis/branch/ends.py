@@ -1,0 +1,108 @@
+"""Where the proof of a branch ends: toggles, found in floating point; and whether a whole turn comes back to itself."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...geometry.vectors import Array
+from ...tolerances import AFFINE_ROUNDING, TOGGLE, TOGGLE_JOINT
+from .answer import Toggle
+from .cells import BranchTube, prove_all
+from .growth import BranchEnd, Growth
+from .part import LoopPart
+
+HALVINGS = 40
+"""How often the way to a toggle is halved."""
+BEYOND = 20.0
+"""How far a toggle is looked for from where a cell was started, as a multiple of the way to its middle."""
+TOLD = 4
+"""Ends of the proof that are looked into, those of the largest cells first, for each set of joints."""
+
+
+def toggles(growth: Growth) -> tuple[Toggle, ...]:
+    """The ends of a proof, one for each set of joints that can move there."""
+    found: dict[tuple[str, ...], Toggle] = {}
+    ends = sorted(growth.endings, key=lambda end: -end.leaf.volume)
+    step = max(1, len(ends) // (TOLD * len(growth.q0) * 2))
+    for end in ends[::step]:
+        toggle = _toggle(growth, end)
+        found.setdefault(toggle.joints, toggle)
+    return tuple(found.values())
+
+
+def _toggle(growth: Growth, end: BranchEnd) -> Toggle:
+    """Go from where a cell was started through its middle and on; where that ends, a loop toggles."""
+    part = growth.part
+    unit = part.system.units[list(part.driven)]
+    middle = (growth.grid.point(end.leaf.low) + growth.grid.point(end.leaf.high)) / 2
+    goal = np.clip(end.q + BEYOND * (middle - end.q), growth.grid.low, growth.grid.high)
+    q, x, last = _followed(part, end.q, end.x, goal)
+    A, home = part.closure(q, x)[1], part.closure(growth.q0, growth.x0)[1]
+    _, strengths, rows = np.linalg.svd(A)
+    weakest = strengths[-1] / max(np.linalg.svd(home, compute_uv=False)[-1], 1e-300)
+    if last == 1.0 or weakest > TOGGLE:
+        why = ("not tried any more: the effort was spent" if not end.leaf.failed else
+               "undecided: the cells would have to be smaller")
+        return Toggle(q * unit, (), (), why)
+    moving = np.abs(rows[-1]) > TOGGLE_JOINT * np.abs(rows[-1]).max()
+    places = [i for i, moves in zip(part.unknowns, moving, strict=True) if moves]
+    joints = tuple(dict.fromkeys(part.system.coordinates[i].joint for i in places))
+    loops = tuple(loop.name for loop in part.loops if set(places).intersection(loop.coordinates))
+    return Toggle(q * unit, joints, loops, "a determinant vanishes: these joints can move while all motors rest")
+
+
+def _followed(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array, Array, float]:
+    """The last closed configuration on the straight way to ``goal`` that short steps reach, and its part of the way."""
+    done, step = 0.0, 0.25
+    for _ in range(HALVINGS):
+        if done >= 1.0:
+            break
+        ahead = min(1.0, done + step)
+        there, good = part.followed((q + (goal - q) * done)[None], x[None], (q + (goal - q) * ahead)[None])
+        # the closure that follows must be the near one: back again must be where it came from
+        back, same = part.followed((q + (goal - q) * ahead)[None], there, (q + (goal - q) * done)[None])
+        if good[0] and same[0] and np.abs(back - x).max(initial=0.0) < AFFINE_ROUNDING**0.5:
+            done, x = ahead, there[0]
+        else:
+            step /= 2
+    return q + (goal - q) * done, x, done
+
+
+def turns(growth: Growth) -> tuple[tuple[str, bool], ...]:
+    """Of each motor that makes a whole turn and whose last cells all meet a first one: whether the closures there are
+    the same, angles modulo 2π."""
+    part, found = growth.part, []
+    for k, i in enumerate(part.driven):
+        whole = abs(growth.grid.high[k] - growth.grid.low[k] - 2 * np.pi) < AFFINE_ROUNDING
+        if part.system.coordinates[i].slides or not whole:
+            continue
+        first = [leaf for leaf in growth.proved if leaf.low[k] == 0]
+        last = [leaf for leaf in growth.proved if leaf.high[k] == growth.whole]
+        same = [_meets(growth, k, one.tube, other.tube, face) for one in last for other in first
+                for face in growth.opposite(k, one, other) if one.tube is not None and other.tube is not None]
+        if same:
+            found.append((part.system.names[i], all(same)))
+    return tuple(found)
+
+
+def _meets(growth: Growth, k: int, one: BranchTube, other: BranchTube, face: Array) -> bool:
+    """Whether the closure of one tube at a point of the last face lies in another tube, a whole turn before."""
+    part = growth.part
+    x, good = part.closed(face[None], one.at(face)[None])
+    (point,) = prove_all(part, face[None], np.zeros((1, len(face))), x) if good[0] else (None,)
+    if point is None:
+        return False
+    before = face.copy()
+    before[k] = growth.grid.low[k]
+    angles = np.array([not part.system.coordinates[i].slides for i in part.unknowns])
+    off = point.x - other.at(before)
+    off = off - np.where(angles, 2 * np.pi * np.round(off / (2 * np.pi)), 0.0)
+    inside = np.abs(off) + point.radius + AFFINE_ROUNDING * 100 < other.radius
+    return bool(np.all(inside) and np.all(np.abs(point.x - one.at(face)) + point.radius < one.radius))
+
+
+def told(ends: Sequence[Toggle]) -> list[str]:
+    """The ends of a proof in words."""
+    return [f"{each.reason}: {', '.join(each.joints)}" if each.joints else each.reason for each in ends]

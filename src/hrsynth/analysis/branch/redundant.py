@@ -1,0 +1,76 @@
+"""Why equations of loops that were left out hold: by the group that a loop's links move in, or to what bound."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...geometry.ranks import range_basis
+from ...geometry.vectors import Array
+from ...mechanism import JointType
+from .cells import BranchTube, evaluated, trial_of
+from .loops import JointLoop, LoopSystem, parts
+from .part import LoopEquation, LoopPart
+
+
+def unexplained(part: LoopPart) -> tuple[LoopEquation, ...]:
+    """The equations that were left out and do not follow from the others.
+
+    All displacements about a loop lie in the group that its joints generate, of dimension d; with the f freedoms of the
+    joint that is cut d − f independent equations close it, so that the others hold as long as these are independent.
+    """
+    found = []
+    chosen = [each.of.name for block in part.blocks for each in block.equations]
+    needed = {loop.name: group_dimension(part.system, loop) - _freedoms(part.system, loop)
+              for loop in part.loops if loop.swung is None}
+    for each in part.left_out:
+        name = each.of.name
+        if name not in needed or chosen.count(name) != needed[name]:
+            found.append(each)
+    return tuple(found)
+
+
+def _freedoms(system: LoopSystem, loop: JointLoop) -> int:
+    return JointType(system.mechanism.joints[loop.name].type).freedoms
+
+
+def group_dimension(system: LoopSystem, loop: JointLoop) -> int:
+    """The dimension of the Lie algebra that the twists of a loop's joints at zero generate."""
+    joint = system.mechanism.joints[loop.name]
+    lines = [(each.slides, each.axis, each.point) for each in (system.coordinates[i] for i in loop.coordinates)]
+    lines += [(slides, axis, loop.point) for _, slides, axis in parts(joint)]
+    basis = np.zeros((6, 0))
+    twists = np.array([[*np.zeros(3), *axis] if slides else [*axis, *np.cross(point, axis)]
+                       for slides, axis, point in lines]).reshape(-1, 6).T
+    while True:
+        basis, rank = range_basis(np.hstack([basis, twists]), 1.0)
+        brackets = [_bracket(a, b) for a in basis.T for b in basis.T]
+        if rank.value == 6 or not brackets:
+            return rank.value
+        twists = np.array(brackets).T
+        if range_basis(np.hstack([basis, twists]), 1.0)[1].value == rank.value:
+            return rank.value
+
+
+def _bracket(a: Array, b: Array) -> Array:
+    """[a, b] of twists (angular velocity, velocity at the origin)."""
+    return np.concatenate([np.cross(a[:3], b[:3]), np.cross(a[:3], b[3:]) + np.cross(a[3:], b[:3])])
+
+
+def closed_to(part: LoopPart, tubes: Sequence[BranchTube], equations: Sequence[LoopEquation]) -> float:
+    """A bound, over tubes, of equations that were left out (characteristic lengths, pure numbers; of a distance how far
+    it is off)."""
+    if not equations or not tubes:
+        return 0.0
+    trial = trial_of(part, tubes)
+    values, _ = evaluated(part, equations, trial.forms(trial.radius))
+    bound = 0.0
+    for each, value in zip(equations, values, strict=True):
+        size = float(np.max(value.size))
+        if isinstance(each.of, JointLoop) and each.row is not None and each.row.kind == "distance":
+            assert each.of.swung is not None
+            centre = part.system.coordinates[each.of.chains[1][each.of.swung]].point
+            size /= float(np.linalg.norm(each.of.point - centre)) * (1 - 1e-12)
+        bound = max(bound, size)
+    return bound

@@ -1,0 +1,51 @@
+"""A branch from motors to joints: where it is proved, and where that ends."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .tables import Rows, listing
+
+if TYPE_CHECKING:
+    from ...analysis.branch.answer import BranchPart, BranchProof, Toggle
+
+
+def branch(found: BranchProof) -> str:
+    """The robot, then each part: its box, how much of it is proved, and what ends that."""
+    rows: Rows = [("robot", found.robot.name), ("motors", ", ".join(found.motors)),
+                  ("passive", f"{len(found.passive)} coordinates"
+                   + (f", {len(found.held)} idle ones held" if found.held else "")),
+                  ("box", found.box)]
+    for part in found.parts:
+        rows += _part(part)
+    if not found.parts:
+        rows.append(("branch", "no loops: the motors are all there is"))
+    return listing(rows)
+
+
+def _part(part: BranchPart) -> Rows:
+    bounds = [f"{name} {low:.6g} to {high:.6g} (of {first:.6g} to {last:.6g})" for name, low, high, first, last in
+              zip(part.motors, *part.proved, *part.asked, strict=True)]
+    rows: Rows = [("", ""), ("from", ", ".join(part.motors)), ("to", ", ".join(part.passive))]
+    if not part.cells:
+        return [*rows, ("branch", "undecided: no cell about the zero configuration could be proved")]
+    weakest = min(cell.weakest for cell in part.cells)
+    whole = part.share > 1 - 1e-12
+    rows += [("branch", "one branch, proved in the whole box" if whole else
+              f"one branch, proved in {100 * part.share:.3g} % of the box"),
+             ("cells", f"{len(part.cells)}; smallest singular value of the loops at least {weakest:.3g}")]
+    if not whole:
+        rows.append(("proved box", bounds))
+    rows += [(f"turn of {name}", "comes back to itself" if same else "does not come back to itself")
+             for name, same in part.turns]
+    if part.redundant:
+        rows.append(("redundant", part.redundant + (f": closed to {part.closed_to:.2g}" if part.closed_to else "")))
+    return rows + [("ends" if not place else "", _end(part, each)) for place, each in enumerate(part.toggles)]
+
+
+def _end(part: BranchPart, end: Toggle) -> str:
+    at = ", ".join(f"{name}={value:.4g}" for name, value in zip(part.motors, end.q, strict=True))
+    if not end.joints:
+        return f"at {at}: {end.reason}"
+    loops = f" (loop {', '.join(end.loops)})" if len(end.loops) == 1 else ""
+    return f"at {at}, found: {', '.join(end.joints)} can move while all motors rest{loops}"

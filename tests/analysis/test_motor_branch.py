@@ -1,0 +1,240 @@
+"""The branch from motors to joints: what is proved holds along small steps of plain NumPy."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hrsynth import branch, load
+from hrsynth.analysis.branch.answer import BranchProof
+from hrsynth.errors import BadRequest, MotorsNotEnough
+from hrsynth.geometry.affine import AffineForms, affine
+from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.model import Mechanism
+from strategies import random_rotation
+
+Z = np.array([0.0, 0.0, 1.0])
+
+
+def circles(A, B, a, b, side):
+    """The point at distances a and b from A and B."""
+    d = B - A
+    size = np.linalg.norm(d)
+    along = (a * a - b * b + size * size) / (2 * size)
+    return A + along * d / size + side * np.sqrt(a * a - along**2) * np.cross(Z, d / size)
+
+
+def four_bar(ground=1.0, crank=0.5, coupler=1.2, rocker=0.8, angle=0.7, turn=None, side=1) -> Mechanism:
+    """A crank that is driven, with its plane turned."""
+    R = np.eye(3) if turn is None else turn
+    A, D = np.zeros(3), np.array([ground, 0, 0])
+    B = crank * np.array([np.cos(angle), np.sin(angle), 0])
+    C = circles(B, D, coupler, rocker, side)
+    b = Builder("four_bar")
+    for name in ("base", "crank", "coupler", "rocker"):
+        b.link(name)
+    for name, one, other, at in (("a", "base", "crank", A), ("b", "crank", "coupler", B), ("d", "base", "rocker", D)):
+        b.joint(name, "R", one, other, at=R @ at, axis=R @ Z, motor=name == "a")
+    b.joint("c", "R", "coupler", "rocker", at=R @ C, axis=R @ Z, loop=True)
+    return b.build(platform="coupler")
+
+
+def screw_motion(coordinate, length, value):
+    """The displacement (4, 4) of a coordinate, by the series of the exponential of its twist."""
+    twist, a = np.zeros((4, 4)), coordinate.axis
+    if coordinate.slides:
+        twist[:3, 3] = a
+    else:
+        twist[:3, :3] = [[0, -a[2], a[1]], [a[2], 0, -a[0]], [-a[1], a[0], 0]]
+        twist[:3, 3] = -twist[:3, :3] @ coordinate.point * length
+    X, term = np.eye(4), np.eye(4)
+    for k in range(1, 30):
+        term = term @ twist * value / k
+        X = X + term
+    return X
+
+
+def misses(proof: BranchProof, values) -> np.ndarray:
+    """How far each cut joint is from being assembled at values of all coordinates, from the joints' own geometry."""
+    system, placed = proof.system, {-1: np.eye(4)}
+    for i, (coordinate, value) in enumerate(zip(system.coordinates, values, strict=True)):
+        placed[i] = placed[coordinate.parent] @ screw_motion(coordinate, system.length, value)
+    found = []
+    for loop in system.loops:
+        joint = proof.robot.joints[loop.name]
+        X, Y = (placed[system.body[link]] for link in joint.links)
+        gap = (Y - X) @ [*joint.point, 1.0]
+        letter = joint.type.value
+        if letter in "RUS":
+            found += [*gap[:3]]
+        if letter in "RPC":
+            a = joint.axes[0]
+            found += [*np.cross(X[:3, :3] @ a, Y[:3, :3] @ a)]
+        if letter in "PC":
+            found += [*np.cross(X[:3, :3] @ joint.axes[0], gap[:3])]
+        if letter == "P":
+            found += [*(X[:3, :3] - Y[:3, :3]).ravel()]
+        if letter == "U":
+            found.append((X[:3, :3] @ joint.axes[0]) @ (Y[:3, :3] @ joint.axes[1]))
+    for coupling in proof.robot.couplings:
+        one, other = (next(i for i, c in enumerate(system.coordinates)
+                           if proof.robot.joints[c.joint].successor == link)
+                      for link in (coupling.predecessor, coupling.successor))
+        found.append(values[other] - coupling.ratio * values[one])
+    return np.array(found)
+
+
+def followed(proof: BranchProof, motors, values, steps):
+    """Values of all coordinates along a straight way of the motors, closed again after each small step by Newton's
+    method with differences."""
+    names = proof.system.names
+    driven, free = ([names.index(name) for name in each] for each in (proof.motors, proof.passive))
+    start = values[driven].copy()
+    for k in range(1, steps + 1):
+        values = values.copy()
+        values[driven] = start + (motors - start) * k / steps
+        for _ in range(8):
+            miss = misses(proof, values)
+            if np.linalg.norm(miss) < 1e-12:
+                break
+            J = np.array([(misses(proof, values + 1e-6 * e) - miss) / 1e-6 for e in np.eye(len(values))[free]]).T
+            values[free] -= np.linalg.lstsq(J, miss, rcond=1e-7)[0]
+        assert np.linalg.norm(miss) < 1e-9
+        yield values
+
+
+def obeys(proof: BranchProof, rng, ways: int, steps: int) -> int:
+    """Along random ways in the proved boxes the tubes of all cells hold the closure; the number of points looked at."""
+    names, count = proof.system.names, 0
+    values = np.zeros(len(names))
+    for _ in range(ways):
+        goal = np.zeros(len(proof.motors))
+        for part in proof.parts:
+            goal[[proof.motors.index(name) for name in part.motors]] = rng.uniform(*part.proved)
+        for now in followed(proof, goal, values, steps):
+            values = now
+            for part in proof.parts:
+                q, x = (now[[names.index(name) for name in each]] for each in (part.motors, part.passive))
+                cell = part.find(q)
+                assert cell is not None
+                assert np.all(np.abs(x - cell.at(q)) <= cell.radius + 1e-9)
+                count += 1
+    return count
+
+
+def connected(part) -> bool:
+    """Whether all cells hang together by faces."""
+    seen, pending = {0}, [0]
+    while pending:
+        for other in part.cells[pending.pop()].neighbours:
+            if other not in seen:
+                seen.add(other)
+                pending.append(other)
+    return len(seen) == len(part.cells)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_forms_enclose(seed):
+    """Products, sums and sines of affine forms hold the values at all symbols."""
+    rng = np.random.default_rng(seed)
+
+    def form() -> AffineForms:
+        return affine(rng.normal(size=50), 0.3 * rng.normal(size=(50, 3)), 0.1 * np.abs(rng.normal(size=50)))
+
+    a, b, c = form(), form(), form()
+    sine, cosine = (a + b).sines()
+    made = a * b - c * c * a + sine * c - cosine * cosine * 2.0
+    for _ in range(100):
+        e = rng.choice([-1.0, 1.0, rng.uniform(-1, 1)], size=3)
+        x, y, z = (each.v[0] + np.tensordot(e, each.v[1:], 1) + each.r * rng.choice([-1, 0.3, 1], size=50)
+                   for each in (a, b, c))
+        value = x * y - z * z * x + np.sin(x + y) * z - 2 * np.cos(x + y) ** 2
+        assert np.all(np.abs(value - made.v[0] - np.tensordot(e, made.v[1:], 1)) <= made.r)
+
+
+def test_a_crank_stays_on_its_branch_over_a_whole_turn():
+    """Bars 1, 0.5, 1.2, 0.8: one branch all round, which comes back to itself; no tube holds the other closure."""
+    robot = four_bar()
+    (part,) = branch(robot).parts
+    assert part.share == part.box_share == 1.0
+    assert part.turns == (("a", True),)
+    assert connected(part)
+    d, b = part.passive.index("d"), part.passive.index("b")
+    home = np.array([0.5 * np.cos(0.7), 0.5 * np.sin(0.7), 0])
+    D = np.array([1.0, 0, 0])
+
+    def angles(q, side):
+        B = 0.5 * np.array([np.cos(0.7 + q), np.sin(0.7 + q), 0])
+        C = circles(B, D, 1.2, 0.8, side)
+        return np.arctan2(*(C - D)[1::-1]), np.arctan2(*(C - B)[1::-1]) - q
+
+    zero = angles(0.0, 1)
+    assert np.linalg.norm(home) == pytest.approx(0.5)
+    for q in np.linspace(-np.pi, np.pi, 3001):
+        cell = part.find([q])
+        for side, inside in ((1, True), (-1, False)):
+            off = np.zeros(2)
+            off[[d, b]] = np.array(angles(q, side)) - zero
+            off -= cell.at(np.array([q]))
+            off -= 2 * np.pi * np.round(off / (2 * np.pi))
+            assert bool(np.all(np.abs(off) <= cell.radius + 1e-9)) is inside
+
+
+def test_the_proof_ends_where_the_loop_toggles():
+    """No crank: it turns as far as coupler and rocker are in line, and these are named."""
+    (part,) = branch(four_bar(1.0, 0.9, 0.6, 0.8, 1.2)).parts
+    ends = [np.arccos((1 + 0.81 - reach**2) / 1.8) - 1.2 for reach in (0.2, 1.4)]
+    named = [each for each in part.toggles if each.joints]
+    assert named
+    for each in named:
+        assert set(each.joints) == {"b", "d"} or set(each.joints) == {"d", "b"}
+        assert min(abs(each.q[0] - end) for end in ends) < 1e-2
+    assert ends[0] < part.proved[0][0] < 0 < part.proved[1][0] < ends[1]
+    assert part.proved[0][0] - ends[0] < 0.05
+    assert not part.turns
+
+
+@pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))])
+def test_tubes_hold_what_small_steps_find_in_random_four_bars(seed):
+    rng = np.random.default_rng(seed)
+    while True:
+        bars, angle = rng.uniform(0.3, 1.5, 4), rng.uniform(-3, 3)
+        B = bars[1] * np.array([np.cos(angle), np.sin(angle)])
+        reach = np.hypot(*(B - [bars[0], 0]))
+        if abs(bars[2] - bars[3]) + 0.1 < reach < bars[2] + bars[3] - 0.1:
+            break
+    proof = branch(four_bar(*bars, angle, random_rotation(rng), rng.choice([-1, 1])))
+    assert proof.parts[0].cells
+    assert connected(proof.parts[0])
+    assert obeys(proof, rng, 3, 40) == 120
+
+
+SLOW = pytest.mark.slow
+
+
+@pytest.mark.parametrize(("name", "half"), [
+    ("rrrrr_m1", 0.15), ("3rrr_m1", 0.1), ("3ppr_m1", 0.01), pytest.param("3prr_m1", 0.02, marks=SLOW),
+    pytest.param("delta", 0.04, marks=SLOW), pytest.param("3rps", 0.01, marks=SLOW),
+    pytest.param("gough_stewart", 0.002, marks=SLOW), pytest.param("quattro", 0.001, marks=SLOW)])
+def test_tubes_hold_what_small_steps_find(name, half):
+    robot = load(name)
+    box = {joint.name: (-half, half) for joint in robot.joints.values() if joint.actuated}
+    proof = branch(robot, box, effort=100)
+    assert proof.parts[0].share == 1.0
+    assert obeys(proof, np.random.default_rng(1), 3, 6) == 18
+
+
+def test_motors_that_do_not_make_a_function_are_refused():
+    with pytest.raises(BadRequest, match="depend on each other"):
+        branch("quattro_rigid")
+    robot = load("rrrrr_m1")
+    idle = Mechanism.of("one", robot.links.values(), [
+        joint if joint.name != "shoulder_2" else type(joint)(joint.name, joint.type, *joint.links, joint.point,
+                                                             joint.axes) for joint in robot.joints.values()],
+        platform=robot.platform, base=robot.base)
+    with pytest.raises(MotorsNotEnough):
+        branch(idle)
+    with pytest.raises(BadRequest, match="shoulder_9"):
+        branch(robot, {"shoulder_9": (-1, 1)})
+    with pytest.raises(BadRequest, match="low < high"):
+        branch(robot, "shoulder_1=1:2")
