@@ -39,7 +39,10 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     number of cells that are tried at most, for each part of the loops.
 
     Raises ``MotorsNotEnough`` where the motors do not determine the platform at the zero configuration, ``BadRequest``
-    for motors that there are not, ``LoopsNotClosed``.
+    for motors that there are not or that depend on each other, ``LoopsNotClosed``.
+
+    >>> hrsynth.branch("rrrrr_m1", {"shoulder_1": (-0.05, 0.05), "shoulder_2": (-0.05, 0.05)})
+    <BranchProof: rrrrr_m1, 2 motors, 2 passive coordinates: shoulder_1, shoulder_2: 100 % of the box proved, 1 cells>
     """
     given = as_robot(robot)
     mechanism = given if isinstance(given, Mechanism) else given.robot
