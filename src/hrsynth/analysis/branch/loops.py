@@ -29,7 +29,7 @@ _PREFERRED = {"F": 0, "6": 1, "P": 2, "R": 3, "C": 4, "U": 5, "E": 6, "S": 7}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LoopCoordinate(Value):
+class TreeCoordinate(Value):
     """One coordinate of a joint: a turn (rad) about, or a slide (characteristic lengths) along an ``axis`` (3,) through
     ``point`` (3,), both as they lie at zero; ``parent`` is the coordinate before it, −1 at the base."""
 
@@ -93,7 +93,7 @@ class LoopSystem(Value):
 
     mechanism: Mechanism
     length: float
-    coordinates: tuple[LoopCoordinate, ...]
+    coordinates: tuple[TreeCoordinate, ...]
     body: Mapping[str, int]
     loops: tuple[JointLoop, ...]
     gears: tuple[GearEquation, ...]
@@ -145,7 +145,7 @@ class Swept:
     points: list[Any]
 
     @classmethod
-    def of(cls, chain: Sequence[LoopCoordinate], values: Sequence[Any]) -> Swept:
+    def of(cls, chain: Sequence[TreeCoordinate], values: Sequence[Any]) -> Swept:
         """The product of the exponentials of coordinates with ``values`` (…), floats or forms."""
         R: Any = np.eye(3)
         c = chain[0].point if chain else np.zeros(3)
@@ -278,7 +278,7 @@ def loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False)
     geared = {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
     weights = [-2.0 if free and not k else _weight(joint, mechanism, driven, geared) for k, joint in enumerate(joints)]
     tree = graphs.spanning_forest(mechanism.links, joints, weights)
-    coordinates: list[LoopCoordinate] = []
+    coordinates: list[TreeCoordinate] = []
     body = {mechanism.base: -1}
     for joint, near, far in graphs.outward(mechanism.base, tree):
         own = joint if joint.predecessor == near else joint.turned()
@@ -287,7 +287,7 @@ def loop_system(mechanism: Mechanism, driven: Sequence[str], free: bool = False)
         if own is not joint and joint.type is JointType.UNIVERSAL:
             cut = [(other[0], each[1], each[2]) for other, each in zip(reversed(cut), cut, strict=True)]
         for name, slides, axis in cut:
-            coordinates.append(LoopCoordinate(name, joint.name, slides, frozen(axis), frozen(own.point / length),
+            coordinates.append(TreeCoordinate(name, joint.name, slides, frozen(axis), frozen(own.point / length),
                                               parent, joint.name in driven))
             parent = len(coordinates) - 1
         body[far] = parent
@@ -356,7 +356,7 @@ def parts(joint: Joint) -> list[tuple[str, bool, Array]]:
             return []
 
 
-def _gears(mechanism: Mechanism, coordinates: Sequence[LoopCoordinate], length: float) -> tuple[GearEquation, ...]:
+def _gears(mechanism: Mechanism, coordinates: Sequence[TreeCoordinate], length: float) -> tuple[GearEquation, ...]:
     found = []
     for coupling in mechanism.couplings:
         pair = []
