@@ -12,6 +12,7 @@ import sys
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
+from generated import generated
 from measure import Row
 from others import catalog, derivations, jacobians, modes, platforms
 from sweeps import exact_maxima, growth, matrices
@@ -38,6 +39,7 @@ def lines() -> Iterator[Row]:
     yield from modes()
     yield from platforms()
     yield from jacobians()
+    yield from generated()
     yield derivations()
     yield from catalog()
     yield from growth()

@@ -160,9 +160,9 @@ def test_a_four_bar_stays_on_its_branch_all_round(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.cos(knee + q), cosine, atol=1e-12)
     np.testing.assert_allclose(np.sin(knee + q), sine, atol=1e-12)
     code = export(robot, "c++").code
-    rows = answered(compiled(tmp_path, code, MAIN, "-DNAME=four_bar"), q[:2000, None])
+    rows = answered(compiled(tmp_path, code, MAIN, "-DNAME=four_bar"), q[:, None])
     assert np.all(rows[:, 0] == 0)
-    np.testing.assert_allclose(rows[:, 2:5], x[:2000], atol=1e-12)
+    np.testing.assert_allclose(rows[:, 2:5], x, atol=1e-12)
 
 
 @pytest.mark.slow
