@@ -236,3 +236,19 @@ def test_the_page_s_loop_runs(tmp_path: Path) -> None:
     out = subprocess.run([program], capture_output=True, text=True, check=True).stdout
     moved = [float(x) for x in out.split()] - robot.links[robot.platform].pose[:2, 3]
     np.testing.assert_allclose(moved, [0.02 * 0.099, 0.01 * 0.099], atol=1e-5)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("ending", [".xml", ".sdf", ".urdf"])
+def test_files_of_other_dialects(tmp_path: Path, ending: str) -> None:
+    robot = hrsynth.load("rrrrr_m1")
+    hrsynth.save(robot, tmp_path / f"five_bar{ending}")
+    motors = [name for name, joint in robot.joints.items() if joint.actuated]
+    again = hrsynth.load(tmp_path / f"five_bar{ending}", platform=robot.platform, motors=motors)
+    one, other = (exported(each, 0.1) for each in (robot, again))
+    assert one.proof.motors == other.proof.motors
+    q = inside(one, 50)
+    (_, _, R, p), (status, _, R_again, p_again) = (module_of(each.code).forward(q) for each in (one, other))
+    assert np.all(status == 0)
+    np.testing.assert_allclose(R_again, R, atol=1e-9)
+    np.testing.assert_allclose(p_again, p, atol=1e-9)
