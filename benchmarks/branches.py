@@ -24,8 +24,8 @@ def row(name: str, effort: int) -> str:
     parts = found.parts
     reach = ", ".join(f"{low:.2g} to {high:.2g}" for part in parts for low, high in zip(*part.proved, strict=True))
     ends = sorted({joint for part in parts for each in part.toggles for joint in each.joints})
-    share = min((100 * part.share for part in parts), default=100.0)
-    return (f"| {name} | {found.box} | {share:.2g} | {reach} | {sum(len(part.cells) for part in parts)} | "
+    share = min(parts, key=lambda part: part.share).percent if parts else "100"
+    return (f"| {name} | {found.box} | {share} | {reach} | {sum(len(part.cells) for part in parts)} | "
             f"{seconds:.0f} | {', '.join(ends[:4])}{', …' if len(ends) > 4 else ''} |")
 
 

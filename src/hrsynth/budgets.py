@@ -194,8 +194,8 @@ BRANCH_CELLS = 1000
 """Cells of motor coordinates that are tried at most where a branch is proved, for each part of the loops."""
 FINEST_BRANCH_CELL = 40
 """Halvings of a side of the box that the whole numbers that count them can tell."""
-BRANCH_DEPTH = 10
-"""How often a cell of a branch is halved at most, and four times more for each motor."""
+BRANCH_DEPTH = 7
+"""How often a cell of a branch is halved at most for each motor, and once more as often."""
 
 # Accuracy
 

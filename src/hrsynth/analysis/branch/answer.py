@@ -92,6 +92,11 @@ class BranchPart(Value):
     redundant: str
     """Why the equations that were left out hold; empty where none was."""
 
+    @property
+    def percent(self) -> str:
+        """The share in per cent, never rounded up to all of it."""
+        return "100" if self.share == 1.0 else f"{min(100 * self.share, 99.9):.3g}"
+
     def find(self, q: Sequence[float] | Array) -> BranchCell | None:
         """The cell that motor coordinates (n,), in the order of ``motors``, lie in; None outside of what is proved."""
         at = np.asarray(q, dtype=float)
@@ -132,7 +137,7 @@ class BranchProof(Result, shown_as="branch"):
     def headline(self) -> str:
         """The robot, and how much of the box is proved."""
         return f"{self.robot.name}, {len(self.motors)} motors, {len(self.passive)} passive coordinates: " + "; ".join(
-            f"{', '.join(each.motors)}: {100 * each.share:.3g} % of the box proved, {len(each.cells)} cells"
+            f"{', '.join(each.motors)}: {each.percent} % of the box proved, {len(each.cells)} cells"
             for each in self.parts)
 
     def to_dict(self) -> dict[str, Any]:

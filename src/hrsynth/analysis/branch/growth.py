@@ -113,6 +113,12 @@ class Growth:
         self.endings += [BranchEnd(leaf, q, x) for leaf, q, x in waiting]
         return self
 
+    @property
+    def share(self) -> float:
+        """The volume of all proved cells, as part of the box: 1.0 for all of it alone."""
+        volume, whole = sum(_volume(leaf.high - leaf.low) for leaf in self.proved), self.whole ** len(self.q0)
+        return 1.0 if volume == whole else min(volume / whole, 1 - 2.0**-50)
+
     def _coarse(self, leaf: GrownCell) -> bool:
         return bool(np.max(leaf.high - leaf.low) / self.whole > self.coarsest) and leaf.depth < self.depth
 

@@ -88,14 +88,14 @@ def _reach(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> floa
     """The size of the largest cell about zero that is proved at once, as part of the box: by half as often as needed,
     or two thirds of that."""
     grid = _grid(part, intervals)
-    sizes = np.array([scale * 2.0**-k for k in range(BRANCH_DEPTH) for scale in (1.0, 0.7)])
+    sizes = np.array([scale * 2.0**-k for k in range(2 * BRANCH_DEPTH) for scale in (1.0, 0.7)])
     half = np.minimum(grid.high - grid.low, 2 * np.pi)[None] / 2 * sizes[:, None]
     tubes = prove_all(part, np.zeros(half.shape), half, np.zeros((len(half), len(part.unknowns))))
     return max((float(size) for size, tube in zip(sizes, tubes, strict=True) if tube is not None), default=0.0)
 
 
 def _depth(part: LoopPart) -> int:
-    return BRANCH_DEPTH + 4 * len(part.driven)
+    return BRANCH_DEPTH * (1 + len(part.driven))
 
 
 def _grid(part: LoopPart, intervals: Mapping[int, tuple[float, float]]) -> CellGrid:
@@ -171,5 +171,5 @@ def _answer(part: LoopPart, growth: Growth) -> BranchPart:
     return BranchPart(
         tuple(names[i] for i in part.driven), tuple(names[i] for i in part.unknowns), growth.q0 * unit_q,
         growth.x0 * unit_x, (low * unit_q, high * unit_q), (box[0] * unit_q, box[1] * unit_q),
-        sum(leaf.volume for leaf in growth.proved), float(np.prod((box[1] - box[0]) / (high - low))), tuple(cells),
+        growth.share, float(np.prod((box[1] - box[0]) / (high - low))), tuple(cells),
         toggles(growth), turns(growth), closed_to(part, tubes, loose), redundant)

@@ -30,9 +30,9 @@ def _part(part: BranchPart) -> Rows:
     if not part.cells:
         return [*rows, ("branch", "undecided: no cell about the zero configuration could be proved")]
     weakest = min(cell.weakest for cell in part.cells)
-    whole = part.share > 1 - 1e-12
+    whole = part.share == 1.0
     rows += [("branch", "one branch, proved in the whole box" if whole else
-              f"one branch, proved in {100 * part.share:.3g} % of the box"),
+              f"one branch, proved in {part.percent} % of the box"),
              ("cells", f"{len(part.cells)}; smallest singular value of the loops at least {weakest:.3g}")]
     if not whole:
         rows.append(("proved box", bounds))
