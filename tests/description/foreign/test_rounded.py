@@ -88,16 +88,17 @@ def test_what_is_not_rounded_stays_as_it_is(name: str):
 
 
 @pytest.mark.parametrize("decimals", [6, 4])
-def test_a_tilted_robot_of_no_round_numbers_is_the_same(decimals: int, tmp_path: Path):
+@pytest.mark.parametrize("name", ["linear_delta", "3ppr_m2"])
+def test_a_tilted_robot_of_no_round_numbers_is_the_same(name: str, decimals: int, tmp_path: Path):
     """No axis along a base axis, no length of few digits: nothing is found by its numbers."""
-    robot, X = load("linear_delta"), pose((0.123, -0.377, 0.219), rotation_about(unit([1.0, 2.0, 0.5]), 0.7))
+    robot, X = load(name), pose((0.123, -0.377, 0.219), rotation_about(unit([1.0, 2.0, 0.5]), 0.7))
     moved = {name: replace(link, pose=link.pose if name == robot.base else X @ link.pose)
              for name, link in robot.links.items()}
     joints = {name: replace(joint, point=X[:3, :3] @ joint.point + X[:3, 3],
                             axes=tuple(X[:3, :3] @ axis for axis in joint.axes))
               for name, joint in robot.joints.items()}
     tilted = of_hinges(replace(robot, links=moved, joints=joints))
-    assert answer(again(tilted, tmp_path / "robot.xml", decimals)) == answer(robot)
+    assert answer(again(tilted, tmp_path / "robot.sdf", decimals)) == answer(robot)
 
 
 def test_what_was_made_exact_is_exact_and_told(tmp_path: Path):

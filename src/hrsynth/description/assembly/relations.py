@@ -9,7 +9,7 @@ lengths; a *defect* is by how much a relation misses (characteristic lengths, ra
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
@@ -85,10 +85,10 @@ def _equal_across(p: Vectors, q: Vectors, r: Vectors, s: Vectors, a: Vectors) ->
 
 
 class Bodies:
-    """Links held together by fixed joints are one body; ``on`` are the joints on each."""
+    """Links held together by joints of types ``held`` are one body; ``on`` are the joints on each."""
 
-    def __init__(self, mechanism: Mechanism) -> None:
-        fixed = (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED)
+    def __init__(self, mechanism: Mechanism, held: Container[JointType] = (JointType.FIXED,)) -> None:
+        fixed = (j.links for j in mechanism.joints.values() if j.type in held)
         groups = graphs.components(graphs.adjacency(mechanism.links, fixed))
         self.of = {link: number for number, group in enumerate(groups) for link in group}
         self.on: dict[int, list[Joint]] = defaultdict(list)
@@ -214,13 +214,14 @@ def of_axes(at: JointCoordinates, bodies: Bodies) -> Iterator[GeometricRelation]
                         for name, k in members)
             yield GeometricRelation("parallel", tuple(dict.fromkeys(name for name, _ in members)), _length, (i,), worst)
     seen = set()
-    for one, two in bodies.pairs():
+    for one, two in Bodies(at.mechanism, (JointType.FIXED, JointType.PRISMATIC)).pairs():  # slides keep directions
         for k in range(len(one.axes)):
             for m in range(len(two.axes)):
                 i, j = sorted((at.direction[one.name, k][0], at.direction[two.name, m][0]))
                 if i != j and (i, j) not in seen:
                     seen.add((i, j))
                     yield _perpendicular(at, one.name, two.name, i, j)
+    for one, two in bodies.pairs():
         if one.type in LINES and two.type in LINES and at.axis_of(one) == at.axis_of(two):
             miss = lines.distance(one.point, two.point, two.axis) / length
             yield GeometricRelation("coaxial", (one.name, two.name), _on_line,
