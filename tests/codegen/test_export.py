@@ -20,6 +20,7 @@ from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.builder import Builder
 from strategies import planar, random_rotation, transformed
 
 MAIN = """
@@ -201,6 +202,12 @@ def test_what_is_refused() -> None:
         export(four_bar(), "fortran")
     with pytest.raises(BadRequest):
         export(four_bar(), box="wheel=-1:1")
+    b = Builder("pendulum")
+    b.link("base")
+    b.link("bob", at=(0, 0, -1))
+    b.joint("hinge", "R", "base", "bob", axis=(0, 1, 0), motor=True)
+    with pytest.raises(BadRequest, match="loops"):
+        export(b.build(platform="bob"))
 
 
 SMALL = {"3rrr_m1": 0.02, "3prr_m1": 0.02, "rrrrr_m2": 0.05, "prrrp_m1": 0.05, "3rps": 0.01, "3rpr_m1": 0.02}

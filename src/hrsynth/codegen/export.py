@@ -71,6 +71,8 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
         raise BadRequest("language", lang, tuple(TEMPLATES))
     given = as_robot(robot)
     proof = branch(given, box) if box is not None else branch(given)
+    if not proof.parts:
+        raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
     tell("code")
     watched = _watched(given, observe, camera)
     source = Source.of(TubedBranch.of(proof), watched)
