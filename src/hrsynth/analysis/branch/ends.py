@@ -71,8 +71,8 @@ def _followed(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array, A
 
 
 def turns(growth: Growth) -> tuple[tuple[str, bool], ...]:
-    """Of each motor that makes a whole turn and whose last cells all meet a first one: whether the closures there are
-    the same, angles modulo 2π."""
+    """Of each motor that makes a whole turn and whose first and last face are proved throughout: whether the closures
+    there are the same, angles modulo 2π."""
     part, found = growth.part, []
     for k, i in enumerate(part.driven):
         whole = abs(growth.grid.high[k] - growth.grid.low[k] - 2 * np.pi) < AFFINE_ROUNDING
@@ -82,7 +82,7 @@ def turns(growth: Growth) -> tuple[tuple[str, bool], ...]:
         last = [leaf for leaf in growth.proved if leaf.high[k] == growth.whole]
         same = [_meets(growth, k, one.tube, other.tube, face) for one in last for other in first
                 for face in growth.opposite(k, one, other) if one.tube is not None and other.tube is not None]
-        if same:
+        if same and growth.whole_face(k, first) and growth.whole_face(k, last):
             found.append((part.system.names[i], all(same)))
     return tuple(found)
 

@@ -206,6 +206,10 @@ class Growth:
         sides = np.delete(high - low, k)
         return [self.grid.point((low + high) / 2)] if np.all(sides > 0) else []
 
+    def whole_face(self, k: int, cells: Sequence[GrownCell]) -> bool:
+        """Whether cells at a face across side k fill it."""
+        return sum(_volume(np.delete(leaf.high - leaf.low, k)) for leaf in cells) == self.whole ** (len(self.q0) - 1)
+
     def _face(self, one: GrownCell, other: GrownCell) -> Array:
         """The middle of what two cells have in common."""
         return self.grid.point((np.maximum(one.low, other.low) + np.minimum(one.high, other.high)) / 2)
