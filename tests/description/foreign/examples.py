@@ -170,3 +170,32 @@ FILES: dict[str, dict[str, str]] = {
     **{f"sdf: {name}": {"robot.sdf": text} for name, text in SDF.items()},
 }
 """Name of the example, its files; the first one is what is read."""
+
+_BALL = "drake:ball_constraint"
+_BALL_SDF = {"body_A": "rocker", "p_AP": at("rocker", C), "body_B": "bar", "p_BQ": at("bar", C)}
+_OPEN_SDF = SDF["1.7"][: SDF["1.7"].index('<joint name="d"')]
+_BUSHING = ('<frame name="f" link="rocker" xyz="0 0 1"/><drake:linear_bushing_rpy><drake:bushing_frameA name="f"/>'
+            '<drake:bushing_frameC name="bar"/><drake:bushing_torque_stiffness value="9 9 0"/>'
+            '<drake:bushing_force_stiffness value="7 7 7"/></drake:linear_bushing_rpy>')
+_HOLDER = ('<plugin filename="libgz-sim-detachable-joint-system.so" name="gz::sim::systems::DetachableJoint">'
+           "<parent_link>rocker</parent_link><child_model>four_bar</child_model><child_link>bar</child_link></plugin>")
+EXTENDED: dict[str, dict[str, str]] = {
+    "drake ball": {"robot.urdf": urdf(
+        f'<{_BALL}><{_BALL}_body_A name="rocker"/><{_BALL}_p_AP value="{at("rocker", C)}"/>'
+        f'<{_BALL}_body_B name="bar"/>'
+        f'<{_BALL}_p_BQ value="{at("bar", C)}"/></{_BALL}><!-- a -- b -->')},
+    "drake ball in sdf": {"robot.sdf": f"{_OPEN_SDF}<{_BALL}>" + "".join(
+        f"<{_BALL}_{key}>{value}</{_BALL}_{key}>" for key, value in _BALL_SDF.items()) + f"</{_BALL}></model></sdf>"},
+    "bushing": {"robot.urdf": urdf(_BUSHING)},
+    "detachable": {"robot.urdf": urdf(f"<gazebo>{_HOLDER}</gazebo>")},
+    "detachable in sdf": {"robot.sdf": f"{_OPEN_SDF}{_HOLDER}</model></sdf>"},
+    "pairs": {"robot.urdf": urdf(_frame("l1_cl1_1", "rocker", C) + _frame("l1_cl1_2", "bar", C))},
+    "loop_joint": {"robot.urdf": urdf(
+        f'<loop_joint name="d" type="revolute"><parent link="rocker"/><child link="bar"/><parent_origin xyz="'
+        f'{at("rocker", C)}"/><child_origin xyz="{at("bar", C)}"/><axis xyz="{along("rocker")}"/></loop_joint>')},
+    "other yaml": {"robot.urdf": GEPETTO_POINT[0], "closures.yaml": GEPETTO_POINT[1]},
+    "free": {"robot.xml": MJCF["connect"].replace('<body name="base">', '<body name="base"><freejoint/>')},
+    "sites": {"robot.xml": MJCF["sites"].replace('<connect name="d" site1="s" site2="t"/>', "").replace(
+        '"s"', '"cl1_a"').replace('"t"', '"cl1_b"')},
+}
+"""Closures in words that only some tools know: damaged, too."""
