@@ -49,6 +49,8 @@ READ: dict[str, tuple[dict[str, str], int, int, int]] = {
     f"{CASSIE}/cassiepole.xml": ({"platform": "left-foot"}, 23, 6, 6),
     f"{CASSIE}/cassie_tray_box.xml": ({"platform": "left-foot"}, 28, 6, 6),
 }
+SPHERICAL = ("Rhoban/placo-examples/models/orbita/robot.urdf", "Rhoban/placo-examples/models/spm/robot.urdf",
+             "Rhoban/placo-examples/models/spm/robot.xml", f"{ONSHAPE}/orbita_mujoco/robot.xml")
 REFUSED: dict[str, tuple[dict[str, str], type[Exception], str]] = {
     f"{GEPETTO}/disney_robot/robot.urdf": ({}, BadRobotFile, "joint_name 'left_spherical_free_foot'"),
     f"{GEPETTO}/kangaroo_like/robot.urdf": ({"platform": "foot"}, LoopsNotClosed, "cannot be closed"),
@@ -77,6 +79,13 @@ def test_mobility_and_verdict_are_those_of_independent_counts(name: str):
     assert len(verdict.lost) == lost == relation.shape[1] - _rank(relation[6:])
     words = {0: "controllable", dof: "uncontrollable"}
     assert verdict.verdict == words.get(lost, "partially controllable")
+
+
+@pytest.mark.parametrize("name", SPHERICAL)
+def test_rounded_spherical_robots_have_three_freedoms(name: str):
+    """None of their links has two joint centres, so that no segment of theirs can be watched."""
+    robot = Oracle(load(path_of(name)))
+    assert robot.mobility(robot.zero()) == 3
 
 
 def _rank(rows: Array) -> int:
