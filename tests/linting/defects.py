@@ -72,7 +72,7 @@ def limited(joint: Root, dialect: str, lower: float, upper: float) -> None:
 
 def damaged(text: str, damage: Damage) -> str:
     """The file with one damage."""
-    root = etree.fromstring(text)
+    root = etree.fromstring(text.encode())
     damage(root)
     etree.indent(root)
     return etree.tostring(root, encoding="unicode")
@@ -153,6 +153,16 @@ def scaled(factor: float) -> Damage:
     def damage(root: Root) -> None:
         for origin in root.iter("origin"):
             origin.set("xyz", " ".join(str(factor * float(word)) for word in origin.get("xyz", "0 0 0").split()))
+
+    return damage
+
+
+def rounded(decimals: int) -> Damage:
+    """All places and axes with so many decimals."""
+    def damage(root: Root) -> None:
+        for each in root.iter("origin", "axis"):
+            for key in {"xyz", "rpy"} & set(each.attrib):
+                each.set(key, " ".join(f"{float(word):.{decimals}f}" for word in (each.get(key) or "").split()))
 
     return damage
 

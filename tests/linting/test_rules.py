@@ -17,9 +17,10 @@ from hrsynth.errors import BadRequest, BadRobotFile
 from hrsynth.linting.elements import inertials
 from hrsynth.linting.rules import lint_rules
 from hrsynth.linting.subject import LintedFile
-from linting.defects import CASES, Case, damaged, put, sound
+from linting.defects import CASES, Case, damaged, foreign, put, rounded, sound
+from strategies import planar, random_rotation, transformed
 
-ELSEWHERE = {"constraint-redundant", "loop-mirrored", "frames-coincide", "zero-singular", "merged"}
+ELSEWHERE = {"geometry-rounded", "constraint-redundant", "loop-mirrored", "frames-coincide", "zero-singular", "merged"}
 """Rules whose files are made in a test of their own."""
 
 
@@ -158,6 +159,28 @@ def test_redundant_constraints_are_named_and_counted(tmp_path: Path):
     assert [each.message for each in found] == [
         f"3 of the 5 constraints of 'wrist_{leg}' repeat what the loops before it say" for leg in (2, 3)]
     assert rules_in(shipped()["gough_stewart"])["constraint-redundant"] == 0
+
+
+@pytest.mark.parametrize("decimals", [5, 6])
+@pytest.mark.parametrize("native", [True, False])
+def test_rounded_geometry_is_found_and_written_as_it_is_meant(decimals: int, native: bool, tmp_path: Path):
+    """A planar robot in a tilted base, its parallel axes printed with few digits: mended, they are parallel again."""
+    rng = np.random.default_rng(1)
+    made = transformed(planar(("RRR", "RRR", "RRR"), rng, [(0,)] * 3), random_rotation(rng), rng.normal(size=3))
+    one, two = tmp_path / "sound.urdf", tmp_path / "rounded.urdf"
+    save(made, one)
+    damage = rounded(decimals) if native else foreign(rounded(decimals))
+    two.write_text(damaged(one.read_text(), damage))
+    found = hrsynth.lint(two, platform=None if native else made.platform)
+    assert {each.rule for each in found.findings if each.mends} == {"geometry-rounded"}
+    mended = hrsynth.lint(two, fix=True, platform=None if native else made.platform)
+    assert not {"geometry-rounded", "refused", "loop-open"} & {each.rule for each in mended.findings}
+    before, after = load(one), load(two, platform=made.platform) if not native else load(two)
+    assert not [note for note in after.notes if "relations" in note.text]
+    axes = np.array([joint.axis for joint in after.joints.values() if joint.axes])
+    assert np.max(np.abs(np.cross(axes, axes[0]))) < 1e-12
+    for name, joint in before.joints.items():
+        assert np.linalg.norm(after.joints[name].point - joint.point) < 30 * 10.0**-decimals
 
 
 def test_frames_that_nobody_closes_are_told(tmp_path: Path):

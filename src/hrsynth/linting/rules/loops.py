@@ -21,7 +21,7 @@ from ..elements import NumberAt
 from ..findings import LintRule, Mend, Spot
 from ..freedoms import NearbyFreedoms
 from ..subject import LintedFile
-from .names import remove
+from .names import OWN, remove
 
 CLOSING = ("loop", "constraint", "loop_joint", "joint", "connect", "weld", "coupling")
 """Elements that say how a loop closes, in any dialect."""
@@ -82,7 +82,8 @@ def _closed(file: LintedFile, graph: JointGraph, assembly: LoopAssembly, closed:
         if np.array_equal(displacement(joint, closed.values[joint.name]), np.eye(4)):
             continue
         element = file.element(graph.joints[joint.name].line, "joint", name=joint.name)
-        if element is None or joint.kind not in (JointType.REVOLUTE, JointType.PRISMATIC):
+        part = OWN.search(joint.name)  # of a chain that is one joint only as long as its frames are not turned apart
+        if element is None or part or joint.kind not in (JointType.REVOLUTE, JointType.PRISMATIC):
             return None
         moved.append((joint, element))
     return partial(_rezero, moved, closed.values, graph, assembly)

@@ -6,13 +6,17 @@ import re
 from collections.abc import Callable, Iterator
 
 from ...errors import BadRequest, LoopsNotClosed
+from ...tolerances import NOISE
 from ..findings import LintRule, Spot
 from ..subject import LintedFile, defects_of
+from .geometry import ROUNDED
 
 
 def _refused(file: LintedFile) -> Iterator[Spot]:
     error = file.refusal
-    if error is None or isinstance(error, LoopsNotClosed | BadRequest):
+    if error is None or isinstance(error, BadRequest):
+        return
+    if isinstance(error, LoopsNotClosed) and error.residual > NOISE:  # a rule of its own tells it
         return
     for line, text in defects_of(error):
         yield Spot(line, text)
@@ -53,7 +57,7 @@ RULES = (
              "close the loop as the line says", _unread),
     LintRule("merged", "note", "what is read as something else",
              "Closures and joints that mean one joint are read as that joint, and relations that hold but for printed "
-             "digits are made good.", "nothing, if it is meant so", noted("merged")),
+             "digits are made good.", "nothing, if it is meant so", noted("merged", text=rf"(?!{ROUNDED.pattern})")),
     LintRule("zero-singular", "warning", "a singular zero configuration",
              "Ranks at that pose are not those nearby: motors are at a dead point, or the loops gain a freedom. This "
              "program counts from a pose nearby.",

@@ -1,0 +1,83 @@
+"""Geometry that is meant but rounded, and what writes it back as it is meant."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import partial
+
+from lxml import etree
+
+from ...description import numerals, xml
+from ...description.chains import TIP
+from ...geometry.vectors import Array, inverse, pose
+from ...mechanism.model import Joint, Mechanism
+from ..findings import LintRule, Mend, Spot
+from ..subject import LintedFile
+
+ROUNDED = re.compile(r"\d+ relations of joints|made to be ")
+"""How the reader's notes of such relations begin."""
+
+
+def _rounded(file: LintedFile) -> Iterator[Spot]:
+    robot = file.mechanism
+    for note in () if robot is None else robot.notes:
+        if note.kind == "merged" and ROUNDED.match(note.text):
+            yield Spot(None, note.text, None if robot is None else _as_meant(file, robot))
+
+
+def _as_meant(file: LintedFile, robot: Mechanism) -> Mend | None:
+    """What gives every joint of a URDF the place that it is read to have, where each of its joints is one of the
+    robot's (or the tip of one) and its zero pose has not moved."""
+    graph = file.said
+    if file.dialect != "urdf" or graph is None or any(note.kind == "solved" for note in robot.notes):
+        return None
+    tips = {given.links[0]: given.links[1] for given in graph.joints.values() if given.name.endswith(TIP)}
+    found = []
+    for given in graph.joints.values():
+        joint = robot.joints.get(given.name.removesuffix(TIP))
+        element = file.element(given.line, "joint" if given.in_tree else "loop", name=given.name)
+        if element is None or joint is None or joint.in_tree != given.in_tree:
+            return None
+        one, two = given.links
+        if not given.name.endswith(TIP) and joint.links != (one, tips.get(two, two)):
+            return None
+        found.append((joint, given.links, element))
+    return partial(_write, found, robot) if len(found) == len(robot.joints) + len(tips) else None
+
+
+def _write(joints: list[tuple[Joint, tuple[str, str], xml.Element]], robot: Mechanism) -> None:
+    X = {name: link.pose for name, link in robot.links.items()}
+    for joint, (_, two), element in joints:  # the frame of a URDF link is that of the joint that carries it
+        if joint.in_tree and element.get("name") == joint.name:
+            X[two] = pose(joint.point, robot.links[joint.successor].pose[:3, :3])
+    for joint, (one, two), element in joints:
+        if joint.in_tree:
+            _place(element, inverse(X[one]) @ X[two])
+            axes = [X[two][:3, :3].T @ axis for axis in joint.axes] if element.get("name") == joint.name else []
+        else:
+            at = pose(joint.point, X[one][:3, :3])
+            for tag, link in (("predecessor", one), ("successor", two)):
+                for child in element.findall(tag):
+                    _place(child, inverse(X[link]) @ at)
+            axes = [X[one][:3, :3].T @ axis for axis in joint.axes]
+        for tag, axis in zip(("axis", "axis2"), axes, strict=False):
+            for child in element.findall(tag) or [etree.SubElement(element, tag)]:
+                child.set("xyz", numerals.exact_vector(axis))
+
+
+def _place(element: xml.Element, X: Array) -> None:
+    origin = element.find("origin")
+    if origin is None:
+        origin = etree.SubElement(element, "origin")
+    origin.set("xyz", numerals.exact_vector(X[:3, 3]))
+    origin.set("rpy", numerals.exact_vector(numerals.rpy(X[:3, :3])))
+
+
+RULES = (
+    LintRule("geometry-rounded", "warning", "relations that hold but for printed digits",
+             "Axes parallel to six digits, rods of almost one length: over-constrained loops lock or lose rank by it "
+             "in programs that take the digits as they stand. This program makes such relations good, and says so.",
+             "write the numbers with all their digits (in other dialects: hrsynth convert IN OUT)", _rounded,
+             mends=True),
+)
