@@ -38,6 +38,7 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
     require_other(target, path)
     asking = not (yes or json) and sys.stdin.isatty() and sys.stdout.isatty()
     if asking:
+        sys.stdin.reconfigure(errors="replace")  # type: ignore[union-attr]
         source, observe = _answered(path, source, observe, target, view)
     with Progress():
         mechanism = _read(source, observe, tell=not asking)
