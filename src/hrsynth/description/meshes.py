@@ -22,6 +22,9 @@ from ..mechanism.model import Mechanism, Note
 from . import xml
 from .jointgraph import comma_list
 
+KNOWN = (".stl", ".obj", ".dae", ".ply", ".off", ".msh", ".glb", ".gltf", ".3mf", ".wrl", ".usd", ".usda", ".usdc")
+"""What meshes are called: no other file is ever copied."""
+
 
 def located(name: str, folder: Path) -> Path | None:
     """The file that a mesh's address names: beside the robot file, or of a package in a folder above it; None where
@@ -88,7 +91,7 @@ def carried(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, 
     source = source if source.is_dir() else source.parent
     moved: dict[str, str | None] = {}
     files: dict[Path, Callable[[], bytes]] = {}
-    missing, foreign, inside = [], [], []
+    missing, foreign, inside, strange = [], [], [], []
 
     def place(name: str) -> str | None:
         """What the mesh is called in the new file; None where it has to be left out."""
@@ -101,7 +104,11 @@ def carried(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, 
         if endings is not None and (ending not in endings or (inner is not None and not copy) or _is_text(path)):
             foreign.append(name)
             return None
-        if copy:
+        if copy and ending not in KNOWN:
+            strange.append(name)
+        elif copy:
+            if path is not None and path.stat().st_size > LARGEST_MESHES:
+                raise BadRequest("bytes of a mesh", path.stat().st_size, f"up to {LARGEST_MESHES}")
             stem = Path(prim).name if path is None else path.stem
             new, number = folder / "meshes" / f"{stem}{ending}", 2
             while new in files:
@@ -135,6 +142,7 @@ def carried(robot: Mechanism, target: Path, endings: tuple[str, ...] | None, *, 
     notes = []
     for names, what in ((missing, "meshes that are not there" + (" are not written" if endings else "")),
                         (foreign, f"meshes are not written, as only binary files {', '.join(endings or ())} can be"),
+                        (strange, "files that are not called as meshes are not copied"),
                         (inside, "meshes lie in the USD file (--meshes copy makes files of them)")):
         if names:
             notes.append(Note("warning", f"{what}: {comma_list(names, 4)}"))

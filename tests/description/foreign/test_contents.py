@@ -207,3 +207,15 @@ def test_a_unit_is_that_of_shapes_too_and_inertias_stay_as_told(tmp_path: Path):
         for a, b in zip(one.solids, two.solids, strict=True):
             assert b.sizes == pytest.approx(np.array(a.sizes) / 1000)
             assert b.scale == pytest.approx(np.array(a.scale) / (1000 if a.file else 1))
+
+
+def test_only_meshes_are_copied(tmp_path: Path):
+    robot = filled(tmp_path)
+    (tmp_path / "secret.txt").write_text("secret")
+    text = (tmp_path / "src" / "robot.urdf").read_text()
+    (tmp_path / "src" / "robot.urdf").write_text(text.replace('"a.stl"', '"../secret.txt"'))
+    (tmp_path / "out").mkdir()
+    (note,) = save(load(tmp_path / "src" / "robot.urdf"), tmp_path / "out" / "robot.urdf", meshes="copy")
+    assert "secret.txt" in note.text
+    assert [path.name for path in (tmp_path / "out" / "meshes").iterdir()] == ["b.stl"]
+    assert robot.name in (tmp_path / "out" / "robot.urdf").read_text()
