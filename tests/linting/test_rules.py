@@ -208,7 +208,7 @@ def test_a_singular_zero_pose_and_what_is_read_otherwise_are_told(tmp_path: Path
     assert found["merged"] >= 1
 
 
-SOME = ("quattro", "3rps", "rrrrr_m1")
+SOME = ("3rps", "rrrrr_m1")
 NAMES = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in shipped()]
 
 
