@@ -203,7 +203,8 @@ def test_tubes_hold_what_small_steps_find_in_random_four_bars(seed):
         reach = np.hypot(*(B - [bars[0], 0]))
         if abs(bars[2] - bars[3]) + 0.1 < reach < bars[2] + bars[3] - 0.1:
             break
-    proof = branch(four_bar(*bars, angle, random_rotation(rng), rng.choice([-1, 1])))
+    ground, crank, coupler, rocker = bars.tolist()
+    proof = branch(four_bar(ground, crank, coupler, rocker, angle, random_rotation(rng), rng.choice([-1, 1])))
     assert proof.parts[0].cells
     assert connected(proof.parts[0])
     assert obeys(proof, rng, 3, 40) == 120

@@ -13,6 +13,7 @@ from hrsynth.description import load
 from hrsynth.geometry.so3 import exponential
 from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.observation import Direction
 from hrsynth.mechanism.pose import Pose
 from hrsynth.mechanism.sensors import defaults_of
 from oracle import Oracle
@@ -28,6 +29,7 @@ def test_the_watched_axis_is_told_with_its_reason(name: str):
     for (seen, why), record in zip(found.setting.watched(), found.to_dict()["watched"], strict=True):
         assert why.startswith(WHY[name])
         assert (record["leg"], record["link"], record["why"]) == (seen.leg, seen.link, why)
+        assert isinstance(seen, Direction)
         assert np.allclose(record["axis"], seen.direction)
         assert f"{seen.link} along (" in str(found)
         assert why in str(found)
@@ -112,6 +114,7 @@ def test_a_connector_of_no_length_is_never_watched(skew: float, short: float, tm
     robot = load(tmp_path / "robot.xml", platform="plate")
     for number, leg in enumerate(decompose(normal_form(robot).mechanism).legs):
         seen = defaults_of(decompose(normal_form(robot).mechanism))[leg.label]
+        assert isinstance(seen, Direction)
         assert seen.link == f"rod{number}"
         origins = [robot.links[link].pose for link in (f"rod{number}", f"e{number}")]
         along = origins[0][:3, :3].T @ (origins[1][:3, 3] - origins[0][:3, 3])

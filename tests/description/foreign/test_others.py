@@ -1,6 +1,7 @@
 """Closed-loop files of public repositories, where a folder holds clones of them as OWNER/NAME: HRSYNTH_OTHERS.
 
-Mobilities were counted by MuJoCo: coordinates less the rank of its equalities' Jacobian, at closed poses near zero.
+Mobilities were counted by MuJoCo where it reads and closes a file (coordinates less the rank of its equalities'
+Jacobian, at closed poses near zero), else by the tests' oracle.
 """
 
 from __future__ import annotations
