@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import tempfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -329,6 +330,19 @@ def test_a_missing_package_is_told_with_what_installs_it(tmp_path: Path, monkeyp
         load(path)
     assert execute(["check", str(path)]) == 3
     assert capsys.readouterr().err.count("\n") == 1
+    assert execute(["convert", "3rps", str(tmp_path / "out.usdc")]) == 3
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert str(tmp_path / "out.usdc") in error
+
+
+def test_no_room_for_temporary_files_is_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys):
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "none"))
+    assert execute(["convert", "3rps", "-o", str(tmp_path / "out.usdc")]) == 2
+    error = capsys.readouterr().err
+    assert error.count("\n") == 1
+    assert "cannot write a temporary file" in error
+    assert list(tmp_path.iterdir()) == []
 
 
 def test_masses_shapes_and_colours_come_back(tmp_path: Path):

@@ -15,7 +15,7 @@ def _packed(text: str, path: Path) -> bytes:
         return text.encode()
     from .stage import binary
 
-    return binary(text)
+    return binary(text, path)
 
 
 DIALECT = Dialect("usd", lambda file: file.start.startswith((*_TEXT, *_BINARY)), (".usda", ".usd", ".usdc"), rank=-2,

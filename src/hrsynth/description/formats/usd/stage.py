@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ....budgets import LARGEST_FILE, MOST_INCLUDES, USD_SECONDS
-from ....errors import MissingExtra
+from ....errors import BadRequest, MissingExtra
 from ... import xml
 
 PROCESS = Path(__file__).with_name("stage_process.py")
@@ -30,18 +30,27 @@ def mesh(path: Path, prim: str) -> bytes:
     return _run(path, "mesh", str(path), prim)
 
 
-def binary(text: str) -> bytes:
-    """The binary form of a stage given as text."""
-    with tempfile.TemporaryDirectory() as folder:
-        one, two = Path(folder, "robot.usda"), Path(folder, "robot.usdc")
-        one.write_text(text, encoding="utf-8")
-        _run(one, "binary", str(one), str(two))
-        return two.read_bytes()
+def binary(text: str, path: Path) -> bytes:
+    """The binary form, for ``path``, of a stage given as text; raises ``BadRequest`` where there is no room for
+    temporary files."""
+    _require_package(path)
+    try:
+        with tempfile.TemporaryDirectory() as folder:
+            one, two = Path(folder, "robot.usda"), Path(folder, "robot.usdc")
+            one.write_text(text, encoding="utf-8")
+            _run(one, "binary", str(one), str(two))
+            return two.read_bytes()
+    except OSError as error:
+        raise BadRequest(f"cannot write a temporary file: {error.strerror}", tempfile.gettempdir()) from None
+
+
+def _require_package(path: Path) -> None:
+    if importlib.util.find_spec("pxr") is None:
+        raise MissingExtra(f"{path}: USD", "usd")
 
 
 def _run(path: Path, *arguments: str) -> bytes:
-    if importlib.util.find_spec("pxr") is None:
-        raise MissingExtra(f"{path}: USD", "usd")
+    _require_package(path)
     command = [sys.executable, "-P", str(PROCESS), str(LARGEST_FILE), str(MOST_INCLUDES), *arguments]
     try:
         own = {key: value for key, value in os.environ.items() if key != "PXR_AR_DEFAULT_SEARCH_PATH"}
