@@ -65,14 +65,14 @@ class Question:
         files = {each: values.pop(each.option) for each in OUTPUTS[self.name].files if each.option is not None}
         for each, path in files.items():
             each.require(path, values)
-        for option in ("cone", "noise"):
-            told_radians(option, values.get(option))
         source = values["robot"]
         more = {each.record: None for each in files if each.record is not None}
         writers = []
         with Progress() as progress, following(progress.tell):
             mechanism = robot_of(values)
             found = self._ask(getattr(hrsynth, self.name), mechanism, values)
+            for option in ("cone", "noise"):
+                told_radians(option, values.get(option))
             for each, path in files.items():
                 if path is None:
                     continue

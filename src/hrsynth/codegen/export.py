@@ -66,6 +66,9 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
 
     It answers where :func:`.branch` proves the branch (``box`` as there) and refuses elsewhere. The same robot gives
     the same text. Raises what ``branch`` raises, ``NothingProved``, ``BadRequest`` for another language.
+
+    >>> hrsynth.export("rrrrr_m1", "numpy", {"shoulder_1": (-0.05, 0.05), "shoulder_2": (-0.05, 0.05)}).lang
+    'numpy'
     """
     if lang not in TEMPLATES:
         raise BadRequest("language", lang, tuple(TEMPLATES))
