@@ -132,7 +132,7 @@ def test_completion_knows_commands_options_and_words(typed: list[str], expected:
 
 
 def test_completion_knows_robots_and_every_option():
-    assert candidates(ROOT, ["derive", ""]) == list(shipped())
+    assert candidates(ROOT, ["derive", ""]) == candidates(ROOT, ["lint", "a.urdf", ""]) == list(shipped())
     for path in LEAVES:
         offered = candidates(ROOT, [*path, "--"])
         known = {part for each in command(path).params for part in (*each.opts, *each.secondary_opts)}

@@ -38,7 +38,11 @@ def test_help_has_an_example_that_works(name: str):
     (lambda wrong: hrsynth.observe("3rrr_m1", **wrong("leg")), "legs"),
     (lambda wrong: hrsynth.servo("3rrr_m1", start="x=0", goal="x=0", **wrong("gian")), "gain"),
     (lambda wrong: hrsynth.map("check", ["3rrr_m1"], jobs=1, **wrong("camra")), "camera"),
-    (lambda wrong: hrsynth.draw(hrsynth.modes("rrrrr_m1"), **wrong("widht")), "width")])
+    (lambda wrong: hrsynth.draw(hrsynth.modes("rrrrr_m1"), **wrong("widht")), "width"),
+    (lambda wrong: hrsynth.load("3rrr_m1", **wrong("platfrom")), "platform"),
+    (lambda wrong: hrsynth.save("3rrr_m1", "x.xml", **wrong("mesh")), "meshes"),
+    (lambda wrong: hrsynth.lint("3rrr_m1", **wrong("compar")), "compare"),
+    (lambda wrong: hrsynth.lint("3rrr_m1", **wrong("platfrom")), "platform")])
 def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
     given: list[str] = []
 
@@ -50,6 +54,18 @@ def test_a_wrong_keyword_is_told_with_the_nearest_and_all(ask: Any, near: str):
         ask(wrong)
     said = str(told.value)
     assert re.search(rf"has no {given[0]!r}, did you mean {near!r}; it takes .*\b{near}\b", said), said
+
+
+@pytest.mark.parametrize(("ask", "allowed"), [
+    (lambda: hrsynth.load(5), "a path, the name of a shipped robot"),
+    (lambda: hrsynth.lint(5), "a path, the name of a shipped robot"),
+    (lambda: hrsynth.lint(hrsynth.load("3rrr_m1")), "a path, the name of a shipped robot"),
+    (lambda: hrsynth.save("3rrr_m1", "x.xml", meshes="move"), "keep, copy"),
+    (lambda: hrsynth.branch("rrrrr_m1", [1, 2]), "hip=-1:1"),
+    (lambda: hrsynth.draw(5), "what a function of hrsynth answers")])
+def test_a_value_of_another_kind_is_told_with_what_is_allowed(ask: Any, allowed: str):
+    with pytest.raises(BadRequest, match=allowed):
+        ask()
 
 
 def test_what_is_left_out_is_told_with_the_function():

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import difflib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from functools import wraps
 from inspect import Parameter, signature
@@ -127,9 +127,11 @@ class Result(Compared):
         return str(Result.public("html")(self))
 
 
-def require_keywords(function: Callable[..., Any], given: Mapping[str, Any]) -> None:
-    """Raise ``TypeError`` for a keyword that a function has not, with the nearest of those that it has."""
+def require_keywords(function: Callable[..., Any], given: Iterable[str], more: Iterable[str] = ()) -> None:
+    """Raise ``TypeError`` for a keyword that a function has not, with the nearest of those that it has; ``more`` are
+    those behind its ``**``."""
     known = [name for name, each in signature(function).parameters.items() if each.kind is not Parameter.VAR_KEYWORD]
+    known += more
     for name in given:
         if name not in known:
             near = difflib.get_close_matches(name, known, 1)

@@ -48,8 +48,6 @@ def convert(target: str | None, output: str | None, to: str | None, meshes: str,
 
     if (target is None) is (output is None):
         raise BadRequest("convert writes one file", f"{target} and {output}" if target else None, "OUT, or -o OUT")
-    if meshes not in ("keep", "copy"):
-        raise BadRequest("--meshes", meshes, "keep, copy")
     target = str(target or output)
     files, name = [str(file) for file in targets(target, to)], source["robot"]
     with Progress():

@@ -9,7 +9,7 @@ import typer
 
 from .colour import painted
 from .commands import add_command
-from .options import JSON, NEEDED, OUTPUT, SOURCE, Option, flag, output
+from .options import JSON, NEEDED, OUTPUT, SOURCE, Option, flag, output, shipped
 from .progress import Progress
 
 FORMATS = ("text", "github", "sarif", "json")
@@ -44,7 +44,7 @@ def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[s
             raise BadRequest(name, value, known)
     with Progress():
         given["close"] = given["close"] or ()
-        found = hrsynth.lint(files, readers=reader or (), ignore=ignore or (), **given)
+        found = hrsynth.lint(files, reader=reader or (), ignore=ignore or (), **given)
     if json or format == "json":
         typer.echo(record("lint", None, found.to_dict()))
     elif format == "text":
@@ -59,7 +59,7 @@ def add(app: typer.Typer) -> None:
     """Make it a command."""
     add_command(app, "lint", "What is wrong, doubtful or lost in robot files, by rules with names, and what mends it.",
                 (Option("files", "Robot files in any dialect, or names of shipped robots.", "FILES", list[str], NEEDED,
-                        argument=True),
+                        argument=True, words=shipped),
                  flag("fix", "Mend what there is one way to mend, and write the file in its place or to --output."),
                  Option("compare", "Another file of the same robot: where the two differ.", "OTHER"),
                  Option("reader", "A program that shall read the file (mujoco, gazebo …): a closure that it loses is "

@@ -118,7 +118,7 @@ def _told(proof: BranchProof, source: Source, lang: str, box: BoxLike | None) ->
               for k, (name, low, high, i) in enumerate(rows)]
     for part in proof.parts:
         low, high = (each.tolist() for each in part.proved)
-        lines.append(f"{len(part.cells)} cells, {100 * part.share:.4g} % of the box that was asked for; what no cell "
+        lines.append(f"{part.in_cells}, {100 * part.share:.4g} % of the box that was asked for; what no cell "
                      "covers is refused. Wholly covered is")
         lines += [f"  {name}: {a!r} to {b!r}" for name, a, b in zip(part.motors, low, high, strict=True)]
     lines += [f"An answer is given where the last step of Newton's method is at most {GENERATED_LAST_STEP:g} (rad, or "

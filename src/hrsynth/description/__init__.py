@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ..errors import BadRequest
 from ..mechanism.model import Mechanism, Note
+from ..results import spelled
 from . import formats
 from .dialect import Dialect
 from .example_data import PREFIX, examples
@@ -35,6 +36,7 @@ def shipped() -> dict[str, Path]:
     return {path.stem: path for path in sorted(folder.glob("*.urdf"), key=lambda path: path.stem)}
 
 
+@spelled
 def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: str | None = None,
          motors: Iterable[str] | str | None = None, observe: Iterable[str] | str | None = None,
          close: Iterable[str] | str = (), freeze: Iterable[str] | str = (), keyframe: str | None = None,
@@ -79,6 +81,8 @@ def load(robot: str | Path | Mechanism, *, base: str | None = None, platform: st
 
 def file_of(robot: str | Path) -> Path:
     """The file that a name or a path stands for; raises ``BadRequest`` for a name of no robot."""
+    if not isinstance(robot, str | os.PathLike):
+        raise BadRequest("a robot's file", robot, "a path, the name of a shipped robot, example:NAME")
     path = Path(robot)
     if isinstance(robot, str) and robot.startswith(PREFIX) and not os.path.exists(robot):
         return _named(robot.removeprefix(PREFIX), examples(), "not a robot of example-robot-data", "robots --examples")
@@ -106,6 +110,7 @@ def targets(path: str | Path, dialect: str | None = None) -> tuple[Path, ...]:
     return _dialect(Path(path), dialect).files(Path(path))
 
 
+@spelled
 def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | None = None, *, meshes: str = "keep"
          ) -> tuple[Note, ...]:
     """Write a robot file, whole or not at all, of a mechanism or of a robot by its file or name; what the dialect
@@ -126,6 +131,8 @@ def save(mechanism: Mechanism | str | Path, path: str | Path, dialect: str | Non
     >>> with tempfile.TemporaryDirectory() as folder:
     ...     notes = hrsynth.save(hrsynth.load("3rrr_m1"), f"{folder}/robot.urdf")
     """
+    if meshes not in ("keep", "copy"):
+        raise BadRequest("meshes", meshes, ("keep", "copy"))
     target = Path(path)
     chosen, mechanism = _dialect(target, dialect), load(mechanism)
     robot, copies, notes = carried(mechanism, target, chosen.meshes, copy=meshes == "copy")

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ from ..description import file_of
 from ..description.files import write_whole
 from ..description.overrides import Overrides, names
 from ..errors import BadRequest, BadRobotFile, Defect
-from ..results import Result
+from ..results import Result, require_keywords
 from .findings import SEVERITIES, Finding, Mend
 from .rules import lint_rules
 from .rules.readers import PROGRAMS
@@ -51,12 +51,12 @@ class Lint(Result, shown_as="lint"):
 
 
 def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None = None,
-         readers: Iterable[str] | str = (), ignore: Iterable[str] | str = (), fix: bool = False,
+         reader: Iterable[str] | str = (), ignore: Iterable[str] | str = (), fix: bool = False,
          output: str | Path | None = None, **said: Any) -> Lint:
     """Everything that is wrong, doubtful or lost in robot files, by the rules of ``hrsynth.linting.rules``.
 
-    ``compare`` is another file of the same robot: where the two differ is found too. ``readers`` are programs that
-    shall read the files: a closure that one of them loses is an error. ``ignore`` names rules to leave out. With
+    ``compare`` is another file of the same robot: where the two differ is found too. ``reader`` names programs
+    that shall read the files: a closure that one of them loses is an error. ``ignore`` names rules to leave out. With
     ``fix`` all that there is one way to mend is mended, and the file written, whole or not at all, to ``output`` or in
     its place; what is found then is what is left. What no file says itself is given as for ``load`` (``platform``,
     ``close`` …).
@@ -67,8 +67,9 @@ def lint(files: str | Path | Iterable[str | Path], *, compare: str | Path | None
     >>> hrsynth.lint("3rrr_m1")
     <Lint: 1 file: 0 errors, 0 warnings, 6 notes>
     """
-    paths = [files] if isinstance(files, str | Path) else list(files)
-    skipped, programs = names(ignore) or (), tuple(names(readers) or ())
+    require_keywords(lint, said, (each.name for each in fields(Overrides)))
+    paths = list(files) if isinstance(files, Iterable) and not isinstance(files, str) else [files]
+    skipped, programs = names(ignore) or (), tuple(names(reader) or ())
     for what, asked, known in (("rule", skipped, tuple(lint_rules())), ("reader", programs, PROGRAMS)):
         unknown = [name for name in asked if name and name not in known]
         if unknown:

@@ -102,6 +102,8 @@ def draw(result: Result, file: str | Path | None = None, *, plane: Pose | str | 
     Raises ``BadRequest`` for a result that has no picture.
     """
     asked = {"plane": plane, "steps": steps, "seed": 0, "width": width, "font": font}
+    if not isinstance(result, Result):
+        raise BadRequest("a picture of", repr(result), "what a function of hrsynth answers")
     for drawn in OUTPUTS[result.shown_as].files:
         endings = tuple(each for each in PICTURES if each in drawn.makers)
         if not endings or (drawn.part is not None and getattr(result, drawn.part) is None):

@@ -93,6 +93,11 @@ class BranchPart(Value):
     """Why the equations that were left out hold; empty where none was."""
 
     @property
+    def in_cells(self) -> str:
+        """Its number of cells in words."""
+        return f"{len(self.cells)} cell" + "s" * (len(self.cells) != 1)
+
+    @property
     def percent(self) -> str:
         """The share in per cent, never rounded up to all of it."""
         return "100" if self.share == 1.0 else f"{min(100 * self.share, 99.9):.3g}"
@@ -137,7 +142,7 @@ class BranchProof(Result, shown_as="branch"):
     def headline(self) -> str:
         """The robot, and how much of the box is proved."""
         return f"{self.robot.name}, {len(self.motors)} motors, {len(self.passive)} passive coordinates: " + "; ".join(
-            f"{', '.join(each.motors)}: {each.percent} % of the box proved, {len(each.cells)} cells"
+            f"{', '.join(each.motors)}: {each.percent} % of the box proved, {each.in_cells}"
             for each in self.parts)
 
     def to_dict(self) -> dict[str, Any]:

@@ -42,7 +42,7 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     for motors that there are not or that depend on each other, ``LoopsNotClosed``.
 
     >>> hrsynth.branch("rrrrr_m1", {"shoulder_1": (-0.05, 0.05), "shoulder_2": (-0.05, 0.05)})
-    <BranchProof: rrrrr_m1, 2 motors, 2 passive coordinates: shoulder_1, shoulder_2: 100 % of the box proved, 1 cells>
+    <BranchProof: rrrrr_m1, 2 motors, 2 passive coordinates: shoulder_1, shoulder_2: 100 % of the box proved, 1 cell>
     """
     given = as_robot(robot)
     mechanism = given if isinstance(given, Mechanism) else given.robot
@@ -135,6 +135,9 @@ def _parsed(box: BoxLike | None) -> dict[str, tuple[float, float]]:
     """The intervals that are asked for, by motor."""
     if box is None:
         return {}
+    if not isinstance(box, Mapping | str):
+        raise BadRequest("a box of motors", box, "a dict such as {'hip': (-1, 1)}, or a text such as "
+                         "hip=-1:1,slide=0:0.2")
     pairs = box.items() if isinstance(box, Mapping) else [each.partition("=")[::2] for each in box.split(",")]
     found = {}
     for name, interval in pairs:

@@ -156,7 +156,7 @@ def exported(found: ExportedCode) -> str:
     for part in proof.parts:
         rows.append(("answers for", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
                                      zip(part.motors, *part.proved, strict=True)]
-                     + [f"and in all of {len(part.cells)} cells, {100 * part.share:.4g} % of the box"]))
+                     + [f"and in all of {part.in_cells}, {100 * part.share:.4g} % of the box"]))
     return listing([*rows, ("size", f"{len(found.code.encode()) / 1024:.0f} kB")])
 
 
