@@ -219,6 +219,8 @@ TOGGLE_JOINT = 0.05
 """Part of the largest rate at a toggle from which a joint is one of those that move."""
 THINNEST_TUBE = 1e-13
 """Radius of a tube about a branch (characteristic lengths, radians) below which none is tried: rounding decides."""
+THINNEST_CELL = 1e-11
+"""The same over a cell: closures at its faces are enclosed to some THINNEST_TUBE, and must fit into it."""
 
 # Accuracy
 

@@ -78,7 +78,7 @@ def misses(proof: BranchProof, values) -> np.ndarray:
             found.append((X[:3, :3] @ joint.axes[0]) @ (Y[:3, :3] @ joint.axes[1]))
     for coupling in proof.robot.couplings:
         one, other = (next(i for i, c in enumerate(system.coordinates)
-                           if proof.robot.joints[c.joint].successor == link)
+                           if c.joint in proof.robot.joints and proof.robot.joints[c.joint].successor == link)
                       for link in (coupling.predecessor, coupling.successor))
         found.append(values[other] - coupling.ratio * values[one])
     return np.array(found)
@@ -239,3 +239,35 @@ def test_motors_that_do_not_make_a_function_are_refused():
         branch(robot, {"shoulder_9": (-1, 1)})
     with pytest.raises(BadRequest, match="low < high"):
         branch(robot, "shoulder_1=1:2")
+
+
+@pytest.mark.parametrize("flipped", [False, True])
+def test_a_joint_that_is_idle_at_zero_alone_closes_no_loop(flipped):
+    """A U joint with one axis along its rod at zero, and a knee that is tilted: the ball leaves the plane, so that the
+    coordinate held at zero would leave the loop open by millimetres."""
+    b = Builder("tilted_knee")
+    for name in ("base", "crank", "arm", "rod"):
+        b.link(name)
+    rod, tilt = np.array([0, 1.0, 0]), 0.3
+    b.joint("m", "R", "base", "crank", axis=Z, motor=True)
+    b.joint("knee", "R", "crank", "arm", (1, 0.3, 0), axis=(np.sin(tilt), 0, np.cos(tilt)))
+    b.joint("u", "U", "base", "rod", (0.4, -0.7, 0), axis=Z if flipped else rod, axis2=rod if flipped else Z)
+    b.joint("s", "S", "rod", "arm", (0.4, 0.3, 0), loop=True)
+    for platform in ("crank", "arm"):
+        (part,) = branch(b.build(platform=platform), "m=-0.3:0.3").parts
+        assert not part.cells
+
+
+@pytest.mark.parametrize("ratio", [-1.0, 0.5, 0.1, 7.0])
+def test_a_gear_comes_back_after_whole_turns_alone(ratio):
+    """A platform that a motor carries itself; x = ratio q is affine, so that its tube is as thin as tubes are."""
+    b = Builder("gear")
+    for name in ("base", "one", "two"):
+        b.link(name)
+    b.joint("m", "R", "base", "one", axis=Z, motor=True)
+    b.joint("p", "R", "base", "two", (1, 0, 0), axis=Z)
+    b.coupling("g", "one", "two", ratio)
+    for platform in ("one", "two"):
+        (part,) = branch(b.build(platform=platform)).parts
+        assert part.share == 1.0
+        assert part.turns == (("m", ratio == round(ratio)),)

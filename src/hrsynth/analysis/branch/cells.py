@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 
 from ...geometry.affine import AffineForms, affine, combined, dotted, stacked
 from ...geometry.vectors import Array
-from ...tolerances import AFFINE_ROUNDING, THINNEST_TUBE
+from ...tolerances import AFFINE_ROUNDING, THINNEST_CELL, THINNEST_TUBE
 from .loops import GearEquation, JointLoop, LoopRow, residuals, rod_ends
 from .part import LoopBlock, LoopEquation, LoopPart
 
@@ -144,6 +144,7 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
     one = np.eye(len(own))
     done = np.zeros(len(e), dtype=bool)
     radius = trial.radius.copy()
+    thinnest = np.where(trial.half.any(axis=-1), THINNEST_CELL, THINNEST_TUBE)[:, None]
     for attempt in range(TUBES):
         if attempt:
             at = derivatives(trial, equations, own, radius)
@@ -164,7 +165,7 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
         if not possible.any():
             break
         wanted = np.linalg.solve(one - M[possible], e[possible][..., None])[..., 0]
-        radius[np.ix_(possible, own)] = np.maximum(WIDER * wanted, THINNEST_TUBE)
+        radius[np.ix_(possible, own)] = np.maximum(WIDER * wanted, thinnest[possible])
     trial.alive &= done
     if block.loop is not None:
         trial.alive &= _same_side(trial, block)

@@ -72,7 +72,7 @@ def _followed(part: LoopPart, q: Array, x: Array, goal: Array) -> tuple[Array, A
 
 def turns(growth: Growth) -> tuple[tuple[str, bool], ...]:
     """Of each motor that makes a whole turn and whose first and last face are proved throughout: whether the closures
-    there are the same, angles modulo 2π."""
+    there are the same, angles modulo 2π; not listed where neither is proved."""
     part, found = growth.part, []
     for k, i in enumerate(part.driven):
         whole = abs(growth.grid.high[k] - growth.grid.low[k] - 2 * np.pi) < AFFINE_ROUNDING
@@ -82,25 +82,33 @@ def turns(growth: Growth) -> tuple[tuple[str, bool], ...]:
         last = [leaf for leaf in growth.proved if leaf.high[k] == growth.whole]
         same = [_meets(growth, k, one.tube, other.tube, face) for one in last for other in first
                 for face in growth.opposite(k, one, other) if one.tube is not None and other.tube is not None]
-        if same and growth.whole_face(k, first) and growth.whole_face(k, last):
-            found.append((part.system.names[i], all(same)))
+        filled = growth.whole_face(k, first) and growth.whole_face(k, last)
+        if same and filled and (False in same or all(same)):
+            found.append((part.system.names[i], False not in same))
     return tuple(found)
 
 
-def _meets(growth: Growth, k: int, one: BranchTube, other: BranchTube, face: Array) -> bool:
-    """Whether the closure of one tube at a point of the last face lies in another tube, a whole turn before."""
+def _meets(growth: Growth, k: int, one: BranchTube, other: BranchTube, face: Array) -> bool | None:
+    """Whether the closure of one tube at a point of the last face lies in another tube, a whole turn before; None where
+    it is proved neither to lie in it nor out of it."""
     part = growth.part
     x, good = part.closed(face[None], one.at(face)[None])
     (point,) = prove_all(part, face[None], np.zeros((1, len(face))), x) if good[0] else (None,)
-    if point is None:
-        return False
+    if point is None or np.any(np.abs(point.x - one.at(face)) + point.radius >= one.radius):
+        return None
     before = face.copy()
     before[k] = growth.grid.low[k]
-    angles = np.array([not part.system.coordinates[i].slides for i in part.unknowns])
+    own = [part.system.coordinates[i] for i in part.unknowns]
+    angles = np.array([not each.slides for each in own])
     off = point.x - other.at(before)
-    off = off - np.where(angles, 2 * np.pi * np.round(off / (2 * np.pi)), 0.0)
-    inside = np.abs(off) + point.radius + AFFINE_ROUNDING * 100 < other.radius
-    return bool(np.all(inside) and np.all(np.abs(point.x - one.at(face)) + point.radius < one.radius))
+    off = np.abs(off - np.where(angles, 2 * np.pi * np.round(off / (2 * np.pi)), 0.0))
+    doubt = point.radius + AFFINE_ROUNDING * 100
+    if np.all(off + doubt < other.radius):
+        return True
+    # three turns one after the other may be the same orientation with other angles
+    alone = np.array([sum(each.joint == mate.joint and not mate.slides for mate in part.system.coordinates) < 3
+                      for each in own])
+    return False if np.any((off - doubt > other.radius) & alone) else None
 
 
 def told(ends: Sequence[Toggle]) -> list[str]:

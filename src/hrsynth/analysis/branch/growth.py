@@ -150,6 +150,11 @@ class Growth:
         own = [(leaf, q, x, tube) for (leaf, q, x), tube in zip(batch, tubes, strict=True) if tube is not None]
         at_start = self._same([(q, x, tube, None) for _, q, x, tube in own])
         own = [each for each, same in zip(own, at_start, strict=True) if same]
+        # samples: equations that were left out may depend on the others at zero alone
+        for way in (-1.0, 1.0) if self.part.left_out else ():
+            corners = [(tube.centre + way * tube.half, tube) for *_, tube in own]
+            closed = self._same([(q, tube.at(q), tube, None) for q, tube in corners])
+            own = [each for each, same in zip(own, closed, strict=True) if same]
         for leaf, _, _, tube in own:
             leaf.tube = tube
         pairs = []

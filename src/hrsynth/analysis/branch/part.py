@@ -4,7 +4,7 @@ equations that are solved one after another; closing a part in floating point.""
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -246,7 +246,8 @@ def _part(system: LoopSystem, group: tuple[list[int], list[JointLoop], list[Gear
     """The blocks of a group of unknowns: those that close rods by turning them come last."""
     from scipy.linalg import qr
 
-    unknowns, loops, gears = group
+    unknowns, every, gears = group
+    loops = [_as_cut(loop, unknowns) for loop in every]
     asked = {i for loop in loops for i in loop.coordinates} | {i for gear in gears for i in (gear.first, gear.second)}
     driven = tuple(i for i in system.driven if i in asked)
     swung: dict[int, tuple[int, ...]] = {}
@@ -270,6 +271,15 @@ def _part(system: LoopSystem, group: tuple[list[int], list[JointLoop], list[Gear
     blocks = [*_triangular(system, main, chosen),
               *(LoopBlock(own, (), loops[place]) for place, own in swung.items())]
     return LoopPart(system, driven, tuple(unknowns), tuple(blocks), tuple(loops), tuple(gears), left_out)
+
+
+def _as_cut(loop: JointLoop, unknowns: Sequence[int]) -> JointLoop:
+    """A loop with all its equations where the joint that was left out cannot turn its rod everywhere: a held coordinate
+    of it is no spin."""
+    if loop.swung is None:
+        return loop
+    turning = sum(i in unknowns for i in loop.chains[1][loop.swung : loop.swung + loop.swings])
+    return loop if turning == min(loop.swings, 2) else replace(loop, swung=None, swings=0)
 
 
 def _slope(system: LoopSystem, equation: LoopEquation, values: Array) -> Array:
@@ -298,7 +308,7 @@ def _triangular(system: LoopSystem, unknowns: Sequence[int], equations: Sequence
     needs = [set(each.names(system)).intersection(unknowns) for each in equations]
     pairs.add_edges_from((row, i) for row, own in zip(rows, needs, strict=True) for i in own)
     match = nx.bipartite.hopcroft_karp_matching(pairs, rows)
-    if any(row not in match for row in rows):
+    if len(rows) < len(unknowns) or any(row not in match for row in rows):
         return [LoopBlock(tuple(unknowns), tuple(equations))]
     graph: nx.DiGraph = nx.DiGraph()
     graph.add_nodes_from(range(len(rows)))

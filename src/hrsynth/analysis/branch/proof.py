@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from ...budgets import BRANCH_CELLS, BRANCH_DEPTH
-from ...errors import BadRequest, LoopsNotClosed
+from ...errors import BadMechanism, BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
 from ...progress import tell
@@ -77,7 +77,10 @@ def _shaped(mechanism: Mechanism, motors: Sequence[str], box: BoxLike | None) ->
     joints: Shaped = (system, *parts_of(system))
     if len(joints[1]) != 1 or mechanism.base == mechanism.platform:
         return joints
-    other = loop_system(mechanism, motors, free=True)
+    try:
+        other = loop_system(mechanism, motors, free=True)
+    except BadMechanism:  # a motor or a gear carries the platform itself
+        return joints
     posed: Shaped = (other, *parts_of(other))
     if len(posed[1]) != 1:
         return joints

@@ -31,8 +31,9 @@ def _part(part: BranchPart) -> Rows:
         return [*rows, ("branch", "undecided: no cell about the zero configuration could be proved")]
     weakest = min(cell.weakest for cell in part.cells)
     whole = part.share == 1.0
-    rows += [("branch", "one branch, proved in the whole box" if whole else
-              f"one branch, proved in {part.percent} % of the box"),
+    but = " but for the redundant equations, which are bounded" if part.closed_to else ""
+    rows += [("branch", ("one branch, proved in the whole box" if whole else
+                         f"one branch, proved in {part.percent} % of the box") + but),
              ("cells", f"{len(part.cells)}; smallest singular value of the loops at least {weakest:.3g}")]
     if not whole:
         rows.append(("proved box", bounds))
