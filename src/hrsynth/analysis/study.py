@@ -36,8 +36,8 @@ def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLi
     ``question`` is a public function or its name, or a function of your own with the same parameters: a pose is given
     to it as ``at``, or as ``goal`` where it has no ``at``, a set of legs as ``observe``; ``options`` are the same for
     all. There are ``jobs`` processes, by default as many as cores; with 1 all is done in this one. A robot's samples
-    are drawn once in each process that is asked about it. ``errors`` is ``raise``, or ``keep``: what a question raised
-    (an ``HrsynthError``) then stands in the place of its answer. The error says what was asked.
+    are drawn once in each process that is asked about it. ``errors`` is ``raise``, or ``keep``: what a question raised,
+    or reading its robot (an ``HrsynthError``), then stands in the place of its answer. The error says what was asked.
 
     Raises ``BadRequest``, and what the question raises.
 
@@ -50,7 +50,7 @@ def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLi
     if jobs is not None and (isinstance(jobs, bool) or not isinstance(jobs, int) or jobs < 1):
         raise BadRequest("number of processes", jobs, "1 or more")
     several: Any = [robots] if isinstance(robots, str | os.PathLike) or not isinstance(robots, Iterable) else robots
-    every = [as_robot(each) for each in several]
+    every = [_read(each, errors) for each in several]
     sets = [legs] if isinstance(legs, str) else legs
     watched: list[Given] = [{}] if sets is None else [{"observe": as_names(each)} for each in sets]
     asked: list[Given] = [{}] if poses is None else [{_place(function): each} for each in asked_poses(poses)]
@@ -66,6 +66,16 @@ def map(question: str | Callable[..., Any], robots: RobotLike | Iterable[RobotLi
             if errors == RAISE and isinstance(answers[-1], HrsynthError):
                 raise answers[-1]
     return answers
+
+
+def _read(given: RobotLike, errors: str) -> RobotLike:
+    """The robot, read once; where errors are kept, one that cannot be read as it was given."""
+    try:
+        return as_robot(given)
+    except HrsynthError:
+        if errors == RAISE:
+            raise
+        return given
 
 
 def _function(question: str | Callable[..., Any]) -> Callable[..., Any]:
@@ -102,7 +112,7 @@ def _answered(function: Callable[..., Any], errors: str, part: list[Given]) -> l
     found: list[Any] = []
     for given in part:
         try:
-            found.append(function(**given))
+            found.append(function(**{**given, "robot": as_robot(given["robot"])}))
         except Exception as error:
             error.add_note("asked: " + ", ".join(f"{name} {_told(value)}" for name, value in given.items()))
             if not isinstance(error, HrsynthError):
