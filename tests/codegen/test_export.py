@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import hrsynth
-from codegen.robots import BARS, answered, compiled, four_bar, module_of, own_pose
+from codegen.robots import BARS, answered, compiled, eigen, four_bar, module_of, own_pose
 from hrsynth.codegen.export import ExportedCode, export
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array
@@ -259,3 +259,15 @@ def test_files_of_other_dialects(tmp_path: Path, ending: str) -> None:
     assert np.all(status == 0)
     np.testing.assert_allclose(R_again, R, atol=1e-9)
     np.testing.assert_allclose(p_again, p, atol=1e-9)
+
+
+def test_a_compiler_that_drops_checks_is_refused(tmp_path: Path) -> None:
+    """With -ffast-math what is no number may pass the comparisons that refuse it."""
+    header = tmp_path / "robot.hpp"
+    header.write_text(exported(four_bar(), 0.4, "c++").code, encoding="utf-8")
+    command = ["g++", "-E", f"-isystem{eigen()}", str(header)]
+    assert subprocess.run(command, capture_output=True).returncode == 0
+    for flag in ("-ffast-math", "-Ofast", "-ffinite-math-only"):
+        done = subprocess.run([*command, flag], capture_output=True, text=True)
+        assert done.returncode != 0
+        assert "#error" in done.stderr
