@@ -100,7 +100,8 @@ def test_text_names_place_rule_and_mend(bad: Path):
 @pytest.mark.parametrize(("arguments", "status"), [
     ([], 1), (["--fail-on", "nothing"], 0), (["--ignore", "limits-order", "--ignore", "refused"], 0),
     (["--format", "sarif"], 1),
-    (["--format", "xml"], 2), (["--fail-on", "x"], 2), (["--compare", "nothing.urdf"], 2), (["more.urdf"], 2),
+    (["--format", "xml"], 2), (["--json", "--format", "sarif"], 2), (["--fail-on", "x"], 2),
+    (["--compare", "nothing.urdf"], 2), (["more.urdf"], 2),
     (["--ignore", "refused", "--fail-on", "note"], 1), (["-o", "x.urdf"], 2), (["--reader", "x"], 2)])
 def test_the_exit_status_tells(bad: Path, capsys, arguments: list[str], status: int):
     assert execute(["lint", str(bad), *arguments]) == status

@@ -42,6 +42,8 @@ def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[s
     for name, value, known in (("--format", format, FORMATS), ("--fail-on", fail_on, FAILING)):
         if value not in known:
             raise BadRequest(name, value, known)
+    if json and format not in ("text", "json"):
+        raise BadRequest("--json together with --format", format, "one of them")
     with Progress():
         given["close"] = given["close"] or ()
         found = hrsynth.lint(files, reader=reader or (), ignore=ignore or (), **given)
