@@ -93,6 +93,8 @@ def test_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, a
     monkeypatch.chdir(tmp_path)
     if "c.json" in arguments and arguments[0] == "verify":  # the file that the example of modes writes
         assert execute(["modes", "quattro", "--observe", "1,4", "--certificate", "c.json"]) == 0
+    if "leg.xml" in arguments:
+        assert execute(["convert", "3rrr_m1", "leg.xml"]) == 0
     assert execute(list(arguments)) == 0, capsys.readouterr().err
     assert capsys.readouterr().err == ""
 
