@@ -37,7 +37,8 @@ from .progress import Progress
 class Question:
     """A command: the public function of its ``name``, what it says of itself, its own options, named as the function's
     parameters and those of the files, and examples. ``before`` gets the options before the work, ``after`` the answer
-    and the options at the end; ``shows`` does so instead of printing the text where nothing was written."""
+    and the options at the end; ``shows`` does so instead of printing the text where nothing was written. ``seeded``:
+    whether anything is random."""
 
     name: str
     help: str
@@ -46,12 +47,13 @@ class Question:
     before: Callable[[], object] | None = None
     shows: Callable[..., None] | None = None
     after: Callable[..., None] | None = None
+    seeded: bool = True
 
     def add(self, app: typer.Typer) -> None:
         """Make it a command."""
         drawn = FIGURE if any(each.drawn for each in OUTPUTS[self.name].files) else ()
-        add_command(app, self.name, self.help, (SOURCE[0], *self.options, SEED, *drawn, JSON, *SOURCE[1:]), self.answer,
-                    self.examples)
+        options = SOURCE[0], *self.options, *[SEED] * self.seeded, *drawn, JSON, *SOURCE[1:]
+        add_command(app, self.name, self.help, options, self.answer, self.examples)
 
     def answer(self, *, json: bool, **values: Any) -> None:
         """Ask, write the files that are asked for, print."""
@@ -168,6 +170,8 @@ BEGIN = Option("at", "Start there instead of at the zero configuration, in anoth
                "mode:2.", "POSE")
 START = Option("start", "Start pose, such as x=0.02,y=0.1,z=-0.7, or mode:2 of the other pose.", "POSE",
                default=NEEDED, old=("--from",))
+BOX = Option("box", "Intervals of motors (m, rad), as hip=-1:1,slide=0:0.2 (default: the file's limits, else a whole "
+             "turn, or a characteristic length either way).", "INTERVALS")
 QUESTIONS = (
     Question("derive", "The hidden robot of a robot, how it is derived, its certificate, and what the controller can "
              "see.",
@@ -199,11 +203,10 @@ QUESTIONS = (
              WATCHED, ("uranesx", "quattro --observe 1")),
     Question("branch", "Where the joints are proved to be one function of the motors, on the branch of the zero "
              "configuration, and what ends that.",
-             (Option("box", "Intervals of motors, as hip=-1:1,slide=0:0.2 (m, rad; default: the file's limits).",
-                     "INTERVALS"),
+             (BOX,
               Option("effort", "Cells that are tried at most, for each part of the loops.", "COUNT", int, BRANCH_CELLS,
                      low=1)),
-             ("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",)),
+             ("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",), seeded=False),
     Question("modes", "All assembly modes: every pose of the platform with the same directions.",
              (Option("at", "Pose whose directions are held, as x=0.02,y=0.1,z=-0.7 (default: the zero "
                      "configuration's).", "POSE"),
@@ -268,11 +271,9 @@ QUESTIONS = (
              "branch of the zero configuration.",
              (*WATCHED, Option("lang", "c++ (one header, C++17, Eigen) or numpy (one module).", default="c++",
                      words=("c++", "numpy")),
-              Option("box", "Intervals of motors (m, rad), as hip=-1:1,slide=0:0.2 (default: the file's limits, else a "
-                     "whole turn, or a characteristic length either way).", "BOX"),
-              _file("export")),
+              BOX, _file("export")),
              ("rrrrr_m1 --box shoulder_1=-0.1:0.1,shoulder_2=-0.1:0.1 -o five_bar.hpp",
-              "robot.urdf --lang numpy -o robot.py")),
+              "robot.urdf --lang numpy -o robot.py"), seeded=False),
     Question("view", "A 3D view in the browser: sliders that keep the loops closed, what is observed, assembly modes.",
              (*WATCHED, flag("hidden", "The hidden robot too, its virtual actuators highlighted."),
               _file("view", "static"),

@@ -44,6 +44,8 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     >>> hrsynth.branch("rrrrr_m1", {"shoulder_1": (-0.05, 0.05), "shoulder_2": (-0.05, 0.05)})
     <BranchProof: rrrrr_m1, 2 motors, 2 passive coordinates: shoulder_1, shoulder_2: 100 % of the box proved, 1 cell>
     """
+    if effort < 1:
+        raise BadRequest("effort", effort, "1 cell or more")
     given = as_robot(robot)
     mechanism = given if isinstance(given, Mechanism) else given.robot
     motors = [name for name, joint in mechanism.joints.items() if joint.actuated]
