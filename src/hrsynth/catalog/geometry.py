@@ -111,7 +111,7 @@ def _observed(drawn: Mechanism, word: RobotWord, chords: Mapping[str, Direction]
     found: list[Direction] = []
     for (label, chord), leg, limb in zip(chords.items(), word.legs, anatomy.legs, strict=True):
         try:
-            segment = (default_observation(anatomy, limb) if leg.observed is None
+            segment = (default_observation(anatomy, limb, last=True) if leg.observed is None
                        else observation_of(anatomy, chord.link))
         except BadRequest:
             found.append(chord)

@@ -23,13 +23,14 @@ Place = TypeVar("Place")
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 
 
-def default_observation(anatomy: LegDecomposition, leg: Leg) -> Direction:
+def default_observation(anatomy: LegDecomposition, leg: Leg, last: bool = False) -> Direction:
     """The default segment of a leg (docs/pages/theory.md, section 2): the axis of a P that joins two moving links;
-    else the last segment before the platform (of equal parallel rods the first)."""
-    return _default(anatomy, leg)[0]
+    else the last segment before the platform (of equal parallel rods the first) that has a length; with ``last`` the
+    last one, and ``NoSegment`` where it has none."""
+    return _default(anatomy, leg, last)[0]
 
 
-def _default(anatomy: LegDecomposition, leg: Leg) -> tuple[Direction, str]:
+def _default(anatomy: LegDecomposition, leg: Leg, last: bool = False) -> tuple[Direction, str]:
     """The default segment of a leg, and why it is that one."""
     segments = _Segments(anatomy, leg, NOISE)
     path, nodes, base = segments.path, segments.nodes, anatomy.mechanism.base
@@ -44,7 +45,7 @@ def _default(anatomy: LegDecomposition, leg: Leg) -> tuple[Direction, str]:
         return rod, "the first of the parallel rods before the platform"
     if len(nodes) < 3:
         raise NoSegment(f"leg {leg.label} has no segment to observe: it is one joint", path[-1].joints[0])
-    found = _first(segments.at, range(len(nodes) - 2, 0, -1))
+    found = _first(segments.at, range(len(nodes) - 2, 0, -1)[: 1 if last else None])
     short = "" if found.link == nodes[-2] else " that has a length"
     return found, f"the last segment before the platform{short}"
 

@@ -107,7 +107,7 @@ def test_a_million_links_are_refused_in_time_and_memory(name: str, tmp_path: Pat
     few = name == "just not too many"
     assert run.returncode == (0 if few else 2), run.stderr[-500:]
     assert (tmp_path / "out.sdf").exists() is few
-    assert len(run.stderr.splitlines()) == 1
+    assert len(run.stderr.splitlines()) == (2 if few else 1)  # that it is an open chain, and its platform
     (peak,) = re.findall(r"VmHWM:\s+(\d+) kB", told.read_text())
     assert 1_000_000 < int(peak) * 1024 < BYTES
 
