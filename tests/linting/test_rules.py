@@ -61,7 +61,7 @@ def test_every_rule_has_a_case():
 def test_a_rule_finds_its_defect_and_no_other(case: Case, tmp_path: Path, shelf: Path):
     _, two = files(case, tmp_path, shelf)
     _, before = sound_file(case.robot, case.ending, shelf)
-    after = rules_in(two, **{} if case.reader is None else {"readers": case.reader})
+    after = rules_in(two, **{} if case.reader is None else {"reader": case.reader})
     if case.reader is None:
         assert before[case.rule] == 0 or case.rule == "motor-unlimited"
     assert after[case.rule] > (0 if case.reader else before[case.rule])
@@ -241,7 +241,7 @@ def test_nothing_is_written_where_nothing_is_mended_or_the_request_is_wrong(tmp_
     before = path.stat().st_mtime_ns
     assert hrsynth.lint(path, fix=True).written is None
     assert path.stat().st_mtime_ns == before
-    for wrong in ({"output": tmp_path / "o.urdf"}, {"ignore": "nothing"}, {"readers": "nothing"}):
+    for wrong in ({"output": tmp_path / "o.urdf"}, {"ignore": "nothing"}, {"reader": "nothing"}):
         with pytest.raises(BadRequest):
             hrsynth.lint(path, **wrong)
     with pytest.raises(BadRequest):
