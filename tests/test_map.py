@@ -58,7 +58,8 @@ def test_a_defect_in_a_worker_is_told_with_what_was_asked():
 
 def test_a_robot_that_cannot_be_read_is_an_error_in_the_place_of_its_answers():
     for question in ("derive", lambda robot, observe: robot.name):
-        found = hrsynth.map(question, ["rrrrr_m1", "nope", 5], legs=["1", "2"], jobs=1, errors="keep")
+        robots: list = ["rrrrr_m1", "nope", 5]
+        found = hrsynth.map(question, robots, legs=["1", "2"], jobs=1, errors="keep")
         assert [isinstance(each, BadRequest) for each in found] == [False, False, True, True, True, True]
         assert [each.__notes__[0].startswith("asked: robot 'nope', observe") for each in found[2:4]] == [True, True]
     with pytest.raises(BadRequest, match="nope"):
