@@ -28,7 +28,11 @@ CLOSING = ("loop", "constraint", "loop_joint", "joint", "connect", "weld", "coup
 
 
 def as_written(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
-    """The loops of a file before anything is solved, merged or made exact."""
+    """The loops of a file before anything is solved, merged or made exact; nothing may change them."""
+    return file.remembered("as written", lambda: _as_written(file))
+
+
+def _as_written(file: LintedFile) -> tuple[JointGraph, LoopAssembly] | None:
     try:
         graph = file.graph()
         file.given.apply(graph)

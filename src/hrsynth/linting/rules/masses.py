@@ -84,8 +84,9 @@ def _missing(file: LintedFile) -> Iterator[Spot]:
     graph, root = file.said, file.root
     if not known or graph is None or root is None:
         return
+    moved = moving(file)
     bonds = graphs.adjacency(graph.links, (j.links for j in graph.joints.values() if j.kind is JointType.FIXED))
-    for name in [name for name in graph.links if name in moving(file) and not OWN.search(name)]:
+    for name in [name for name in graph.links if name in moved and not OWN.search(name)]:
         line = graph.links[name].line
         if not known & graphs.component(bonds, name) and file.element(line, "link", "body", name=name) is not None:
             yield Spot(line, f"link {name!r} moves and has no <inertial>, as others in the file have, nor has one that "
