@@ -196,6 +196,14 @@ FINEST_BRANCH_CELL = 40
 """Halvings of a side of the box that the whole numbers that count them can tell."""
 BRANCH_DEPTH = 7
 """How often a cell of a branch is halved at most for each motor, and once more as often."""
+COARSEST_BRANCH_CELL = 4.0
+"""How much larger a cell may be than the largest about zero that is proved at once, to be tried."""
+TUBE_RADII = 4
+"""Radii of a tube that are tried, each after the one before was too narrow."""
+TUBE_WIDER = 1.2
+"""How much wider than what a linear estimate asks for a tube is tried."""
+FARTHEST_MOTOR = 1e6
+"""Coordinate (m, rad) up to which a motor outside of all loops is taken where it has no limits."""
 
 # Accuracy
 

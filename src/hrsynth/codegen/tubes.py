@@ -8,13 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.branch.answer import BranchProof
+from ..budgets import FARTHEST_MOTOR
 from ..errors import NothingProved
 from ..geometry.vectors import Array
 from ..results import Value
 from .formulas import LoopFormulas
-
-UNBOUNDED = 1e6
-"""Coordinate (m, rad) up to which a motor outside of all loops is taken where it has no limits."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,7 +72,7 @@ class TubedBranch(Value):
         for place, i in enumerate(motors):
             low, high = proof.robot.limited.get(system.coordinates[i].joint, (-np.inf, np.inf))
             if not np.isfinite(lower[place]):  # in no loop
-                lower[place], upper[place] = max(low, -UNBOUNDED), min(high, UNBOUNDED)
+                lower[place], upper[place] = max(low, -FARTHEST_MOTOR), min(high, FARTHEST_MOTOR)
         return cls(equations, motors, lower, upper, tuple(parts))
 
     @property

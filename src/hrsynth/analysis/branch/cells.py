@@ -20,16 +20,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...budgets import TUBE_RADII, TUBE_WIDER
 from ...geometry.affine import AffineForms, affine, combined, dotted, stacked
 from ...geometry.vectors import Array
 from ...tolerances import AFFINE_ROUNDING, THINNEST_CELL, THINNEST_TUBE
 from .loops import GearEquation, JointLoop, LoopRow, residuals, rod_ends
 from .part import LoopBlock, LoopEquation, LoopPart
-
-TUBES = 4
-"""Radii of a tube that are tried, each after the one before was too narrow."""
-WIDER = 1.2
-"""How much wider than what a linear estimate asks for a tube is tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,7 +141,7 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
     done = np.zeros(len(e), dtype=bool)
     radius = trial.radius.copy()
     thinnest = np.where(trial.half.any(axis=-1), THINNEST_CELL, THINNEST_TUBE)[:, None]
-    for attempt in range(TUBES):
+    for attempt in range(TUBE_RADII):
         if attempt:
             at = derivatives(trial, equations, own, radius)
         M = (one - combined(Y, at.by_own)).size
@@ -165,7 +161,7 @@ def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
         if not possible.any():
             break
         wanted = np.linalg.solve(one - M[possible], e[possible][..., None])[..., 0]
-        radius[np.ix_(possible, own)] = np.maximum(WIDER * wanted, thinnest[possible])
+        radius[np.ix_(possible, own)] = np.maximum(TUBE_WIDER * wanted, thinnest[possible])
     trial.alive &= done
     if block.loop is not None:
         trial.alive &= _same_side(trial, block)

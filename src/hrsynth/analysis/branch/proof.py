@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ...budgets import BRANCH_CELLS, BRANCH_DEPTH
+from ...budgets import BRANCH_CELLS, BRANCH_DEPTH, COARSEST_BRANCH_CELL
 from ...errors import BadMechanism, BadRequest, LoopsNotClosed
 from ...geometry.vectors import Array
 from ...mechanism import Mechanism
@@ -24,8 +24,6 @@ from .redundant import closed_to, unexplained
 
 GROUPS = "the loops' links move in groups of fewer dimensions"
 BOUNDED = "bounded over the tubes"
-COARSEST = 4.0
-"""How much larger a cell may be than the largest about zero that is proved at once, to be tried."""
 BoxLike = Mapping[str, Sequence[float]] | str
 
 
@@ -56,7 +54,7 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
     found, tried = [], 0
     for part in parts:
         growth = Growth(part, _grid(part, intervals), np.zeros(len(part.driven)), np.zeros(len(part.unknowns)),
-                        _depth(part), effort, COARSEST * _reach(part, intervals)).run()
+                        _depth(part), effort, COARSEST_BRANCH_CELL * _reach(part, intervals)).run()
         tried += growth.tried
         found.append(_answer(part, growth))
         tell("parts")
