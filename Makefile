@@ -5,6 +5,7 @@ MUTATIONS ?= 100000
 SEED ?= 0
 INSTANCES ?= 10000
 COUNT ?= 300
+THREE ?= 0.187.0
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --quiet --no-input --disable-pip-version-check
@@ -14,7 +15,7 @@ LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generat
 	--no-annotate --custom-compile-command "make lock" $(LOCKFLAGS) pyproject.toml --group build
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all test-long fuzz adversary bounds endings bench lint types robots readme catalog notebooks jupyter docs pictures lock release setup setup-dev setup-all setup-browser clean
+.PHONY: help demo test test-all test-long fuzz adversary bounds endings bench lint types robots readme catalog notebooks jupyter docs pictures lock three release setup setup-dev setup-all setup-browser clean
 .DELETE_ON_ERROR:
 
 help:  ## this list
@@ -85,6 +86,12 @@ lock: setup-dev  ## resolve the dependencies again (LOCKFLAGS=--upgrade: to the 
 	@$(LOCK) --output-file requirements/main.txt
 	@$(LOCK) --group dev --constraint requirements/main.txt --output-file requirements/dev.txt
 	@$(LOCK) --group dev --group browser --extra all --constraint requirements/dev.txt --output-file requirements/all.txt
+
+three:  ## bundle three.js for the 3D pages again (needs npm)
+	@mkdir -p build/three && cp docs/three.js build/three/ && cd build/three && npm install --silent three@$(THREE) esbuild && \
+		npx esbuild three.js --bundle --minify --format=iife --global-name=THREE --target=es2020 --outfile=three.min.js
+	@{ echo '/*!'; echo 'three.js $(THREE) with OrbitControls and TransformControls, bundled by `make three`.'; echo; \
+		cat build/three/node_modules/three/LICENSE; echo '*/'; cat build/three/three.min.js; } > src/hrsynth/present/studio/page/three.min.js
 
 release: setup-dev  ## set VERSION=0.3.0, the changelog's date and the citation, build and check dist/, commit, tag; nothing is uploaded
 	@$(BIN)/python docs/release.py $(VERSION)
