@@ -21,7 +21,7 @@ from sympy.polys.matrices import DomainMatrix
 
 import hrsynth
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES
-from analysis.modes.laws import draw
+from analysis.modes.laws import draw, needs_msolve
 from certificates.mutations import FALSE, false, means_the_same, scribbled
 from hrsynth.analysis.modes.solve import solve
 from hrsynth.certificates import verify_certificate as checker
@@ -80,8 +80,11 @@ LONGER = {"spatial, six spheres", "spatial, three planes and three spheres", "sp
           "spatial, a pivot and three spheres"}
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in LONGER))
-                                  for name in sorted(FAMILIES | MEETING | SURFACES)])
+NEEDED = {name: [mark for mark, names in ((pytest.mark.slow, LONGER), (needs_msolve, SURFACES)) if name in names]
+          for name in sorted(FAMILIES | MEETING | SURFACES)}
+
+
+@pytest.mark.parametrize("name", [pytest.param(name, marks=marks) for name, marks in NEEDED.items()])
 def test_random_platforms(name):
     """The checker's bound, which trusts no resultant, is the engine's count."""
     system, _ = draw(name, 1)

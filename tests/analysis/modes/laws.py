@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 
 import numpy as np
+import pytest
 
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES, Draw
 from hrsynth.analysis.modes.msolve import executable
@@ -26,6 +27,9 @@ def installed() -> bool:
     except MissingExtra:
         return False
     return True
+
+
+needs_msolve = pytest.mark.skipif(not installed(), reason="msolve is not installed (extra `solve`)")
 
 
 def draw(name: str, seed: int) -> Draw:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from analysis.modes.draws import six_rods, spatial
-from analysis.modes.laws import among, installed
+from analysis.modes.laws import among, needs_msolve
 from hrsynth.analysis.modes.curves import Line
 from hrsynth.analysis.modes.fits import as_meant
 from hrsynth.analysis.modes.rigid import Spatial
@@ -17,7 +17,6 @@ from hrsynth.errors import MeaningUndecided
 from hrsynth.geometry.vectors import Array
 from strategies import random_rotation
 
-needs_msolve = pytest.mark.skipif(not installed(), reason="msolve is not installed (extra `solve`)")
 CLASSES = [("AAABBC", "ABCDEF", 8), ("AAABCD", "ABCDEF", 16), ("AABBCC", "ABBCCA", 16), ("AABBCC", "ABCDEF", 16),
            ("ABCDEF", "AAABCD", 16), ("AABCDE", "ABCCDE", 24), ("AABBCD", "ABCDEF", 32), ("AABCDE", "ABCDEF", 40)]
 """Which rods share balls of the platform and of the base, and the complex modes (J.-C. Faugère, D. Lazard, Mech. Mach.

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from analysis.modes.draws import FAMILIES, MEETING, SURFACES, on_two_bodies, spatial, translating
-from analysis.modes.laws import among, check_agreement, check_member, draw, installed
+from analysis.modes.laws import among, check_agreement, check_member, draw, needs_msolve
 from hrsynth.analysis.modes.curves import Circle, Plane, Reach, Sphere
 from hrsynth.analysis.modes.msolve import parametrised, read, written
 from hrsynth.analysis.modes.polynomials import Quadric
@@ -25,8 +25,6 @@ from hrsynth.analysis.modes.wholes import wholes
 from hrsynth.errors import BadRequest, MissingExtra, Unsolved
 from hrsynth.geometry.vectors import rotation_about, unit
 from strategies import random_rotation
-
-needs_msolve = pytest.mark.skipif(not installed(), reason="msolve is not installed (extra `solve`)")
 
 SLOWEST = {"spatial, six spheres", "spatial, three planes and three spheres", "spatial, two circles and two spheres",
            "spatial, a line and four spheres", "spatial, three circles", "spatial, two circles and a line",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from analysis.modes.laws import installed
+from analysis.modes.laws import needs_msolve
 from hrsynth.analysis.modes.branches import model
 from hrsynth.analysis.modes.curves import Circle, Line, Plane, Point, Sphere
 from hrsynth.analysis.modes.solve import solve
@@ -105,7 +105,7 @@ def check_real_robot(name: str, complex_count: int) -> None:
     assert min(np.abs(mode.pose - home).max() for mode in modes.modes) < 1e-10
 
 
-@pytest.mark.skipif(not installed(), reason="msolve is not installed (extra `solve`)")
+@needs_msolve
 @pytest.mark.parametrize(("name", "complex_count"), [
     ("quattro", 8), pytest.param("hexa", 40, marks=pytest.mark.slow)])
 def test_real_robots_with_rods_have_their_known_number_of_modes(name: str, complex_count: int):
