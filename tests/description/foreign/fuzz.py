@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import argparse
+import importlib.util
 import random
 import re
 import signal
@@ -21,11 +22,13 @@ from lxml import etree
 sys.path[:0] = [str(Path(__file__).resolve().parents[2])]  # run as a program, this folder alone is on the path
 
 from description.foreign.examples import EXTENDED, FILES  # noqa: E402
-from hrsynth.description import load, native, shipped, spanning  # noqa: E402
+from hrsynth.description import load, native, save, shipped, spanning  # noqa: E402
 from hrsynth.errors import HrsynthError  # noqa: E402
 from hrsynth.mechanism import Mechanism  # noqa: E402
 
 SECONDS = 5
+USD_SHARE = 0.01
+"""Of the mutations, those of a USD file: each is opened in a process of its own, as long as a hundred others."""
 WORDS = ["0", "-1", "1e-300", "1e8", "1e9", "nan", "inf", "-", "", "world", "base", "bar", "crank", "rocker", "true",
          "fixed", "ball", "universal", "revolute2", "screw", "gearbox", "prismatic", "hinge", "free", "slide", "0 0 0",
          "1 2 3 4", "__model__", "robot.xml", "../x", "d", "a", "3d", "[", "]", "'", '"', "<", "&", "\0", "é", "__cut",
@@ -42,6 +45,19 @@ def originals() -> list[dict[str, str]]:
     """The files that are mutated: the examples and some shipped robots."""
     robots = [{"robot.urdf": path.read_text()} for name, path in shipped().items() if name in ("3rrr_m1", "3rps")]
     return [*FILES.values(), *EXTENDED.values(), *robots]
+
+
+def stages() -> list[dict[str, str]]:
+    """USD files that are mutated; none where USD cannot be read."""
+    if importlib.util.find_spec("pxr") is None:
+        return []
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "robot.usda"
+        found = []
+        for name in ("3rrr_m1", "3rps"):
+            save(load(name), path)
+            found.append({path.name: path.read_text()})
+    return found
 
 
 def mutated(text: str, rng: random.Random) -> str:
@@ -103,7 +119,7 @@ def check_valid(robot: Mechanism) -> None:
 
 def outcomes(count: int, seed: int) -> Iterator[tuple[str, dict[str, str], str]]:
     """Outcome, the files and the message of each mutation; anything that is no answer is raised with its files."""
-    rng, base = random.Random(seed), originals()
+    rng, base, usd = random.Random(seed), originals(), stages()
 
     def stop(number: int, frame: object) -> None:
         raise Hang
@@ -111,7 +127,7 @@ def outcomes(count: int, seed: int) -> Iterator[tuple[str, dict[str, str], str]]
     signal.signal(signal.SIGVTALRM, stop)
     with tempfile.TemporaryDirectory() as folder:
         for _ in range(count):
-            files = dict(rng.choice(base))
+            files = dict(rng.choice(usd if usd and rng.random() < USD_SHARE else base))
             name = rng.choice(list(files))
             files[name] = mutated(files[name], rng)
             path = Path(folder) / next(iter(files))
