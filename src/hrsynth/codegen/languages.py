@@ -26,7 +26,7 @@ TEMPLATES = {"c++": "header.hpp.j2", "numpy": "module.py.j2"}
 
 def program(source: Source, language: str, told: Sequence[str]) -> str:
     """The program in a language, with lines ``told`` at its head; the same each time."""
-    branch, mechanism = source.branch, source.branch.equations.mechanism
+    branch, mechanism = source.branch, source.branch.system.mechanism
     arguments = "const Motors& q, const Unknowns& x, "
     functions = [("platform", f"{arguments}Eigen::Matrix3d& R, Eigen::Vector3d& p", source.platform)]
     if source.cut:

@@ -55,7 +55,7 @@ class Source(Value):
     @classmethod
     def of(cls, branch: TubedBranch, observed: Sequence[Direction]) -> Source:
         """The formulas of a branch, and those of observed directions."""
-        tracer = FormulaTracer(branch.equations, branch.motors, branch.passive)
+        tracer = FormulaTracer(branch.system, branch.motors, branch.passive)
         parts = tuple(_part(branch, tracer, part) for part in branch.parts)
         names, values, slopes = tracer.cut()
         return cls(branch, parts, tracer.platform(), tuple(names), values, slopes, tracer.rates(observed),
@@ -63,7 +63,7 @@ class Source(Value):
 
     def names(self, places: Sequence[int]) -> list[str]:
         """The names of coordinates."""
-        return [self.branch.equations.coordinates[i].name for i in places]
+        return [self.branch.system.coordinates[i].name for i in places]
 
 
 def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourcePart:

@@ -6,11 +6,14 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
+from ..analysis.branch.loops import LoopSystem, mapped
 from ..batch.tape import Symbol, Tape
-from ..geometry.components import cross
+from ..geometry.affine import crossed
 from ..mechanism.observation import Direction
 from ..results import Value
-from .formulas import LoopFormulas
+from .formulas import cut, cut_coordinate, placed, rows
 
 Place = tuple[int, ...]
 VALUES = ("R", "p", "u", "O")
@@ -27,7 +30,9 @@ class TracedFunction(Value):
     @classmethod
     def of(cls, tape: Tape, names: Sequence[str], stores: Iterable[tuple[str, Place, Any]]) -> TracedFunction:
         """What some symbols of a tape need; derivatives that are constantly zero are not stored."""
-        kept = [(array, place, value) for array, place, value in stores
+        single = [(array, place, np.ravel(value)[0] if isinstance(value, np.ndarray) else value)
+                  for array, place, value in stores]
+        kept = [(array, place, value) for array, place, value in single
                 if array in VALUES or isinstance(value, Symbol) or float(value) != 0.0]
         return cls(tuple(tape.statements([(0, value) for _, _, value in kept], names)),
                    tuple((array, place, f"t{value.number}" if isinstance(value, Symbol) else repr(float(value)))
@@ -39,7 +44,7 @@ class FormulaTracer(Value):
     """The coordinates of a mechanism's tree as inputs: ``motors`` are q, ``passive`` x, by their places among all; the
     others are held at 0."""
 
-    equations: LoopFormulas
+    system: LoopSystem
     motors: tuple[int, ...]
     passive: tuple[int, ...]
 
@@ -55,62 +60,63 @@ class FormulaTracer(Value):
 
     def _values(self, tape: Tape) -> list[Any]:
         places = self.places
-        return [tape.load(places[i]) if i in places else 0.0 for i in range(len(self.equations.coordinates))]
+        return [np.array([tape.load(places[i])], dtype=object) if i in places else None
+                for i in range(len(self.system.coordinates))]
 
-    def loops(self, rows: Sequence[int], unknowns: Sequence[int], driven: Sequence[int]
+    def loops(self, which: Sequence[int], unknowns: Sequence[int], driven: Sequence[int]
               ) -> tuple[TracedFunction, TracedFunction]:
-        """G with J, its derivatives by ``unknowns``; K, those by ``driven`` coordinates; of some rows."""
+        """G with J, its derivatives by ``unknowns``; K, those by ``driven`` coordinates; of some equations."""
         tape = Tape([])
-        found = self.equations.rows(self._values(tape))
-        stores: list[tuple[str, Place, Any]] = [("G", (i,), found[row][0]) for i, row in enumerate(rows)]
+        found = rows(self.system, self._values(tape))
+        stores: list[tuple[str, Place, Any]] = [("G", (i,), found[row][0]) for i, row in enumerate(which)]
         slopes: list[list[tuple[str, Place, Any]]] = []
         for array, columns in (("J", unknowns), ("K", driven)):
             where = {each: k for k, each in enumerate(columns)}
-            slopes.append([(array, (i, where[k]), slope) for i, row in enumerate(rows)
+            slopes.append([(array, (i, where[k]), slope) for i, row in enumerate(which)
                            for k, slope in found[row][1].items() if k in where])
         return (TracedFunction.of(tape, self.names, stores + slopes[0]), TracedFunction.of(tape, self.names, slopes[1]))
 
-    def closure(self, rows: Sequence[int]) -> TracedFunction:
-        """E, what is left of some rows."""
+    def closure(self, which: Sequence[int]) -> TracedFunction:
+        """E, what is left of some equations."""
         tape = Tape([])
-        found = self.equations.rows(self._values(tape))
-        return TracedFunction.of(tape, self.names, [("E", (i,), found[row][0]) for i, row in enumerate(rows)])
+        found = rows(self.system, self._values(tape))
+        return TracedFunction.of(tape, self.names, [("E", (i,), found[row][0]) for i, row in enumerate(which)])
 
     def platform(self) -> TracedFunction:
         """Rotation R (3, 3) and position p (3,) of the platform's frame."""
         tape = Tape([])
-        at = self.equations.moved(self._values(tape))
-        R, p = self.equations.pose(at, self.equations.mechanism.platform)
-        return TracedFunction.of(tape, self.names, [*(("R", divmod(i, 3), each) for i, each in enumerate(R)),
-                                                    *(("p", (i,), each) for i, each in enumerate(p))])
+        R, p, _ = placed(self.system, self._values(tape), self.system.mechanism.platform)
+        return TracedFunction.of(tape, self.names, [*(("R", divmod(i, 3), each) for i, each in enumerate(R.ravel())),
+                                                    *_three("p", 0, p)])
 
     def cut(self) -> tuple[list[str], TracedFunction, TracedFunction]:
         """The names of the cut joints' coordinates; O, their values; C, their derivatives by the coordinates of q, then
         x."""
-        tape, places = Tape([]), self.places
-        at = self.equations.moved(self._values(tape))
-        names = self.equations.cut()
-        rows = [self.equations.cut_coordinate(at, joint, which) for _, joint, which in names]
+        tape, places, names = Tape([]), self.places, cut(self.system)
+        values = self._values(tape)
+        found = [cut_coordinate(self.system, values, loop, which) for _, loop, which in names]
         return ([name for name, _, _ in names],
-                TracedFunction.of(tape, self.names, [("O", (k,), value) for k, (value, _) in enumerate(rows)]),
-                TracedFunction.of(tape, self.names, [("C", (k, places[i]), slope) for k, (_, slopes) in enumerate(rows)
-                                                     for i, slope in slopes.items() if i in places]))
+                TracedFunction.of(tape, self.names, [("O", (k,), value) for k, (value, _) in enumerate(found)]),
+                TracedFunction.of(tape, self.names, [("C", (k, places[i]), slope) for k, (_, slopes) in enumerate(found)
+                                                     for i, slope in slopes.items()]))
 
     def rates(self, observed: Sequence[Direction]) -> TracedFunction:
         """V (6, n), the velocity of the platform's frame, and W (3 k, n), those of the observed directions u (3 k,), by
         the coordinates of q, then x."""
-        tape, places, mechanism = Tape([]), self.places, self.equations.mechanism
-        at = self.equations.moved(self._values(tape))
-        p = self.equations.pose(at, mechanism.platform)[1]
-        twists = self.equations.velocity(at, self.equations.body[mechanism.platform], p)
-        stores: list[tuple[str, Place, Any]] = [("V", (i, places[k]), each) for k, (v, w) in twists.items()
-                                                if k in places for i, each in enumerate((*v, *w))]
+        tape, places, mechanism = Tape([]), self.places, self.system.mechanism
+        values = self._values(tape)
+        twists = placed(self.system, values, mechanism.platform)[2]
+        stores = [store for k, twist in twists.items() for i in (0, 1)
+                  for store in _three("V", 3 * i, twist[i], places[k])]
         for number, observation in enumerate(observed):
-            carrier = self.equations.body[observation.link]
-            d = mechanism.links[observation.link].pose[:3, :3] @ observation.direction
-            u = at.bodies[carrier].direction(d)
-            stores += [("u", (3 * number + i,), each) for i, each in enumerate(u)]
-            stores += [("W", (3 * number + i, places[k]), each)
-                       for k, (_, w) in self.equations.velocity(at, carrier, p).items() if k in places
-                       for i, each in enumerate(cross(w, u))]
+            R, _, twists = placed(self.system, values, observation.link)
+            u = mapped(R, observation.direction)
+            stores += _three("u", 3 * number, u)
+            stores += [store for k, (_, w) in twists.items()
+                       for store in _three("W", 3 * number, crossed(w, u), places[k])]
         return TracedFunction.of(tape, self.names, stores)
+
+
+def _three(array: str, first: int, vector: Any, *column: int) -> list[tuple[str, Place, Any]]:
+    """Where the components of a vector go: to places from ``first`` on."""
+    return [(array, (first + i, *column), each) for i, each in enumerate(np.ravel(vector))]

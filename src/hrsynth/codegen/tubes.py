@@ -8,11 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..analysis.branch.answer import BranchProof
+from ..analysis.branch.loops import LoopSystem
+from ..analysis.branch.part import whole
 from ..budgets import FARTHEST_MOTOR
 from ..errors import NothingProved
 from ..geometry.vectors import Array
 from ..results import Value
-from .formulas import LoopFormulas
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -43,10 +44,10 @@ class TubePart(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class TubedBranch(Value):
-    """The loops' equations, the motors' coordinates and the bounds (m,) of the proved box, the parts; coordinates in no
+    """The loops in metres, the motors' coordinates and the bounds (m,) of the proved box, the parts; coordinates in no
     part are held at 0."""
 
-    equations: LoopFormulas
+    system: LoopSystem
     motors: tuple[int, ...]
     lower: Array
     upper: Array
@@ -56,7 +57,6 @@ class TubedBranch(Value):
     def of(cls, proof: BranchProof) -> TubedBranch:
         """The parts of a proof that have cells; raises ``NothingProved`` where one has none."""
         system, table = proof.system, {name: i for i, name in enumerate(proof.system.names)}
-        equations = LoopFormulas.of(system)
         motors = tuple(table[name] for name in proof.motors)
         lower, upper = np.full(len(motors), -np.inf), np.full(len(motors), np.inf)
         parts = []
@@ -73,7 +73,7 @@ class TubedBranch(Value):
             low, high = proof.robot.limited.get(system.coordinates[i].joint, (-np.inf, np.inf))
             if not np.isfinite(lower[place]):  # in no loop
                 lower[place], upper[place] = max(low, -FARTHEST_MOTOR), min(high, FARTHEST_MOTOR)
-        return cls(equations, motors, lower, upper, tuple(parts))
+        return cls(system.metric, motors, lower, upper, tuple(parts))
 
     @property
     def passive(self) -> tuple[int, ...]:
@@ -83,23 +83,18 @@ class TubedBranch(Value):
     @property
     def idle(self) -> tuple[int, ...]:
         """The coordinates that are held."""
-        return tuple(i for i in range(len(self.equations.coordinates)) if i not in {*self.motors, *self.passive})
+        return tuple(i for i in range(len(self.system.coordinates)) if i not in {*self.motors, *self.passive})
 
     def unit(self, i: int) -> float:
         """What counts as 1 of a coordinate: the characteristic length, or a radian."""
-        return self.equations.mechanism.length if self.equations.coordinates[i].slides else 1.0
+        return self.system.mechanism.length if self.system.coordinates[i].slides else 1.0
 
     def unit_name(self, i: int) -> str:
         """Its unit's name."""
-        return "m" if self.equations.coordinates[i].slides else "rad"
+        return "m" if self.system.coordinates[i].slides else "rad"
 
     def evaluate(self, q: Array, x: Array) -> tuple[Array, Array]:
         """All equations (e,) and their derivatives (e, N) at q and x, in the order of ``motors`` and ``passive``."""
-        values = np.zeros(len(self.equations.coordinates))
+        values = np.zeros(len(self.system.coordinates))
         values[list(self.motors)], values[list(self.passive)] = q, x
-        found = self.equations.rows(list(values))
-        J = np.zeros((len(found), len(values)))
-        for row, (_, slopes) in zip(J, found, strict=True):
-            for i, slope in slopes.items():
-                row[i] = slope
-        return np.array([float(value) for value, _ in found]), J
+        return whole(self.system, self.system.loops, self.system.gears, values)

@@ -1,5 +1,5 @@
 """The loops of a mechanism as equations in joint coordinates, with derivatives: for many floats or affine forms at
-once.
+once, or for arrays of one symbol of a tape each.
 
 Every joint of the spanning tree is cut into coordinates of one axis each, in the order of the file: U its two axes, C
 slide then turn, planar two slides then the turn, spherical turns about the base's axes x, y, z (as they lie at zero).
@@ -22,7 +22,7 @@ from ...geometry.affine import crossed, dotted
 from ...geometry.vectors import Array, cross, frozen, hat, perpendicular
 from ...mechanism import Joint, JointType, Mechanism, graphs
 from ...results import Value
-from ...tolerances import SAME_POINT
+from ...tolerances import ROUNDED_AXIS, SAME_POINT
 
 _PREFERRED = {"F": 0, "6": 1, "P": 2, "R": 3, "C": 4, "U": 5, "E": 6, "S": 7}
 """Which joints the spanning tree takes first."""
@@ -113,6 +113,26 @@ class LoopSystem(Value):
         """The coordinates that are given."""
         return tuple(i for i, each in enumerate(self.coordinates) if each.driven)
 
+    @property
+    def metric(self) -> LoopSystem:
+        """The same in metres; what is zero but for rounding is zero."""
+        def point(p: Array) -> Array:
+            return frozen(_sharpened(p * self.length))
+
+        def row(each: LoopRow) -> LoopRow:
+            return replace(each, one=None if each.one is None else _sharpened(each.one),
+                           other=None if each.other is None else _sharpened(each.other))
+
+        units = self.units
+        return replace(
+            self, length=1.0,
+            coordinates=tuple(replace(each, axis=frozen(_sharpened(each.axis)), point=point(each.point))
+                              for each in self.coordinates),
+            loops=tuple(replace(each, point=point(each.point), rows=tuple(map(row, each.rows)))
+                        for each in self.loops),
+            gears=tuple(replace(each, ratio=float(each.ratio * units[each.second] / units[each.first]))
+                        for each in self.gears))
+
     def way(self, body: int) -> tuple[int, ...]:
         """The coordinates from the base to a body."""
         found = []
@@ -185,6 +205,11 @@ class Swept:
     def turned(self, k: int, v: Any) -> Any:
         """The rate (…, 3) of a direction v with the k-th coordinate, None where it is zero."""
         return None if self.points[k] is None else crossed(self.axes[k], v)
+
+
+def _sharpened(directions: Array) -> Array:
+    """Directions or points whose components that are zero but for rounding are zero."""
+    return np.where(np.abs(directions) < ROUNDED_AXIS, 0.0, directions)
 
 
 def mapped(R: Any, p: Any) -> Any:
