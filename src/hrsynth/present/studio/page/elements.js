@@ -1,0 +1,166 @@
+"use strict";
+/* Small pieces of a page. Nothing here writes markup: text is always text. */
+
+/* An element with its fields, attributes (`aria-…`, `data-…`, `role`, `for`) and children. */
+function element(kind, fields = {}, ...children) {
+  const made = document.createElement(kind);
+  for (const [name, value] of Object.entries(fields)) {
+    if (value === undefined || value === null || value === false) continue;
+    if (name.includes("-") || name === "role" || name === "for") made.setAttribute(name, value);
+    else made[name] = value;
+  }
+  made.append(...children.filter((child) => child !== null && child !== undefined));
+  return made;
+}
+
+function button(words, onclick, fields = {}) {
+  return element("button", { type: "button", textContent: words, onclick, ...fields });
+}
+
+let ids = 0;
+const fresh = (stem) => `${stem}-${(ids += 1)}`;
+
+/* A choice with its label; `options` are [value, words]. */
+function choice(words, options, chosen, onchange) {
+  const id = fresh("choice");
+  const list = element("select", { id }, ...options.map(([value, text]) => element("option", { value, textContent: text })));
+  list.value = chosen;
+  list.onchange = () => onchange(list.value);
+  return element("div", { className: "field" }, element("label", { for: id, textContent: words }), list);
+}
+
+/* Radio buttons that exclude each other; `options` are [value, words]. */
+function radios(words, options, chosen, onchange) {
+  const name = fresh("radios");
+  const group = element("fieldset", { className: "radios" }, element("legend", { textContent: words }));
+  for (const [value, text] of options) {
+    const input = element("input", { type: "radio", name, value, checked: value === chosen });
+    input.onchange = () => onchange(value);
+    group.append(element("label", {}, input, element("span", { textContent: text })));
+  }
+  return group;
+}
+
+/* A switch: a box to tick with its words. */
+function tick(words, checked, onchange) {
+  const input = element("input", { type: "checkbox", checked });
+  input.onchange = () => onchange(input.checked);
+  return element("label", { className: "tick" }, input, element("span", { textContent: words }));
+}
+
+/* A number in the unit that people read: degrees for radians. */
+function written(value, unit) {
+  if (value === null || value === undefined) return "";
+  return unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)} ${unit}`;
+}
+
+/* A slider with its label and what it stands at; `read` sets it without a call of `onmove`. */
+class Slider {
+  constructor({ label, unit, min, max, value, steps = 200 }, onmove, onset = () => {}) {
+    this.unit = unit;
+    const id = fresh("slider");
+    this.input = element("input", { type: "range", id });
+    Object.assign(this.input, { min, max, step: unit ? (max - min) / steps || 1e-6 : 1 });
+    this.output = element("output", { for: id });
+    this.root = element("div", { className: "slider" }, element("label", { for: id, textContent: label }), this.output, this.input);
+    this.input.oninput = () => { this.told(Number(this.input.value)); onmove(Number(this.input.value)); };
+    this.input.onchange = () => onset(Number(this.input.value));
+    this.read(value);
+  }
+
+  read(value) {
+    this.input.value = value;
+    this.told(value);
+  }
+
+  told(value) {
+    const words = this.unit ? written(value, this.unit) : String(value);
+    this.output.textContent = words;
+    this.input.setAttribute("aria-valuetext", words);
+  }
+
+  get value() { return Number(this.input.value); }
+}
+
+/* The command and the Python line that give the same, each with a button that copies it. */
+class Same {
+  constructor() {
+    this.root = element("details", { className: "same", hidden: true }, element("summary", { textContent: "The same as a command, in Python" }));
+    this.rows = ["command", "python"].map((key) => this.row(key));
+  }
+
+  row(key) {
+    const code = element("code"), copied = element("span", { className: "copied", role: "status" });
+    const words = key === "command" ? "Copy the command" : "Copy the Python line";
+    const copy = button("Copy", () => this.copy(code, copied), { "aria-label": words });
+    const root = element("div", { className: "line" }, code, copy, copied);
+    this.root.append(root);
+    return { key, code, root };
+  }
+
+  async copy(code, copied) {
+    const done = await navigator.clipboard.writeText(code.textContent).then(() => true, () => false);
+    if (!done) getSelection().selectAllChildren(code);
+    copied.textContent = done ? "Copied." : "Marked: copy it with Ctrl+C.";
+    setTimeout(() => { copied.textContent = ""; }, 2500);
+  }
+
+  show(answer) {
+    for (const { key, code, root } of this.rows) {
+      code.textContent = answer?.[key] || "";
+      root.hidden = !answer?.[key];
+    }
+    this.root.hidden = this.rows.every(({ root }) => root.hidden);
+  }
+}
+
+/* One line that says what is under way, with a button that ends it, or what went wrong. */
+class Status {
+  constructor() {
+    this.words = element("span", { role: "status" });
+    this.wrong = element("span", { role: "alert", className: "wrong" });
+    this.stop = button("Cancel", () => this.ondrop?.(), { hidden: true, className: "small" });
+    this.root = element("p", { className: "status" }, this.words, this.wrong, this.stop);
+  }
+
+  /* Show `words` while a promise is pending, once that takes a moment; the promise's error is shown and swallowed. */
+  async during(promise, words, ondrop) {
+    const turn = (this.turn = {});
+    const started = performance.now();
+    this.clear();
+    this.ondrop = ondrop;
+    const told = () => {
+      const seconds = Math.round((performance.now() - started) / 1000);
+      this.words.textContent = seconds < 2 ? `${words} …` : `${words} … ${seconds} s`;
+      this.stop.hidden = !ondrop;
+    };
+    const clock = [setTimeout(told, Status.QUIET), setInterval(told, Status.TICK)];
+    const over = () => { clock.forEach(clearTimeout); if (this.turn === turn) this.clear(); };
+    try {
+      const answer = await promise;
+      over();
+      return answer;
+    } catch (error) {
+      over();
+      if (this.turn === turn) this.fail(error.message);
+      return null;
+    }
+  }
+
+  clear() {
+    this.words.textContent = this.wrong.textContent = "";
+    this.stop.hidden = true;
+  }
+
+  say(words) {
+    this.clear();
+    this.words.textContent = words;
+  }
+
+  fail(words) {
+    this.clear();
+    this.wrong.textContent = words;
+  }
+}
+Status.QUIET = 300;   /* ms after which an ask is slow */
+Status.TICK = 2000;   /* ms between two words on how long it takes */

@@ -1,0 +1,110 @@
+"use strict";
+/* Which legs are watched, and what follows: the verdict, what is lost, the hidden robot, the smallest sets. */
+
+class LegsPanel extends Panel {
+  constructor(studio) {
+    super(studio, "legs", "Legs");
+    this.legs = element("fieldset", { className: "legs" });
+    this.verdict = element("div", { className: "verdict", "aria-live": "polite" });
+    this.lost = element("div", { className: "lost" });
+    this.player = new Player((frame) => studio.draw(frame), { loop: true, reduced: studio.reduced });
+    this.played = element("p", { className: "played" });
+    this.hidden = element("div", { className: "hidden-robot" });
+    this.sets = element("div", { className: "sets" });
+    this.body.append(this.legs, this.verdict, this.lost, this.player.root, this.played, this.hidden, this.sets);
+  }
+
+  opened(scene) {
+    this.legs.replaceChildren(element("legend", { textContent: "Watched legs" }), ...scene.legs.map((leg) => this.row(leg)));
+    for (const part of [this.verdict, this.lost, this.hidden, this.sets]) part.replaceChildren();
+    this.stop();
+    this.same.show(null);
+    this.refresh();
+  }
+
+  row({ name, words, can, why, watched }) {
+    const row = tick(name, watched, () => this.chosen());
+    const input = row.querySelector("input");
+    Object.assign(input, { value: name, disabled: !can });
+    row.append(element("small", { textContent: can ? words : `${words} – ${why}` }));
+    return row;
+  }
+
+  boxes() { return [...this.legs.querySelectorAll("input")]; }
+
+  /* A leg is ticked, or clicked in the picture. */
+  chosen() {
+    const names = this.boxes().filter(({ checked }) => checked).map(({ value }) => value);
+    if (names.length) this.studio.rewatch(names);
+    else this.status.say("Watch at least one leg.");
+  }
+
+  toggle(name) {
+    const box = this.boxes().find(({ value, disabled }) => value === name && !disabled);
+    if (box) { box.checked = !box.checked; this.chosen(); }
+  }
+
+  rewatched(names) {
+    this.boxes().forEach((box) => { box.checked = names.includes(box.value); });
+    this.refresh();
+  }
+
+  settled() { this.refresh(); }
+
+  async refresh() {
+    const found = await this.ask("watch", "Deriving the hidden robot");
+    if (!found) return;
+    this.found = found;
+    this.tell(found);
+    this.studio.stage.hidden(found.hidden);
+    this.studio.hasHidden(Boolean(found.hidden));
+    this.entered();
+    this.same.show(found);
+  }
+
+  tell({ verdict, rank, dof, lost, hidden_words: hidden, condition, sets, error }) {
+    const good = verdict.controllable;
+    const line = (words, more = {}) => (words ? element("p", { textContent: words, ...more }) : null);
+    this.verdict.className = `verdict ${good ? "good" : "bad"}`;
+    this.verdict.replaceChildren(
+      element("p", { className: "head" }, element("b", { textContent: verdict.words }), element("span", { className: "certainty", textContent: verdict.certainty })),
+      line(`${rank} of ${dof} freedoms are seen here.`), ...[line(error?.words)].filter(Boolean));
+    const head = lost.length ? [element("h3", { textContent: lost.length > 1 ? "Lost freedoms" : "Lost freedom" })] : [];
+    this.lost.replaceChildren(...head, ...lost.map(({ words }, i) =>
+      element("div", { className: "row" }, element("span", { textContent: words }), button("Play", () => this.play(i), { "aria-label": `Play: ${words}` }))));
+    this.hidden.replaceChildren(element("h3", { textContent: "Hidden robot" }),
+      ...[line(hidden), line(condition)].filter(Boolean));
+    this.sets.replaceChildren(...(sets?.length ? [element("h3", { textContent: "Smallest sets of legs" })] : []),
+      ...(sets || []).map(({ legs, words }) => element("div", { className: "row" },
+        button(legs.join(", "), () => this.studio.rewatch(legs), { "aria-label": `Watch ${legs.join(", ")}` }), element("span", { textContent: words }))));
+  }
+
+  async play(index) {
+    this.stop();
+    const found = await this.ask("play", "Following the lost freedom", { lost: index });
+    if (!found) return;
+    this.played.textContent = found.words;
+    this.player.load(found.frames, LegsPanel.SECONDS);
+    this.player.play();
+  }
+
+  stop() {
+    this.player.load([], 1);
+    this.played.textContent = "";
+    if (this.studio.state) this.studio.draw(this.studio.state);
+  }
+
+  entered() {
+    if (!this.studio.isShown(this.key)) return;
+    this.studio.stage.lost(this.found?.lost || []);
+    this.studio.stage.ellipsoid(this.found?.ellipsoid || null);
+    this.studio.relegend();
+  }
+
+  left() {
+    this.stop();
+    this.studio.stage.lost([]);
+    this.studio.stage.ellipsoid(null);
+  }
+}
+LegsPanel.SECONDS = 3;  /* how long a lost freedom is played, there and back */

@@ -1,0 +1,43 @@
+"use strict";
+/* The platform is moved by a slider for each of its freedoms, or dragged in the picture. */
+
+class MovePanel extends Panel {
+  constructor(studio) {
+    super(studio, "move", "Move");
+    this.sliders = [];
+    this.list = element("div", { className: "sliders" });
+    this.drag = tick("Drag the platform in the picture", false, (on) => this.grip(on));
+    this.body.append(this.list, element("div", { className: "row" }, button("Home", () => this.home()), this.drag));
+  }
+
+  opened(scene) {
+    this.list.replaceChildren();
+    this.sliders = scene.sliders.map((record) => {
+      const slider = new Slider({ ...record, value: record.home }, () => this.send());
+      this.list.append(slider.root);
+      return slider;
+    });
+    this.drag.querySelector("input").checked = false;
+    this.grip(false);
+    this.status.clear();
+    this.same.show(scene);
+  }
+
+  send() { this.studio.move({ values: this.sliders.map(({ value }) => value) }); }
+
+  home() { this.studio.move({ values: null, here: null }); }
+
+  grip(on) {
+    this.dragging = on;
+    this.studio.stage.gizmo(on, this.studio.state, (place) => this.studio.move({ platform: place }));
+  }
+
+  /* While a slider is held its own value stays; at rest all show what was reached. */
+  moved(answer) {
+    if (this.studio.moving) return;
+    this.sliders.forEach((slider, i) => slider.read(this.studio.values[i]));
+    if (answer.stopped) this.status.say("The robot goes no further that way.");
+    else this.status.clear();
+    if (answer.command) this.same.show(answer);
+  }
+}

@@ -1,0 +1,101 @@
+"use strict";
+/* Which robot: a gallery of the shipped ones, the files of the folder, a file of one's own; and what was guessed. */
+
+class RobotPanel extends Panel {
+  constructor(studio) {
+    super(studio, "robot", "Robot");
+    this.guesses = element("div", { className: "guesses" });
+    this.notes = element("ul", { className: "notes" });
+    this.files = element("div", { className: "files" });
+    this.gallery = element("ul", { className: "gallery", "aria-label": "Shipped robots" });
+    this.mine = new Map();
+    const input = element("input", { type: "file", multiple: true, id: fresh("file") });
+    input.onchange = () => { this.take([...input.files]); input.value = ""; };
+    this.drop = element("div", { className: "drop" },
+      element("label", { for: input.id, textContent: "Drop a robot file here, with its meshes if it has any, or choose one" }), input);
+    this.body.append(this.guesses, this.notes, this.drop, this.files,
+      element("h3", { textContent: "Shipped robots" }), this.gallery);
+    for (const [name, over] of [["dragover", true], ["dragleave", false], ["drop", false]])
+      document.addEventListener(name, (event) => this.dragged(event, over));
+  }
+
+  /* A file may be dropped anywhere on the page. */
+  dragged(event, over) {
+    if (![...(event.dataTransfer?.types || [])].includes("Files")) return;
+    event.preventDefault();
+    this.drop.classList.toggle("over", over && event.relatedTarget !== null);
+    if (event.type === "drop") { this.studio.show("robot"); this.take([...event.dataTransfer.files]); }
+  }
+
+  /* The gallery, and the files of the folder. */
+  async fill() {
+    const found = await this.ask("gallery", "Looking for robots");
+    if (!found) return;
+    this.gallery.replaceChildren(...found.robots.map((robot) => this.card(robot)));
+    this.folder = found.files;
+    this.list();
+  }
+
+  card({ source, name, title, words, picture }) {
+    const image = element("img", { alt: "", src: `data:image/svg+xml;charset=utf-8,${encodeURIComponent(picture)}` });
+    const card = button("", () => this.studio.open({ source, options: {} }), { className: "card", "data-source": source });
+    card.append(image, element("b", { textContent: title || name }), element("span", { textContent: words }));
+    return element("li", {}, card);
+  }
+
+  list() {
+    const files = [...[...this.mine.keys()].filter(RobotPanel.isRobot).map((name) => [`file:${name}`, name]),
+      ...(this.folder || []).map((name) => [`folder:${name}`, name])];
+    this.files.replaceChildren(...files.map(([source, name]) =>
+      button(name, () => this.studio.open({ source, options: {} }), { className: "file", "data-source": source })));
+    this.mark();
+  }
+
+  mark() {
+    for (const each of this.root.querySelectorAll("[data-source]"))
+      each.setAttribute("aria-current", each.dataset.source === this.studio.robot?.source);
+  }
+
+  /* Send files, and open the first that may be a robot. */
+  async take(files) {
+    const names = [];
+    for (const file of files) {
+      const name = await this.status.during(this.studio.link.upload(file), `Sending ${file.name}`);
+      if (!name) return;
+      this.mine.set(name, file);
+      names.push(name);
+    }
+    this.list();
+    const robot = names.find(RobotPanel.isRobot);
+    if (robot) await this.studio.open({ source: `file:${robot}`, options: {} });
+    else if (names.length) this.status.say(`${names.join(", ")}: kept for the robot file that names ${names.length > 1 ? "them" : "it"}.`);
+  }
+
+  /* After a break the server has a new folder for this tab: what was dropped in goes there again. */
+  async again() {
+    for (const file of this.mine.values()) await this.studio.link.upload(file).catch((error) => this.status.fail(error.message));
+  }
+
+  opened(scene) {
+    this.guesses.replaceChildren(...(scene.guesses || []).map((guess) => this.guess(guess)));
+    if (this.guesses.children.length)
+      this.guesses.prepend(element("h3", { textContent: "What the file does not say" }),
+        element("p", { textContent: `Read as ${scene.dialect}. These were found; choose others if they are wrong.` }));
+    this.notes.replaceChildren(...(scene.notes || []).map((note) => element("li", { textContent: note })));
+    this.same.show(scene);
+    this.mark();
+  }
+
+  /* What was guessed: another choice opens the robot anew with it. */
+  guess({ name, found, why, candidates }) {
+    const id = fresh("why"), robot = this.studio.robot;
+    const words = (value) => (Array.isArray(value) ? value.join(", ") : String(value));
+    const options = (candidates?.length ? candidates : [found]).map((value) => [JSON.stringify(value), words(value)]);
+    const field = choice(name, options, JSON.stringify(found), (value) =>
+      this.studio.open({ source: robot.source, options: { ...robot.options, [name]: JSON.parse(value) } }));
+    field.querySelector("select").setAttribute("aria-describedby", id);
+    field.append(element("small", { id, textContent: why }));
+    return field;
+  }
+}
+RobotPanel.isRobot = (name) => /\.(urdf|xacro|xml|mjcf|sdf|world|usd|usda|usdc|usdz|json|ya?ml|toml)$/i.test(name);

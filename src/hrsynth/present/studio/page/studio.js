@@ -1,0 +1,208 @@
+"use strict";
+/* The page: which robot, which legs, where it stands; panels ask and show, the stage draws. */
+
+const $ = (id) => document.getElementById(id);
+
+class Studio {
+  constructor() {
+    this.reduced = matchMedia("(prefers-reduced-motion: reduce)").matches;
+    this.stage = new Stage($("pane"), { reduced: this.reduced });
+    this.stage.onpick = (kind, name) => { if (kind === "leg") this.panels.legs?.toggle(name); };
+    this.link = new Link({ onstart: (said) => this.begin(said), onback: () => this.back(), onlost: () => this.lost() });
+    this.pending = 0;
+    this.tools();
+    $("legend").open = !matchMedia("(max-width: 760px)").matches;
+    document.addEventListener("keydown", (event) => { if (event.key === "Escape") this.stop(); });
+  }
+
+  begin({ start, panels }) {
+    const kinds = panels ? [RobotPanel, MovePanel, LegsPanel, ModesPanel, PlanePanel, ServoPanel, ExportPanel] : [MovePanel, ModesPanel];
+    const made = kinds.map((Kind) => new Kind(this));
+    this.panels = Object.fromEntries(made.map((panel) => [panel.key, panel]));
+    document.body.classList.toggle("plain", !panels);
+    if (panels) this.tabs = new Tabs($("panels"), made, (key, before) => { this.panels[before]?.left(); this.panels[key].entered(); });
+    else $("panels").append(...made.map(({ root }) => root));
+    this.show(start ? "move" : "robot");
+    this.panels.robot?.fill();
+    if (start) this.open(start.source ? start : { source: start, options: {} }, start);
+    else { $("answer").textContent = "Pick a robot, or drop a robot file in."; this.ready(); }
+  }
+
+  ready() { requestAnimationFrame(() => { document.body.dataset.ready = "yes"; }); }
+
+  /* The connection is gone; it is back, with an empty folder for this tab. */
+  lost() {
+    $("lost-link").hidden = false;
+    $("lost-link").textContent = "The connection to hrsynth is lost. Trying again … If you have ended it, start it once more and open the address that it prints.";
+  }
+
+  async back() {
+    await this.panels.robot?.again();
+    $("lost-link").hidden = true;
+    this.say("Connected again.");
+  }
+
+  show(key) { if (this.tabs) this.tabs.choose(key); }
+
+  isShown(key) { return this.tabs ? this.tabs.chosen === key : key in this.panels; }
+
+  each(what, ...more) { Object.values(this.panels).forEach((panel) => panel[what](...more)); }
+
+  say(words) { $("said").textContent = words; }
+
+  /* What each ask carries. */
+  asked() {
+    return { robot: this.robot, watch: this.watch, camera: this.camera, here: this.here };
+  }
+
+  /* Another robot; the one that is shown stays until the new one is read. */
+  async open(robot, { watch = null, camera = null } = {}) {
+    const given = { source: robot.source, options: robot.options || {} };
+    const { status } = this.panels.robot || this.panels.move;
+    const scene = await status.during(this.link.ask("open", { robot: given, watch, camera, here: null }), "Reading the robot", () => this.link.cancel("open"));
+    this.ready();
+    if (!scene) { if (!this.scene) this.show("robot"); return; }
+    Object.assign(this, { robot: given, camera, scene, here: scene.here ?? null });
+    this.watch = scene.legs.filter(({ watched }) => watched).map(({ name }) => name);
+    this.values = scene.values ?? scene.sliders.map(({ home }) => home);
+    $("name").textContent = scene.name;
+    $("words").textContent = scene.words;
+    document.title = `${scene.name} – hrsynth studio`;
+    this.stage.scene(scene);
+    this.stage.watch(this.watch);
+    this.hasHidden(false);
+    this.draw((this.state = scene.state));
+    this.each("opened", scene);
+    this.stage.fit();
+    this.relegend();
+    this.answer();
+  }
+
+  /* The plain answer, on top. */
+  async answer() {
+    if (!this.panels.robot) return;
+    const { robot } = this;
+    $("answer").textContent = "Which legs to watch is being worked out …";
+    $("answer-actions").replaceChildren();
+    const found = await this.link.ask("answer", { robot, camera: this.camera }).catch((error) => ({ sentences: [error.message] }));
+    if (!found || robot !== this.robot) return;
+    $("answer").textContent = found.sentences.join(" ");
+    if (!found.watch?.length) return;
+    const same = new Same();
+    same.show(found);
+    $("answer-actions").replaceChildren(button(`Watch ${found.watch.join(", ")}`, () => this.rewatch(found.watch), { className: "small" }), same.root);
+  }
+
+  /* Move the platform; each answer is drawn, and what stands still for a moment has settled. */
+  async move(fields) {
+    this.pending += 1;
+    this.moving = true;
+    const ask = () => ({ ...this.asked(), hidden: this.sees, ...fields });
+    const robot = this.robot;
+    const answer = await this.link.ask("move", ask).catch((error) => { this.panels.move.status.fail(error.message); return null; });
+    this.pending -= 1;
+    this.moving = this.pending > 0;
+    if (!answer || robot !== this.robot) return;
+    this.arrive(answer);
+  }
+
+  arrive(answer) {
+    Object.assign(this, { here: answer.here, values: answer.values, state: answer.state });
+    this.draw(answer.state);
+    this.each("moved", answer);
+    clearTimeout(this.rest);
+    if (!this.moving) this.rest = setTimeout(() => this.each("settled"), Studio.REST);
+  }
+
+  /* Go to a configuration that is known, seen on the way unless motion is to be reduced. */
+  async fly(places, here) {
+    this.here = here;
+    if (places && !this.reduced) await this.glide(this.state, { ...this.state, real: places });
+    this.move({ values: null, here, stay: true });
+  }
+
+  glide(from, to) {
+    const began = performance.now();
+    return new Promise((done) => {
+      const step = (now) => {
+        const part = Math.min(1, Math.max(0, now - began) / Studio.FLIGHT);
+        this.stage.state({ ...to, real: to.real.map((place, i) => between(from.real[i], place, part)) });
+        if (part < 1) requestAnimationFrame(step);
+        else done();
+      };
+      requestAnimationFrame(step);
+    });
+  }
+
+  rewatch(names) {
+    this.watch = names;
+    if (this.here) this.here = { ...this.here, hidden: null };
+    this.stage.watch(names);
+    this.each("rewatched", names);
+  }
+
+  draw(state) {
+    this.stage.state(state);
+    $("now").textContent = state.error ? state.error.words : "";
+    $("now").hidden = !state.error;
+    if (this.step !== state.error?.step) this.relegend();
+    this.step = state.error?.step;
+  }
+
+  tools() {
+    const layouts = [["real", "Robot"], ["hidden", "Hidden robot"], ["overlay", "Both, overlaid"], ["beside", "Side by side"]];
+    this.layouts = radios("Shown", layouts, "real", (layout) => this.arrange(layout));
+    $("tools").append(this.layouts, button("Fit", () => this.stage.fit(), { "aria-label": "Fit the robot into the picture" }));
+    this.hasHidden(false);
+  }
+
+  /* Whether there is a hidden robot to be shown; what was chosen stays chosen. */
+  hasHidden(there) {
+    this.layouts.querySelectorAll("input").forEach((input) => { input.disabled = !there && input.value !== "real"; });
+    if (there && this.sees) this.arrange(this.layout);
+    else if (!there) this.stage.layout("real");
+  }
+
+  arrange(layout) {
+    this.layout = layout;
+    this.sees = layout !== "real";
+    this.stage.layout(layout);
+    if (this.sees) this.move({ values: this.values });
+    this.stage.fit();
+    this.relegend();
+  }
+
+  relegend() {
+    const entries = this.stage.legend().map(({ colour, words, now }) => {
+      const swatch = element("i", { "aria-hidden": "true" });
+      swatch.style.background = colour;
+      return element("li", { "aria-current": now ? "true" : null }, swatch, now ? `${words} (here)` : words);
+    });
+    $("legend").querySelector("ul").replaceChildren(...entries);
+    $("legend").hidden = !entries.length;
+  }
+
+  /* Escape: what plays stops, what is asked for in the panel that is seen is cancelled. */
+  stop() {
+    for (const panel of Object.values(this.panels || {})) if (this.isShown(panel.key)) {
+      panel.stop();
+      if (!panel.status.stop.hidden) panel.status.stop.click();
+    }
+  }
+}
+Studio.REST = 300;    /* ms without a move after which the robot is at rest */
+Studio.FLIGHT = 600;  /* ms of a flight to another mode */
+
+/* A place (position, quaternion) between two others. */
+function between(from, to, part) {
+  const near = from.slice(3).reduce((sum, value, i) => sum + value * to[3 + i], 0) < 0 ? -1 : 1;
+  const mixed = from.map((value, i) => (1 - part) * value + part * (i < 3 ? to[i] : near * to[i]));
+  const size = Math.hypot(...mixed.slice(3));
+  return mixed.map((value, i) => (i < 3 ? value : value / size));
+}
+
+try {
+  window.studio = new Studio();
+} catch (error) {
+  $("pane").append(element("p", { className: "broken", textContent: `The picture needs WebGL: ${error.message}` }));
+}
