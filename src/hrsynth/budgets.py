@@ -245,6 +245,39 @@ REMEMBERED_ANSWERS = 64
 REMEMBERED_GRIDS = 2
 """Answers over grids and planes of poses that are kept: they may be large."""
 
+# The page to work in
+
+MOST_TABS = 8
+"""Tabs of the page that are served at once: each has two processes."""
+MOST_CONNECTIONS = 100
+"""Connections to its server at once."""
+MOST_WAITING = 64
+"""Asks of a tab that wait for one of its processes."""
+LARGEST_ASK = 256 * 1024
+"""Bytes of a message of the page."""
+LARGEST_ANSWER = 64 * 1024 * 1024
+"""Bytes of an answer to it."""
+LARGEST_UPLOAD = 20_000_000
+"""Bytes of a file that is dropped into the page."""
+MOST_UPLOADS = 50
+"""Files that a tab holds."""
+LONGEST_FILE_NAME = 200
+"""Bytes of the name of such a file."""
+MOVE_SECONDS = 10.0
+"""Seconds after which a move of the robot is given up, and its process ended."""
+ASK_SECONDS = 120.0
+"""The same for any other ask."""
+WORKER_START_SECONDS = 60.0
+"""Seconds after which a process that does not start is given up."""
+WORKER_BYTES = 4 * 1024**3
+"""Bytes of memory (addresses) that such a process may have."""
+SENDER_SECONDS = 10.0
+"""Seconds in which a request's head must be here, and each further part of its body."""
+UPLOAD_SECONDS = 60.0
+"""Seconds in which a whole file must be here."""
+FAREWELL_SECONDS = 2.0
+"""Seconds that open connections are given when the server ends."""
+
 # Generated programs
 
 NEWTON_STEPS_AT_RUN = 8

@@ -84,6 +84,14 @@ class NoSegment(BadRequest):
     """A leg without a segment whose direction could be observed: it is one joint, or its links have no length."""
 
 
+class FileTooLarge(BadRequest):
+    """A file that is larger than what is taken: its name, and bytes at most."""
+
+    def __init__(self, name: str, most: int) -> None:
+        self.name, self.most = name, most
+        super().__init__("a file that is too large", name, f"at most {most / 1e6:g} MB")
+
+
 class BadMechanism(BadRequest):
     """A mechanism whose parts contradict each other (a joint of an unknown link, a zero axis)."""
 

@@ -11,7 +11,7 @@ from typing import Annotated
 
 import typer
 
-from . import completion, files, importing, lint, schema
+from . import completion, files, importing, lint, schema, studio
 from .catalog import catalog
 from .commands import HELP, WholeGroup
 from .questions import QUESTIONS
@@ -25,6 +25,7 @@ for question in QUESTIONS:
 lint.add(app)
 files.add(app)
 importing.add(app)
+studio.add(app)
 app.add_typer(catalog)
 schema.add(app)
 completion.add(app)

@@ -1,0 +1,57 @@
+"""The page to work in: the server is started, its address told, and it ends with Ctrl-C."""
+
+from __future__ import annotations
+
+import signal
+import sys
+import threading
+from typing import TYPE_CHECKING, Any
+
+import typer
+
+from .commands import add_command
+from .options import CAMERA, WATCHING, Option, listed, shipped
+
+if TYPE_CHECKING:
+    from ..present.studio.server import StudioServer
+
+PORT = Option("port", "Port of the server (default: any that is free).", None, int, 0, low=0, high=65535)
+
+
+def studio(robot: str | None, observe: str | None, camera: str | None, port: int, browser: bool) -> None:
+    """Serve the page until Ctrl-C."""
+    from ..present.studio.server import studio as started
+
+    watched = None if observe is None else listed(observe)
+    serve(started(robot, watched, camera, port=port, open_=browser), "The studio")
+
+
+def serve(server: StudioServer, what: str) -> None:
+    """Tell where the page is, and wait until Ctrl-C or the end of the terminal; nothing is left then."""
+
+    def end(*_: Any) -> None:
+        raise KeyboardInterrupt
+
+    if threading.current_thread() is threading.main_thread():
+        for number in (signal.SIGTERM, signal.SIGHUP):
+            signal.signal(number, end)
+    try:
+        typer.echo(f"{what} is served at {server.address} (Ctrl-C ends it).")
+        sys.stdout.flush()
+        server.wait()
+    except KeyboardInterrupt:
+        pass
+    finally:
+        server.stop()
+
+
+def add(app: typer.Typer) -> None:
+    """Make it a command."""
+    add_command(app, "studio", "The page to work in, in the browser: a robot, a folder of robots or what is dropped "
+                "in, its hidden robot, its modes, its accuracy and runs, live.",
+                (Option("robot", "A robot file in any dialect, a shipped robot's name, example:NAME, or a folder.",
+                        "[ROBOT|FOLDER]", argument=True, words=shipped),
+                 Option("observe", "Legs to watch (1,4), links, or all (default: what the file says).", "LEGS",
+                        group=WATCHING), CAMERA, PORT,
+                 Option("browser", "Open the page in the browser.", None, bool, True, ("--browser/--no-browser",))),
+                studio, ("quattro --observe 1,4", "robots/ --port 8000 --no-browser"))

@@ -1,0 +1,183 @@
+"""The server's side of the processes that answer: where they come from, and the line of asks before each."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import json
+import os
+import socket
+import subprocess
+import sys
+from collections import deque
+from collections.abc import Awaitable, Callable
+from dataclasses import dataclass, field
+from threading import Lock
+from typing import Any
+
+from ...budgets import LARGEST_ANSWER, MOST_WAITING, WORKER_START_SECONDS
+
+DESK = "hrsynth.present.studio.desk:Desk"
+"""What answers."""
+START = ("import sys, json; sys.path[:] = json.loads(sys.argv[1]); from {} import main; "
+         "main(int(sys.argv[2]), sys.argv[3])")
+HEAD = 4
+"""Bytes of a frame's length."""
+
+
+class ForkServer:
+    """A process with all modules loaded, from which others are forked quickly; it starts when this is made."""
+
+    def __init__(self, desk: str = DESK) -> None:
+        self.desk, self.lock, self.closed = desk, Lock(), False
+        self._start()
+
+    def _start(self) -> None:
+        self.control, other = socket.socketpair()
+        quiet = None if os.environ.get("HRSYNTH_DEBUG") else subprocess.DEVNULL
+        with other:
+            self.process = subprocess.Popen(
+                [sys.executable, "-I", "-c", START.format(f"{__package__}.worker"), json.dumps(sys.path),
+                 str(other.fileno()), self.desk],
+                stdin=subprocess.DEVNULL, stdout=quiet, stderr=quiet, pass_fds=[other.fileno()], start_new_session=True)
+
+    def channel(self) -> socket.socket:
+        """The near end of the channel to a new child; closing it kills the child. Raises ``OSError``."""
+        near, far = socket.socketpair()
+        with far:
+            try:
+                with self.lock:
+                    if self.closed:
+                        raise ConnectionError("closed")
+                    if self.process.poll() is not None:
+                        self.control.close()
+                        self._start()
+                    socket.send_fds(self.control, [b"+"], [far.fileno()])
+            except OSError:
+                near.close()
+                raise
+        near.setblocking(False)
+        return near
+
+    def close(self) -> None:
+        """End it and all its children."""
+        with self.lock:
+            self.closed = True
+            self.control.close()
+        try:
+            self.process.wait(1.0)
+        except subprocess.TimeoutExpired:  # still loading modules, without children
+            self.process.kill()
+            self.process.wait()
+
+
+@dataclass
+class WorkerProcess:
+    """One process of a tab, and the asks that wait for it: one is answered at a time, in order.
+
+    An ask that takes longer than ``seconds``, is cancelled, or whose process ends costs the process; the next has a new
+    one. Asks carry all that they need, so nothing is lost with it.
+    """
+
+    forks: ForkServer
+    setup: bytes
+    seconds: float
+    send: Callable[[str], Awaitable[None]]
+    waiting: deque[tuple[int, bytes]] = field(default_factory=deque)
+    current: tuple[int, asyncio.Task[str]] | None = None
+    streams: tuple[asyncio.StreamReader, asyncio.StreamWriter] | None = None
+    more: asyncio.Event = field(default_factory=asyncio.Event)
+
+    def ask(self, number: int, text: bytes) -> bool:
+        """Put an ask into the line; whether there is room."""
+        if len(self.waiting) >= MOST_WAITING:
+            return False
+        self.waiting.append((number, text))
+        self.more.set()
+        return True
+
+    def cancel(self, number: int) -> bool:
+        """Give an ask up; whether it was waiting here or being answered."""
+        if self.current is not None and self.current[0] == number:
+            return self.current[1].cancel()
+        kept = [each for each in self.waiting if each[0] != number]
+        found = len(kept) < len(self.waiting)
+        self.waiting = deque(kept)
+        return found
+
+    async def run(self) -> None:
+        """Answer until cancelled; the process ends with this."""
+        try:
+            with contextlib.suppress(OSError, EOFError, TimeoutError):
+                await self._started()  # before the first ask comes
+            while True:
+                while not self.waiting:
+                    self.more.clear()
+                    await self.more.wait()
+                number, text = self.waiting.popleft()
+                task = asyncio.create_task(self._answered(number, text))
+                self.current = number, task
+                try:
+                    await asyncio.wait([task])
+                finally:
+                    self.current = None
+                    task.cancel()
+                await self.send(gone(number, "given up", "Cancelled") if task.cancelled() else task.result())
+        finally:
+            self._end()
+
+    async def _answered(self, number: int, text: bytes) -> str:
+        """The message that answers an ask."""
+        whole = False
+        try:
+            reader, writer = await self._started()
+            writer.write(framed(text))
+            async with asyncio.timeout(self.seconds):
+                await writer.drain()
+                answer = await _frame(reader)
+            whole = True
+            return answer.decode()
+        except TimeoutError:
+            return gone(number, f"that takes longer than {self.seconds:g} seconds and was given up", "TooSlow")
+        except (OSError, EOFError):
+            return gone(number, "the process that was to answer has ended: it may have run out of memory", "Ended")
+        finally:
+            if not whole:
+                self._end()
+
+    async def _started(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
+        """The process, made where there is none, ready to answer."""
+        if self.streams is None:
+            channel = await asyncio.to_thread(self.forks.channel)
+            self.streams = reader, writer = await asyncio.open_unix_connection(sock=channel)
+            writer.write(framed(self.setup))
+            try:
+                async with asyncio.timeout(WORKER_START_SECONDS):
+                    await _frame(reader)
+            except BaseException:
+                self._end()
+                raise
+        return self.streams
+
+    def _end(self) -> None:
+        if self.streams is not None:
+            self.streams[1].transport.abort()
+            self.streams = None
+
+
+def framed(text: bytes) -> bytes:
+    """A frame, as the other side reads it."""
+    return len(text).to_bytes(HEAD, "big") + text
+
+
+async def _frame(reader: asyncio.StreamReader) -> bytes:
+    size = int.from_bytes(await reader.readexactly(HEAD), "big")
+    if size > 2 * LARGEST_ANSWER:
+        raise EOFError(size)
+    return await reader.readexactly(size)
+
+
+def gone(number: int | None, error: str, kind: str) -> str:
+    """The message of an ask that has no answer."""
+    message: dict[str, Any] = {"n": number, "error": error, "kind": kind}
+    return json.dumps(message)

@@ -1,0 +1,193 @@
+"""The server of the page, on this machine alone. It reads no robot: it shows files of its own and passes asks on."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import os
+import socket
+import tempfile
+import threading
+import time
+import webbrowser
+from collections.abc import Iterable
+from http import HTTPStatus
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...budgets import FAREWELL_SECONDS, LARGEST_ASK, MOST_CONNECTIONS, SENDER_SECONDS
+from ...errors import BadRequest, FileTooLarge, MissingExtra
+from .guard import HOST, Guard
+from .processes import DESK, ForkServer
+from .tabs import Opening, Tabs
+
+if TYPE_CHECKING:
+    from starlette.requests import Request
+    from starlette.responses import Response
+    from uvicorn import Server
+
+PAGE = Path(__file__).parent / "page"
+TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8",
+         ".css": "text/css; charset=utf-8", ".svg": "image/svg+xml"}
+"""What is shown of the page's folder."""
+MAIN = "studio.html"
+
+
+def studio(robot: str | Path | None = None, observe: Iterable[str | int] | str | None = None,
+           camera: str | None = None, *, port: int = 0, open_: bool = True) -> StudioServer:
+    """Serve the page to work in on this machine, with a robot, a folder of robots or nothing, and open it in the
+    browser: a server with ``address`` and ``stop()``. Port 0 is any that is free.
+
+    Raises ``BadRequest`` for a name of no robot and a port that cannot be had, ``BadRobotFile`` for a file that there
+    is none, ``MissingExtra``.
+
+    >>> server = hrsynth.studio("3rrr_m1", open_=False)
+    >>> server.stop()
+    """
+    from ...description import file_of
+    from ...description.overrides import names
+    from ...description.xml import content
+
+    here = Opening()
+    if robot is not None and Path(robot).is_dir():
+        here = Opening(folder=Path(robot))
+    elif robot is not None:
+        content(file_of(robot))
+        watched = names(observe if observe is None or isinstance(observe, str) else map(str, observe))
+        here = Opening(given={"robot": str(robot), "options": {}}, start={
+            "start": {"source": "given", "options": {}}, "camera": camera,
+            "watch": None if watched in (None, ("all",)) else list(watched)})
+    server = StudioServer(here, port)
+    if open_:
+        server.show()
+    return server
+
+
+def application(tabs: Tabs) -> Any:
+    """Its paths below the secret: the page, its files, the socket of a tab, and what is dropped into one."""
+    from starlette.applications import Starlette
+    from starlette.responses import JSONResponse, Response
+    from starlette.routing import Route, WebSocketRoute
+
+    async def page(request: Request) -> Response:
+        name = request.path_params.get("name", MAIN)
+        known = {file.name: file for file in PAGE.iterdir() if file.suffix in TYPES}
+        if name not in known:
+            return Response(status_code=HTTPStatus.NOT_FOUND)
+        return Response(known[name].read_bytes(), media_type=TYPES[known[name].suffix])
+
+    async def upload(request: Request) -> Response:
+        tab, name = tabs.open.get(request.query_params.get("tab", "")), request.query_params.get("name", "")
+        if tab is None:
+            return Response(status_code=HTTPStatus.NOT_FOUND)
+        try:
+            tab.uploads.require(name, request.headers.get("content-length"))
+            await tab.uploads.receive(name, request.stream())
+        except BadRequest as error:
+            status = HTTPStatus.REQUEST_ENTITY_TOO_LARGE if isinstance(error, FileTooLarge) else HTTPStatus.BAD_REQUEST
+            return JSONResponse({"error": str(error), "kind": type(error).__name__}, status)
+        except TimeoutError:
+            return Response(status_code=HTTPStatus.REQUEST_TIMEOUT)
+        return JSONResponse({"file": name})
+
+    return Starlette(routes=[Route("/", page), Route("/{name}", page, methods=["GET"]),
+                             Route("/upload", upload, methods=["POST"]), WebSocketRoute("/live", tabs.serve)])
+
+
+class StudioServer:
+    """A server in a thread of its own: the ``address`` of its page, and ``stop()``.
+
+    Raises ``BadRequest`` for a port that cannot be had (0: any that is free), ``MissingExtra``.
+    """
+
+    def __init__(self, opening: Opening, port: int = 0, *, desk: str = DESK) -> None:
+        listener = bound(port)
+        try:
+            forks = ForkServer(desk)  # while modules are loaded there, the server's are loaded here
+            self.server, guard, self.folder = made(opening, listener.getsockname()[1], forks)
+        except BaseException:
+            listener.close()
+            raise
+        self.forks, self.guard = forks, guard
+        self.root = f"http://{HOST}:{listener.getsockname()[1]}/"
+        self.address = f"{self.root}{guard.secret}/"
+        self.thread = threading.Thread(target=self._run, args=(listener,), daemon=True)
+        self.thread.start()
+        while not self.server.started and self.thread.is_alive():
+            time.sleep(0.005)
+
+    def _run(self, listener: socket.socket) -> None:
+        with self.folder, contextlib.suppress(SystemExit):
+            try:
+                asyncio.run(self.server.serve([listener]))
+            finally:
+                self.forks.close()
+
+    def show(self) -> None:
+        """Open the page in the browser."""
+        threading.Thread(target=webbrowser.open, args=(self.root + self.guard.door() + "/",), daemon=True).start()
+
+    def wait(self) -> None:
+        """Wait until it ends."""
+        self.thread.join()
+
+    def stop(self) -> None:
+        """End it, with all its processes and what was dropped into its page."""
+        self.server.should_exit = True
+        self.thread.join()
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.address}>"
+
+
+def made(opening: Opening, port: int, forks: ForkServer) -> tuple[Server, Guard, tempfile.TemporaryDirectory[str]]:
+    """The server, not started, who guards it, and the folder of what is dropped into its pages."""
+    try:
+        import h11
+        import uvicorn
+        from uvicorn.protocols.http.h11_impl import H11Protocol
+        from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
+    except ImportError:
+        raise MissingExtra("the studio", "studio") from None
+
+    class PatientProtocol(H11Protocol):
+        """A connection on which a request must come in time; each has one."""
+
+        def connection_made(self, transport: Any) -> None:
+            super().connection_made(transport)
+            self.patience = self.loop.call_later(SENDER_SECONDS, self._give_up)
+
+        def _give_up(self) -> None:
+            if self.conn.their_state is h11.IDLE:
+                self.transport.close()
+
+        def handle_websocket_upgrade(self, event: Any) -> None:
+            self.patience.cancel()
+            super().handle_websocket_upgrade(event)
+
+        def connection_lost(self, exc: Exception | None) -> None:
+            self.patience.cancel()
+            super().connection_lost(exc)
+
+    folder = tempfile.TemporaryDirectory(prefix="hrsynth-", ignore_cleanup_errors=True)
+    guard = Guard(application(Tabs(forks, opening, Path(folder.name))), port)
+    config = uvicorn.Config(
+        guard, http=PatientProtocol, ws=WebSocketsSansIOProtocol, lifespan="off", loop="asyncio", log_config=None,
+        log_level="debug" if os.environ.get("HRSYNTH_DEBUG") else "critical", access_log=False, server_header=False,
+        proxy_headers=False, limit_concurrency=MOST_CONNECTIONS, ws_max_size=LARGEST_ASK, ws_per_message_deflate=False,
+        timeout_graceful_shutdown=int(FAREWELL_SECONDS))
+    return uvicorn.Server(config), guard, folder
+
+
+def bound(port: int) -> socket.socket:
+    """A socket at a port, which nobody else has; raises ``BadRequest`` for one that cannot be had."""
+    listener = socket.socket()
+    try:
+        listener.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+        listener.bind((HOST, port))
+        listener.listen(MOST_CONNECTIONS)
+    except (OSError, OverflowError) as error:
+        listener.close()
+        reason = getattr(error, "strerror", None) or "no such port"
+        raise BadRequest(f"cannot serve the page: {reason}", port, "a free port, or 0 for any") from None
+    return listener

@@ -1,0 +1,108 @@
+"""The tabs of the page: each has a socket, two processes that answer, and the files that were dropped into it.
+
+What moves the robot has a process of its own, so that a drag never waits for a longer question.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import secrets
+import shutil
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ...budgets import ASK_SECONDS, MOST_TABS, MOVE_SECONDS
+from .processes import ForkServer, WorkerProcess, gone
+from .uploads import UploadFolder
+
+if TYPE_CHECKING:
+    from starlette.websockets import WebSocket
+
+MOVE = "move"
+
+
+@dataclass(frozen=True)
+class Opening:
+    """What a server was opened with: a folder of robots, a robot with its options as ``given`` (what ``Desk`` takes),
+    and what the page is told to ``start`` with; ``panels``: whether there are any, or only the view."""
+
+    folder: Path | None = None
+    given: dict[str, Any] | None = None
+    start: dict[str, Any] = field(default_factory=dict)
+    panels: bool = True
+
+
+class BrowserTab:
+    """One tab, from the opening of its socket to the end."""
+
+    def __init__(self, socket: WebSocket, uploads: UploadFolder, forks: ForkServer, opening: Opening) -> None:
+        self.socket, self.uploads = socket, uploads
+        folder = opening.folder
+        setup = json.dumps({"folder": None if folder is None else str(folder), "uploads": str(uploads.folder),
+                            "given": opening.given}).encode()
+        self.mover, self.desk = (WorkerProcess(forks, setup, seconds, socket.send_text)
+                                 for seconds in (MOVE_SECONDS, ASK_SECONDS))
+
+    async def run(self) -> None:
+        """Answer until the socket is closed, from whichever side."""
+        tasks = [asyncio.create_task(each) for each in (self._listen(), self.mover.run(), self.desk.run())]
+        try:
+            await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+        finally:
+            for task in tasks:
+                task.cancel()
+            await asyncio.gather(*tasks, return_exceptions=True)
+
+    async def _listen(self) -> None:
+        while True:
+            message = await self.socket.receive()
+            if message["type"] != "websocket.receive":
+                return
+            refused = self._routed(message.get("text"))
+            if refused is not None:
+                await self.socket.send_text(refused)
+
+    def _routed(self, text: str | None) -> str | None:
+        """Put an ask where it is answered, or cancel one; what is said where that cannot be."""
+        try:
+            asked = json.loads(text or "")
+            number, kind = asked["n"], asked["ask"]
+            if not isinstance(number, int) or not isinstance(kind, str):
+                raise TypeError(number)
+            if kind == "cancel":
+                other = asked["of"]
+                self.mover.cancel(other) or self.desk.cancel(other)
+                return None
+        except (ValueError, KeyError, TypeError, RecursionError):
+            return gone(None, "no message: an object with a whole number n and the name of an ask", "Unknown")
+        there = self.mover if kind == MOVE else self.desk
+        return None if there.ask(number, (text or "").encode()) else gone(number, "too many questions wait", "TooMany")
+
+
+class Tabs:
+    """All that are open."""
+
+    def __init__(self, forks: ForkServer, opening: Opening, folder: Path) -> None:
+        self.forks, self.opening, self.folder = forks, opening, folder
+        self.open: dict[str, BrowserTab] = {}
+
+    async def serve(self, socket: WebSocket) -> None:
+        """A tab from its beginning to its end; its processes and files go with it."""
+        await socket.accept()
+        if len(self.open) >= MOST_TABS:
+            await socket.send_text(gone(None, f"{MOST_TABS} tabs are open: close one first", "TooMany"))
+            await socket.close()
+            return
+        name = secrets.token_urlsafe(12)
+        uploads = UploadFolder(self.folder / name)
+        self.open[name] = tab = BrowserTab(socket, uploads, self.forks, self.opening)
+        try:
+            opening = self.opening
+            await socket.send_text(json.dumps({"tab": name, "start": None, "folder": opening.folder is not None,
+                                               "panels": opening.panels, **opening.start}))
+            await tab.run()
+        finally:
+            del self.open[name]
+            shutil.rmtree(uploads.folder, ignore_errors=True)

@@ -1,0 +1,62 @@
+"""Files that are dropped into the page: flat names, of limited size and number, each whole or not there."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import re
+import secrets
+from collections.abc import AsyncIterator
+from pathlib import Path
+
+from ...budgets import LARGEST_UPLOAD, LONGEST_FILE_NAME, MOST_UPLOADS, SENDER_SECONDS, UPLOAD_SECONDS
+from ...errors import BadRequest, FileTooLarge
+
+NAME = re.compile(r"\w[\w .,()+@-]*")
+"""A name without folders and odd characters."""
+PART = ".part-"
+"""What the name of a file begins with while it comes."""
+
+
+class UploadFolder:
+    """The files of one tab."""
+
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
+        self.coming: set[str] = set()
+        folder.mkdir(mode=0o700)
+
+    def require(self, name: str, length: str | None) -> None:
+        """Raise ``BadRequest`` for a name or a length that is refused, before anything is read."""
+        if not NAME.fullmatch(name) or name.endswith((" ", ".")) or len(name.encode()) > LONGEST_FILE_NAME:
+            raise BadRequest("a file's name", name, "letters, digits, spaces and . , ( ) + @ - _, no folder")
+        if length is not None and not (length.isascii() and length.isdecimal()):
+            raise BadRequest("a file's length", length, "a whole number")
+        if length is not None and (len(length) > len(str(LARGEST_UPLOAD)) or int(length) > LARGEST_UPLOAD):
+            raise FileTooLarge(name, LARGEST_UPLOAD)
+        if len({*os.listdir(self.folder), *self.coming, name} - self._parts()) > MOST_UPLOADS:
+            raise BadRequest("another file", name, f"at most {MOST_UPLOADS} in one tab")
+
+    def _parts(self) -> set[str]:
+        return {each for each in os.listdir(self.folder) if each.startswith(PART)}
+
+    async def receive(self, name: str, chunks: AsyncIterator[bytes]) -> None:
+        """Keep a file whose name was found good; raises ``FileTooLarge``, ``TimeoutError``."""
+        part, size = self.folder / (PART + secrets.token_hex(8)), 0
+        self.coming.add(name)
+        try:
+            async with asyncio.timeout(UPLOAD_SECONDS):
+                with part.open("xb") as file:
+                    while True:
+                        async with asyncio.timeout(SENDER_SECONDS):
+                            chunk = await anext(chunks, None)
+                        if chunk is None:
+                            break
+                        size += len(chunk)
+                        if size > LARGEST_UPLOAD:
+                            raise FileTooLarge(name, LARGEST_UPLOAD)
+                        file.write(chunk)
+            part.replace(self.folder / name)
+        finally:
+            self.coming.discard(name)
+            part.unlink(missing_ok=True)

@@ -1,0 +1,155 @@
+"""The processes that answer: one loads all modules and forks where it is asked to; its children answer a tab each.
+
+Both sides of a channel write frames: four bytes, the length of what follows. The first frame tells a child what it may
+read; then each frame is an ask as the page sent it, and its answer, in order. A child whose channel is closed at the
+other end is killed with all that it started, whatever it is doing; so are all of them where the first process's own
+channel is closed: none outlives the server, however that ends.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import gc
+import json
+import os
+import resource
+import select
+import signal
+import socket
+import struct
+import traceback
+from collections.abc import Callable
+from importlib import import_module
+from pathlib import Path
+from typing import Any
+
+from ...budgets import LARGEST_ANSWER, WORKER_BYTES
+from ...errors import HrsynthError
+
+FRAME = struct.Struct("!I")
+READY = b"{}"
+"""What a child says first."""
+
+
+def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
+    """Fork a child for each channel that comes, until ``control`` is closed at the other end."""
+    children: dict[int, socket.socket] = {}
+    woken, waker = socket.socketpair()
+    for each in (woken, waker):
+        each.setblocking(False)
+    signal.set_wakeup_fd(waker.fileno(), warn_on_full_buffer=False)
+    signal.signal(signal.SIGCHLD, lambda *_: None)
+    while True:
+        poll = select.poll()
+        for each in (control, woken):
+            poll.register(each, select.POLLIN)
+        left = {channel.fileno(): pid for pid, channel in children.items()}
+        for number in left:
+            poll.register(number, 0)  # told of the other end's closing alone
+        events = {number for number, _ in poll.poll()}
+        for number in events & left.keys():
+            _kill(left[number])
+        if woken.fileno() in events:
+            with contextlib.suppress(BlockingIOError):
+                woken.recv(4096)
+        for pid in [*children]:
+            if os.waitpid(pid, os.WNOHANG)[0]:
+                with contextlib.suppress(ProcessLookupError, PermissionError):
+                    os.killpg(pid, signal.SIGKILL)  # what it started, where that is left
+                children.pop(pid).close()
+        if control.fileno() in events:
+            mark, numbers, _, _ = socket.recv_fds(control, 1, 1)
+            if not mark:
+                for pid in children:
+                    _kill(pid)
+                return
+            channel = socket.socket(fileno=numbers[0])
+            with contextlib.suppress(OSError):  # no process to be had: the other end sees the channel closed
+                pid = os.fork()
+                if pid == 0:
+                    _child(channel, [control, woken, waker, *children.values()], desk)
+                os.setpgid(pid, pid)
+                children[pid] = channel
+                continue
+            channel.close()
+
+
+def _kill(pid: int) -> None:
+    """End a child that was not waited for yet, with its process group."""
+    for end in (os.killpg, os.kill):
+        with contextlib.suppress(ProcessLookupError, PermissionError):
+            end(pid, signal.SIGKILL)
+
+
+def _child(channel: socket.socket, others: list[socket.socket], desk: Callable[..., Any]) -> None:
+    """What a child does, to its end."""
+    status = 1
+    try:
+        os.setpgid(0, 0)
+        signal.set_wakeup_fd(-1)
+        signal.signal(signal.SIGCHLD, signal.SIG_DFL)
+        for each in others:
+            each.close()
+        for limit, amount in ((resource.RLIMIT_AS, WORKER_BYTES), (resource.RLIMIT_CORE, 0)):
+            resource.setrlimit(limit, (amount, amount))
+        answer_all(channel, desk)
+        status = 0
+    finally:
+        os._exit(status)
+
+
+def answer_all(channel: socket.socket, desk: Callable[..., Any]) -> None:
+    """Answer what comes until there is no more."""
+    with channel.makefile("rwb") as stream:
+        setup = json.loads(_read(stream) or b"{}")
+        folder, uploads = (None if setup[each] is None else Path(setup[each]) for each in ("folder", "uploads"))
+        found = desk(folder, uploads, setup["given"])
+        _write(stream, READY)
+        while asked := _read(stream):
+            _write(stream, answered(found, json.loads(asked)))
+
+
+def answered(desk: Any, asked: dict[str, Any]) -> bytes:
+    """The message to the page: the answer, or what went wrong, as the command line says it."""
+    reply: dict[str, Any] = {"n": asked["n"]}
+    try:
+        told = json.dumps({**reply, "answer": desk.answer(asked)}, ensure_ascii=False, allow_nan=False).encode()
+        if len(told) <= LARGEST_ANSWER:
+            return told
+        reply |= failure(f"the answer has {len(told)} bytes, at most {LARGEST_ANSWER} are sent", "TooLarge")
+    except HrsynthError as error:
+        reply |= failure("\n".join(error.lines()), type(error).__name__)
+    except (MemoryError, RecursionError) as error:
+        reply |= failure(f"that needs more memory than is allowed ({WORKER_BYTES >> 30} GB)", type(error).__name__)
+    except Exception as error:
+        if os.environ.get("HRSYNTH_DEBUG"):
+            traceback.print_exc()
+        what = " ".join(f"{type(error).__name__}: {error}".split())
+        reply |= failure(f"a defect of hrsynth itself, please report it: {what}", "Defect")
+    return json.dumps(reply).encode()
+
+
+def failure(error: str, kind: str) -> dict[str, str]:
+    """What a message says of an ask that has no answer."""
+    return {"error": error, "kind": kind}
+
+
+def _read(stream: Any) -> bytes:
+    head = stream.read(FRAME.size)
+    return stream.read(FRAME.unpack(head)[0]) if len(head) == FRAME.size else b""
+
+
+def _write(stream: Any, text: bytes) -> None:
+    stream.write(FRAME.pack(len(text)) + text)
+    stream.flush()
+
+
+def main(control: int, desk: str) -> None:
+    """The first process; ``desk`` is where the class that answers is, as ``package.module:Class``."""
+    os.environ.update(dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1"))
+    gc.set_threshold(50_000)
+    module, _, name = desk.partition(":")
+    answers = getattr(import_module(module), name)
+    gc.freeze()
+    with socket.socket(fileno=control) as channel:
+        fork_on_request(channel, answers)
