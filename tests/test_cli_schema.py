@@ -69,8 +69,6 @@ def wrong(command: str, record: dict) -> list[str]:
 
 @pytest.mark.parametrize("command", RECORDS)
 def test_every_answer_is_what_its_schema_says(here: Path, capsys, command: str):
-    if command == "view":
-        pytest.importorskip("meshcat")
     if command == "verify":
         assert execute(["modes", "3rrr_m1", "--certificate", "c.json"]) == 0
     for arguments in QUICK[command]:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import importlib.util
 import json
 import socket
 from pathlib import Path
@@ -10,8 +9,6 @@ from pathlib import Path
 import pytest
 
 from hrsynth.cli import execute
-
-pytest.importorskip("meshcat")
 
 
 def ask(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, str]:
@@ -67,12 +64,3 @@ def test_a_port_that_is_taken_is_refused(capfd: pytest.CaptureFixture[str]):
         taken.listen()
         port = str(taken.getsockname()[1])
         assert_refused(ask(capfd, "rrrrr_m1", "--no-open", "--port", port), 2, "cannot serve the view")
-
-
-def test_without_meshcat_the_extra_is_named(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch):
-    def find(name: str, *rest: str | None) -> object:
-        return None if name == "meshcat" else there(name, *rest)
-
-    there = importlib.util.find_spec
-    monkeypatch.setattr(importlib.util, "find_spec", find)
-    assert_refused(ask(capfd, "rrrrr_m1", "--no-open"), 3, 'pip install "hrsynth[view]"')

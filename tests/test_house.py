@@ -50,7 +50,7 @@ ROBOTS = re.compile(
 
 # Packages that are slow to import: only inside functions, save in the one folder that is named.
 SLOW = {"pinocchio": "kinematics"} | dict.fromkeys(
-    ["cv2", "dask", "example_robot_data", "flint", "joblib", "matplotlib", "meshcat", "mujoco", "numba", "scipy"]
+    ["cv2", "dask", "example_robot_data", "flint", "joblib", "matplotlib", "mujoco", "numba", "scipy"]
     + ["sympy", "trimesh", "yourdfpy"]
 )
 NOT_FOR_HELP = ["pinocchio", "sympy", "networkx", "scipy", "yourdfpy", "matplotlib", "flint", "mujoco"]

@@ -92,8 +92,6 @@ def test_the_python_example_runs_and_prints_what_it_says():
 def test_the_commands_print_what_is_shown(command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,
                                           monkeypatch: pytest.MonkeyPatch):
     """Line by line, with its numbers; a page may leave lines out."""
-    if command.startswith("view "):
-        pytest.importorskip("meshcat")
     monkeypatch.chdir(tmp_path)
     assert execute(shlex.split(command)) == 0
     printed = capsys.readouterr().out.splitlines()

@@ -33,7 +33,7 @@ def test_every_extra_that_is_named_is_there_and_all_holds_them():
     extras = PROJECT["optional-dependencies"]
     named = {extra for path in (ROOT / "src").rglob("*.py")
              for extra in re.findall(r'MissingExtra\([^()]*?"([a-z]+)"\)', path.read_text(encoding="utf-8"))}
-    assert {"plots", "view", "solve", "bench", "examples"} <= named
+    assert {"plots", "solve", "bench", "examples"} <= named
     assert named <= extras.keys()
     (whole,) = extras["all"]
     assert set(re.search(r"\[(.*)\]", whole)[1].split(",")) == extras.keys() - {"all"}
@@ -72,7 +72,6 @@ def without(packages: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 @pytest.mark.parametrize(("packages", "extra", "arguments"), [
     ("matplotlib", "plots", ["modes", "3rrr_m1", "-o", "modes.png"]),
     ("matplotlib", "plots", ["derive", "3rrr_m1", "--report", "report.html"]),
-    ("meshcat", "view", ["view", "3rrr_m1", "--static", "view.html"]),
     ("mujoco", "bench", ["servo", "3rrr_m1", "--start", "x=0,y=0,phi=0", "--goal", "x=0.01,y=0,phi=0", "--physics"]),
 ])
 def test_what_needs_a_package_that_is_missing_says_so_in_one_line(packages, extra, arguments, tmp_path, monkeypatch):
@@ -87,9 +86,10 @@ def test_what_needs_a_package_that_is_missing_says_so_in_one_line(packages, extr
 
 def test_the_core_answers_without_any_extra(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    every = "matplotlib meshcat mujoco cv2 numba dask distributed xacro mkdocs nbclient IPython"
+    every = "matplotlib mujoco cv2 numba dask distributed xacro mkdocs nbclient IPython"
     for arguments in (["derive", "3rrr_m1"], ["check", "3rrr_m1", "--grid", "x=0:0.01:3,y=0,phi=0"],
-                      ["modes", "3rrr_m1"], ["derive", "3rrr_m1", "-o", "hidden.urdf"]):
+                      ["modes", "3rrr_m1"], ["view", "3rrr_m1", "--static", "view.html"],
+                      ["derive", "3rrr_m1", "-o", "hidden.urdf"]):
         run = without(every, *arguments)
         assert (run.returncode, run.stderr) == (0, ""), arguments
         assert run.stdout

@@ -12,8 +12,7 @@ import pytest
 
 import hrsynth
 from browser import Tab
-from hrsynth.errors import BadRequest, MissingExtra
-from hrsynth.present.view import page
+from hrsynth.errors import BadRequest
 
 
 @pytest.fixture(scope="module")
@@ -28,19 +27,6 @@ def test_a_notebook_holds_the_page_itself(found, tmp_path):
     assert html.unescape(inner) == (tmp_path / "view.html").read_text(encoding="utf-8")
     assert shown.startswith("<iframe ")
     assert shown.endswith("</iframe>")
-
-
-def test_without_the_viewer_a_notebook_shows_the_text_and_what_is_missing(found, monkeypatch):
-    def missing() -> str:
-        raise MissingExtra("the 3D view", "view")
-
-    monkeypatch.setattr(page, "viewer", missing)
-    shown = html.unescape(found._repr_html_())
-    assert shown.startswith("<pre")
-    assert 'pip install "hrsynth[view]"' in shown
-    assert "3rrr_m1" in shown
-    with pytest.raises(MissingExtra):
-        found.save("view.html")
 
 
 def test_a_view_is_written_as_a_page_alone(found, tmp_path):

@@ -17,8 +17,6 @@ from browser import Tab
 from hrsynth.present.view import page
 from present.views import FIVE, seen, serving
 
-pytest.importorskip("meshcat")
-
 READY = "document.body.dataset.ready == 'yes'"
 PANEL = 300
 """Width of the panel beside the picture (pixels)."""
@@ -141,6 +139,7 @@ def test_the_page_is_whole_and_asks_for_nothing():
     assert not re.search(r"(src|href)\s*=\s*[\"'](?!data:)", outside)
     assert text.count("<script") == 3
     assert "Three.js Authors" in text
+    assert "The MIT License" in text
 
 
 def test_a_name_cannot_break_the_page():

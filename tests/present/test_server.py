@@ -18,8 +18,6 @@ from hrsynth.present.view.view import View, view
 from present.views import miss, moved, seen, serving
 from strategies import planar
 
-pytest.importorskip("meshcat")
-
 FIVE_BAR = "rrrrr_m1"
 
 

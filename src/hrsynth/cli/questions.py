@@ -36,15 +36,13 @@ from .progress import Progress
 @dataclass(frozen=True)
 class Question:
     """A command: the public function of its ``name``, what it says of itself, its own options, named as the function's
-    parameters and those of the files, and examples. ``before`` gets the options before the work, ``after`` the answer
-    and the options at the end; ``shows`` does so instead of printing the text where nothing was written. ``seeded``:
-    whether anything is random."""
+    parameters and those of the files, and examples. ``after`` gets the answer and the options at the end; ``shows``
+    does so instead of printing the text where nothing was written. ``seeded``: whether anything is random."""
 
     name: str
     help: str
     options: tuple[Option, ...]
     examples: tuple[str, ...] = ()
-    before: Callable[[], object] | None = None
     shows: Callable[..., None] | None = None
     after: Callable[..., None] | None = None
     seeded: bool = True
@@ -62,8 +60,6 @@ class Question:
         from ..description.files import require_other
         from ..present.show import record, text
 
-        if self.before is not None:
-            self.before()
         files = {each: values.pop(each.option) for each in OUTPUTS[self.name].files if each.option is not None}
         for each, path in files.items():
             each.require(path, values)
@@ -124,13 +120,6 @@ def _decided(found: Any, at: list[str] | None, **_: Any) -> None:
 def _deprecated(_: Any, seconds: float | None, **__: Any) -> None:
     if seconds is not None:
         warn("--seconds is deprecated, what it leaves out depends on the machine: try --examine")
-
-
-def _viewer() -> None:
-    """Raise ``MissingExtra`` where a library for the view is missing."""
-    from ..present.view.page import viewer
-
-    viewer()
 
 
 def _served(found: Any, port: int, open_: bool, **_: Any) -> None:
@@ -280,6 +269,6 @@ QUESTIONS = (
               Option("port", "Port of the server (default: any that is free).", None, int, 0, low=0, high=65535),
               Option("open_", "Open the page in the browser.", None, bool, True, ("--open/--no-open",))),
              ("quattro --observe 1,4 --hidden", "quattro --observe 1,4 --static quattro.html"),
-             before=_viewer, shows=_served),
+             shows=_served),
 )
 """The commands in the order of the help."""

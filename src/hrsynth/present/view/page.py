@@ -1,16 +1,17 @@
-"""The view as one self-contained page: MeshCat's viewer, the scene and the script that moves it, no network."""
+"""The view as one self-contained page: the studio's stage, the scene and the script that moves it, no network."""
 
 from __future__ import annotations
 
-import importlib.util
 from html import escape
 from pathlib import Path
 from typing import Any
 
-from ...errors import MissingExtra
 from .view import View
 
 FOLDER = Path(__file__).parent
+STAGE = FOLDER.parent / "studio" / "page"
+SCRIPTS = ("colours.js", "solids.js", "robots.js", "stage.js")
+"""What draws the stage beside three.js, in this order."""
 
 
 def static(found: View) -> bytes:
@@ -19,7 +20,7 @@ def static(found: View) -> bytes:
 
 
 def inline(found: View) -> str:
-    """The same page in a frame, for a notebook; raises ``MissingExtra``."""
+    """The same page in a frame, for a notebook."""
     return (f'<iframe srcdoc="{escape(page(found))}" title="{escape(found.headline())}" '
             'style="width: 100%; height: 560px; border: 0"></iframe>')
 
@@ -28,22 +29,11 @@ def page(found: View, *, live: bool = False) -> str:
     """The page; ``live`` where a server answers its sliders."""
     from jinja2 import Environment, StrictUndefined
 
-    def own(name: str) -> str:
-        return (FOLDER / name).read_text(encoding="utf-8")
+    def text(*files: Path) -> str:
+        return "".join(file.read_text(encoding="utf-8") for file in files)
 
     scene: dict[str, Any] = {**found.scene(), "live": live}
-    template = Environment(autoescape=True, undefined=StrictUndefined).from_string(own("page.html"))
-    return template.render(robot=found.setting.robot.name, scene=scene, viewer=viewer(), style=own("page.css"),
-                           solids=own("solids.js"), script=own("page.js"))
-
-
-def viewer() -> str:
-    """MeshCat's script with the notices of what it holds; raises ``MissingExtra``."""
-    spec = importlib.util.find_spec("meshcat")
-    for place in spec.submodule_search_locations or () if spec is not None else ():
-        script = Path(place, "viewer", "dist", "main.min.js")
-        if script.is_file():
-            notice = script.with_name(script.name + ".LICENSE.txt")
-            words = notice.read_text(encoding="utf-8") if notice.is_file() else ""
-            return words + "\n" + script.read_text(encoding="utf-8")
-    raise MissingExtra("the 3D view", "view")
+    template = Environment(autoescape=True, undefined=StrictUndefined).from_string(text(FOLDER / "page.html"))
+    return template.render(robot=found.setting.robot.name, scene=scene,
+                           style=text(FOLDER / "page.css", STAGE / "stage.css"), three=text(STAGE / "three.min.js"),
+                           script=text(*(STAGE / name for name in SCRIPTS), FOLDER / "page.js"))

@@ -34,7 +34,7 @@ MARGIN = 4.0
 @dataclass(frozen=True, eq=False, repr=False)
 class Machine(Value):
     """A robot that is drawn: ``key`` real or hidden, what it is called, its links in order, its shapes, the base's
-    and the platform's frame (7,) at the zero configuration."""
+    and the platform's frame (7,) at the zero configuration, and of each link the real robot's leg that holds it."""
 
     key: str
     words: str
@@ -42,11 +42,12 @@ class Machine(Value):
     platform: tuple[str, ...]
     shapes: tuple[Shape, ...]
     frames: tuple[tuple[str, Array], ...] = ()
+    legs: tuple[str | None, ...] = ()
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
         places = {name: i for i, name in enumerate(self.links)}
-        return {"key": self.key, "words": self.words, "links": list(self.links),
+        return {"key": self.key, "words": self.words, "links": list(self.links), "legs": list(self.legs),
                 "platform": [places[link] for link in self.platform],
                 "shapes": [shape.scene(places) for shape in self.shapes],
                 "frames": [{"link": places[link], "place": page_values(X[None])[0]} for link, X in self.frames]}
@@ -87,15 +88,14 @@ class View(Result, shown_as="view"):
         return max((value for value in found if value is not None), default=self.home.distance)
 
     def save(self, file: str | Path) -> None:
-        """Write the view as one page (.html) that needs neither server nor network; raises ``BadRequest``,
-        ``MissingExtra``."""
+        """Write the view as one page (.html) that needs neither server nor network; raises ``BadRequest``."""
         (each,) = OUTPUTS[self.shown_as].files
         each.require(str(file), {})
         each.writer(self, str(file), {})[0]()
 
     def serve(self, port: int = 0, *, open_: bool = True) -> Any:
         """Serve the view on this machine, where all sliders move together, and open it in the browser: a server with
-        ``address`` and ``stop()``. Port 0 is any that is free. Raises ``BadRequest``, ``MissingExtra``."""
+        ``address`` and ``stop()``. Port 0 is any that is free. Raises ``BadRequest``."""
         return function("view.server:served")(self, port, open_)
 
     def to_dict(self) -> dict[str, Any]:
@@ -112,10 +112,13 @@ class View(Result, shown_as="view"):
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
-        mechanism = self.setting.mechanism
+        mechanism, motion = self.setting.mechanism, self.setting.motion
         places = {name: i for i, name in enumerate(mechanism.links)}
         return {
-            "length": mechanism.length, "radius": _radius(mechanism), "largest": self.largest,
+            "name": self.setting.robot.name, "length": mechanism.length, "radius": _radius(mechanism),
+            "largest": self.largest, "freedoms": {
+                "translations": np.round(motion.translations.T, PAGE_DIGITS).tolist(),
+                "rotations": np.round(motion.rotations.T, PAGE_DIGITS).tolist()},
             "normal": None if self.normal is None else np.round(self.normal, PAGE_DIGITS).tolist(),
             "machines": [machine.scene() for machine in self.machines],
             "home": self.home.scene(), "sliders": [slider.scene() for slider in self.sliders],
@@ -164,7 +167,9 @@ def _machine(key: str, setting: ObservedRobot, mechanism: Mechanism, words: str,
     drawer = Drawer(mechanism, real, setting.anatomy.platform, _radius(real), kept)
     shapes = drawer.shapes(_travels(drawer, key, states))
     frames = tuple((link, place(mechanism.links[link].pose)) for link in (mechanism.base, mechanism.platform))
-    return Machine(key, words, tuple(mechanism.links), setting.anatomy.platform, shapes, frames)
+    legs = {link: leg.label for leg in setting.anatomy.legs for link in leg.links}
+    return Machine(key, words, tuple(mechanism.links), setting.anatomy.platform, shapes, frames,
+                   tuple(map(legs.get, mechanism.links)))
 
 
 def _radius(mechanism: Mechanism) -> float:
