@@ -10,6 +10,9 @@ ASSEMBLED = 1e-12
 """Residual (characteristic lengths, radians) below which a shipped or written file counts as assembled at zero."""
 SOLVED = 1e-12
 """Residual (characteristic lengths, radians) at which the solver of closed configurations is content."""
+STANDING = 1e-5
+"""Relative decrease of a sum of squares below which least squares far from a zero are given up; near a zero each step
+takes away nearly all of it."""
 SHARP = 1e-15
 """Residual that is asked for where a singular pose is wanted as exactly as numbers allow."""
 CLOSED = 1e-10

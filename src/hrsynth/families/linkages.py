@@ -9,18 +9,17 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 
 import numpy as np
 
 from ..budgets import LINKAGE_STARTS
 from ..errors import BadRequest
-from ..geometry.vectors import Array, rotation_about
+from ..geometry.vectors import Array
 from ..mechanism.builder import Builder
 from ..mechanism.model import Mechanism
-from ..tolerances import RANK_CUTOFF, SOLVED
-from .geometry import Z
+from ..tolerances import RANK_CUTOFF, SOLVED, STANDING
 
-X = np.array([1.0, 0.0, 0.0])
 RIGHT = math.pi / 2
 
 
@@ -39,13 +38,12 @@ class Linkage:
 
     def frames(self, angles: Array) -> list[Array]:
         """The frames (4, 4) of the joints' axes, one after another, the last that of the first joint again."""
-        found = [np.eye(4)]
-        for angle, a, twist, d in zip(angles, self.lengths, self.twists, self.offsets, strict=True):
-            link = np.eye(4)
-            link[:3, :3] = rotation_about(Z, angle) @ rotation_about(X, twist)
-            link[:3, 3] = [a * np.cos(angle), a * np.sin(angle), d]
-            found.append(found[-1] @ link)
-        return found
+        cos, sin, level, up = np.cos(angles), np.sin(angles), np.cos(self.twists), np.sin(self.twists)
+        links = np.zeros((len(angles), 4, 4))  # Rot(z, θ) Trans(a, 0, d) Rot(x, α)
+        links[:, 0] = np.stack([cos, -sin * level, sin * up, self.lengths * cos], axis=1)
+        links[:, 1] = np.stack([sin, cos * level, -cos * up, self.lengths * sin], axis=1)
+        links[:, 2, 1], links[:, 2, 2], links[:, 2, 3], links[:, 3, 3] = up, level, self.offsets, 1.0
+        return list(accumulate(links, np.matmul, initial=np.eye(4)))
 
     def axes(self, angles: Array) -> Array:
         """The screws (6, n) of the joints: directions, and moments about the origin."""
@@ -61,7 +59,7 @@ class Linkage:
             return x if second is None else np.insert(x, 1, second)
 
         end = least_squares(lambda x: (self.frames(angles(x))[-1] - np.eye(4))[:3].ravel(),
-                            start if second is None else np.delete(start, 1), xtol=1e-15, ftol=1e-15, gtol=1e-15)
+                            start if second is None else np.delete(start, 1), xtol=1e-15, ftol=STANDING, gtol=1e-15)
         return angles(end.x) if np.abs(end.fun).max() < SOLVED else None
 
     def regular(self, rng: np.random.Generator) -> Array:
