@@ -14,7 +14,7 @@ from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.model import Joint, Link, Motor
 
 ENDINGS = {"native": ".urdf", "gepetto": ".yaml", "mjcf": ".xml", "sdf": ".sdf"}
-_NUMBER = re.compile(rb"-?\d+\.\d+(?:[eE][-+]?\d+)?|-?\d+[eE][-+]?\d+")
+_NUMBER = re.compile(rb"(?<![\w.])-?\d+\.\d+(?:[eE][-+]?\d+)?|(?<![\w.])-?\d+[eE][-+]?\d+")
 
 
 def of_hinges(robot: Mechanism, aligned: bool = False) -> Mechanism:
@@ -58,8 +58,8 @@ def round_file(path: Path, decimals: int) -> None:
 
     for file in (path, path.with_suffix(".urdf")):
         if file.exists() and file.suffix != ".yaml":
-            head, _, rest = file.read_bytes().partition(b"?>")
-            file.write_bytes(head + b"?>" + _NUMBER.sub(short, rest) if rest else _NUMBER.sub(short, head))
+            head, mark, rest = file.read_bytes().partition(b"\n" if file.suffix == ".usda" else b"?>")
+            file.write_bytes(head + mark + _NUMBER.sub(short, rest) if rest else _NUMBER.sub(short, head))
 
 
 def exported(robot: Mechanism, path: Path, decimals: int) -> Path:

@@ -61,6 +61,19 @@ def test_every_rounded_robot_is_the_same_or_refused(name: str, tmp_path: Path):
         assert answer(again(robot, folder / f"robot{ending}", decimals)) == meant, folder.name
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped())
+def test_a_usd_file_of_single_precision_is_the_same(name: str, tmp_path: Path):
+    """As simulators write them: nothing beside the seven digits of single precision; and with four decimals."""
+    pytest.importorskip("pxr")
+    robot, meant = of_hinges(load(name)), answer(load(name))
+    assert answer(again(robot, tmp_path / "four.usda", 4)) == meant
+    path = tmp_path / "robot.usda"
+    save(robot, path)
+    path.write_text("\n".join(line for line in path.read_text().splitlines() if "hrsynth:local" not in line))
+    assert answer(load(path, platform=robot.platform)) == meant
+
+
 @pytest.mark.long
 @pytest.mark.timeout(3600)
 @pytest.mark.parametrize("decimals", DECIMALS)

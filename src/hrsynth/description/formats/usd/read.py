@@ -23,6 +23,7 @@ from ...contents import Content, Inertial, Solid, along_z, fragments
 from ...dialect import RobotFile
 from ...jointgraph import ORIGIN, FrameSpec, GearSpec, JointGraph, JointSpec, comma_list
 from ...jointmotion import residual
+from ...numerals import exact_vector
 from .stage import prims
 
 AXES = {"X": np.eye(3)[0], "Y": np.eye(3)[1], "Z": np.eye(3)[2]}
@@ -199,7 +200,7 @@ class _StageReader:
         moments, turn = _vector(values.get("physics:diagonalInertia")), _quaternion(values.get("physics:principalAxes"))
         if moments is None or not np.any(moments):
             return Inertial(mass * self.kilograms, frozen(pose(centre)))
-        R = np.eye(3) if turn is None else turn
+        R = np.eye(3) if turn is None else rotation_of(unit(turn))
         inertia = self.kilograms * self.metres**2 * (R @ np.diag(moments) @ R.T)
         exact = values.get(f"{PREFIX}:inertia")
         if isinstance(exact, list) and len(exact) == 6:
@@ -288,10 +289,12 @@ class _StageReader:
         if turn is None or place is None or not np.all(np.abs(place) <= LARGEST_NUMBER):
             self.defect(prim.path, f"the joint's frame on physics:body{side}", None, "a finite position, a rotation")
             return None
+        self.result.digits.read(exact_vector([*place, *map(_number, turn)]))
+        self.result.digits.length(float(np.linalg.norm(turn)))
         if not targets:
-            return FrameSpec(self.world, frozen(self.up @ pose(self.metres * place, turn)))
+            return FrameSpec(self.world, frozen(self.up @ pose(self.metres * place, rotation_of(unit(turn)))))
         target, carrier = self.prims[targets[0]], self._carrier(targets[0])
-        X = target.X @ pose(target.X[:3, :3].T @ target.M @ place, turn)
+        X = target.X @ pose(target.X[:3, :3].T @ target.M @ place, rotation_of(unit(turn)))
         if carrier is None:
             return FrameSpec(self.world, frozen(X))
         body = self.prims[carrier]
@@ -516,11 +519,11 @@ def _vector(value: Any, exact: Any = None) -> Array | None:
 
 
 def _quaternion(value: Any, exact: Any = None) -> Array | None:
-    """The rotation of a quaternion w x y z, in the same manner; None for what is none."""
+    """A quaternion w x y z as it is written, in the same manner; None for what is none."""
     found = np.array(value, dtype=float) if isinstance(value, list) and len(value) == 4 else None
     if found is None or not np.linalg.norm(found) > WITHOUT_DIRECTION or not np.all(np.isfinite(found)):
         return None
     if isinstance(exact, list) and len(exact) == 4:
         better = np.array(exact, dtype=float)
         found = better if np.max(np.abs(better - found)) <= SINGLE else found
-    return rotation_of(unit(found))
+    return found
