@@ -30,8 +30,8 @@ _NUMBER = re.compile(r"[+-]?(\d+(\.\d*)?|\.\d+)([eE][+-]?\d+)?", re.ASCII)
 class Digits:
     """What the numbers of a file tell of their own accuracy."""
 
-    decimals: Counter[int] = field(default_factory=Counter)
-    """How many numbers have so many decimals."""
+    numbers: Counter[tuple[int, int]] = field(default_factory=Counter)
+    """How many numbers have so many decimals and significant digits."""
     rounded: bool = False
     """Whether a unit vector has not quite length one, or an angle is not quite a simple part of a turn."""
 
@@ -39,7 +39,8 @@ class Digits:
         """Take numbers into account as they are written."""
         for word in text.split():
             number, _, exponent = word.lower().partition("e")
-            self.decimals[len(number.partition(".")[2]) - int(exponent or 0)] += 1
+            decimals = len(number.partition(".")[2]) - int(exponent or 0)
+            self.numbers[decimals, len(number.replace(".", "").lstrip("+-0"))] += 1
 
     def length(self, size: float) -> None:
         """The length of a vector that should have length one."""
@@ -53,11 +54,16 @@ class Digits:
 
     @property
     def last_place(self) -> float:
-        """One in the last decimal, that one in five of the longer numbers reach; 0 where none are rounded."""
-        longer = sorted(count for count in self.decimals.elements() if count >= FEWEST_DECIMALS)
+        """One in the last decimal, that one in five of the longer numbers reach; where more of them share their count
+        of significant digits, one in the coarsest last digit of these; 0 where none are rounded."""
+        longer = sorted(each for each in self.numbers.elements() if each[0] >= FEWEST_DECIMALS)
         if len(longer) < FEWEST_ROUNDED:
             return 0.0
-        decimals = longer[(4 * len(longer)) // 5]
+        decimals = longer[(4 * len(longer)) // 5][0]
+        most = max(significant for _, significant in longer)
+        full = [each for each, significant in longer if significant == most]
+        if len(full) > sum(each == longer[-1][0] for each, _ in longer):
+            decimals = full[0]
         self.rounded |= decimals >= SURELY_ROUNDED
         return 10.0**-decimals if decimals <= MOST_DECIMALS else 0.0
 

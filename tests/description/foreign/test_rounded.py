@@ -181,6 +181,15 @@ def test_a_file_tells_its_last_decimal(decimals: int, expected: float):
     assert digits.last_place == pytest.approx(expected)
 
 
+@pytest.mark.parametrize(("digits", "expected"), [(4, 1e-3), (6, 1e-5), (7, 1e-6)])
+def test_a_file_tells_its_last_significant_digit(digits: int, expected: float):
+    """As %.6g writes: the largest numbers, of one to ten, have the coarsest last digit."""
+    read = Digits()
+    for number in np.random.default_rng(digits).uniform(-1, 1, 100) * 10.0 ** np.arange(-2, 2).repeat(25):
+        read.read(f"{number:.{digits}g}")
+    assert read.last_place == pytest.approx(expected)
+
+
 @pytest.mark.parametrize(("angle", "rounded"), [(np.pi / 2, False), (1.5708, True), (2.0944, True), (0.3, False),
                                                 (1.57, True), (0.0, False), (1.0, False)])
 def test_a_file_tells_that_its_angles_are_rounded(angle: float, rounded: bool):
