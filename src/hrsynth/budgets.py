@@ -277,6 +277,14 @@ UPLOAD_SECONDS = 60.0
 """Seconds in which a whole file must be here."""
 FAREWELL_SECONDS = 2.0
 """Seconds that open connections are given when the server ends."""
+LONGEST_STUDIO_NAME = 500
+"""Characters of a name in a question of the studio."""
+LARGEST_STUDIO_LIST = 200
+"""Names in a list of such a question."""
+FOLLOWING = 60
+"""Iterations in which a hidden robot is to follow the real one in the view."""
+APPROACH = 8
+"""Steps, once the straight way ends, by which a dragged platform comes nearer to where it is wanted."""
 
 # Generated programs
 

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import combinations
 
 import numpy as np
 
@@ -24,8 +25,9 @@ from .relation import Measurement, relation
 from .steps import track
 
 NAMES = ("x", "y", "z", "turn about x", "turn about y", "turn about z")
-INDEPENDENT = 0.1
-"""Part of a coordinate's rate that those before it must leave free."""
+INDEPENDENT = 0.5
+"""How independent the coordinates are at least (the smallest singular value of their rates), as part of what it is of
+those that are it most."""
 HALVINGS = 4
 """How often a step is halved before a slider stops."""
 
@@ -40,20 +42,19 @@ class Coordinates(Value):
 
     @classmethod
     def of(cls, start: ClosedConfiguration, question: Measurement, motion: PlatformMotion) -> Coordinates:
-        """Those of a configuration that tell its neighbours apart, positions before turns; where it has other freedoms
-        than the platform generically has, those of the generic motion."""
+        """Those of a configuration that tell its neighbours apart well, positions before turns; where it has other
+        freedoms than the platform generically has, those of the generic motion."""
         twists = relation(start, replace(question, observations=(), bodies=())).twists
         if twists.shape[1] != motion.dof:
             twists = motion.twists
         if motion.rotations.shape[1] == 1:
             twists = np.vstack([twists[:3], _axis(motion) @ twists[3:]])
-        chosen: list[int] = []
-        for place in range(len(twists) if motion.body else 3):
-            before = twists[chosen]
-            rest = twists[place] - np.linalg.pinv(before) @ (before @ twists[place]) if chosen else twists[place]
-            if np.linalg.norm(rest) > INDEPENDENT and len(chosen) < motion.dof:
-                chosen.append(place)
-        made = cls(motion, tuple(chosen), np.zeros(len(chosen)))
+        rows = twists if motion.body else twists[:3]
+        size = min(motion.dof, len(rows))
+        sets = list(combinations(range(len(rows)), size))
+        weakest = np.array([np.linalg.svd(rows[list(each)], compute_uv=False)[:size].min(initial=1.0) for each in sets])
+        chosen = sets[int(np.argmax(weakest >= INDEPENDENT * weakest.max()))]
+        made = cls(motion, chosen, np.zeros(len(chosen)))
         return replace(made, values=made.read(start.pose(motion.link)))
 
     @property
@@ -106,6 +107,13 @@ class Coordinates(Value):
         on each side, equally spaced as far as small steps lead within ``spans`` (metres, radians)."""
         down, up = (list(self._out(start, index, way, count)) for way in (-spans[0], spans[1]))
         return (*reversed(down), (float(self.values[index]), start), *up)
+
+    def ends(self, start: ClosedConfiguration, index: int, spans: tuple[float, float]
+             ) -> tuple[ClosedConfiguration, ClosedConfiguration]:
+        """Where the robot comes to as one coordinate alone goes down and up from ``start``, within ``spans``."""
+        down, up = (track(start, self.motion, self._changed(index, self.values[index] + span), HALVINGS)[0]
+                    for span in (-spans[0], spans[1]))
+        return down, up
 
     def _out(self, start: ClosedConfiguration, index: int, span: float, count: int
              ) -> Iterator[tuple[float, ClosedConfiguration]]:

@@ -17,6 +17,7 @@ from ..budgets import LARGEST_MODEL
 from ..errors import BadMechanism, BadRequest
 from ..geometry.vectors import Array, cross
 from ..mechanism import Joint, JointType, Mechanism, graphs
+from ..tolerances import SAME_GEOMETRY
 
 _WEIGHT = {"F": 0, "R": 1, "P": 1, "C": 2, "U": 2, "E": 3, "S": 4, "6": 100}
 
@@ -281,6 +282,10 @@ class PinocchioModel:
     def moved(self, q: Array, step: Array) -> Array:
         """The configuration that ``step`` (nv) leads to from ``q``."""
         return pin.integrate(self.model, q, step)
+
+    def is_normalized(self, q: Array) -> bool:
+        """Whether all turns in ``q`` are unit quaternions."""
+        return bool(pin.isNormalized(self.model, q, SAME_GEOMETRY))
 
     def difference(self, q: Array, other: Array) -> Array:
         """The step (nv) that leads from ``q`` to ``other``."""

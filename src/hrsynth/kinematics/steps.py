@@ -57,10 +57,17 @@ def track(here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask,
     return here, 1.0
 
 
-def _eased(here: ClosedConfiguration, goal: GuidedTask, X: Array, stride: float) -> ClosedConfiguration:
+def approach(here: ClosedConfiguration, goal: Goal, easing: int = EASING) -> ClosedConfiguration:
+    """As near to a goal as small steps with closed loops come, whether the platform can be there or not."""
+    error = float(np.linalg.norm(goal.rows(here.twin, here.q)[0]))
+    return _eased(here, goal, here.pose(goal.link), 1 / max(1, int(np.ceil(error / STRIDE))), easing)
+
+
+def _eased(here: ClosedConfiguration, goal: GuidedTask, X: Array, stride: float, easing: int = EASING
+           ) -> ClosedConfiguration:
     """As near as steps with closed loops come to a goal of more parts than the platform has freedoms: the straight way
     from the pose X need not be one that it can go."""
-    for fraction in (*np.arange(stride, 1, stride), *[1.0] * EASING):
+    for fraction in (*np.arange(stride, 1, stride), *[1.0] * easing):
         ahead = goal.towards(X, float(fraction))
         if fraction == 1 and np.linalg.norm(ahead.rows(here.twin, here.q)[0]) <= SOLVED:
             break

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ...batch.error_bounds import bounds_of
+from ...geometry.ranks import kernel_basis
 from ...geometry.vectors import Array, oriented
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, relation
@@ -82,6 +84,45 @@ def maxima(at: ClosedConfiguration, question: Measurement, cones: Array) -> tupl
     return float(position.largest[0]), float(orientation.largest[0])
 
 
+def attained(at: ClosedConfiguration, question: Measurement, cones: Array) -> tuple[float, float]:
+    """The largest position (m) and orientation error (rad) that an ascent from many views finds: as :func:`maxima`, but
+    a lower bound of it, in a tenth of the time."""
+    position, orientation = (_axes(part, 1) for part in _parts(at, question, cones))
+    return _longest(position), _longest(orientation)
+
+
+def error_axes(at: ClosedConfiguration, question: Measurement, cones: Array) -> Array | None:
+    """Three axes (3, 3), by rows, as long as the largest position errors (m) along them, the first along the largest
+    that an ascent finds, the next along the largest normal to it; None where a freedom is lost that moves it."""
+    return _axes(next(_parts(at, question, cones)), 3)
+
+
+def _parts(at: ClosedConfiguration, question: Measurement, cones: Array) -> Iterator[tuple[Array, Array] | None]:
+    """Range and blocks of position and orientation, None where a freedom is lost that moves it."""
+    rates, twists = reading(at, question)
+    lost, _ = kernel_basis(rates, 1.0)
+    inverse = np.linalg.pinv(rates, rcond=RANK_CUTOFF)
+    for part in (twists[:3], twists[3:]):
+        gone = np.linalg.norm(part @ lost) > RANK_CUTOFF * np.linalg.norm(part)
+        yield None if gone else _seen(part @ inverse, cones)
+
+
+def _axes(part: tuple[Array, Array] | None, count: int) -> Array | None:
+    """So many axes (count, 3) of the errors, zero where there are no more."""
+    if part is None:
+        return None
+    (span, blocks), found = part, np.zeros((count, 3))
+    for row in found[: span.shape[1]]:
+        w = span @ _ascended(blocks @ span)
+        row[:] = float(_width(blocks, w[:, None])[0]) * w
+        span = span @ kernel_basis((w @ span)[None], 1.0)[0]
+    return found
+
+
+def _longest(axes: Array | None) -> float:
+    return np.inf if axes is None else float(np.linalg.norm(axes[0]))
+
+
 def measured(at: ClosedConfiguration, question: Measurement, cones: Array, pose: Pose) -> PoseErrors:
     """The error maxima at a configuration with their directions, for half-angles (k,)."""
     rates, twists = reading(at, question)
@@ -97,9 +138,7 @@ def _extent(J: Array, cones: Array, largest: float, lower: float) -> ErrorEllips
     """The extremes of Σ ψ_i ‖J_iᵀ w‖ over unit w in the range of J (3, 3 k)."""
     if not np.isfinite(largest):
         return ErrorEllipsoid(np.inf, None, 0.0, None, None)
-    blocks = (J.reshape(3, -1, 3) * cones[:, None]).transpose(1, 2, 0)
-    left, values, _ = np.linalg.svd(J)
-    span = left[:, : int(np.sum(values > INVERTED * values[0]))] if values[0] > INVERTED else np.zeros((3, 0))
+    span, blocks = _seen(J, cones)
     if not span.shape[1]:
         return ErrorEllipsoid(0.0, None, 0.0, None, None)
     inside = blocks @ span
@@ -110,6 +149,13 @@ def _extent(J: Array, cones: Array, largest: float, lower: float) -> ErrorEllips
     errors = cones[:, None] * pulls / np.where(sizes > 0, sizes, 1.0)[:, None]
     return ErrorEllipsoid(largest, w, float(_width(blocks, low[:, None])[0]), low, errors,
                   (largest - lower) / largest if largest else 0.0, span.shape[1] == 1)
+
+
+def _seen(J: Array, cones: Array) -> tuple[Array, Array]:
+    """The range (3, d) of J (3, 3 k), and its blocks ψ_i J_iᵀ (k, 3, 3)."""
+    left, values, _ = np.linalg.svd(J)
+    span = left[:, : int(np.sum(values > INVERTED * values[0]))] if values[0] > INVERTED else np.zeros((3, 0))
+    return span, (J.reshape(3, -1, 3) * cones[:, None]).transpose(1, 2, 0)
 
 
 def _width(blocks: Array, w: Array) -> Array:

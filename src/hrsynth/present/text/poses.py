@@ -25,7 +25,7 @@ if TYPE_CHECKING:
     from ...analysis.posture import Distances, Kinds, Posture
     from ...analysis.singularity.singular import Singularity
 
-_STATES = {REGULAR: "regular", "type1": "Type 1 singularity", "type2": "Type 2 singularity",
+STATES = {REGULAR: "regular", "type1": "Type 1 singularity", "type2": "Type 2 singularity",
            "type3": "Type 3 singularity (Type 1 and 2 at once)", CONSTRAINT: "constraint singularity",
            UNDECIDED: "not decided"}
 _SINCE = {"hidden": "the observed directions", "real": "the motors' coordinates"}
@@ -88,7 +88,7 @@ def _posture(posture: Posture, length: float) -> Rows:
 
 
 def _kinds(name: str, what: str, kinds: Kinds, lost: str) -> Rows:
-    state = _STATES[kinds.state]
+    state = STATES[kinds.state]
     if kinds.classes is not None and kinds.classes.RO < 0:
         state += f", but special: {-kinds.classes.RO} fewer are lost than at generic poses"
     title = f"{what}: {state} (smallest rank gap {kinds.gap:.1e}, needed {RANK_GAP:.0e})"

@@ -7,18 +7,21 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
 from ...analysis.observed import ObservedRobot
 from ...analysis.posture import ConfigurationAnalysis
+from ...budgets import APPROACH, FOLLOWING
 from ...geometry.vectors import Array, inverse
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.pinocchio_model import PinocchioModel
-from ...kinematics.steps import track
-from ...kinematics.tasks import Target, solve
+from ...kinematics.platform_motion import Goal
+from ...kinematics.steps import approach, track
+from ...kinematics.tasks import Target, solve, system
 from ...mechanism import Mechanism
 from ...results import Value
 from ...tolerances import FOLLOWED, SOLVED
@@ -31,8 +34,6 @@ BEYOND_SLIDERS = 100.0
 """Such distances beyond which no slider sends the platform."""
 STEPS = 10
 """Configurations on each side of a slider's home."""
-EASY = 60
-"""Iterations in which the hidden robot is to follow."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -117,6 +118,47 @@ class Mover(Value):
         found = followed[-1] if followed else here
         return found, values + aim.apart(found.real.pose(self.setting.motion.link))
 
+    def drawn_to(self, here: Posed, X: Array) -> Posed:
+        """Where the robot comes to from ``here`` when its platform is drawn to the pose X (4, 4): as near as it goes,
+        lengths in characteristic lengths, turns in radians."""
+        motion = self.setting.motion
+        whole = Goal(motion.link, motion.point, motion.home[:3, :3], np.eye(3), motion.position(X), motion.normal,
+                     rotation=X[:3, :3] if motion.body and motion.rotations.shape[1] else None)
+        followed = self._followed(here, [approach(here.real, whole, APPROACH)])
+        return followed[-1] if followed else here
+
+    def read(self, posed: Posed) -> Array:
+        """The coordinates (n,) of the platform."""
+        return self.coordinates.read(posed.real.pose(self.setting.motion.link))
+
+    def beside(self, at: ClosedConfiguration, q: Array) -> Posed | None:
+        """The real robot with the hidden one at ``q``, None where that is at another pose or its directions at others.
+        """
+        assert self.hidden is not None
+        return Posed(at, q) if np.linalg.norm(self._misses(at, q)) <= FOLLOWED else None
+
+    def joined(self, at: ClosedConfiguration) -> Posed:
+        """The real robot with the hidden one beside it, which comes there from its zero configuration; without it where
+        it does not arrive."""
+        found = self._followed(self.home, [at])
+        if not found:
+            goal = Coordinates(self.setting.motion, self.coordinates.places, self.coordinates.read(
+                at.pose(self.setting.motion.link)))
+            halfway = goal.towards(self.home.real.pose(self.setting.motion.link), 0.5)
+            way = [track(self.home.real, self.setting.motion, each)[0] for each in (halfway, goal)]
+            found = self._followed(self.home, [*way, at])
+        return found[-1] if found and found[-1].real is at else Posed(at)
+
+    @cached_property
+    def ends(self) -> tuple[tuple[Posed, Posed], ...]:
+        """Where each coordinate alone comes to, down and up, as far as small steps lead within its slider's span."""
+        found = []
+        for index, place in enumerate(self.coordinates.places):
+            span = TURN if place >= 3 else WAY * self.home.real.twin.length
+            down, up = self.coordinates.ends(self.home.real, index, (span, span))
+            found.append((Posed(down), Posed(up)))
+        return tuple(found)
+
     def far(self, values: Array) -> bool:
         """Whether coordinates (n,) are so far from home that no slider means them."""
         spans = np.where(np.array(self.coordinates.places) >= 3, TURN, WAY * self.home.real.twin.length)
@@ -144,11 +186,16 @@ class Mover(Value):
         q = start.hidden
         for at in way:
             if self.hidden is not None and q is not None:
-                q, residual = solve(self.hidden, q, self._target(at), tolerance=SOLVED, iterations=EASY)
+                q, residual = solve(self.hidden, q, self._target(at), tolerance=SOLVED, iterations=FOLLOWING)
                 if not residual <= FOLLOWED:
                     break
             found.append(Posed(at, q))
         return found
+
+    def _misses(self, at: ClosedConfiguration, q: Array) -> Array:
+        """What the hidden robot misses at ``q``: its loops, the pose and the directions."""
+        assert self.hidden is not None
+        return system(self.hidden, q, self._target(at))[0]
 
     def _target(self, at: ClosedConfiguration) -> Target:
         """The pose and the directions that the hidden robot takes over; blind links are not in it."""

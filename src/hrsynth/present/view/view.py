@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from ...analysis.question import question
 from ...geometry.vectors import Array, oriented
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
-from ...mechanism.observation import Direction
+from ...mechanism.observation import Direction, Observation
 from ...progress import tell
 from ...results import Result, Value
 from ..outputs import OUTPUTS, function
@@ -112,18 +112,9 @@ class View(Result, shown_as="view"):
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
-        mechanism, motion = self.setting.mechanism, self.setting.motion
-        places = {name: i for i, name in enumerate(mechanism.links)}
         return {
-            "name": self.setting.robot.name, "length": mechanism.length, "radius": _radius(mechanism),
-            "largest": self.largest, "freedoms": {
-                "translations": np.round(motion.translations.T, PAGE_DIGITS).tolist(),
-                "rotations": np.round(motion.rotations.T, PAGE_DIGITS).tolist()},
-            "normal": None if self.normal is None else np.round(self.normal, PAGE_DIGITS).tolist(),
-            "machines": [machine.scene() for machine in self.machines],
+            **stage(self.setting, self.machines, self.arrows), "largest": self.largest,
             "home": self.home.scene(), "sliders": [slider.scene() for slider in self.sliders],
-            "arrows": [{"leg": a.leg, "link": places[a.link], "ends": np.round(a.ends, PAGE_DIGITS).tolist()}
-                       for a in self.arrows],
             "ghosts": [outline.scene() for outline in self.mode_outlines], "notes": list(self.notes),
         }
 
@@ -151,17 +142,32 @@ def view(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, 
     shapes, missing = meshes(setting)
     home = mover.state(mover.home)
     states = (home, *(state for slider in sliders for state in slider.states))
-    machines = [_machine(REAL, setting, setting.mechanism, str(setting.anatomy.architecture()), states, shapes)]
+    machines = [machine_of(REAL, setting, setting.mechanism, str(setting.anatomy.architecture()), states, shapes)]
     if derivation is not None and other is not None:
-        machines.append(_machine(HIDDEN, setting, other, str(derivation.hidden_architecture), states, shapes))
+        machines.append(machine_of(HIDDEN, setting, other, str(derivation.hidden_architecture), states, shapes))
     elif hidden:
         notes = (*notes, "every leg is blind: there is no hidden robot")
-    return View(setting, derivation, mover, tuple(machines), home, sliders, tuple(_arrows(setting)), found,
+    arrows = tuple(arrows_of(setting, setting.observed))
+    return View(setting, derivation, mover, tuple(machines), home, sliders, arrows, found,
                 plane_normal(setting.motion), (*notes, *missing))
 
 
-def _machine(key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, states: Sequence[ViewState],
-             meshes: Sequence[Shape]) -> Machine:
+def stage(setting: ObservedRobot, machines: Sequence[Machine], arrows: Iterable[Arrow]) -> dict[str, Any]:
+    """What any page is given of what stands on its stage."""
+    mechanism, motion, normal = setting.mechanism, setting.motion, plane_normal(setting.motion)
+    places = {name: i for i, name in enumerate(mechanism.links)}
+    return {"name": setting.robot.name, "length": mechanism.length, "radius": _radius(mechanism),
+            "freedoms": {"translations": np.round(motion.translations.T, PAGE_DIGITS).tolist(),
+                         "rotations": np.round(motion.rotations.T, PAGE_DIGITS).tolist()},
+            "normal": None if normal is None else np.round(normal, PAGE_DIGITS).tolist(),
+            "machines": [machine.scene() for machine in machines],
+            "arrows": [{"leg": a.leg, "link": places[a.link], "ends": np.round(a.ends, PAGE_DIGITS).tolist()}
+                       for a in arrows]}
+
+
+def machine_of(key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, states: Sequence[ViewState],
+               meshes: Sequence[Shape]) -> Machine:
+    """A mechanism to be drawn, ``key`` real or hidden, its rails as long as it slides in the ``states``."""
     real = setting.mechanism
     kept = tuple(shape for shape in meshes if shape.link in mechanism.links)
     drawer = Drawer(mechanism, real, setting.anatomy.platform, _radius(real), kept)
@@ -191,10 +197,10 @@ def _travels(drawer: Drawer, key: str, states: Sequence[ViewState]) -> dict[str,
     return found
 
 
-def _arrows(setting: ObservedRobot) -> Iterator[Arrow]:
-    """An arrow on the middle of each observed link, along what is observed."""
+def arrows_of(setting: ObservedRobot, observations: Iterable[Observation]) -> Iterator[Arrow]:
+    """An arrow on the middle of each link with a direction, along what is or could be observed."""
     mechanism = setting.mechanism
-    for seen in setting.observed:
+    for seen in observations:
         if not isinstance(seen, Direction):
             continue
         direction = mechanism.links[seen.link].pose[:3, :3] @ seen.direction

@@ -1,0 +1,61 @@
+"""The shipped robots with a picture each, and the files of the folder that was opened."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import numpy as np
+
+from ....description import load, shipped
+from ....families.table import ROBOTS
+from ....geometry.vectors import Array, oriented
+from ....mechanism import JointType, Mechanism
+from ....mechanism.legs import decompose
+from ....mechanism.normal import normal_form
+from ....mechanism.notation import parse
+from ....tolerances import SAME_DIRECTION
+from ...portrait import Portrait
+from ..request import SHIPPED, Request
+
+ENDINGS = (".urdf", ".xacro", ".sdf", ".xml", ".mjcf", ".usd", ".usda", ".usdc", ".usdz", ".yaml", ".yml")
+"""Of files that may be robots."""
+WIDTH, HEIGHT = 180, 130
+"""Of a picture (pixels)."""
+
+
+def answer(request: Request) -> dict[str, Any]:
+    """All robots that can be opened by a click."""
+    return {"robots": robots(), "files": [] if request.folder is None else files(request)}
+
+
+@cache
+def robots() -> list[dict[str, Any]]:
+    """The shipped robots, sorted."""
+    known = {each.name: each for each in ROBOTS}
+    return [{"source": f"{SHIPPED}:{name}", "name": name, "title": name.replace("_", " "),
+             "words": f"{parse(known[name].architecture)}, {known[name].dof} freedoms", "picture": picture(load(name))}
+            for name in shipped()]
+
+
+def picture(robot: Mechanism) -> str:
+    """A small drawing of a robot."""
+    anatomy = decompose(normal_form(robot).mechanism)
+    portrait = Portrait.drawn(anatomy.mechanism, anatomy.platform, (), flat(anatomy.mechanism))
+    return portrait.svg(WIDTH, HEIGHT, robot.name)
+
+
+def flat(robot: Mechanism) -> Array | None:
+    """The normal of the plane to which the joints of a robot confine it, None where they do not."""
+    turns = [joint.axis for joint in robot.joints.values() if joint.type is JointType.REVOLUTE]
+    slides = [joint.axis for joint in robot.joints.values() if joint.type is JointType.PRISMATIC]
+    if not turns or len(turns) + len(slides) < len(robot.joints):
+        return None
+    away = max([np.linalg.norm(np.cross(turns[0], axis)) for axis in turns] + [abs(turns[0] @ axis) for axis in slides])
+    return oriented(turns[0]) if away < SAME_DIRECTION else None
+
+
+def files(request: Request) -> list[str]:
+    """The robot files of the folder, by name."""
+    assert request.folder is not None
+    return sorted(path.name for path in request.folder.iterdir() if path.suffix.lower() in ENDINGS and path.is_file())

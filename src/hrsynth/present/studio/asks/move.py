@@ -1,0 +1,64 @@
+"""The robot moved: by its sliders, by its platform, to where it is known to be, or home; its loops stay closed."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ....errors import BadRequest
+from ....geometry.so3 import rotation_of
+from ....geometry.vectors import pose
+from ....kinematics.limits import outside
+from ....tolerances import SLIDER_ARRIVED
+from ...view.states import BEYOND_SLIDERS, Mover, Posed
+from ..request import Request
+from ..scale import error, nothing, unit_of
+
+PLACE = 7
+"""Numbers of a place: position and unit quaternion."""
+
+
+def answer(request: Request) -> dict[str, Any]:
+    """Where the robot comes to from ``here`` when its sliders are at ``values``, or when its platform is drawn to the
+    place ``platform`` (its displacement from home); without either, what is at ``here``."""
+    mover = request.mover(request.flag("hidden"))
+    here = request.here(mover)
+    values = request.vector("values", len(mover.coordinates.places))
+    place = request.vector("platform", PLACE)
+    if values is not None and place is not None:
+        raise BadRequest("both values and a place of the platform are given", None, "one of them")
+    if values is not None:
+        if mover.far(values):
+            raise BadRequest("values", values.tolist(), "what the robot's sliders can mean")
+        here, reached = mover.sent(here, values)
+        return told(request, mover, here, bool(np.max(np.abs(reached - values), initial=0.0) > SLIDER_ARRIVED))
+    if place is not None:
+        return _drawn(request, mover, here, place)
+    return told(request, mover, here)
+
+
+def _drawn(request: Request, mover: Mover, here: Posed, place: Any) -> dict[str, Any]:
+    size = float(np.linalg.norm(place[3:]))
+    if not 0.5 < size < 2.0:
+        raise BadRequest("platform", place.tolist(), "a position and a unit quaternion")
+    link = mover.setting.motion.link
+    wanted = pose(place[:3], rotation_of(place[[6, 3, 4, 5]] / size)) @ mover.setting.mechanism.links[link].pose
+    if float(np.linalg.norm(place[:3])) > BEYOND_SLIDERS * mover.home.real.twin.length:
+        raise BadRequest("platform", place.tolist(), f"within {BEYOND_SLIDERS:g} sizes of the robot")
+    found = mover.drawn_to(here, wanted)
+    apart = np.abs(found.real.pose(link) - wanted).max()
+    return told(request, mover, found, bool(apart > SLIDER_ARRIVED))
+
+
+def told(request: Request, mover: Mover, posed: Posed, stopped: bool = False) -> dict[str, Any]:
+    """A configuration with all that is shown of it; ``stopped``: it is not where it was sent."""
+    return {"state": state(request, mover, posed), "here": request.told(posed),
+            "values": mover.read(posed).tolist(), "stopped": stopped, "residual": posed.real.residual}
+
+
+def state(request: Request, mover: Mover, posed: Posed) -> dict[str, Any]:
+    """What is drawn of a configuration, how wrong the platform can be there, and the joints beyond their limits."""
+    wrong = (nothing(unit_of(mover.setting), "no leg is watched") if request.blind
+             else error(mover.setting, posed.real))
+    return {**mover.state(posed).scene(), "error": wrong, "beyond": outside(posed.real.twin, posed.real.q)}

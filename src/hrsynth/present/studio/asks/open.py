@@ -1,0 +1,125 @@
+"""A robot on the stage: all that a page draws of it, its legs and sliders, and what was guessed of its file."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from ....analysis.observed import ObservedRobot
+from ....description import file_of
+from ....description.assembly.choices import ImportChoices, choices
+from ....description.overrides import UNITS, Overrides
+from ....errors import HrsynthError, NoSegment
+from ....mechanism.legs import Leg
+from ....mechanism.sensors import default_observation, reason
+from ...view.meshes import meshes
+from ...view.shapes import PAGE_DIGITS
+from ...view.states import REAL, Mover
+from ...view.view import arrows_of, machine_of, stage
+from ..commands import lines
+from ..request import Request
+from ..scale import scale, unit_of
+from .move import told
+
+MOST_OFFERED = 30
+"""Candidates of a guess that are offered."""
+
+
+def answer(request: Request) -> dict[str, Any]:
+    """The scene of a robot. Where its file can be read but no robot be made of it: why (``failed``), and what was
+    guessed."""
+    found = guessed(request)
+    guesses = [] if found is None else list(offers(request, found))
+    dialect = "hrsynth" if found is None else found.dialect
+    try:
+        return {**scene(request), "guesses": guesses, "dialect": dialect, "failed": None}
+    except HrsynthError as error:
+        if not guesses:
+            raise
+        name = request.source.robot.rpartition("/")[2]
+        return {"name": name, "words": "", "failed": "\n".join(error.lines()), "guesses": guesses, "dialect": dialect,
+                "notes": [str(note) for note in found.notes] if found else [], **lines(request, "derive")}
+
+
+def scene(request: Request) -> dict[str, Any]:
+    """What is drawn and moved."""
+    setting, mover = request.setting, request.mover()
+    known = {each.leg: each for each in (*setting.segments, *setting.observed)}
+    shapes, missing = meshes(setting)
+    ends = [mover.state(each) for pair in mover.ends for each in pair]
+    words = str(setting.anatomy.architecture())
+    machine = machine_of(REAL, setting, setting.mechanism, words, [mover.state(mover.home), *ends], shapes)
+    here = request.here(mover)
+    return {
+        **stage(setting, [machine], arrows_of(setting, known.values())),
+        "words": f"{words}, {setting.dof} freedoms",
+        "legs": [_leg(request, setting, leg) for leg in setting.anatomy.legs],
+        "sliders": sliders(mover), "scale": scale(unit_of(setting)), **told(request, mover, here),
+        "notes": [*map(str, setting.robot.notes), *setting.beside(), *missing], **lines(request, "derive")}
+
+
+def sliders(mover: Mover) -> list[dict[str, Any]]:
+    """A slider for each freedom, as far as it goes alone from home."""
+    made = []
+    coordinates = mover.coordinates
+    for number, (name, place, pair) in enumerate(zip(coordinates.names, coordinates.places, mover.ends, strict=True)):
+        low, high = (float(mover.read(each)[number]) for each in pair)
+        home = float(coordinates.values[number])
+        low, high = sorted((min(low, home), max(high, home)))
+        made.append({"name": name, "label": name, "unit": "rad" if place >= 3 else "m",
+                     "min": round(low, PAGE_DIGITS), "max": round(high, PAGE_DIGITS), "home": home})
+    return made
+
+
+def _leg(request: Request, setting: ObservedRobot, leg: Leg) -> dict[str, Any]:
+    """A leg: its chain, whether it can be watched, and why at this link, or why not."""
+    seen = next((each for each in setting.observed if each.leg == leg.label), None)
+    default = next((each for each in setting.segments if each.leg == leg.label), None)
+    shown, why = seen or default, None
+    if shown is None:
+        try:
+            shown = default_observation(setting.anatomy, leg)
+        except NoSegment as error:
+            why = str(error)
+    if shown is not None:
+        why = reason(setting.anatomy, shown)
+    return {"name": leg.label, "words": str(setting.anatomy.word(leg)), "can": shown is not None, "why": why,
+            "watched": seen is not None and not request.blind, "link": None if shown is None else shown.link}
+
+
+def guessed(request: Request) -> ImportChoices | None:
+    """What the file leaves open, None where it says all, or cannot be read."""
+    said = dict(request.source.options)
+    try:
+        given = Overrides.said(base=said.get("base"), motors=said.get("motors"), close=said.get("close", ()),
+                               freeze=said.get("freeze", ()), unit=said.get("unit"))
+        return choices(file_of(request.source.robot), given)
+    except HrsynthError:
+        return None
+
+
+def offers(request: Request, found: ImportChoices) -> Iterator[dict[str, Any]]:
+    """What was guessed, by the name of the option that says otherwise, with what could be meant instead."""
+    said = dict(request.source.options)
+
+    def offer(name: str, now: Any, why: str, candidates: list[Any]) -> dict[str, Any]:
+        offered = [now, *(each for each in candidates if each != now)]
+        return {"name": name, "found": now, "why": why, "candidates": offered[:MOST_OFFERED]}
+
+    if found.platforms:
+        told = "chosen" if "platform" in said else found.why if found.told else "several could be"
+        yield offer("platform", said.get("platform", found.platforms[0]), told or "the file says so",
+                    list(found.platforms))
+    if len(found.bases) > 1:
+        yield offer("base", said.get("base", found.bases[0]), "no joint carries it", list(found.bases))
+    driven = [joint.name for joint in found.moving if joint.motor is not None]
+    on_base = [joint.name for joint in found.moving if found.bases[0] in joint.links]
+    yield offer("motors", list(said.get("motors", driven)), "chosen" if "motors" in said else "as the file says",
+                [driven, on_base])
+    if found.candidates or "close" in said:
+        near = [each.wish for each in found.candidates]
+        yield offer("close", list(said.get("close", ())), "frames that lie near to each other could meet",
+                    [[], near, *([each] for each in near)])
+    yield offer("unit", said.get("unit", "m"), "of the file's lengths", list(UNITS))
+    yield offer("as_written", said.get("as_written", False), "else what is parallel, or meets, but for rounding is "
+                "made so", [False, True])

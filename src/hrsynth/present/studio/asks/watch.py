@@ -1,0 +1,126 @@
+"""What the watched legs see: the verdict, lost freedoms, the hidden robot, when it is singular, the smallest sets."""
+
+from __future__ import annotations
+
+from functools import lru_cache
+from itertools import combinations
+from typing import Any
+
+import numpy as np
+
+from ....analysis.accuracy.pose_errors import error_axes
+from ....analysis.freedoms import Freedom
+from ....analysis.measured import MeasuredRobot
+from ....analysis.observed import ObservedRobot, restricted
+from ....analysis.posture import ConfigurationAnalysis
+from ....analysis.verdict import CONTROLLABLE, Verdict, verdict_of
+from ....budgets import REMEMBERED
+from ....constraints.condition import always
+from ....errors import HrsynthError
+from ....kinematics.configuration import ClosedConfiguration
+from ....mechanism.observation import Direction, labels_of
+from ....tolerances import NAMED
+from ...text.poses import STATES
+from ...text.robots import certificate, exact_words
+from ...view.states import HIDDEN
+from ...view.view import machine_of
+from ..commands import lines
+from ..request import Request
+from ..scale import CONE, error, nothing, unit_of
+
+MOST_SETS = 10
+"""Smallest sets that are listed."""
+
+
+def answer(request: Request) -> dict[str, Any]:
+    """All that follows from which legs are watched, at ``here``."""
+    setting = request.setting
+    sets = [{"legs": list(each.legs), "words": each.verdict} for each in smallest(all_legs(setting))[:MOST_SETS]]
+    if request.blind:
+        return {"verdict": {"controllable": False, "words": "no leg is watched", "certainty": ""}, "rank": 0,
+                "dof": setting.dof, "lost": [], "hidden": None, "hidden_words": "", "condition": "", "sets": sets,
+                "ellipsoid": None, "error": nothing(unit_of(setting), "no leg is watched"), **lines(request, "legs")}
+    derivation, mover = request.derivation, request.mover()
+    verdict, here = derivation.verdict, request.here(mover)
+    posture = ConfigurationAnalysis.of(setting).examine(here.real)
+    point = setting.motion.position(here.real.pose(setting.motion.link))
+    return {
+        "verdict": {"controllable": verdict == CONTROLLABLE, "words": verdict.verdict,
+                    "certainty": exact_words(derivation.exact, verdict.rank)},
+        "rank": posture.hidden.rank, "dof": verdict.dof, "here": STATES[posture.hidden.state],
+        "lost": [lost(each, point.tolist()) for each in posture.hidden.lost],
+        "hidden": hidden(request), "hidden_words": hidden_words(request), "condition": condition(setting),
+        "sets": sets, "ellipsoid": ellipsoid(setting, here.real), "error": error(setting, here.real),
+        **lines(request, "derive")}
+
+
+def lost(freedom: Freedom, point: list[float]) -> dict[str, Any]:
+    """A lost freedom; its ``kind`` is translation or rotation."""
+    turns = bool(np.linalg.norm(freedom.twist[3:]) > NAMED)
+    return {"words": freedom.name, "twist": freedom.to_dict()["twist"], "point": point,
+            "kind": "rotation" if turns else "translation"}
+
+
+def hidden(request: Request) -> dict[str, Any] | None:
+    """The hidden robot as a machine to be drawn, None where every leg is blind."""
+    found = request.derivation
+    if found.hidden is None:
+        return None
+    mover = request.mover(hidden=True)
+    posed = [each for each in (mover.home, *(mover.joined(end.real) for pair in mover.ends for end in pair))
+             if each.hidden is not None]
+    return machine_of(HIDDEN, request.setting, found.hidden, str(found.hidden_architecture),
+                      [mover.state(each) for each in posed], ()).scene()
+
+
+def hidden_words(request: Request) -> str:
+    """The hidden robot's legs, and how it was compared with the real one."""
+    found = request.derivation
+    legs = found.hidden_architecture
+    return (f"{legs}; certificate {certificate(found.certificate)}" if legs
+            else "none: every observed direction is constant")
+
+
+def condition(setting: ObservedRobot) -> str:
+    """When a freedom is lost that is seen generically (Type 2)."""
+    robot = MeasuredRobot.watched(setting)
+    try:
+        if robot.verdict.lost:
+            return always(robot.pattern, [each.name for each in robot.verdict.lost])
+        return robot.condition.words
+    except HrsynthError as problem:
+        return str(problem)
+
+
+def all_legs(setting: ObservedRobot) -> ObservedRobot:
+    """The same robot with all legs watched."""
+    return ObservedRobot.of(setting.robot)
+
+
+@lru_cache(maxsize=REMEMBERED)
+def smallest(setting: ObservedRobot) -> tuple[Verdict, ...]:
+    """The verdicts of the smallest sets of watched legs that see as much as all of them: those of ``hrsynth legs``, of
+    which larger ones are left out."""
+    labels = labels_of(setting.observed)
+    best = verdict_of(setting, labels, setting.samples).rank
+    for size in range(1, len(labels) + 1):
+        found = []
+        for chosen in combinations(labels, size):
+            samples = restricted(setting.everything, [each for each in setting.observed if each.leg in chosen])
+            verdict = verdict_of(setting, chosen, samples)
+            if verdict.rank == best:
+                found.append(verdict)
+        if found:
+            return tuple(found)
+    return ()
+
+
+def ellipsoid(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any] | None:
+    """The ellipsoid that stands for the position errors for 0.1° of each direction (:func:`.error_axes`); None where
+    they have no bound, or there are none."""
+    if not all(isinstance(each, Direction) for each in setting.observed):
+        return None
+    axes = error_axes(at, setting.samples.question, np.full(len(setting.observed), CONE))
+    if axes is None or not axes.any():
+        return None
+    return {"center": setting.motion.position(at.pose(setting.motion.link)).tolist(), "axes": axes.tolist()}

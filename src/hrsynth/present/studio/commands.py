@@ -1,0 +1,38 @@
+"""The command line and the line of Python that give what a panel shows."""
+
+from __future__ import annotations
+
+import shlex
+from typing import Any
+
+from .request import Request
+
+
+def lines(request: Request, name: str, *options: str, legs: bool = True, **given: Any) -> dict[str, str]:
+    """The fields ``command`` and ``python`` of an answer: the question ``name``, with the ``options`` of the command
+    line and the arguments ``given`` in Python; ``legs``: with what is watched."""
+    words = ["hrsynth", name, request.source.robot]
+    python = []
+    if legs and request.watched:
+        words += ["--observe", ",".join(request.watched)]
+        python.append(repr(list(request.watched)))
+    if request.camera is not None:
+        words += ["--camera", request.camera]
+        python.append(f"camera={request.camera!r}")
+    robot = repr(request.source.robot)
+    said = dict(request.source.options)
+    for option, value in said.items():
+        flag = f"--{option.replace('_', '-')}"
+        if value is True:
+            words.append(flag)
+        elif option == "close":
+            words += [word for each in value for word in (flag, each)]
+        else:
+            words += [flag, ",".join(value) if isinstance(value, tuple) else str(value)]
+    if said:
+        values = ", ".join(f"{option}={list(value) if isinstance(value, tuple) else value!r}"
+                           for option, value in said.items())
+        robot = f"hrsynth.load({robot}, {values})"
+    python += [f"{each}={value!r}" for each, value in given.items()]
+    return {"command": shlex.join([*words, *options]),
+            "python": f"hrsynth.{name}({', '.join([robot, *python])})"}

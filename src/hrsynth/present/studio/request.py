@@ -1,0 +1,285 @@
+"""What a question of the studio gives, read and checked field by field: the robot, the watched legs, where it is."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...analysis.asked import observe
+from ...analysis.derive import Derivation, derive
+from ...analysis.observed import ObservedRobot
+from ...budgets import FARTHEST_POSE, LARGEST_STUDIO_LIST, LONGEST_STUDIO_NAME, REMEMBERED
+from ...description import load, shipped
+from ...description.example_data import PREFIX
+from ...errors import BadRequest, LoopsNotClosed
+from ...geometry.vectors import Array
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.pinocchio_model import PinocchioModel
+from ...mechanism import Mechanism
+from ...results import Value
+from ...tolerances import FOLLOWED
+from ..view.states import Mover, Posed
+
+SHIPPED, FILE, FOLDER, GIVEN = "shipped", "file", "folder", "given"
+LISTS, TEXTS = ("motors", "close", "freeze"), ("base", "platform", "keyframe", "unit")
+OPTIONS = (*TEXTS, *LISTS, "tolerance", "as_written")
+"""What a question may say of a file, as ``hrsynth.load`` takes it."""
+
+
+@dataclass(frozen=True)
+class RobotSource:
+    """A robot: what ``hrsynth.load`` takes, the options that are set, and when its file was written."""
+
+    robot: str
+    options: tuple[tuple[str, Any], ...]
+    written: tuple[int, int] | None = None
+
+    def load(self) -> Mechanism:
+        """The mechanism; one that was read is not read again while its file stays as it is."""
+        return _loaded(self)
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _loaded(source: RobotSource) -> Mechanism:
+    return load(source.robot, **dict(source.options))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Request(Value):
+    """A question's ``fields``, and where its robots lie (see :class:`.desk.Desk`). Every field is read by one of these
+    methods; all raise ``BadRequest`` in one line."""
+
+    fields: Mapping[str, Any]
+    folder: Path | None = None
+    uploads: Path | None = None
+    given: Mapping[str, Any] | None = None
+
+    # Fields of any question
+
+    def flag(self, name: str) -> bool:
+        """Yes or no; no where it is not said."""
+        found = self.fields.get(name)
+        if found is not None and not isinstance(found, bool):
+            raise BadRequest(name, found, "true or false")
+        return bool(found)
+
+    def text(self, name: str, allowed: Iterable[str] | None = None) -> str | None:
+        """A short text, one of those ``allowed``."""
+        found = self.fields.get(name)
+        return None if found is None else _text(name, found, allowed)
+
+    def number(self, name: str, low: float, high: float) -> float | None:
+        """A number from ``low`` to ``high``."""
+        found = self.fields.get(name)
+        return None if found is None else _number(name, found, low, high)
+
+    def count(self, name: str, low: int, high: int) -> int | None:
+        """A whole number from ``low`` to ``high``."""
+        found = self.number(name, low, high)
+        if found is not None and found != int(found):
+            raise BadRequest(name, found, "a whole number")
+        return None if found is None else int(found)
+
+    def vector(self, name: str, size: int) -> Array | None:
+        """So many finite numbers."""
+        found = self.fields.get(name)
+        return None if found is None else _vector(name, found, size)
+
+    # The robot
+
+    @cached_property
+    def source(self) -> RobotSource:
+        """The robot that is asked about."""
+        said = self.fields.get("robot")
+        if not isinstance(said, dict):
+            raise BadRequest("robot", said, "an object with a field `source`")
+        kind, _, name = _text("source of a robot", said.get("source", "")).partition(":")
+        options = _options(said.get("options"))
+        if kind == SHIPPED:
+            if name not in shipped():
+                raise BadRequest("no such shipped robot", name, "what the gallery lists")
+            return RobotSource(name, options)
+        if kind == GIVEN and not name:
+            if self.given is None:
+                raise BadRequest("the robot of the command line", None, "none was given")
+            own = {**dict(_options(self.given.get("options"))), **dict(options)}
+            return _of_file(str(self.given["robot"]), tuple(sorted(own.items())))
+        if kind == PREFIX.removesuffix(":"):
+            return RobotSource(f"{PREFIX}{name}", options)
+        root = {FILE: self.uploads, FOLDER: self.folder}.get(kind)
+        if root is None:
+            raise BadRequest("source of a robot", said.get("source"), "shipped:NAME, file:NAME, folder:NAME or given")
+        return _of_file(str(inside(root, name)), options)
+
+    @cached_property
+    def mechanism(self) -> Mechanism:
+        """The robot as it is read."""
+        return self.source.load()
+
+    @cached_property
+    def watched(self) -> tuple[str, ...] | None:
+        """The names of what is watched; None: the file's own."""
+        found = self.fields.get("watch")
+        return None if found is None else _texts("watch", found)
+
+    @cached_property
+    def camera(self) -> str | None:
+        """The link that carries the camera, None for the base."""
+        return self.text("camera")
+
+    @cached_property
+    def setting(self) -> ObservedRobot:
+        """The robot with what is watched of it; with all legs where none is."""
+        return observe(self.mechanism, self.watched or None, self.camera)
+
+    @property
+    def blind(self) -> bool:
+        """Whether no leg is watched at all."""
+        return self.watched == ()
+
+    def seeing(self) -> ObservedRobot:
+        """The robot with what is watched of it; raises ``BadRequest`` where no leg is."""
+        if self.blind:
+            raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
+        return self.setting
+
+    @cached_property
+    def derivation(self) -> Derivation:
+        """The hidden robot of the watched legs."""
+        return derive(self.seeing(), paper=False)
+
+    def mover(self, hidden: bool = False) -> Mover:
+        """What moves the robot, and with ``hidden`` its hidden robot beside it."""
+        other = self.derivation.hidden if hidden and not self.blind else None
+        return _mover(self.setting, other)
+
+    # Where it is
+
+    def here(self, mover: Mover) -> Posed:
+        """Where the robot is: the zero configuration where nothing is said. What a hidden robot had for other legs does
+        not count; its loops and those of the real robot are closed, else it is refused."""
+        found = self.fields.get("here")
+        if found is None:
+            return mover.home
+        if not isinstance(found, dict):
+            raise BadRequest("here", found, "what an answer has there, or null")
+        twin = mover.home.real.twin
+        q = _configuration(twin, found.get("q"))
+        try:
+            at = ClosedConfiguration.of(twin, q)
+        except LoopsNotClosed as error:
+            raise BadRequest("here: the loops are not closed, residual", f"{error.residual:.2g}",
+                             f"up to {error.tolerance:g}") from None
+        other = found.get("hidden")
+        if mover.hidden is None:
+            return Posed(at)
+        if isinstance(other, dict) and other.get("legs") == list(self.setting.labels):
+            q = _configuration(mover.hidden, other.get("q"))
+            posed = mover.beside(at, q)
+            if posed is None:
+                raise BadRequest("here: the hidden robot is elsewhere", None, f"with the platform, to {FOLLOWED:g}")
+            return posed
+        if other is not None and not isinstance(other, dict):
+            raise BadRequest("here: hidden", other, "what an answer has there, or null")
+        return mover.joined(at)
+
+    def told(self, posed: Posed) -> dict[str, Any]:
+        """The field ``here`` of an answer."""
+        hidden = None if posed.hidden is None else {"legs": list(self.setting.labels), "q": posed.hidden.tolist()}
+        return {"q": posed.real.q.tolist(), "hidden": hidden}
+
+
+@lru_cache(maxsize=REMEMBERED)
+def _mover(setting: ObservedRobot, hidden: Mechanism | None) -> Mover:
+    return Mover.of(setting, hidden)
+
+
+def inside(root: Path, name: str) -> Path:
+    """The file of a name in a folder, links resolved; raises ``BadRequest`` for one that lies outside of it or is not
+    there."""
+    try:
+        top, path = root.resolve(), (root / name).resolve()
+        if name and "\0" not in name and path.is_relative_to(top) and path != top and path.exists():
+            return path
+    except (OSError, ValueError, RuntimeError):
+        pass
+    raise BadRequest("no such file", name, "a file that was dropped here, or one of the folder")
+
+
+def _of_file(robot: str, options: tuple[tuple[str, Any], ...]) -> RobotSource:
+    """A robot by its path, or by a name."""
+    try:
+        state = Path(robot).stat()
+    except (OSError, ValueError):
+        return RobotSource(robot, options)
+    return RobotSource(robot, options, (state.st_mtime_ns, state.st_size))
+
+
+def _options(found: Any) -> tuple[tuple[str, Any], ...]:
+    """The options that are set, sorted by name."""
+    if found is None:
+        return ()
+    if not isinstance(found, dict):
+        raise BadRequest("options of a robot", found, "an object")
+    set_: dict[str, Any] = {}
+    for name, value in found.items():
+        if name not in OPTIONS:
+            raise BadRequest("options of a robot: unknown option", name, OPTIONS)
+        if value is None or value == [] or value is False:
+            continue
+        if name in LISTS:
+            set_[name] = _texts(name, value)
+        elif name in TEXTS:
+            set_[name] = _text(name, value)
+        elif name == "tolerance":
+            set_[name] = _number(name, value, 0.0, math.inf)
+        elif value is not True:
+            raise BadRequest(name, value, "true or false")
+        else:
+            set_[name] = True
+    # a file beside the robot's own would be read: FILE.srdf:NAME
+    if "/" in set_.get("keyframe", "") or "\\" in set_.get("keyframe", ""):
+        raise BadRequest("keyframe", set_["keyframe"], "the name of a posture")
+    return tuple(sorted(set_.items()))
+
+
+def _text(name: str, found: Any, allowed: Iterable[str] | None = None) -> str:
+    if not isinstance(found, str) or len(found) > LONGEST_STUDIO_NAME or "\0" in found:
+        raise BadRequest(name, found, f"a text of at most {LONGEST_STUDIO_NAME} characters")
+    if allowed is not None and found not in tuple(allowed):
+        raise BadRequest(name, found, tuple(allowed))
+    return found
+
+
+def _texts(name: str, found: Any) -> tuple[str, ...]:
+    if not isinstance(found, list) or len(found) > LARGEST_STUDIO_LIST:
+        raise BadRequest(name, found, f"a list of at most {LARGEST_STUDIO_LIST} names")
+    return tuple(_text(name, each) for each in found)
+
+
+def _number(name: str, found: Any, low: float, high: float) -> float:
+    if isinstance(found, bool) or not isinstance(found, int | float):
+        raise BadRequest(name, found, "a number")
+    if not (math.isfinite(found) if isinstance(found, float) else True) or not low <= found <= high:
+        raise BadRequest(name, found, f"a number from {low:g} to {high:g}")
+    return float(found)
+
+
+def _vector(name: str, found: Any, size: int) -> Array:
+    if not isinstance(found, list) or len(found) != size:
+        raise BadRequest(name, found, f"a list of {size} numbers")
+    return np.array([_number(name, each, -FARTHEST_POSE, FARTHEST_POSE) for each in found])
+
+
+def _configuration(twin: PinocchioModel, found: Any) -> Array:
+    """A configuration of a twin: its size, finite, with unit quaternions."""
+    q = _vector("here: coordinates", found, len(twin.q0))
+    if not twin.is_normalized(q):
+        raise BadRequest("here: a turn", None, "a unit quaternion")
+    return q

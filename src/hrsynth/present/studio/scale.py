@@ -1,0 +1,68 @@
+"""How wrong the platform can be, on one scale for all robots: millimetres and degrees for 0.1° of each direction."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from ...analysis.accuracy.pose_errors import attained, finite
+from ...analysis.observed import ObservedRobot
+from ...kinematics.configuration import ClosedConfiguration
+from ...mechanism.observation import Direction
+
+CONE = math.radians(0.1)
+"""Half-angle of the errors of each watched direction (rad)."""
+CONE_TEXT = "0.1deg"
+NAMES = ("very good", "good", "fair", "poor", "very poor")
+"""What the steps of the scale are called."""
+STEPS = {"mm": (1.0, 3.0, 10.0, 30.0), "deg": (0.1, 0.3, 1.0, 3.0)}
+"""Where one step of the scale ends and the next begins, for 0.1° of each direction."""
+SIGNS = {"mm": " mm", "deg": "°"}
+LOST = "a freedom is not seen: the error has no bound"
+
+
+def unit_of(setting: ObservedRobot) -> str:
+    """In which unit a platform's error is shown: degrees where it only turns."""
+    return "mm" if setting.motion.translations.shape[1] else "deg"
+
+
+def step_of(value: float | None, unit: str) -> int:
+    """The step of an error on the scale; the last where it has no bound."""
+    return len(NAMES) - 1 if value is None else int(np.searchsorted(STEPS[unit], value, side="right"))
+
+
+def error(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
+    """What the platform can be wrong by at a configuration, found by an ascent (:func:`.attained`); None where there is
+    no bound."""
+    unit = unit_of(setting)
+    if not all(isinstance(each, Direction) for each in setting.observed):
+        return nothing(unit, "not told: what is watched is no direction")
+    metres, radians = attained(at, setting.samples.question, np.full(len(setting.observed), CONE))
+    return told(finite(1e3 * metres), finite(math.degrees(radians)), unit)
+
+
+def told(mm: float | None, deg: float | None, unit: str) -> dict[str, Any]:
+    """The record of an error of position and of orientation."""
+    value = {"mm": mm, "deg": deg}[unit]
+    if mm is None or deg is None:
+        return {"mm": mm, "deg": deg, "unit": unit, "step": len(NAMES) - 1, "words": LOST}
+    step = step_of(value, unit)
+    return {"mm": mm, "deg": deg, "unit": unit, "step": step,
+            "words": f"about {rounded(value)}{SIGNS[unit]} wrong per 0.1°: {NAMES[step]}"}
+
+
+def nothing(unit: str, words: str) -> dict[str, Any]:
+    """The record where nothing is watched."""
+    return {"mm": None, "deg": None, "unit": unit, "step": len(NAMES) - 1, "words": words}
+
+
+def scale(unit: str) -> dict[str, Any]:
+    """The scale, for a legend."""
+    return {"unit": unit, "edges": list(STEPS[unit]), "names": list(NAMES)}
+
+
+def rounded(value: float | None) -> str:
+    """A number as one says it: two digits."""
+    return "?" if value is None else f"{float(f'{value:.2g}'):g}"
