@@ -51,9 +51,10 @@ ROBOTS = re.compile(
 # Packages that are slow to import: only inside functions, save in the one folder that is named.
 SLOW = {"pinocchio": "kinematics"} | dict.fromkeys(
     ["cv2", "dask", "example_robot_data", "flint", "joblib", "matplotlib", "mujoco", "numba", "scipy"]
-    + ["sympy", "trimesh", "yourdfpy"]
+    + ["starlette", "sympy", "trimesh", "uvicorn", "websockets", "yourdfpy"]
 )
-NOT_FOR_HELP = ["pinocchio", "sympy", "networkx", "scipy", "yourdfpy", "matplotlib", "flint", "mujoco"]
+NOT_FOR_HELP = ["pinocchio", "sympy", "networkx", "scipy", "yourdfpy", "matplotlib", "flint", "mujoco", "starlette",
+                "uvicorn", "websockets"]
 
 # Spelt apart, so that this file does not hold them.
 NOT_IN_FILES = ["TO" "DO", "FIX" "ME", "/wo" "rk/", "pypi" ".org", "python" "hosted", "--extra-" "index-url"]

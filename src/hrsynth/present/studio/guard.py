@@ -45,12 +45,14 @@ class Guard:
         if host not in self.hosts or not self._own(scope, host):
             await refuse(scope, send, HTTPStatus.FORBIDDEN)
             return
-        first, _, rest = scope["raw_path"].decode("ascii").removeprefix("/").partition("/")
+        first, slash, rest = scope["raw_path"].decode("ascii").removeprefix("/").partition("/")
         if scope["type"] == "http" and scope["method"] == "GET" and first in self.once and not rest:
             self.once.discard(first)
             await refuse(scope, send, HTTPStatus.SEE_OTHER, {"location": f"/{self.secret}/"})
         elif not hmac.compare_digest(first, self.secret):
             await refuse(scope, send, HTTPStatus.NOT_FOUND)
+        elif not slash:
+            await refuse(scope, send, HTTPStatus.SEE_OTHER, {"location": f"/{self.secret}/"})
         else:
             headers = HEADERS | {"content-security-policy": POLICY.format(f"ws://{host.decode()}")}
 

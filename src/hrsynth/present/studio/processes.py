@@ -97,9 +97,9 @@ class WorkerProcess:
         return True
 
     def cancel(self, number: int) -> bool:
-        """Give an ask up; whether it was waiting here or being answered."""
+        """Give an ask up; whether it was waiting: one that is being answered is told of when its process has ended."""
         if self.current is not None and self.current[0] == number:
-            return self.current[1].cancel()
+            self.current[1].cancel()
         kept = [each for each in self.waiting if each[0] != number]
         found = len(kept) < len(self.waiting)
         self.waiting = deque(kept)
@@ -122,7 +122,7 @@ class WorkerProcess:
                 finally:
                     self.current = None
                     task.cancel()
-                await self.send(gone(number, "given up", "Cancelled") if task.cancelled() else task.result())
+                await self.send(cancelled(number) if task.cancelled() else task.result())
         finally:
             self._end()
 
@@ -175,6 +175,11 @@ async def _frame(reader: asyncio.StreamReader) -> bytes:
     if size > 2 * LARGEST_ANSWER:
         raise EOFError(size)
     return await reader.readexactly(size)
+
+
+def cancelled(number: int) -> str:
+    """The message of an ask that was cancelled."""
+    return gone(number, "given up", "Cancelled")
 
 
 def gone(number: int | None, error: str, kind: str) -> str:

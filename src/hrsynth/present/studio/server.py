@@ -71,7 +71,7 @@ def application(tabs: Tabs) -> Any:
 
     async def page(request: Request) -> Response:
         name = request.path_params.get("name", MAIN)
-        known = {file.name: file for file in PAGE.iterdir() if file.suffix in TYPES}
+        known = {file.name: file for file in PAGE.iterdir() if file.suffix in TYPES and not file.is_symlink()}
         if name not in known:
             return Response(status_code=HTTPStatus.NOT_FOUND)
         return Response(known[name].read_bytes(), media_type=TYPES[known[name].suffix])
@@ -102,15 +102,15 @@ class StudioServer:
 
     def __init__(self, opening: Opening, port: int = 0, *, desk: str = DESK) -> None:
         listener = bound(port)
+        self.forks = ForkServer(desk)  # while modules are loaded there, the server's are loaded here
         try:
-            forks = ForkServer(desk)  # while modules are loaded there, the server's are loaded here
-            self.server, guard, self.folder = made(opening, listener.getsockname()[1], forks)
+            self.server, self.guard, self.folder = made(opening, listener.getsockname()[1], self.forks)
         except BaseException:
             listener.close()
+            self.forks.close()
             raise
-        self.forks, self.guard = forks, guard
         self.root = f"http://{HOST}:{listener.getsockname()[1]}/"
-        self.address = f"{self.root}{guard.secret}/"
+        self.address = f"{self.root}{self.guard.secret}/"
         self.thread = threading.Thread(target=self._run, args=(listener,), daemon=True)
         self.thread.start()
         while not self.server.started and self.thread.is_alive():

@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...budgets import ASK_SECONDS, MOST_TABS, MOVE_SECONDS
-from .processes import ForkServer, WorkerProcess, gone
+from .processes import ForkServer, WorkerProcess, cancelled, gone
 from .uploads import UploadFolder
 
 if TYPE_CHECKING:
@@ -67,18 +67,23 @@ class BrowserTab:
     def _routed(self, text: str | None) -> str | None:
         """Put an ask where it is answered, or cancel one; what is said where that cannot be."""
         try:
-            asked = json.loads(text or "")
+            asked = json.loads(text or "", parse_constant=_no_number)
             number, kind = asked["n"], asked["ask"]
-            if not isinstance(number, int) or not isinstance(kind, str):
+            if type(number) is not int or not isinstance(kind, str):
                 raise TypeError(number)
             if kind == "cancel":
                 other = asked["of"]
-                self.mover.cancel(other) or self.desk.cancel(other)
-                return None
+                waited = self.mover.cancel(other) or self.desk.cancel(other)
+                return cancelled(other) if waited else None
         except (ValueError, KeyError, TypeError, RecursionError):
             return gone(None, "no message: an object with a whole number n and the name of an ask", "Unknown")
         there = self.mover if kind == MOVE else self.desk
         return None if there.ask(number, (text or "").encode()) else gone(number, "too many questions wait", "TooMany")
+
+
+def _no_number(name: str) -> None:
+    """Raise ``ValueError``: NaN and infinities are no JSON."""
+    raise ValueError(name)
 
 
 class Tabs:

@@ -151,5 +151,5 @@ def main(control: int, desk: str) -> None:
     module, _, name = desk.partition(":")
     answers = getattr(import_module(module), name)
     gc.freeze()
-    with socket.socket(fileno=control) as channel:
-        fork_on_request(channel, answers)
+    fork_on_request(socket.socket(fileno=control), answers)
+    os._exit(0)  # no need to take all these modules down
