@@ -103,13 +103,13 @@ class Unanswered(HrsynthError):
 
 
 class LoopsNotClosed(Unanswered):
-    """The loops cannot be closed: the residual that is left, and the loop that misses most."""
+    """The loops cannot be closed: the residual that is left, the loop that misses most, and what may help, if known."""
 
-    def __init__(self, robot: str, residual: float, tolerance: float, loop: str) -> None:
+    def __init__(self, robot: str, residual: float, tolerance: float, loop: str, cure: str = "") -> None:
         self.robot, self.residual, self.tolerance, self.loop = robot, residual, tolerance, loop
         super().__init__(
             f"{robot}: the loop {loop!r} cannot be closed at the zero configuration, residual {residual:.3g} "
-            f"(characteristic lengths, radians), allowed: {tolerance:.3g}"
+            f"(characteristic lengths, radians), allowed: {tolerance:.3g}" + (f"; {cure}" if cure else "")
         )
 
 

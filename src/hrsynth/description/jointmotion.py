@@ -14,7 +14,7 @@ from ..geometry.screws import rotation, translation
 from ..geometry.so3 import exponential, logarithm
 from ..geometry.vectors import Array, hat, perpendicular, pose, rotation_about
 from ..mechanism.model import JointType
-from ..tolerances import SAME_DIRECTION, SAME_GEOMETRY, WITHOUT_DIRECTION
+from ..tolerances import EXACT, LARGEST_NOISE, SAME_DIRECTION, SAME_GEOMETRY, WITHOUT_DIRECTION
 from . import chains
 from .jointgraph import JointSpec
 
@@ -125,4 +125,10 @@ def require_closed(robot: str, loops: Sequence[tuple[JointSpec, Array, Array]], 
         worst = int(np.argmax(misses))
         joint = loops[worst][0]
         where = robot if joint.line is None else f"{robot}:{joint.line}"
-        raise LoopsNotClosed(where, misses[worst], SAME_GEOMETRY, joint.name)
+        raise LoopsNotClosed(where, misses[worst], SAME_GEOMETRY, joint.name, cure(misses[worst]))
+
+
+def cure(opening: float) -> str:
+    """What may close loops that are open by so much (characteristic lengths, radians); nothing if far open."""
+    tolerance = 10.0 ** np.ceil(np.log10(max(opening, EXACT)))
+    return f"if its numbers are rounded: --tolerance {tolerance:g}" if tolerance < LARGEST_NOISE else ""

@@ -11,6 +11,7 @@ from ...geometry.vectors import Array, unit
 from ...mechanism.model import Coupling, Joint, JointType, Mechanism, Note
 from ...tolerances import NO_FINER, NOISE, ROUNDED, SAME_GEOMETRY
 from ..jointgraph import JointGraph, JointSpec, comma_list
+from ..jointmotion import cure
 from ..numerals import Digits
 from ..overrides import Overrides
 from ..postures import posture
@@ -21,6 +22,8 @@ from .coordinates import with_weighed_motors, without_coordinates
 from .idealise import as_meant
 from .loops import LoopAssembly, LoopSolution, Values, regular_values, solve
 from .zero import moves, with_limits, with_zero_at
+
+POSTURE = "from a posture near to closing them: --keyframe NAME of the file, or FILE.srdf:NAME"
 
 
 def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
@@ -61,7 +64,8 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     else:
         solution = solve(assembly)
     if not solution.residual <= assembly.noise:
-        raise LoopsNotClosed(graph.file, solution.residual, assembly.noise, assembly.worst(solution.values)[0])
+        raise LoopsNotClosed(graph.file, solution.residual, assembly.noise, assembly.worst(solution.values)[0],
+                             cure(solution.residual) or POSTURE)
     _note_solution(graph, assembly, solution, overrides.keyframe)
     mechanism = _mechanism(graph, base, platform, assembly, solution.values)
     mechanism = closures.points_as_hinges(mechanism, tolerance)
