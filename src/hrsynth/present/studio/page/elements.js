@@ -85,7 +85,7 @@ class Slider {
 /* The command and the Python line that give the same, each with a button that copies it. */
 class Same {
   constructor() {
-    this.root = element("details", { className: "same", hidden: true }, element("summary", { textContent: "The same as a command, in Python" }));
+    this.root = element("details", { className: "same", hidden: true }, element("summary", { textContent: "The same as a command and in Python" }));
     this.rows = ["command", "python"].map((key) => this.row(key));
   }
 

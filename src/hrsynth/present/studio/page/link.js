@@ -21,7 +21,10 @@ class Link {
     let first = true;
     this.socket.onmessage = ({ data }) => {
       const said = JSON.parse(data);
-      if (first) { first = false; this.begin(said); } else this.answered(said);
+      if (said.tab !== undefined && first) this.begin(said);
+      else if (first) this.refused = said.error;
+      else this.answered(said);
+      first = false;
     };
     this.socket.onclose = () => this.lost();
   }
@@ -47,7 +50,8 @@ class Link {
       else if (lane.waiting.has(ask.channel)) ask.done(null);
       else lane.waiting.set(ask.channel, ask);
     }
-    this.onlost();
+    this.onlost(this.refused);
+    if (this.refused) return;
     setTimeout(() => this.connect(), this.pause);
     this.pause = Math.min(2 * this.pause, Link.LONGEST);
   }
@@ -96,7 +100,7 @@ class Link {
       lane.waiting.get(channel)?.done(null);
       lane.waiting.delete(channel);
       if (lane.sent?.channel !== channel) continue;
-      this.socket.send(JSON.stringify({ ask: "cancel", of: lane.sent.n }));
+      this.socket.send(JSON.stringify({ n: (this.number += 1), ask: "cancel", of: lane.sent.n }));
       lane.sent.done(null);
       lane.sent = null;
       this.next(lane);

@@ -11,11 +11,13 @@ class LegsPanel extends Panel {
     this.played = element("p", { className: "played" });
     this.hidden = element("div", { className: "hidden-robot" });
     this.sets = element("div", { className: "sets" });
-    this.body.append(this.legs, this.verdict, this.lost, this.player.root, this.played, this.hidden, this.sets);
+    this.camera = element("div");
+    this.body.append(this.legs, this.camera, this.verdict, this.lost, this.player.root, this.played, this.hidden, this.sets);
   }
 
   opened(scene) {
     this.legs.replaceChildren(element("legend", { textContent: "Watched legs" }), ...scene.legs.map((leg) => this.row(leg)));
+    this.camera.replaceChildren(this.cameras(scene));
     for (const part of [this.verdict, this.lost, this.hidden, this.sets]) part.replaceChildren();
     this.stop();
     this.same.show(null);
@@ -30,13 +32,19 @@ class LegsPanel extends Panel {
     return row;
   }
 
+  /* The link that carries the camera: another one is another question from the start. */
+  cameras({ machines: [{ links }] }) {
+    const { studio } = this, [base, ...others] = links;
+    return choice("The camera stands on", [["", base], ...others.map((link) => [link, link])], studio.camera ?? "",
+      (link) => studio.open(studio.robot, { watch: studio.watch, camera: link || null }));
+  }
+
   boxes() { return [...this.legs.querySelectorAll("input")]; }
 
   /* A leg is ticked, or clicked in the picture. */
   chosen() {
     const names = this.boxes().filter(({ checked }) => checked).map(({ value }) => value);
-    if (names.length) this.studio.rewatch(names);
-    else this.status.say("Watch at least one leg.");
+    this.studio.rewatch(names);
   }
 
   toggle(name) {

@@ -39,8 +39,8 @@ class ServoPanel extends Panel {
     const kept = this.ends[key], sliders = this.studio.scene.sliders;
     const said = kept ? sliders.map(({ label, unit }, i) => `${label} ${written(kept.values[i], unit)}`).join(", ") : key === "start" ? "home" : "not set";
     const root = element("div", { className: "row" }, element("span", { textContent: `${key === "start" ? "Start" : "Goal"}: ${said}` }),
-      button("Set here", () => this.set(key), { "aria-label": `Set the ${key} here` }));
-    if (kept) root.append(button("Go there", () => this.studio.fly(null, kept.here), { "aria-label": `Go to the ${key}` }));
+      button("Set here", () => this.set(key), { "aria-label": `Set here: the ${key}` }));
+    if (kept) root.append(button("Go there", () => this.studio.fly(null, kept.here), { "aria-label": `Go there: the ${key}` }));
     return root;
   }
 

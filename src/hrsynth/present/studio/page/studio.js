@@ -8,14 +8,14 @@ class Studio {
     this.reduced = matchMedia("(prefers-reduced-motion: reduce)").matches;
     this.stage = new Stage($("pane"), { reduced: this.reduced });
     this.stage.onpick = (kind, name) => { if (kind === "leg") this.panels.legs?.toggle(name); };
-    this.link = new Link({ onstart: (said) => this.begin(said), onback: () => this.back(), onlost: () => this.lost() });
+    this.link = new Link({ onstart: (said) => this.begin(said), onback: () => this.back(), onlost: (refused) => this.lost(refused) });
     this.pending = 0;
     this.tools();
     $("legend").open = !matchMedia("(max-width: 760px)").matches;
     document.addEventListener("keydown", (event) => { if (event.key === "Escape") this.stop(); });
   }
 
-  begin({ start, panels }) {
+  begin({ start, panels, watch, camera }) {
     const kinds = panels ? [RobotPanel, MovePanel, LegsPanel, ModesPanel, PlanePanel, ServoPanel, ExportPanel] : [MovePanel, ModesPanel];
     const made = kinds.map((Kind) => new Kind(this));
     this.panels = Object.fromEntries(made.map((panel) => [panel.key, panel]));
@@ -24,16 +24,16 @@ class Studio {
     else $("panels").append(...made.map(({ root }) => root));
     this.show(start ? "move" : "robot");
     this.panels.robot?.fill();
-    if (start) this.open(start.source ? start : { source: start, options: {} }, start);
-    else { $("answer").textContent = "Pick a robot, or drop a robot file in."; this.ready(); }
+    if (start) this.open(start, { watch, camera });
+    else { this.kept(); this.ready(); }
   }
 
   ready() { requestAnimationFrame(() => { document.body.dataset.ready = "yes"; }); }
 
   /* The connection is gone; it is back, with an empty folder for this tab. */
-  lost() {
+  lost(refused) {
     $("lost-link").hidden = false;
-    $("lost-link").textContent = "The connection to hrsynth is lost. Trying again … If you have ended it, start it once more and open the address that it prints.";
+    $("lost-link").textContent = refused || "The connection to hrsynth is lost. Trying again … If you have ended it, start it once more and open the address that it prints.";
   }
 
   async back() {
@@ -61,7 +61,7 @@ class Studio {
     const { status } = this.panels.robot || this.panels.move;
     const scene = await status.during(this.link.ask("open", { robot: given, watch, camera, here: null }), "Reading the robot", () => this.link.cancel("open"));
     this.ready();
-    if (!scene) { if (!this.scene) this.show("robot"); return; }
+    if (!scene) { this.kept(); return; }
     Object.assign(this, { robot: given, camera, scene, here: scene.here ?? null });
     this.watch = scene.legs.filter(({ watched }) => watched).map(({ name }) => name);
     this.values = scene.values ?? scene.sliders.map(({ home }) => home);
@@ -75,7 +75,14 @@ class Studio {
     this.each("opened", scene);
     this.stage.fit();
     this.relegend();
+    this.say(`${scene.name} is open: ${scene.words}.`);
     this.answer();
+  }
+
+  /* A robot that could not be opened: what was shown stays, and so does what the panel says of it. */
+  kept() {
+    if (this.scene) this.panels.robot?.opened(this.scene);
+    else { this.show("robot"); $("answer").textContent = "Pick a robot, or drop a robot file in."; }
   }
 
   /* The plain answer, on top. */
@@ -136,7 +143,6 @@ class Studio {
 
   rewatch(names) {
     this.watch = names;
-    if (this.here) this.here = { ...this.here, hidden: null };
     this.stage.watch(names);
     this.each("rewatched", names);
   }
