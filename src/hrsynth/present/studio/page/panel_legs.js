@@ -24,11 +24,11 @@ class LegsPanel extends Panel {
     this.refresh();
   }
 
-  row({ name, words, can, why, watched }) {
+  row({ name, words, can, why, watched, link }) {
     const row = tick(name, watched, () => this.chosen());
     const input = row.querySelector("input");
     Object.assign(input, { value: name, disabled: !can });
-    row.append(element("small", { textContent: can ? words : `${words} – ${why}` }));
+    row.append(element("small", { textContent: can ? `${words}, seen at ${link}` : `${words}: ${why}` }));
     return row;
   }
 
@@ -70,13 +70,13 @@ class LegsPanel extends Panel {
     this.same.show(found);
   }
 
-  tell({ verdict, rank, dof, lost, hidden_words: hidden, condition, sets, error }) {
+  tell({ verdict, rank, dof, here, lost, hidden_words: hidden, condition, sets, error }) {
     const good = verdict.controllable;
     const line = (words, more = {}) => (words ? element("p", { textContent: words, ...more }) : null);
     this.verdict.className = `verdict ${good ? "good" : "bad"}`;
     this.verdict.replaceChildren(
       element("p", { className: "head" }, element("b", { textContent: verdict.words }), element("span", { className: "certainty", textContent: verdict.certainty })),
-      line(`${rank} of ${dof} freedoms are seen here.`), ...[line(error?.words)].filter(Boolean));
+      line(`Here ${rank} of ${dof} freedoms are seen${here ? `: ${here}` : ""}.`), ...[line(error?.words)].filter(Boolean));
     const head = lost.length ? [element("h3", { textContent: lost.length > 1 ? "Lost freedoms" : "Lost freedom" })] : [];
     this.lost.replaceChildren(...head, ...lost.map(({ words }, i) =>
       element("div", { className: "row" }, element("span", { textContent: words }), button("Play", () => this.play(i), { "aria-label": `Play: ${words}` }))));

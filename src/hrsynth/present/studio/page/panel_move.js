@@ -25,7 +25,7 @@ class MovePanel extends Panel {
 
   send() { this.studio.move({ values: this.sliders.map(({ value }) => value) }); }
 
-  home() { this.studio.move({ values: null, here: null }); }
+  home() { this.studio.move({ here: null }); }
 
   grip(on) {
     this.dragging = on;

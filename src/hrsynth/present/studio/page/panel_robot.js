@@ -66,7 +66,7 @@ class RobotPanel extends Panel {
       names.push(name);
     }
     this.list();
-    const robot = names.find(RobotPanel.isRobot);
+    const robots = names.filter(RobotPanel.isRobot), robot = robots.find((name) => !/ya?ml$/i.test(name)) ?? robots[0];
     if (robot) await this.studio.open({ source: `file:${robot}`, options: {} });
     else if (names.length) this.status.say(`${names.join(", ")}: kept for the robot file that names ${names.length > 1 ? "them" : "it"}.`);
   }
@@ -77,25 +77,38 @@ class RobotPanel extends Panel {
   }
 
   opened(scene) {
-    this.guesses.replaceChildren(...(scene.guesses || []).map((guess) => this.guess(guess)));
-    if (this.guesses.children.length)
-      this.guesses.prepend(element("h3", { textContent: "What the file does not say" }),
-        element("p", { textContent: `Read as ${scene.dialect}. These were found; choose others if they are wrong.` }));
+    this.guessed(scene, this.studio.robot);
     this.notes.replaceChildren(...(scene.notes || []).map((note) => element("li", { textContent: note })));
     this.same.show(scene);
     this.mark();
   }
 
+  /* A file of which no robot could be made: why, and what may be chosen otherwise. */
+  failed(record, robot) {
+    if (!record) return;
+    this.studio.show("robot");
+    this.guessed(record, robot);
+    this.status.fail(`${record.name}: ${record.failed}`);
+  }
+
+  /* What the file leaves open. */
+  guessed({ guesses, dialect }, robot) {
+    this.guesses.replaceChildren(...(guesses || []).map((guess) => this.guess(guess, robot)));
+    if (guesses?.length)
+      this.guesses.prepend(element("h3", { textContent: "What the file leaves open" }),
+        element("p", { textContent: `Read as ${dialect}. Choose otherwise where this is wrong: the robot is then opened anew.` }));
+  }
+
   /* What was guessed: another choice opens the robot anew with it. */
-  guess({ name, found, why, candidates }) {
-    const id = fresh("why"), robot = this.studio.robot;
-    const words = (value) => (Array.isArray(value) ? value.join(", ") : String(value));
-    const options = (candidates?.length ? candidates : [found]).map((value) => [JSON.stringify(value), words(value)]);
-    const field = choice(name, options, JSON.stringify(found), (value) =>
+  guess({ name, found, why, candidates }, robot) {
+    const id = fresh("why"), now = JSON.stringify(found);
+    const words = (value) => (value === true ? "yes" : value === false ? "no" : Array.isArray(value) ? value.join(", ") || "none" : String(value));
+    const options = [...new Map([found, ...(candidates || [])].map((value) => [JSON.stringify(value), words(value)]))];
+    const field = choice(name.replaceAll("_", " "), options, now, (value) =>
       this.studio.open({ source: robot.source, options: { ...robot.options, [name]: JSON.parse(value) } }));
     field.querySelector("select").setAttribute("aria-describedby", id);
     field.append(element("small", { id, textContent: why }));
     return field;
   }
 }
-RobotPanel.isRobot = (name) => /\.(urdf|xacro|xml|mjcf|sdf|world|usd|usda|usdc|usdz|json|ya?ml|toml)$/i.test(name);
+RobotPanel.isRobot = (name) => /\.(urdf|xacro|xml|mjcf|sdf|world|usd[acz]?|ya?ml)$/i.test(name);

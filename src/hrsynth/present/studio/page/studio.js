@@ -61,7 +61,7 @@ class Studio {
     const { status } = this.panels.robot || this.panels.move;
     const scene = await status.during(this.link.ask("open", { robot: given, watch, camera, here: null }), "Reading the robot", () => this.link.cancel("open"));
     this.ready();
-    if (!scene) { this.kept(); return; }
+    if (!scene || scene.failed) { this.kept(); this.panels.robot?.failed(scene, given); return; }
     Object.assign(this, { robot: given, camera, scene, here: scene.here ?? null });
     this.watch = scene.legs.filter(({ watched }) => watched).map(({ name }) => name);
     this.values = scene.values ?? scene.sliders.map(({ home }) => home);
@@ -125,7 +125,7 @@ class Studio {
   async fly(places, here) {
     this.here = here;
     if (places && !this.reduced) await this.glide(this.state, { ...this.state, real: places });
-    this.move({ values: null, here, stay: true });
+    this.move({ here });
   }
 
   glide(from, to) {
@@ -149,8 +149,9 @@ class Studio {
 
   draw(state) {
     this.stage.state(state);
-    $("now").textContent = state.error ? state.error.words : "";
-    $("now").hidden = !state.error;
+    const beyond = state.beyond?.length ? `Beyond its limits: ${state.beyond.join(", ")}.` : "";
+    $("now").textContent = [state.error?.words, beyond].filter(Boolean).join(" ");
+    $("now").hidden = !$("now").textContent;
     if (this.step !== state.error?.step) this.relegend();
     this.step = state.error?.step;
   }

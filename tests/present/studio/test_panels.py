@@ -1,0 +1,362 @@
+"""The studio's page in a browser, with its server: every panel by mouse and by keys, at two sizes, and what goes wrong."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from browser import Tab
+from description.foreign.examples import MJCF, SDF, URDF
+from present.studio.audit import beyond, faint, focused, nameless
+
+pytest.importorskip("starlette")
+pytestmark = [pytest.mark.browser, pytest.mark.slow]
+
+SIZES = {"wide": {"width": 1280, "height": 800}, "narrow": {"width": 390, "height": 844}}
+PANELS = ("robot", "move", "legs", "modes", "plane", "servo", "export")
+SLOW = 60_000
+"""Longest time that an answer may take here (ms)."""
+
+
+@pytest.fixture(scope="module")
+def address() -> Iterator[str]:
+    """The page of a server that was opened with nothing."""
+    from hrsynth.present.studio.server import studio
+
+    server = studio(open_=False)
+    yield server.address
+    server.stop()
+
+
+def enter(tab: Tab, address: str, size: str = "wide") -> Any:
+    """The page, ready."""
+    tab.page.set_viewport_size(SIZES[size])
+    tab.open(address)
+    tab.page.locator("body[data-ready=yes]").wait_for(timeout=SLOW)
+    return tab.page
+
+
+def opened(tab: Tab, address: str, name: str, size: str = "wide") -> Any:
+    """The page with a robot of the gallery, its three sentences and its verdict there."""
+    page = enter(tab, address, size)
+    page.locator(f"[data-source='shipped:{name}']").click(timeout=SLOW)
+    page.locator("#name", has_text=re.compile(f"^{name}$")).wait_for(timeout=SLOW)
+    answered(page)
+    return page
+
+
+def answered(page: Any) -> None:
+    """Wait until nothing is under way."""
+    page.locator("#answer", has_text=re.compile(r"^(?!.*being worked out)")).wait_for(timeout=SLOW)
+    for _ in range(SLOW // 50):
+        if not page.evaluate("() => Object.values(studio.link.lanes).some(({ sent, waiting }) => sent || waiting.size)"):
+            return
+        page.wait_for_timeout(50)
+    raise AssertionError("an ask has no end")
+
+
+def show(page: Any, key: str) -> Any:
+    """A panel, looked at."""
+    page.locator(f"#tab-{key}").click()
+    return page.locator(f"#panel-{key}")
+
+
+def said(panel: Any) -> str:
+    """The error that a panel shows."""
+    return str(panel.locator("[role=alert]").inner_text()).strip()
+
+
+def here(page: Any) -> Any:
+    """The configuration that the page is at."""
+    return page.evaluate("() => studio.here")
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_all_panels_can_be_read_and_used_by_everybody(size: str, tab: Tab, address: str):
+    page = opened(tab, address, "quattro", size)
+    for key in PANELS:
+        panel = show(page, key)
+        answered(page)
+        for summary in page.locator("details:not([open]) > summary").all():
+            if summary.is_visible():
+                summary.click()
+        assert (said(panel), nameless(page), faint(page), beyond(page)) == ("", [], [], []), key
+        scene, box = page.locator("#sight").bounding_box(), panel.bounding_box()
+        assert scene["x"] + scene["width"] <= box["x"] + 1 if size == "wide" else scene["y"] + scene["height"] <= box["y"]
+        assert scene["height"] > 200
+
+
+def test_what_cannot_be_read_is_noticed(tab: Tab, tmp_path: Path):
+    page = tmp_path / "page.html"
+    page.write_text("<body><button></button><p style='color: #999'>words</p><input style='margin-left: 3000px'>")
+    tab.open(page)
+    assert nameless(tab.page) == ["button", "textbox"]
+    assert len(faint(tab.page)) == len(beyond(tab.page)) == 1
+
+
+@pytest.mark.parametrize("size", SIZES)
+def test_legs_are_ticked_and_what_follows_is_told(size: str, tab: Tab, address: str):
+    page = opened(tab, address, "quattro", size)
+    panel = show(page, "legs")
+    answered(page)
+    assert "✗" not in panel.locator(".verdict").inner_text()
+    for box in panel.get_by_role("checkbox").all()[1:]:
+        box.uncheck()
+    answered(page)
+    assert panel.locator(".verdict.bad").count() == 1
+    assert panel.locator(".lost button").count() >= 1
+    panel.locator(".lost button").first.click()
+    answered(page)
+    assert said(panel) == ""
+    assert panel.locator(".player button").inner_text() == "Pause"
+    page.keyboard.press("Escape")
+    assert panel.locator(".player").is_hidden()
+    panel.locator(".sets button").first.click()
+    answered(page)
+    assert panel.locator(".verdict.good").count() == 1
+
+
+def test_sliders_move_the_robot_and_home_brings_it_back(tab: Tab, address: str):
+    page = opened(tab, address, "3rrr_m1")
+    panel = show(page, "move")
+    sliders = panel.get_by_role("slider")
+    assert sliders.count() == 3
+    home = page.evaluate("() => studio.values")
+    for index in range(3):
+        sliders.nth(index).focus()
+        for _ in range(5):
+            page.keyboard.press("ArrowRight")
+        answered(page)
+        values = page.evaluate("() => studio.values")
+        assert values[index] > home[index]
+    panel.get_by_role("button", name="Home").click()
+    answered(page)
+    assert page.evaluate("() => studio.values") == pytest.approx(home, abs=1e-6)
+
+
+def test_a_mode_is_flown_to_and_back(tab: Tab, address: str):
+    page = opened(tab, address, "3rrr_m1")
+    before = page.evaluate("() => studio.values")
+    panel = show(page, "modes")
+    answered(page)
+    panel.locator(".modes button:enabled").first.click()
+    page.wait_for_timeout(900)
+    answered(page)
+    assert page.evaluate("() => studio.values") != pytest.approx(before, abs=1e-3)
+    panel.get_by_role("button", name="Back to where I was").click()
+    answered(page)
+    assert page.evaluate("() => studio.values") == pytest.approx(before, abs=1e-6)
+
+
+def test_a_run_is_set_played_and_scrubbed(tab: Tab, address: str):
+    page = opened(tab, address, "3rrr_m1")
+    show(page, "move").get_by_role("slider").first.focus()
+    for _ in range(20):
+        page.keyboard.press("ArrowRight")
+    answered(page)
+    panel = show(page, "servo")
+    assert panel.get_by_role("button", name="Run").is_disabled()
+    panel.get_by_role("button", name="Set here: the goal").click()
+    panel.get_by_role("button", name="Run").click()
+    answered(page)
+    assert said(panel) == ""
+    assert panel.locator("svg .leg").count() == panel.locator("svg .desired").count() == 3
+    panel.get_by_role("button", name="Pause").click()
+    first = panel.locator("svg .leg").first.get_attribute("x2")
+    panel.get_by_role("slider").fill("0")
+    assert panel.locator("svg .leg").first.get_attribute("x2") != first
+
+
+def test_keys_are_enough(tab: Tab, address: str):
+    page = enter(tab, address)
+    page.locator("[data-source='shipped:3rrr_m1']").wait_for(timeout=SLOW)
+    page.keyboard.press("Tab")
+    assert focused(page)[0] == "To the panels"
+    page.keyboard.press("Enter")
+    order = []
+    for _ in range(60):
+        page.keyboard.press("Tab")
+        name, seen = focused(page)
+        order.append(name)
+        assert seen, f"{name} does not show that it has the focus"
+        if name.startswith("3rrr_m1"):
+            break
+    assert order[0] == "tab-robot"
+    page.keyboard.press("Enter")
+    page.locator("#name", has_text="3rrr_m1").wait_for(timeout=SLOW)
+    page.locator("#tab-robot").focus()
+    for key in (*PANELS[1:], "robot"):
+        page.keyboard.press("ArrowRight")
+        assert focused(page) == (f"tab-{key}", True)
+        assert page.locator(f"#panel-{key}").is_visible()
+    page.keyboard.press("ArrowRight")
+    answered(page)
+    page.keyboard.press("Tab")
+    before = here(page)
+    page.keyboard.press("ArrowRight")
+    answered(page)
+    assert here(page) != before
+    page.keyboard.press("Shift+Tab")
+    page.keyboard.press("ArrowRight")
+    page.keyboard.press("Tab")
+    page.keyboard.press("Space")
+    answered(page)
+    assert page.evaluate("() => studio.watch") == ["2", "3"]
+
+
+def test_with_reduced_motion_nothing_moves_by_itself(tab: Tab, address: str):
+    tab.page.emulate_media(reduced_motion="reduce")
+    page = opened(tab, address, "quattro")
+    panel = show(page, "legs")
+    for box in panel.get_by_role("checkbox").all()[1:]:
+        box.uncheck()
+    answered(page)
+    panel.locator(".lost button").first.click()
+    answered(page)
+    page.wait_for_timeout(500)
+    drawn = page.evaluate("() => studio.stage.drawn")
+    page.wait_for_timeout(700)
+    assert page.evaluate("() => studio.stage.drawn") == drawn
+    assert panel.locator(".player button").is_hidden()
+    slider = panel.locator(".player").get_by_role("slider")
+    assert slider.input_value() == "0"
+    slider.focus()
+    page.keyboard.press("ArrowRight")
+    page.wait_for_timeout(200)
+    assert page.evaluate("() => studio.stage.drawn") > drawn
+
+
+def test_each_tab_has_a_robot_of_its_own(tab: Tab, address: str, browser: Any):
+    other = Tab.of(browser.new_page())
+    one, two = opened(tab, address, "3rrr_m1"), opened(other, address, "rrrrr_m1")
+    show(one, "move").get_by_role("slider").first.focus()
+    kept = here(two)
+    one.keyboard.press("ArrowRight")
+    answered(one)
+    assert (one.locator("#name").inner_text(), two.locator("#name").inner_text()) == ("3rrr_m1", "rrrrr_m1")
+    assert here(two) == kept
+    two.close()
+    assert other.complaints == []
+
+
+def drop(page: Any, **files: str) -> None:
+    """Choose files in the page."""
+    page.locator("input[type=file]").set_input_files(
+        [{"name": name.replace("__", "."), "mimeType": "text/xml", "buffer": text.encode()} for name, text in files.items()])
+
+
+DIALECTS = {**{f"urdf_{k}": (f"four_{i}.urdf", text) for i, (k, text) in enumerate(URDF.items())},
+            **{f"mjcf_{k}": (f"four_{i}.xml", text) for i, (k, text) in enumerate(MJCF.items())},
+            **{f"sdf_{k}": (f"four_{i}.sdf", text) for i, (k, text) in enumerate(SDF.items())}}
+
+
+def test_files_of_all_dialects_are_dropped_in(tab: Tab, address: str):
+    page = enter(tab, address)
+    for name, text in DIALECTS.values():
+        drop(page, **{name.replace(".", "__"): text})
+        page.locator(f"[data-source='file:{name}'][aria-current=true]").wait_for(timeout=SLOW)
+        assert said(page.locator("#panel-robot")) == ""
+
+
+def test_what_was_guessed_can_be_chosen_anew(tab: Tab, address: str):
+    page = enter(tab, address)
+    drop(page, four__urdf=next(iter(URDF.values())))
+    field = page.locator(".guesses select").first
+    field.wait_for(timeout=SLOW)
+    answered(page)
+    values = field.locator("option").evaluate_all("(all) => all.map(({ value }) => value)")
+    other = next(value for value in values if value != field.input_value())
+    field.select_option(other)
+    answered(page)
+    assert page.locator(".guesses select").first.input_value() == other or said(page.locator("#panel-robot"))
+
+
+def test_a_file_that_is_no_robot_is_one_line_and_the_robot_stays(tab: Tab, address: str):
+    page = opened(tab, address, "3rrr_m1")
+    panel = show(page, "robot")
+    drop(page, bad__urdf="<robot name='bad'><link/></robot>")
+    panel.locator("[role=alert]:not(:empty)").wait_for(timeout=SLOW)
+    assert "\n" not in said(panel)
+    assert "bad.urdf" in said(panel)
+    assert page.locator("#name").inner_text() == "3rrr_m1"
+    tab.complaints.clear()
+
+
+def test_what_is_shown_can_be_copied_and_saved(tab: Tab, address: str):
+    page = opened(tab, address, "3rrr_m1")
+    page.context.grant_permissions(["clipboard-read", "clipboard-write"])
+    for key in ("legs", "modes"):
+        panel = show(page, key)
+        answered(page)
+        panel.locator(".same summary").click()
+        for words, start in (("Copy the command", "hrsynth "), ("Copy the Python line", "hrsynth.")):
+            panel.get_by_role("button", name=words).click()
+            page.wait_for_timeout(100)
+            assert start in page.evaluate("() => navigator.clipboard.readText()")
+    panel = show(page, "export")
+    for offer in panel.locator(".offers button").all():
+        with page.expect_download(timeout=SLOW) as told:
+            offer.click()
+        assert Path(told.value.path()).stat().st_size > 100
+
+
+def test_a_slow_ask_says_so_and_is_cancelled_and_a_newer_one_replaces_it(tab: Tab, address: str):
+    held: list[str] = []
+
+    def between(route: Any) -> None:
+        server = route.connect_to_server()
+        route.on_message(lambda message: held.append(message) if '"modes"' in message or '"cancel"' in message
+                         else server.send(message))
+        server.on_message(route.send)
+
+    tab.page.route_web_socket(re.compile("/live$"), between)
+    page = opened(tab, address, "3rrr_m1")
+    panel = show(page, "modes")
+    panel.get_by_text("Listing the modes").wait_for()
+    panel.get_by_role("button", name="Find them").click()
+    panel.get_by_role("button", name="Cancel").click()
+    assert [re.search('"ask":"(.*?)"', message)[1] for message in held] == ["modes", "cancel"]
+    show(page, "legs").get_by_role("checkbox").first.uncheck()
+    answered(page)
+    assert page.locator("#panel-legs .verdict").inner_text()
+
+
+def test_a_lost_connection_is_told_and_mended(tab: Tab, address: str):
+    open_: list[Any] = []
+
+    def between(route: Any) -> None:
+        server = route.connect_to_server()
+        route.on_message(server.send)
+        server.on_message(route.send)
+        open_.append(route)
+
+    tab.page.route_web_socket(re.compile("/live$"), between)
+    page = enter(tab, address)
+    drop(page, four__urdf=next(iter(URDF.values())))
+    page.locator("[data-source='file:four.urdf'][aria-current=true]").wait_for(timeout=SLOW)
+    answered(page)
+    open_[0].close()
+    page.locator("#lost-link").wait_for(state="visible")
+    page.locator("#lost-link").wait_for(state="hidden", timeout=SLOW)
+    assert len(open_) == 2
+    show(page, "move").get_by_role("slider").first.focus()
+    before = here(page)
+    page.keyboard.press("ArrowRight")
+    answered(page)
+    assert here(page) != before
+
+
+def test_the_end_of_the_server_is_told(tab: Tab):
+    from hrsynth.present.studio.server import studio
+
+    server = studio(open_=False)
+    page = enter(tab, server.address)
+    server.stop()
+    page.locator("#lost-link", has_text="start it once more").wait_for(timeout=SLOW)
+    page.wait_for_timeout(1000)
+    assert all("WebSocket" in complaint for complaint in tab.complaints)
+    tab.complaints.clear()
