@@ -51,7 +51,8 @@ function tick(words, checked, onchange) {
 /* A number in the unit that people read: degrees for radians. */
 function written(value, unit) {
   if (value === null || value === undefined) return "";
-  return unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)} ${unit}`;
+  const words = unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)} ${unit}`;
+  return words.replace(/^-(?=[0.]+(\D|$))/, "");
 }
 
 /* A slider with its label and what it stands at; `read` sets it without a call of `onmove`. */

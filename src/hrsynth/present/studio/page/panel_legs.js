@@ -12,7 +12,7 @@ class LegsPanel extends Panel {
     this.hidden = element("div", { className: "hidden-robot" });
     this.sets = element("div", { className: "sets" });
     this.camera = element("div");
-    this.body.append(this.legs, this.camera, this.verdict, this.lost, this.player.root, this.played, this.hidden, this.sets);
+    this.body.append(this.legs, this.verdict, this.lost, this.player.root, this.played, this.hidden, this.sets, this.camera);
   }
 
   opened(scene) {
@@ -75,7 +75,7 @@ class LegsPanel extends Panel {
     const line = (words, more = {}) => (words ? element("p", { textContent: words, ...more }) : null);
     this.verdict.className = `verdict ${good ? "good" : "bad"}`;
     this.verdict.replaceChildren(
-      element("p", { className: "head" }, element("b", { textContent: verdict.words }), element("span", { className: "certainty", textContent: verdict.certainty })),
+      element("p", { className: "head" }, element("b", { textContent: verdict.words })), line(verdict.certainty.replace(`${verdict.words}, `, "")) ?? "",
       line(`Here ${rank} of ${dof} freedoms are seen${here ? `: ${here}` : ""}.`), ...[line(error?.words)].filter(Boolean));
     const head = lost.length ? [element("h3", { textContent: lost.length > 1 ? "Lost freedoms" : "Lost freedom" })] : [];
     this.lost.replaceChildren(...head, ...lost.map(({ words }, i) =>

@@ -4,7 +4,7 @@
 class RobotPanel extends Panel {
   constructor(studio) {
     super(studio, "robot", "Robot");
-    this.guesses = element("div", { className: "guesses" });
+    this.guesses = element("details", { className: "guesses", hidden: true });
     this.notes = element("ul", { className: "notes" });
     this.files = element("div", { className: "files" });
     this.gallery = element("ul", { className: "gallery", "aria-label": "Shipped robots" });
@@ -13,8 +13,7 @@ class RobotPanel extends Panel {
     input.onchange = () => { this.take([...input.files]); input.value = ""; };
     this.drop = element("div", { className: "drop" },
       element("label", { for: input.id, textContent: "Drop a robot file here, with its meshes if it has any, or choose one" }), input);
-    this.body.append(this.guesses, this.notes, this.drop, this.files,
-      element("h3", { textContent: "Shipped robots" }), this.gallery);
+    this.body.append(this.drop, this.files, this.guesses, this.notes, element("h3", { textContent: "Shipped robots" }), this.gallery);
     for (const [name, over] of [["dragover", true], ["dragleave", false], ["drop", false]])
       document.addEventListener(name, (event) => this.dragged(event, over));
   }
@@ -91,12 +90,13 @@ class RobotPanel extends Panel {
     this.status.fail(`${record.name}: ${record.failed}`);
   }
 
-  /* What the file leaves open. */
+  /* What the file leaves open; of a shipped robot nobody needs to look at it. */
   guessed({ guesses, dialect }, robot) {
-    this.guesses.replaceChildren(...(guesses || []).map((guess) => this.guess(guess, robot)));
-    if (guesses?.length)
-      this.guesses.prepend(element("h3", { textContent: "What the file leaves open" }),
-        element("p", { textContent: `Read as ${dialect}. Choose otherwise where this is wrong: the robot is then opened anew.` }));
+    this.guesses.hidden = !guesses?.length;
+    this.guesses.open = !robot.source.startsWith("shipped:");
+    this.guesses.replaceChildren(element("summary", { textContent: `What was read into the file (${dialect})` }),
+      element("p", { textContent: "Choose otherwise where this is wrong: the robot is then opened anew." }),
+      ...(guesses || []).map((guess) => this.guess(guess, robot)));
   }
 
   /* What was guessed: another choice opens the robot anew with it. */
