@@ -1,4 +1,4 @@
-"""The studio's page in a browser, with its server: every panel by mouse and by keys, at two sizes, and what goes wrong."""
+"""The studio's page in a browser, with its server: all panels by mouse and by keys, at two sizes; what goes wrong."""
 
 from __future__ import annotations
 
@@ -18,6 +18,8 @@ pytestmark = [pytest.mark.browser, pytest.mark.slow]
 
 SIZES = {"wide": {"width": 1280, "height": 800}, "narrow": {"width": 390, "height": 844}}
 PANELS = ("robot", "move", "legs", "modes", "plane", "servo", "export")
+BUSY = "() => Object.values(studio.link.lanes).some(({ sent, waiting }) => sent || waiting.size)"
+"""Whether the page waits for an answer."""
 SLOW = 60_000
 """Longest time that an answer may take here (ms)."""
 
@@ -53,7 +55,7 @@ def answered(page: Any) -> None:
     """Wait until nothing is under way."""
     page.locator("#answer", has_text=re.compile(r"^(?!.*being worked out)")).wait_for(timeout=SLOW)
     for _ in range(SLOW // 50):
-        if not page.evaluate("() => Object.values(studio.link.lanes).some(({ sent, waiting }) => sent || waiting.size)"):
+        if not page.evaluate(BUSY):
             return
         page.wait_for_timeout(50)
     raise AssertionError("an ask has no end")
@@ -86,7 +88,8 @@ def test_all_panels_can_be_read_and_used_by_everybody(size: str, tab: Tab, addre
                 summary.click()
         assert (said(panel), nameless(page), faint(page), beyond(page)) == ("", [], [], []), key
         scene, box = page.locator("#sight").bounding_box(), panel.bounding_box()
-        assert scene["x"] + scene["width"] <= box["x"] + 1 if size == "wide" else scene["y"] + scene["height"] <= box["y"]
+        beside, above = scene["x"] + scene["width"] <= box["x"] + 1, scene["y"] + scene["height"] <= box["y"] + 1
+        assert beside if size == "wide" else above
         assert scene["height"] > 200
 
 
@@ -246,7 +249,8 @@ def test_each_tab_has_a_robot_of_its_own(tab: Tab, address: str, browser: Any):
 def drop(page: Any, **files: str) -> None:
     """Choose files in the page."""
     page.locator("input[type=file]").set_input_files(
-        [{"name": name.replace("__", "."), "mimeType": "text/xml", "buffer": text.encode()} for name, text in files.items()])
+        [{"name": name.replace("__", "."), "mimeType": "text/xml", "buffer": text.encode()}
+         for name, text in files.items()])
 
 
 DIALECTS = {**{f"urdf_{k}": (f"four_{i}.urdf", text) for i, (k, text) in enumerate(URDF.items())},
