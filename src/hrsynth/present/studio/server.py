@@ -54,9 +54,8 @@ def studio(robot: str | Path | None = None, observe: Iterable[str | int] | str |
     elif robot is not None:
         content(file_of(robot))
         watched = names(observe if observe is None or isinstance(observe, str) else map(str, observe))
-        here = Opening(given={"robot": str(robot), "options": {}}, start={
-            "start": {"source": "given", "options": {}}, "camera": camera,
-            "watch": None if watched in (None, ("all",)) else list(watched)})
+        here = Opening(given={"robot": str(robot), "options": {}}, first={
+            "camera": camera, "watch": None if watched in (None, ("all",)) else list(watched)})
     server = StudioServer(here, port)
     if open_:
         server.show()

@@ -20,18 +20,26 @@ from .uploads import UploadFolder
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
-MOVE = "move"
+TRY_LATER = 1013
+"""How a socket is closed where too many are open."""
+MOVE, CANCEL = "move", "cancel"
 
 
 @dataclass(frozen=True)
 class Opening:
     """What a server was opened with: a folder of robots, a robot with its options as ``given`` (what ``Desk`` takes),
-    and what the page is told to ``start`` with; ``panels``: whether there are any, or only the view."""
+    what the page does with it first (``watch``, ``camera``, ``hidden``), and whether there are ``panels`` or only the
+    view."""
 
     folder: Path | None = None
     given: dict[str, Any] | None = None
-    start: dict[str, Any] = field(default_factory=dict)
+    first: dict[str, Any] = field(default_factory=dict)
     panels: bool = True
+
+    def message(self, tab: str) -> str:
+        """What a tab is told first."""
+        start = None if self.given is None else {"source": "given", "options": {}, **self.first}
+        return json.dumps({"tab": tab, "start": start, "folder": self.folder is not None, "panels": self.panels})
 
 
 class BrowserTab:
@@ -68,15 +76,14 @@ class BrowserTab:
         """Put an ask where it is answered, or cancel one; what is said where that cannot be."""
         try:
             asked = json.loads(text or "", parse_constant=_no_number)
-            number, kind = asked["n"], asked["ask"]
+            kind = asked["ask"]
+            number = asked["of" if kind == CANCEL else "n"]
             if type(number) is not int or not isinstance(kind, str):
                 raise TypeError(number)
-            if kind == "cancel":
-                other = asked["of"]
-                waited = self.mover.cancel(other) or self.desk.cancel(other)
-                return cancelled(other) if waited else None
         except (ValueError, KeyError, TypeError, RecursionError):
             return gone(None, "no message: an object with a whole number n and the name of an ask", "Unknown")
+        if kind == CANCEL:
+            return cancelled(number) if self.mover.cancel(number) or self.desk.cancel(number) else None
         there = self.mover if kind == MOVE else self.desk
         return None if there.ask(number, (text or "").encode()) else gone(number, "too many questions wait", "TooMany")
 
@@ -97,16 +104,13 @@ class Tabs:
         """A tab from its beginning to its end; its processes and files go with it."""
         await socket.accept()
         if len(self.open) >= MOST_TABS:
-            await socket.send_text(gone(None, f"{MOST_TABS} tabs are open: close one first", "TooMany"))
-            await socket.close()
+            await socket.close(TRY_LATER, f"{MOST_TABS} tabs are open")
             return
         name = secrets.token_urlsafe(12)
         uploads = UploadFolder(self.folder / name)
         self.open[name] = tab = BrowserTab(socket, uploads, self.forks, self.opening)
         try:
-            opening = self.opening
-            await socket.send_text(json.dumps({"tab": name, "start": None, "folder": opening.folder is not None,
-                                               "panels": opening.panels, **opening.start}))
+            await socket.send_text(self.opening.message(name))
             await tab.run()
         finally:
             del self.open[name]

@@ -29,6 +29,11 @@ from ...errors import HrsynthError
 FRAME = struct.Struct("!I")
 READY = b"{}"
 """What a child says first."""
+SMALL = "rrrrr_m1"
+"""A robot that is quickly answered about."""
+WARMING, WARMING_PAUSE = ("watch", "open"), 3000
+"""Kinds of questions whose modules are loaded before there is a child: the last before the first, the others after such
+a time (ms) without any."""
 
 
 def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
@@ -39,6 +44,8 @@ def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
         each.setblocking(False)
     signal.set_wakeup_fd(waker.fileno(), warn_on_full_buffer=False)
     signal.signal(signal.SIGCHLD, lambda *_: None)
+    warming = [*WARMING]
+    _warm(desk, warming.pop())
     while True:
         poll = select.poll()
         for each in (control, woken):
@@ -46,7 +53,9 @@ def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
         left = {channel.fileno(): pid for pid, channel in children.items()}
         for number in left:
             poll.register(number, 0)  # told of the other end's closing alone
-        events = {number for number, _ in poll.poll()}
+        events = {number for number, _ in poll.poll(WARMING_PAUSE if warming else None)}
+        if not events:
+            _warm(desk, warming.pop())
         for number in events & left.keys():
             _kill(left[number])
         if woken.fileno() in events:
@@ -72,6 +81,13 @@ def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
                 children[pid] = channel
                 continue
             channel.close()
+
+
+def _warm(desk: Callable[..., Any], kind: str) -> None:
+    """Ask a question, so that all modules that answer it are loaded once, here."""
+    with contextlib.suppress(Exception):
+        desk(None, None, None).answer({"n": 0, "ask": kind, "robot": {"source": "shipped:" + SMALL}})
+    gc.freeze()
 
 
 def _kill(pid: int) -> None:
@@ -150,6 +166,5 @@ def main(control: int, desk: str) -> None:
     gc.set_threshold(50_000)
     module, _, name = desk.partition(":")
     answers = getattr(import_module(module), name)
-    gc.freeze()
     fork_on_request(socket.socket(fileno=control), answers)
     os._exit(0)  # no need to take all these modules down
