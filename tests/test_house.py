@@ -80,24 +80,30 @@ def folder_of(path: Path) -> str:
     return "" if top == "__init__" else top
 
 
+@cache
+def nodes_of(path: Path) -> tuple[ast.AST, ...]:
+    return tuple(ast.walk(tree_of(path)))
+
+
 def imports_of(path: Path) -> Iterator[tuple[int, str]]:
     """Line and dotted name of everything that a module imports, also inside functions; relative ones made full."""
     for node, name in named_imports(path):
         yield node.lineno, name
 
 
-def named_imports(path: Path) -> Iterator[tuple[ast.Import | ast.ImportFrom, str]]:
+@cache
+def named_imports(path: Path) -> tuple[tuple[ast.Import | ast.ImportFrom, str], ...]:
     """The same with the statements."""
+    found: list[tuple[ast.Import | ast.ImportFrom, str]] = []
     package = ["hrsynth", *path.relative_to(PACKAGE).parent.parts]
-    for node in ast.walk(tree_of(path)):
+    for node in nodes_of(path):
         if isinstance(node, ast.Import):
-            for alias in node.names:
-                yield node, alias.name
+            found += [(node, alias.name) for alias in node.names]
         elif isinstance(node, ast.ImportFrom):
             base = package[: len(package) - node.level + 1] if node.level else []
             base = [*base, *(node.module or "").split(".")] if node.module else base
-            for alias in node.names:
-                yield node, ".".join([*base, alias.name])
+            found += [(node, ".".join([*base, alias.name])) for alias in node.names]
+    return tuple(found)
 
 
 def own_imports() -> Iterator[tuple[Path, int, list[str]]]:
@@ -209,7 +215,7 @@ def test_constants_with_the_same_name_are_not_in_both_tables():
 def test_class_names_are_unique():
     homes: dict[str, list[str]] = {}
     for path in MODULES:
-        for node in ast.walk(tree_of(path)):
+        for node in nodes_of(path):
             if isinstance(node, ast.ClassDef):
                 homes.setdefault(node.name, []).append(where(path, node.lineno))
     twice = {name: places for name, places in homes.items() if len(places) > 1}
@@ -282,8 +288,9 @@ def asserts(node: ast.AST) -> bool:
         return True
     if not isinstance(node, ast.Call):
         return False
-    name = ast.unparse(node.func)
-    return name in ("pytest.raises", "pytest.warns") or bool(re.search("check|assert|law", name.split(".")[-1]))
+    name = node.func.attr if isinstance(node.func, ast.Attribute) else ast.unparse(node.func)
+    of_pytest = name in ("raises", "warns") and ast.unparse(node.func) == f"pytest.{name}"
+    return of_pytest or bool(re.search("check|assert|law", name.split(".")[-1]))
 
 
 @pytest.mark.parametrize("path", TESTS, ids=lambda path: str(path.relative_to(ROOT)))

@@ -177,7 +177,7 @@ def test_columns_hold_what_the_records_hold(catalog):
 
 def unmarked(word: str) -> set[str]:
     """The chains of a word without motors and observed links."""
-    return {str(leg.canonical()).translate({ord("*"): None, ord("!"): None}) for leg in parse(word).legs}
+    return {str(leg.canonical).translate({ord("*"): None, ord("!"): None}) for leg in parse(word).legs}
 
 
 def test_structures_part_the_records_and_kin_differ_by_what_is_watched(catalog):

@@ -35,6 +35,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 from ..budgets import LARGEST_WORD
 from ..errors import BadRequest
@@ -88,7 +89,7 @@ class LegWord:
         """Freedoms of the leg's end."""
         return sum(FREEDOMS[joint.letter] for joint in self.joints)
 
-    @property
+    @cached_property
     def unmoved(self) -> LegWord:
         """The leg without its motors."""
         return LegWord(tuple(replace(joint, motor=False) for joint in self.joints))
@@ -104,6 +105,7 @@ class LegWord:
         """The joint after which the observed link follows; None for the default segment."""
         return next((i for i, joint in enumerate(self.joints) if joint.watched), None)
 
+    @cached_property
     def canonical(self) -> LegWord:
         """The leg with names in order and without the mark of a default segment."""
         names: dict[str, str] = {}
@@ -150,7 +152,7 @@ class RobotWord:
     @classmethod
     def of(cls, legs: list[LegWord], *more: list[LegWord], platform: str = "") -> RobotWord:
         """The canonical word of these legs; ``more``: those of a second body."""
-        bodies = (tuple(sorted((leg.canonical() for leg in body), key=_order)) for body in (legs, *more))
+        bodies = (tuple(sorted((leg.canonical for leg in body), key=_order)) for body in (legs, *more))
         return cls(platform, tuple(sorted(bodies, key=lambda body: ([leg.unmoved for leg in body], body))))
 
     @property
