@@ -281,6 +281,10 @@ LONGEST_STUDIO_NAME = 500
 """Characters of a name in a question of the studio."""
 LARGEST_STUDIO_LIST = 200
 """Names in a list of such a question."""
+LARGEST_STUDIO_PLANE = 101
+"""Poses a side of a plane of the studio."""
+LARGEST_STUDIO_SWEEP = 16
+"""The same where they are found one by one."""
 FOLLOWING = 60
 """Iterations in which a hidden robot is to follow the real one in the view."""
 APPROACH = 8

@@ -313,5 +313,8 @@ REST_OF_RUN = 1e-3
 """Part of the largest error below which the rest of a run is not drawn."""
 LARGEST_FIRST_ORDER = 1.0
 """Error of a pose (characteristic lengths, radians) above which what was computed to first order bounds nothing."""
+ON_LOCUS = 0.2
+"""Smallest singular value of Mᵀ, as part of its median over a plane, below which a change of a determinant's sign there
+is where it vanishes, not where it is infinite."""
 SLIDER_ARRIVED = 1e-6
 """Difference (metres, radians) within which the platform has come to where a slider sent it."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 
@@ -64,23 +64,37 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
     motion = motion or generic_motion(start, question)
     goals = [motion.goal(pose, start.twin.mechanism.name) for pose in grid.poses()]
     home = motion.at_home()
-    found: dict[int, ClosedConfiguration] = {}
-    queue: deque[tuple[int, int]] = deque()
     at_once, hopeless = ({}, set()) if placer is None else ready(placer, motion, goals)
 
-    def settle(cell: int, origin: ClosedConfiguration, halvings: int) -> None:
+    def lead(cell: int, origin: ClosedConfiguration, halvings: int) -> ClosedConfiguration | None:
         if cell in hopeless:
-            return
+            return None
         there, came = (at_once[cell], 1.0) if cell in at_once else track(origin, motion, goals[cell], halvings)
         if came == 1:
             there = there if cell in at_once else nearest(there, goals[cell], home)
-        if came == 1 and _arrived(there, goals[cell]):
-            found[cell] = there
-            queue.extend((other, cell) for other in _neighbours(cell, grid.shape) if other not in found)
-            tell("poses")
+        return there if came == 1 and _arrived(there, goals[cell]) else None
 
     distance = [float(np.linalg.norm(goal.rows(start.twin, start.q)[0])) for goal in goals]
-    for cell in sorted(range(len(goals)), key=lambda i: (round(distance[i], 9), i))[:FIRST_CELLS]:
+    return spread(start, grid.shape, distance, lead)
+
+
+def spread(start: ClosedConfiguration, shape: tuple[int, ...], distance: Sequence[float],
+           lead: Callable[[int, ClosedConfiguration, int], ClosedConfiguration | None]
+           ) -> tuple[ClosedConfiguration | None, ...]:
+    """Configurations at the cells of a grid of a ``shape``: ``lead`` gives that of a cell from a configuration nearby
+    with so many halvings, None where it does not come there. It begins at cells of the least ``distance`` from
+    ``start`` and goes on to neighbours."""
+    found: dict[int, ClosedConfiguration] = {}
+    queue: deque[tuple[int, int]] = deque()
+
+    def settle(cell: int, origin: ClosedConfiguration, halvings: int) -> None:
+        there = lead(cell, origin, halvings)
+        if there is not None:
+            found[cell] = there
+            queue.extend((other, cell) for other in _neighbours(cell, shape) if other not in found)
+            tell("poses")
+
+    for cell in sorted(range(len(distance)), key=lambda i: (round(distance[i], 9), i))[:FIRST_CELLS]:
         settle(cell, start, HALVINGS)
         if found:
             break
@@ -88,7 +102,7 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
         cell, origin = queue.popleft()
         if cell not in found:
             settle(cell, found[origin], SWEEP_HALVINGS)
-    return tuple(found.get(cell) for cell in range(len(goals)))
+    return tuple(found.get(cell) for cell in range(len(distance)))
 
 
 def _neighbours(cell: int, shape: tuple[int, ...]) -> Iterator[int]:

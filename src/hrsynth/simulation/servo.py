@@ -147,9 +147,16 @@ class ServoTask:
         wanted = [asked_pose(each) for each in (start, goal)]
         setting = setting.telling(wanted)
         _require_seen(setting)
-        motion = setting.motion
+        first, last = configurations_at(setting, wanted)
+        return cls.between(setting, first, last, conditions, seed)
+
+    @classmethod
+    def between(cls, setting: ObservedRobot, start: ClosedConfiguration, goal: ClosedConfiguration,
+                conditions: Conditions = Conditions(), seed: int = 0) -> ServoTask:
+        """The same between two configurations."""
+        _require_seen(setting)
+        motion, ends = setting.motion, [start, goal]
         law = Law(setting.samples.question, setting.dof, conditions.gain)
-        ends = configurations_at(setting, wanted)
         desired: FixedDirections | Trajectory = FixedDirections(directions(ends[1], law.question)[0])
         if conditions.duration is not None:
             goal_pose = whole(motion, ends[1].pose(motion.link))

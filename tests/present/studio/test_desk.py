@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 import json
+import shlex
+from base64 import b64decode
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from hrsynth import check, load, observe, shipped
+import hrsynth
+from hrsynth import check, legs, load, modes, observe, shipped
+from hrsynth.cli import main
 from hrsynth.errors import BadRequest, HrsynthError
+from hrsynth.mechanism.observation import Direction
 from hrsynth.present.studio.desk import Desk
 
 DESK = Desk()
@@ -101,3 +107,129 @@ def test_where_the_loops_are_open_nothing_is_drawn():
     q[0] += 1e-6
     with pytest.raises(HrsynthError, match="not closed"):
         ask("move", "rrrrr_m1", here={**here, "q": q.tolist()})
+
+
+def test_a_lost_freedom_is_played_with_the_directions_at_rest():
+    setting = observe(load("prrrp_parallel"))
+    found = ask("play", "prrrp_parallel", lost=0)
+    seen = [each for each in setting.observed if isinstance(each, Direction)]
+    twin, rests = setting.everything.start.twin, []
+    for frame in found["frames"]:
+        q = np.array(frame["here"]["q"])
+        assert np.linalg.norm(twin.residual(q)) < CLOSED
+        rests.append([twin.pose(q, each.link)[:3, :3] @ each.direction for each in seen])
+    places = np.array([frame["real"] for frame in found["frames"]])
+    assert np.array(rests) == pytest.approx(np.broadcast_to(rests[0], np.shape(rests)), abs=CLOSED)
+    assert np.ptp(places, axis=0).max() > 0.05
+    with pytest.raises(BadRequest, match="none is lost"):
+        ask("play", "rrrrr_m1", lost=0)
+
+
+def test_a_mode_is_flown_to_and_has_the_same_directions():
+    setting = observe(load("rrrrr_m1"))
+    found = ask("modes", "rrrrr_m1")
+    assert [each["goal"] for each in found["modes"]] == [True, False]
+    there = ask("move", "rrrrr_m1", here=found["modes"][1]["here"])
+    assert there["residual"] < CLOSED
+    assert np.array(there["state"]["real"]) == pytest.approx(np.array(found["modes"][1]["places"]), abs=1e-6)
+    twin = setting.everything.start.twin
+    for each in setting.observed:
+        one, other = (twin.pose(np.array(q), each.link)[:3, :3] @ each.direction
+                      for q in (twin.q0, there["here"]["q"]))
+        assert one == pytest.approx(other, abs=1e-9)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("robot", "of"), [("3upu", "xy"), ("3rps", "turn about xturn about y")])
+def test_a_plane_has_the_errors_that_moving_there_shows(robot: str, of: str):
+    found = ask("plane", robot, of=of, size=5)
+    names = [each["name"] for each in ask("open", robot)["sliders"]]
+    sliders = {each["name"]: each for each in ask("open", robot)["sliders"]}
+    first, second = (names.index(name) for name in found["of"])
+    values = [sliders[name]["home"] for name in names]
+    met = 0
+    for row in range(found["n"]):
+        for column in range(found["n"]):
+            wanted = [*values]
+            for place, cell in ((first, column), (second, row)):
+                slider = sliders[names[place]]
+                wanted[place] = slider["min"] + cell / (found["n"] - 1) * (slider["max"] - slider["min"])
+            told = found["values"][row][column]
+            moved = ask("move", robot, values=wanted)
+            if told is not None and not moved["stopped"]:
+                met += 1
+                assert moved["state"]["error"]["mm"] == pytest.approx(told, rel=2e-2)
+    assert met > found["n"]
+    assert np.shape(found["corners"]) == (4, 3)
+
+
+@pytest.mark.slow
+def test_a_servo_run_ends_where_the_camera_sees_the_goal():
+    home = [each["home"] for each in ask("open", "rrrrr_m1")["sliders"]]
+    goal = [home[0] + 0.02, home[1]]
+    found = ask("servo", "rrrrr_m1", goal=goal)
+    assert found["kind"] == "goal"
+    assert np.array(found["frames"][-1]["image"]) == pytest.approx(np.array(found["desired"]), abs=0.5)
+    assert found["frames"][0]["e"] > found["frames"][-1]["e"]
+    assert ask("move", "rrrrr_m1", here=found["frames"][-1]["here"])["values"] == pytest.approx(goal, abs=1e-4)
+
+
+@pytest.mark.parametrize("robot", ["rrrrr_m1", "prrrp_parallel", "3ppr_m1", "3upu"])
+def test_the_plain_answer_agrees_with_legs_and_modes(robot: str):
+    found = ask("answer", robot)
+    known = legs(robot)
+    controllable = any(each == "controllable" for each in known.sets)
+    assert len(found["sentences"]) == 3
+    assert found["sentences"][0].startswith("Watch leg") == controllable
+    if controllable:
+        assert tuple(found["watch"]) in known.minimal
+        others = [mode for mode in modes(robot, found["watch"]).modes if not mode.goal]
+        assert ("No other pose" in found["sentences"][2]) == (not others)
+
+
+@pytest.mark.parametrize("kind", ["robot", "figure", pytest.param("page", marks=pytest.mark.slow),
+                                  pytest.param("report", marks=pytest.mark.slow)])
+def test_what_is_exported_is_the_file_that_its_name_says(kind: str, tmp_path: Path):
+    found = ask("export", "rrrrr_m1", kind=kind)
+    file = tmp_path / found["name"]
+    file.write_bytes(b64decode(found["base64"]))
+    if kind == "robot":
+        assert load(file) == load("rrrrr_m1")
+    else:
+        assert file.read_text(encoding="utf-8").lstrip().lower().startswith(("<svg", "<!doctype html"))
+
+
+@pytest.mark.parametrize(("what", "robot", "fields"), [
+    ("open", "rrrrr_m1", {}), ("watch", "prrrp_parallel", {"watch": ["1"]}),
+    ("modes", "rrrrr_m1", {"watch": ["2", "1"]}),
+    ("plane", "3upu", {"of": "xy", "size": 4}), ("answer", "rrrrr_m1", {}),
+    pytest.param("servo", "rrrrr_m1", {"goal": [0.03, 0.24]}, marks=pytest.mark.slow),
+])
+def test_the_command_and_the_line_of_python_give_what_the_panel_shows(what: str, robot: str, fields: dict[str, Any],
+                                                                      capsys: pytest.CaptureFixture[str]):
+    found = ask(what, robot, **fields)
+    ran = run(found["command"], capsys)
+    same = json.loads(json.dumps(eval(found["python"], {"hrsynth": hrsynth}).to_dict()))
+    for record in (ran, same):
+        if what in ("open", "watch"):
+            verdict = ask("watch", robot, **fields)
+            assert record["verdict"] == verdict["verdict"]["words"]
+            assert [each["name"] for each in record["lost"]] == [each["words"] for each in verdict["lost"]]
+        elif what == "modes":
+            assert len(record["modes"]) == len(found["modes"])
+        elif what == "plane":
+            told = np.array(record["position_mm"]).T
+            assert told == pytest.approx(np.array(found["values"]), rel=1e-6)
+        elif what == "answer":
+            assert found["watch"] in record["minimal"]
+        else:
+            assert record["ended"] == found["kind"]
+
+
+def run(command: str, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
+    """The JSON of a command line."""
+    capsys.readouterr()
+    with pytest.raises(SystemExit) as ended:
+        main([*shlex.split(command)[1:], "--json"])
+    assert ended.value.code in (0, None)
+    return json.loads(capsys.readouterr().out)

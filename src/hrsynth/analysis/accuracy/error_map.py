@@ -148,9 +148,9 @@ class Mapper(Value):
         count = steps or (FINE if self.batch is not None else COARSE)
         return framed(everything.start, everything.question, motion, plane, count, met)
 
-    def over(self, grid: Grid, seed: int) -> ErrorMap:
-        """The error maxima over a grid; raises ``PlaneNotMet`` where no pose of it is reached, ``BadRequest`` where
-        poses have to be found one by one and are too many for that."""
+    def over(self, grid: Grid, seed: int, checked: int = SPOTS) -> ErrorMap:
+        """The error maxima over a grid, by the batch ``checked`` at so many poses; raises ``PlaneNotMet`` where no pose
+        of it is reached, ``BadRequest`` where poses have to be found one by one and are too many for that."""
         name = self.setting.robot.name
         if self.batch is None and math.prod(grid.shape) > LARGEST_GRID:
             raise BadRequest(f"{name}: poses are found one by one; number of poses", math.prod(grid.shape),
@@ -160,7 +160,7 @@ class Mapper(Value):
             raise PlaneNotMet(name, f"the grid {grid}", f"none of {math.prod(grid.shape)} is")
         spots = smallest_at = None
         if self.batch is not None:
-            spots, smallest_at = self._spots(grid, seen, seed), partial(self._smallest, grid)
+            spots, smallest_at = self._spots(grid, seen, seed, checked), partial(self._smallest, grid)
         shape = grid.shape
         position, orientation = seen.position.reshape(shape), seen.orientation.reshape(shape)
         return ErrorMap(grid, seen.reached.reshape(shape), position, orientation, seen.gap, seen, spots, smallest_at)
@@ -218,25 +218,25 @@ class Mapper(Value):
                 table[2, i] = _weakest(rates, twists, at.twin.length)
         return Seen(np.isfinite(table[2]), table[0], table[1], lambda: None, lambda: table[2], 0.0)
 
-    def _spots(self, grid: Grid, seen: Seen, seed: int) -> Spots:
+    def _spots(self, grid: Grid, seen: Seen, seed: int, count: int) -> Spots:
         """Hold the batch against Pinocchio at random poses; raises ``Disagreement``."""
         sizes = [np.where(np.isfinite(each), each, 0.0) for each in (seen.position, seen.orientation)]
         limits = [USUAL_ERROR * np.median(each[each > 0]) if (each > 0).any() else np.inf for each in sizes]
         finite = np.isfinite(seen.position) & np.isfinite(seen.orientation)
         usual = np.flatnonzero(seen.reached & finite & (sizes[0] <= limits[0]) & (sizes[1] <= limits[1]))
-        chosen = np.random.default_rng(seed).choice(usual, min(SPOTS, len(usual)), replace=False)
-        count, largest = 0, 0.0
+        chosen = np.random.default_rng(seed).choice(usual, min(count, len(usual)), replace=False)
+        met, largest = 0, 0.0
         for i, at in zip(chosen, self._configurations(grid, chosen), strict=True):
             if at is None:
                 continue
-            count += 1
+            met += 1
             for mine, theirs, all_of in zip((seen.position[i], seen.orientation[i]),
                                             maxima(at, self.question, self.cones), sizes, strict=True):
                 scale = max(mine, float(np.median(all_of[all_of > 0])) if (all_of > 0).any() else 1.0)
                 largest = max(largest, abs(mine - theirs) / scale)
         if largest > SAME_RELATION + seen.gap:
-            raise Disagreement(self.setting.robot.name, count, largest)
-        return Spots(count, float(largest))
+            raise Disagreement(self.setting.robot.name, met, largest)
+        return Spots(met, float(largest))
 
     def _configurations(self, grid: Grid, chosen: NDArray[np.int64]) -> list[ClosedConfiguration | None]:
         """The closed configurations at cells of a grid."""

@@ -11,6 +11,7 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -106,6 +107,18 @@ def self_motion(at: ClosedConfiguration, question: Measurement, bodies: Sequence
     size = min(each for each in [ways.shape[1], *(walker.around(q)[0].shape[1] for q in middle)] if each)
     return SelfMotion(at, size, walker.moved(at.q, places), longest.shift * twin.length, longest.turn, longest.returns,
                       goal, way=tuple(map(walker.bodies, places)))
+
+
+def followed(at: ClosedConfiguration, question: Measurement, twist: Array, count: int
+             ) -> tuple[tuple[ClosedConfiguration, ...], ...]:
+    """The motion with the measurements held that begins with a twist (rows of t; m, rad) of the platform, and with its
+    opposite: up to ``count`` closed configurations each way, none where the twist is one to first order only."""
+    twin = at.twin
+    walker = _Follower(twin, Held.at(twin, at.q, question.reference, question.observations), question,
+                       (question.platform,))
+    w = twist / np.repeat([twin.length, 1.0], 3)[: len(twist)]
+    ways = (islice(walker.steps(at.q, sign * w / np.linalg.norm(w)), count) for sign in (1.0, -1.0))
+    return tuple(tuple(ClosedConfiguration.of(twin, q) for q in way) for way in ways)
 
 
 @dataclass(frozen=True, eq=False)

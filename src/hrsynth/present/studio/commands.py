@@ -5,15 +5,17 @@ from __future__ import annotations
 import shlex
 from typing import Any
 
+from ...analysis.observed import ObservedRobot
+from ...kinematics.configuration import ClosedConfiguration
 from .request import Request
 
 
-def lines(request: Request, name: str, *options: str, legs: bool = True, **given: Any) -> dict[str, str]:
+def lines(request: Request, name: str, *options: str, watching: bool = True, **given: Any) -> dict[str, str]:
     """The fields ``command`` and ``python`` of an answer: the question ``name``, with the ``options`` of the command
-    line and the arguments ``given`` in Python; ``legs``: with what is watched."""
+    line and the arguments ``given`` in Python; ``watching``: with what is watched."""
     words = ["hrsynth", name, request.source.robot]
     python = []
-    if legs and request.watched:
+    if watching and request.watched:
         words += ["--observe", ",".join(request.watched)]
         python.append(repr(list(request.watched)))
     if request.camera is not None:
@@ -36,3 +38,14 @@ def lines(request: Request, name: str, *options: str, legs: bool = True, **given
     python += [f"{each}={value!r}" for each, value in given.items()]
     return {"command": shlex.join([*words, *options]),
             "python": f"hrsynth.{name}({', '.join([robot, *python])})"}
+
+
+def at_pose(setting: ObservedRobot, at: ClosedConfiguration) -> str:
+    """The platform's pose as an option says it, to nine digits."""
+    given = setting.motion.pose(at.pose(setting.motion.link)).given
+    return ",".join(f"{name}={'/'.join(map(digits, values))}" for name, values in given.items())
+
+
+def digits(value: float) -> str:
+    """A number as it is typed: to a tenth of a nanometre, nine digits."""
+    return f"{round(float(value), 10) + 0.0:.9g}"

@@ -54,11 +54,13 @@ def mode_outlines(setting: ObservedRobot,
     if found.found.continuum is not None:
         return (), (f"assembly modes are not shown: {found.found.degenerate}",)
     notes = () if found.found.complete else ("perhaps not all assembly modes are shown",)
-    return tuple(_outline(setting, str(number), mode) for number, mode in enumerate(found.modes, 1)
+    return tuple(outline(setting, str(number), mode) for number, mode in enumerate(found.modes, 1)
                  if not mode.goal), notes
 
 
-def _outline(setting: ObservedRobot, label: str, mode: AssemblyMode) -> ModeOutline:
+def outline(setting: ObservedRobot, label: str, mode: AssemblyMode) -> ModeOutline:
+    """An assembly mode with its ``label``."""
+
     def where(link: str) -> Array | None:
         if mode.configuration is not None:
             X = mode.configuration.pose(link)

@@ -114,7 +114,7 @@ class Mover(Value):
         """Where the robot comes to from ``here`` when the platform is sent to coordinates (n,), and those there."""
         aim = Coordinates(self.setting.motion, self.coordinates.places, values)
         there, _ = track(here.real, self.setting.motion, aim)
-        followed = self._followed(here, [there])
+        followed = self.followed(here, [there])
         found = followed[-1] if followed else here
         return found, values + aim.apart(found.real.pose(self.setting.motion.link))
 
@@ -124,7 +124,7 @@ class Mover(Value):
         motion = self.setting.motion
         whole = Goal(motion.link, motion.point, motion.home[:3, :3], np.eye(3), motion.position(X), motion.normal,
                      rotation=X[:3, :3] if motion.body and motion.rotations.shape[1] else None)
-        followed = self._followed(here, [approach(here.real, whole, APPROACH)])
+        followed = self.followed(here, [approach(here.real, whole, APPROACH)])
         return followed[-1] if followed else here
 
     def read(self, posed: Posed) -> Array:
@@ -140,13 +140,13 @@ class Mover(Value):
     def joined(self, at: ClosedConfiguration) -> Posed:
         """The real robot with the hidden one beside it, which comes there from its zero configuration; without it where
         it does not arrive."""
-        found = self._followed(self.home, [at])
+        found = self.followed(self.home, [at])
         if not found:
             goal = Coordinates(self.setting.motion, self.coordinates.places, self.coordinates.read(
                 at.pose(self.setting.motion.link)))
             halfway = goal.towards(self.home.real.pose(self.setting.motion.link), 0.5)
             way = [track(self.home.real, self.setting.motion, each)[0] for each in (halfway, goal)]
-            found = self._followed(self.home, [*way, at])
+            found = self.followed(self.home, [*way, at])
         return found[-1] if found and found[-1].real is at else Posed(at)
 
     @cached_property
@@ -173,14 +173,14 @@ class Mover(Value):
         span = TURN if turns else WAY * home.real.twin.length
         ways = self.coordinates.along(home.real, index, (span, span), STEPS)
         start = next(i for i, (_, at) in enumerate(ways) if at is home.real)
-        down = self._followed(home, [at for _, at in reversed(ways[:start])])
-        up = self._followed(home, [at for _, at in ways[start + 1 :]])
+        down = self.followed(home, [at for _, at in reversed(ways[:start])])
+        up = self.followed(home, [at for _, at in ways[start + 1 :]])
         posed = [*reversed(down), home, *up]
         values = [value for value, _ in ways[start - len(down) : start + len(up) + 1]]
         return Slider(self.coordinates.names[index], "rad" if turns else "m", tuple(values),
                       tuple(map(self.state, posed)), len(down))
 
-    def _followed(self, start: Posed, way: Iterable[ClosedConfiguration]) -> list[Posed]:
+    def followed(self, start: Posed, way: Iterable[ClosedConfiguration]) -> list[Posed]:
         """The way with the hidden robot beside the real one, as far as it can follow."""
         found: list[Posed] = []
         q = start.hidden

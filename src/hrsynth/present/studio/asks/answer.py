@@ -1,0 +1,131 @@
+"""The plain answer: which legs to watch, how wrong the platform can be then, and where else the loop may stop."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ....analysis.modes.modes import AssemblyMode, AssemblyModes, modes
+from ....analysis.observed import ObservedRobot
+from ....analysis.verdict import CONTROLLABLE, Verdict
+from ....errors import HrsynthError
+from ....geometry.so3 import angle_of
+from ....geometry.vectors import Array
+from ....kinematics.platform_motion import PlatformMotion
+from ....tolerances import SAME_RELATION
+from ...text.poses import all_of
+from ..commands import lines
+from ..request import Request
+from ..scale import SIGNS, error, rounded
+from .watch import smallest
+
+
+def answer(request: Request) -> dict[str, Any]:
+    """Three sentences about a robot at its zero configuration, of the smallest sets of legs that see most the one with
+    the least error there."""
+    setting = ObservedRobot.of(request.mechanism, None, request.camera)
+    found = [(watching(setting, each), each) for each in smallest(setting)]
+    start = setting.everything.start
+    chosen, verdict = min(found, key=lambda pair: _size(error(pair[0], start)))
+    legs = list(verdict.legs) if verdict.rank else []
+    return {"sentences": [which(verdict), *(rest(chosen) if verdict == CONTROLLABLE else blind(verdict))],
+            "watch": legs, **lines(request, "legs", watching=False)}
+
+
+def watching(setting: ObservedRobot, verdict: Verdict) -> ObservedRobot:
+    """The robot with the legs of a verdict watched."""
+    return replace(setting, observed=tuple(each for each in setting.observed if each.leg in verdict.legs))
+
+
+def _size(wrong: dict[str, Any]) -> float:
+    value = wrong[wrong["unit"]]
+    return np.inf if value is None else float(value)
+
+
+def which(verdict: Verdict) -> str:
+    """The sentence that says which legs to watch."""
+    legs = named(verdict.legs)
+    if verdict == CONTROLLABLE:
+        return f"Watch {legs}."
+    if not verdict.rank:
+        return "Watching the legs does not help: their directions do not change when the platform moves."
+    return (f"Watching the legs is not enough: {legs} {'sees' if len(verdict.legs) == 1 else 'see'} as much as all of "
+            f"them, but {_listed([each.name for each in verdict.lost])} stay{'s' * (len(verdict.lost) == 1)} unseen "
+            f"({verdict.dof - verdict.rank} of {verdict.dof} freedoms).")
+
+
+def blind(verdict: Verdict) -> list[str]:
+    """What follows where a freedom is not seen."""
+    return ["However well the directions are measured, the platform can then be anywhere along what is not seen.",
+            "Something else must be measured as well: the command advise lists what would do."]
+
+
+def rest(setting: ObservedRobot) -> list[str]:
+    """How wrong the platform can be at the zero configuration, and where else the loop may stop."""
+    wrong = error(setting, setting.everything.start)
+    value = wrong[wrong["unit"]]
+    if value is None:
+        first = "At the zero configuration a freedom is lost, so that the error has no bound there."
+    else:
+        first = f"The platform is then about {rounded(value)}{SIGNS[wrong['unit']]} wrong per 0.1°."
+    return [first, _elsewhere(setting)]
+
+
+def _elsewhere(setting: ObservedRobot) -> str:
+    """Where else the loop may stop: the other assembly modes, as they were listed."""
+    try:
+        found = modes(setting)
+    except HrsynthError as problem:
+        return f"Other poses at which the loop may stop could not be listed: {problem}."
+    if found.found.continuum is not None or found.motions:
+        return "The loop may stop anywhere on a whole curve of poses at which the legs look the same."
+    others = [mode for mode in found.modes if not mode.goal]
+    met = [mode for mode in others if mode.reachable is not False]
+    return _others(found, len(others), met)
+
+
+def _others(found: AssemblyModes, count: int, met: list[AssemblyMode]) -> str:
+    known = found.found.complete
+    if not met:
+        if count:
+            there = f"{_number(count)} other pose{'s' * (count > 1)}"
+            words = f"The legs look the same at {there}, but the robot does not reach {'them' if count > 1 else 'it'}"
+        else:
+            words = f"No other pose has the same directions ({all_of(found)})" if known else (
+                "No other pose was found at which the legs look the same")
+        return f"{words}." if known else f"{words}; there may be others that were not found."
+    away = sorted(_apart(found.setting.motion, found.goal.pose, mode) for mode in met)
+    near, turn = away[0]
+    far = f"{_length(near)} away" if near > SAME_RELATION else f"turned by {np.degrees(turn):.2g}°"
+    where = f"one other pose, {far}" if len(met) == 1 else f"{_number(len(met))} other poses, the nearest {far}"
+    return f"The loop may stop at {where}{'' if known else ', and perhaps at others that were not found'}."
+
+
+def _apart(motion: PlatformMotion, pose: Any, mode: AssemblyMode) -> tuple[float, float]:
+    """How far a mode is from the pose itself: metres, radians."""
+    home: Array = pose(motion.link)
+    at = np.array([mode.pose.x, mode.pose.y, mode.pose.z], dtype=float)
+    turned = mode.pose.rotation
+    return float(np.linalg.norm(at - motion.position(home))), (
+        0.0 if turned is None else angle_of(turned @ home[:3, :3].T))
+
+
+def _length(metres: float) -> str:
+    if metres >= 1:
+        return f"{metres:.2g} m"
+    return f"{100 * metres:.2g} cm" if metres >= 0.01 else f"{1e3 * metres:.2g} mm"
+
+
+def named(legs: tuple[str, ...]) -> str:
+    """Legs as one says them: legs 1, 2 and 4."""
+    return f"leg{'s' * (len(legs) > 1)} {_listed(legs)}"
+
+
+def _listed(words: tuple[str, ...] | list[str]) -> str:
+    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
+
+
+def _number(count: int) -> str:
+    return {1: "one", 2: "two", 3: "three", 4: "four", 5: "five", 6: "six"}.get(count, str(count))

@@ -1,0 +1,74 @@
+"""What is taken away: a page, a report, a figure, a robot file."""
+
+from __future__ import annotations
+
+import base64
+import re
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from ....description import formats
+from ....description.meshes import carried
+from ....errors import BadRequest
+from ...outputs import OUTPUTS
+from ...show import draw
+from ...view.view import view
+from ..commands import lines
+from ..request import Request
+
+NATIVE = "native"
+
+
+def answer(request: Request) -> dict[str, Any]:
+    """The file of a ``kind``, its bytes in base64."""
+    kind = request.text("kind", KINDS)
+    if kind is None:
+        raise BadRequest("kind", None, tuple(KINDS))
+    ending, type_, made = KINDS[kind]
+    name, content, same = made(request)
+    name = re.sub(r"[^\w.-]", "_", name)
+    return {"name": f"{name}{ending}", "type": type_, "base64": base64.b64encode(content).decode(), **same}
+
+
+def _page(request: Request) -> tuple[str, bytes, dict[str, str]]:
+    found = view(request.seeing(), hidden=True)
+    (each,) = OUTPUTS["view"].files
+    name = found.setting.robot.name
+    same = lines(request, "view", "--hidden", "--static", f"{name}.html", hidden=True)
+    return name, _bytes(each.content(found, ".html", {})[0]), same
+
+
+def _report(request: Request) -> tuple[str, bytes, dict[str, str]]:
+    name = request.derivation.robot.name
+    report = next(each for each in OUTPUTS["derive"].files if each.option == "report")
+    content = report.content(request.derivation, ".html", {"seed": 0})[0]
+    return name, _bytes(content), lines(request, "derive", "--report", f"{name}.html")
+
+
+def _figure(request: Request) -> tuple[str, bytes, dict[str, str]]:
+    same = lines(request, "derive")
+    return (request.derivation.robot.name, draw(request.derivation).content,
+            {**same, "python": f"hrsynth.draw({same['python']})"})
+
+
+def _robot(request: Request) -> tuple[str, bytes, dict[str, str]]:
+    mechanism = request.mechanism
+    dialect = next(each for each in formats.writable() if each.name == NATIVE)
+    name = re.sub(r"[^\w.-]", "_", mechanism.name)
+    target = Path(mechanism.file or name).with_name(f"{name}.urdf")
+    robot, _, _ = carried(mechanism, target, dialect.meshes, copy=False)
+    (text,) = formats.writer(NATIVE)(robot).texts
+    same = lines(request, "import", "--yes", "-o", target.name, watching=False)
+    loaded = lines(request, "load", watching=False)["python"]
+    return name, dialect.packed(text, target), {**same, "python": f"hrsynth.save({loaded}, {target.name!r})"}
+
+
+def _bytes(content: Any) -> bytes:
+    return content if isinstance(content, bytes) else b"".join(content)
+
+
+KINDS: dict[str, tuple[str, str, Callable[[Request], tuple[str, bytes, dict[str, str]]]]] = {
+    "page": (".html", "text/html", _page), "report": (".html", "text/html", _report),
+    "figure": (".svg", "image/svg+xml", _figure), "robot": (".urdf", "application/xml", _robot)}
+"""Ending, type and maker of each kind."""

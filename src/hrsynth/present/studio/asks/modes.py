@@ -1,0 +1,44 @@
+"""The poses at which the watched legs look the same, each with where to fly."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ....analysis.asked import at_mode
+from ....analysis.modes.modes import AssemblyMode, AssemblyModes, modes
+from ....errors import PoseNotReached
+from ....mechanism.pose import ModeNumber
+from ...text.poses import all_of, assembly
+from ...view.mode_outlines import outline
+from ...view.states import Posed
+from ..commands import at_pose, lines
+from ..request import Request
+
+
+def answer(request: Request) -> dict[str, Any]:
+    """All assembly modes with the directions at ``here``, and whether these are all."""
+    setting = request.seeing()
+    here = request.here(request.mover())
+    found = modes(setting, at=here.real)
+    pose = at_pose(setting, here.real)
+    return {"modes": [_mode(request, found, number, mode) for number, mode in enumerate(found.modes, 1)],
+            "words": words(found), **lines(request, "modes", "--at", pose, at=pose)}
+
+
+def words(found: AssemblyModes) -> str:
+    """How many there are, and by which proof these are all."""
+    if found.found.continuum is not None and found.found.complex is not None:
+        return f"a continuum of poses: {found.found.degenerate}"
+    more = "" if found.found.degenerate is None else f"; {found.found.degenerate}"
+    return f"{found.count}, {all_of(found)}; {found.found.proof}{more}"
+
+
+def _mode(request: Request, found: AssemblyModes, number: int, mode: AssemblyMode) -> dict[str, Any]:
+    drawn = outline(found.setting, f"mode {number}", mode)
+    try:
+        there = at_mode(found, ModeNumber(number))
+    except PoseNotReached:
+        there = None
+    return {**drawn.scene(), "words": f"{drawn.words}: {'the pose itself' if mode.goal else assembly(mode)[0]}",
+            "pose": mode.pose.to_dict(), "goal": mode.goal,
+            "here": None if there is None else request.told(Posed(there))}

@@ -1,0 +1,213 @@
+"""Values over a plane of poses: how wrong the platform can be, how far a singularity is, where a freedom is lost."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise, permutations
+from typing import Any
+
+import numpy as np
+
+from ....analysis.accuracy.accuracy import sees_all
+from ....analysis.accuracy.error_map import Mapper, nested
+from ....analysis.accuracy.pose_errors import attained
+from ....analysis.singularity.agreement import weakest
+from ....batch.reach import spread
+from ....budgets import FARTHEST_POSE, LARGEST_STUDIO_PLANE, LARGEST_STUDIO_SWEEP
+from ....errors import BadRequest
+from ....geometry.vectors import Array
+from ....kinematics.configuration import ClosedConfiguration
+from ....kinematics.coordinates import Coordinates
+from ....kinematics.steps import track
+from ....mechanism.pose import SCALARS, Grid, Pose
+from ....results import Value
+from ....tolerances import ON_LOCUS, SAME_RELATION
+from ...view.states import Mover
+from ..commands import at_pose, digits, lines
+from ..request import Request
+from ..scale import CONE, CONE_TEXT, SIGNS, STEPS, rounded, unit_of
+
+ACCURACY, DISTANCE = "accuracy", "distance"
+DISTANCES = (0.01, 0.03, 0.1, 0.3)
+"""Steps of the distance to a singularity (the smallest singular value of Mᵀ, characteristic lengths)."""
+CHECKED = 2
+"""Poses at which the batch is held against Pinocchio: it is asked again and again while a plane is dragged."""
+SIZE = 24
+"""Values a side, where no number is asked for."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PoseField(Value):
+    """Values (n, n) over a plane, NaN where no pose is reached, the first index along the first coordinate, and the
+    segments (k, 2, 2) of the curve on which a freedom is lost, in the two coordinates."""
+
+    values: Array
+    locus: Array
+
+
+def answer(request: Request) -> dict[str, Any]:
+    """A plane of two coordinates, the others as at ``here``, the third at ``at``."""
+    setting, mover = request.seeing(), request.mover()
+    sees_all(setting)
+    here = request.here(mover)
+    kind = request.text("kind", (ACCURACY, DISTANCE)) or ACCURACY
+    pair = _pair(mover, request.text("of"))
+    size = request.count("size", 2, LARGEST_STUDIO_PLANE) or SIZE
+    values = mover.read(here)
+    third = [i for i in range(len(values)) if i not in pair]
+    at = request.number("at", -FARTHEST_POSE, FARTHEST_POSE)
+    if at is not None and third:
+        values[third[0]] = at
+    ranges = [(float(mover.read(mover.ends[i][0])[i]), float(mover.read(mover.ends[i][1])[i])) for i in pair]
+    mapper, unit = Mapper(setting, np.full(len(setting.observed), CONE)), unit_of(setting)
+    known = mapper.batch is not None and _at_batch(mover, here.real)
+    cells = size if known else min(size, LARGEST_STUDIO_SWEEP)
+    grid = together(mover, here.real, pair, values, ranges, cells)
+    if grid is not None and known:
+        found = by_batch(mapper, grid, kind, unit)
+    else:
+        found = one_by_one(mover, here.real, pair, values, ranges, cells, kind, unit)
+    text = at_pose(setting, here.real) if grid is None else grid_text(grid)
+    option = "at" if grid is None else "grid"
+    given: dict[str, Any] = {"cone": CONE_TEXT, option: text}
+    same = lines(request, "accuracy", "--cone", CONE_TEXT, f"--{option}", text, **given)
+    place = _placer(mover, pair, values)
+    (a, b), (c, d) = ranges
+    return {"corners": [place(x, y).tolist() for x, y in ((a, c), (b, c), (b, d), (a, d))], "n": cells,
+            "values": nested(found.values.T), "unit": unit if kind == ACCURACY else "",
+            "steps": list(STEPS[unit] if kind == ACCURACY else DISTANCES),
+            "locus": [[place(*point).tolist() for point in segment] for segment in found.locus],
+            "words": _words(kind, unit, found), "of": [mover.coordinates.names[i] for i in pair], **same}
+
+
+def _pair(mover: Mover, said: str | None) -> tuple[int, int]:
+    """The two coordinates that are named, one name after the other; the first two where none are."""
+    names = mover.coordinates.names
+    found = [pair for pair in permutations(range(len(names)), 2) if said in (None, names[pair[0]] + names[pair[1]])]
+    if not found:
+        raise BadRequest("of", said, [names[i] + names[j] for i, j in permutations(range(len(names)), 2)])
+    return found[0][0], found[0][1]
+
+
+def _at_batch(mover: Mover, at: ClosedConfiguration) -> bool:
+    """Whether a configuration is the one that closed forms give at its pose."""
+    placer = mover.setting.placer
+    if placer is None:
+        return False
+    (found,) = placer.configurations(at.pose(mover.setting.motion.link)[None])
+    return found is not None and float(np.linalg.norm(at.twin.difference(found.q, at.q))) < SAME_RELATION
+
+
+def together(mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], values: Array,
+             ranges: list[tuple[float, float]], size: int) -> Grid | None:
+    """The plane as a grid of poses, None where the parts of a pose do not say it."""
+    names, motion = mover.coordinates.names, mover.setting.motion
+    turns = [i for i, name in enumerate(names) if name not in SCALARS]
+    if turns and (set(turns) & set(pair) or not np.array_equal(values[turns], mover.coordinates.read(
+            here.pose(motion.link))[turns])):
+        return None
+    parts: dict[str, Any] = {name: float(f"{value:.9g}") for i, (name, value) in enumerate(
+        zip(names, values, strict=True)) if i not in pair and i not in turns}
+    if turns:
+        parts["rpy"] = motion.pose(here.pose(motion.link)).rpy
+    axes = tuple((names[i], np.linspace(*ends, size)) for i, ends in zip(pair, ranges, strict=True))
+    return Grid(axes, Pose(**parts))
+
+
+def grid_text(grid: Grid) -> str:
+    """The grid as an option says it."""
+    held = [f"{name}={'/'.join(map(digits, values))}" for name, values in grid.fixed.given.items()]
+    return ",".join([*(f"{name}={digits(values[0])}:{digits(values[-1])}:{len(values)}" for name, values in grid.axes),
+                     *held])
+
+
+def by_batch(mapper: Mapper, grid: Grid, kind: str, unit: str) -> PoseField:
+    """The plane by closed forms, held against Pinocchio at some of its poses."""
+    found = mapper.over(grid, 0, CHECKED)
+    table = found.smallest if kind == DISTANCE else _shown(found.position, found.orientation, unit)
+    signs, (x, y) = found.determinant, (values for _, values in grid.axes)
+    if signs is None or found.smallest_at is None:
+        return PoseField(table, np.zeros((0, 2, 2)))
+    segments = np.array([*_crossings(x, y, signs)]).reshape(-1, 2, 2)
+    # a determinant changes its sign as well where it is infinite (Type 1): there Mᵀ does not lose its rank
+    least = found.smallest_at(segments.mean(axis=1)) if len(segments) else np.zeros(0)
+    usual = float(np.nanmedian(found.smallest))
+    return PoseField(table, segments[least < ON_LOCUS * usual])
+
+
+def one_by_one(mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], values: Array,
+               ranges: list[tuple[float, float]], size: int, kind: str, unit: str) -> PoseField:
+    """The plane pose by pose, each led to from a neighbour, in the working mode of ``here``."""
+    setting, motion, question = mover.setting, mover.setting.motion, mover.setting.samples.question
+    aims = []
+    axes = [np.linspace(*ends, size) for ends in ranges]
+    for point in np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2):
+        wanted = values.copy()
+        wanted[list(pair)] = point
+        aims.append(Coordinates(motion, mover.coordinates.places, wanted))
+
+    def lead(cell: int, origin: ClosedConfiguration, halvings: int) -> ClosedConfiguration | None:
+        there, came = track(origin, motion, aims[cell], halvings)
+        return there if came == 1 else None
+
+    distance = [float(np.linalg.norm(aim.rows(here.twin, here.q)[0])) for aim in aims]
+    cones = np.full(len(setting.observed), CONE)
+    found = np.full((2, len(aims)), np.nan)
+    for i, at in enumerate(spread(here, (size, size), distance, lead)):
+        if at is not None:
+            found[:, i] = (weakest(at, question), np.nan) if kind == DISTANCE else attained(at, question, cones)
+    table = found[0] if kind == DISTANCE else _shown(found[0], found[1], unit)
+    return PoseField(table.reshape(size, size), np.zeros((0, 2, 2)))
+
+
+def _shown(position: Array, orientation: Array, unit: str) -> Array:
+    """Errors in the unit in which they are shown; where they have no bound, more than any step."""
+    found = 1e3 * position if unit == "mm" else np.degrees(orientation)
+    return np.where(np.isinf(position) | np.isinf(orientation), FARTHEST_POSE, found)
+
+
+def _crossings(x: Array, y: Array, values: Array) -> Iterator[Array]:
+    """Segments (2, 2) on which values (nx, ny) vanish, between the sides of each cell that they cross."""
+    for i, j in np.argwhere(np.isfinite(values[:-1, :-1] + values[1:, :-1] + values[:-1, 1:] + values[1:, 1:])):
+        corners = [(i, j), (i + 1, j), (i + 1, j + 1), (i, j + 1), (i, j)]
+        met = []
+        for (a, b), (c, d) in pairwise(corners):
+            if values[a, b] * values[c, d] < 0:
+                part = values[a, b] / (values[a, b] - values[c, d])
+                met.append([x[a] + part * (x[c] - x[a]), y[b] + part * (y[d] - y[b])])
+        for k in range(0, len(met) - 1, 2):
+            yield np.array(met[k : k + 2])
+
+
+def _placer(mover: Mover, pair: tuple[int, int], values: Array) -> Callable[[float, float], Array]:
+    """Where a point of the plane is drawn: a turn along its axis, one radian as long as the robot's length."""
+    motion, length = mover.setting.motion, mover.home.real.twin.length
+    ways, origin = np.eye(6, 3), motion.position(mover.home.real.pose(motion.link))
+    ways[3:] = length * np.eye(3)
+    if motion.rotations.shape[1] == 1:
+        ways[3] = length * motion.normal
+    places = mover.coordinates.places
+    for i, number in enumerate(places):
+        if i not in pair and number < 3:
+            origin[number] = values[i]
+    for i in pair:
+        if places[i] < 3:
+            origin[places[i]] = 0.0
+
+    def place(a: float, b: float) -> Array:
+        return origin + a * ways[places[pair[0]]] + b * ways[places[pair[1]]]
+
+    return place
+
+
+def _words(kind: str, unit: str, found: PoseField) -> str:
+    """How much is reached, and between which values it lies."""
+    here = found.values[np.isfinite(found.values)]
+    if not here.size:
+        return "No pose of this plane is reached."
+    part = f"{100 * here.size / found.values.size:.0f} % of these poses are reached"
+    if kind == DISTANCE:
+        return f"{part}; the smallest singular value of Mᵀ lies between {here.min():.2g} and {here.max():.2g}."
+    worst = f"{rounded(float(here.max()))}{SIGNS[unit]}" if here.max() < FARTHEST_POSE else "no bound"
+    return f"{part}; per 0.1° the platform is wrong by {rounded(float(here.min()))}{SIGNS[unit]} to {worst}."

@@ -1,0 +1,58 @@
+"""A servo run from where the robot is to where it is wanted, with the picture of its camera."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ....errors import BadRequest
+from ....geometry.vectors import Array
+from ....simulation.camera import Camera, Cylinder, cylinders, placed
+from ....simulation.servo import ServoTask
+from ....tolerances import SLIDER_ARRIVED
+from ..commands import at_pose, lines
+from ..request import Request
+from .move import state
+
+FRAMES = 60
+"""Of a run that is shown."""
+
+Poses = Callable[[str], Array]
+
+
+def answer(request: Request) -> dict[str, Any]:
+    """The run from ``here`` to the coordinates ``goal``."""
+    setting, mover = request.seeing(), request.mover(request.flag("hidden"))
+    start = request.here(mover)
+    goal = request.vector("goal", len(mover.coordinates.places))
+    if goal is None or mover.far(goal):
+        raise BadRequest("goal", None if goal is None else goal.tolist(), "values of the robot's sliders")
+    end, reached = mover.sent(start, goal)
+    if np.max(np.abs(reached - goal), initial=0.0) > SLIDER_ARRIVED:
+        raise BadRequest("the goal is not reached from the start", goal.tolist(), "values that the robot comes to")
+    task = ServoTask.between(setting, start.real, end.real)
+    found = task.run()
+    reference, rods = setting.mechanism.reference, cylinders(setting.mechanism, setting.observed)
+    eye = placed(rods, reference, (start.real.pose, end.real.pose))
+    last = len(found.run.times) - 1
+    chosen = sorted({round(last * part) for part in np.linspace(0, 1, FRAMES)})
+    way = mover.followed(start, [found.run.configurations[i] for i in chosen])
+    frames = [{**state(request, mover, posed), "here": request.told(posed), "t": float(found.run.times[i]),
+               "e": found.run.commands[i].size, "image": image(eye, reference, rods, posed.real.pose)}
+              for i, posed in zip(chosen, way, strict=False)]
+    poses = [at_pose(setting, each.real) for each in (start, end)]
+    return {"frames": frames, "desired": image(eye, reference, rods, end.real.pose),
+            "size": [eye.width, eye.height], "kind": found.ended,
+            "words": f"Ended in: {found.ended} ({found.ending.reason}), after {found.run.times[-1]:.3g} s",
+            **lines(request, "servo", "--from", poses[0], "--to", poses[1], start=poses[0], goal=poses[1])}
+
+
+def image(eye: Camera, reference: str, rods: tuple[Cylinder, ...], poses: Poses) -> list[list[list[float]] | None]:
+    """The two ends of each watched leg in the picture (pixels); None of one that is not ahead of the camera."""
+    found: list[list[list[float]] | None] = []
+    for rod in rods:
+        ends = eye.seen(poses(reference), poses, rod)
+        found.append(np.round(eye.pixels(ends), 2).tolist() if np.all(ends[:, 2] > 0) else None)
+    return found
