@@ -10,7 +10,7 @@ from .view import View
 
 FOLDER = Path(__file__).parent
 STAGE = FOLDER.parent / "studio" / "page"
-SCRIPTS = ("colours.js", "solids.js", "robots.js", "stage.js")
+SCRIPTS = ("colours.js", "solids.js", "robots.js", "overlays.js", "gizmo.js", "sight.js", "stage.js")
 """What draws the stage beside three.js, in this order."""
 
 

@@ -94,8 +94,8 @@ function label(text, colour, size) {
   const canvas = document.createElement("canvas"), pen = canvas.getContext("2d"), short = [...text].length <= 2;
   const font = `bold ${short ? 72 : 60}px system-ui, "DejaVu Sans", sans-serif`;
   pen.font = font;
-  canvas.height = 128;
-  canvas.width = short ? 128 : Math.min(1024, Math.ceil(pen.measureText(text).width) + 84);
+  const width = short ? 128 : Math.min(1024, Math.ceil(pen.measureText(text).width) + 84);
+  Object.assign(canvas, { width, height: 128 });
   pen.fillStyle = colour;
   pen.strokeStyle = Colours.ink(colour);
   pen.lineWidth = 5;

@@ -3,9 +3,10 @@
 
    All places are displacements (x, y, z, qx, qy, qz, qw) of links from the zero configuration, in the base frame; m, rad. */
 const Stage = (() => {
-const { clear, label, vector } = Solids;
+const { clear, label } = Solids;
 const { Machine, Direction, outline } = Robots;
-const HALF = 13 * Math.PI / 180, CLICK = 6, NEAR = { mouse: 7, pen: 10, touch: 18 };
+const { LostArrows, Plane, ellipsoid } = Overlays;
+const CLICK = 6, NEAR = { mouse: 7, pen: 10, touch: 18 }, ASK_EACH = 120;  /* px, px, ms */
 const NO_WEBGL = "The 3D picture needs WebGL 2, which this browser does not give: all words and numbers are still there.";
 const LOST = "The graphics card has gone; the picture comes back with it.";
 
@@ -22,15 +23,14 @@ return class Stage {
     this.parts = Object.fromEntries(["ghosts", "goal", "lost", "plane", "ellipsoid"].map((key) => [key, new THREE.Group()]));
     this.sides.real.add(...Object.values(this.parts));
     this.names = new THREE.Group();
-    this.camera = new THREE.PerspectiveCamera(2 * 13, 1, 0.01, 100);
+    this.canvas = Object.assign(document.createElement("canvas"), { tabIndex: 0 });
+    this.canvas.setAttribute("role", "img");
+    this.sight = new Sight(this.canvas, () => this.dirty());
     const lamp = new THREE.DirectionalLight(0xffffff, 1.5);
     lamp.position.set(0.4, 0.6, 1);
     this.sky = new THREE.HemisphereLight(0xffffff, 0xc8ced6, 2.2);
-    this.camera.add(lamp);
-    this.world.add(this.sky, this.camera, this.sides.real, this.sides.hidden, this.names);
-    this.canvas = document.createElement("canvas");
-    this.canvas.tabIndex = 0;
-    this.canvas.setAttribute("role", "img");
+    this.sight.camera.add(lamp);
+    this.world.add(this.sky, this.sight.camera, this.sides.real, this.sides.hidden, this.names);
     parent.classList.add("stage");
     const fields = { canvas: this.canvas, antialias: true, alpha: true };
     const context = this.canvas.getContext("webgl2", fields);
@@ -53,7 +53,9 @@ return class Stage {
   /* Show another robot; what was shown of the last one goes. */
   scene(record) {
     this.record = record;
-    Object.keys(this.parts).forEach((key) => clear(this.parts[key]));
+    this.gizmo(false);
+    this.pulled = this.sheet = this.arrowsOfLost = this.factor = null;
+    Object.values(this.parts).forEach(clear);
     this.arrows.forEach(({ group }) => { clear(group); group.removeFromParent(); });
     const hidden = record.machines.find(({ key }) => key === "hidden");
     this.machine("real", record.machines.find(({ key }) => key === "real"));
@@ -66,6 +68,7 @@ return class Stage {
     }));
     this.canvas.setAttribute("aria-label", `Picture of ${record.name ?? "the robot"}; arrow keys turn it, plus and minus move closer and away, Home shows all.`);
     if (record.home ?? record.state) this.state(record.home ?? record.state);
+    this.sight.look(record.normal);
     this.layout(this.mode);
     this.fit();
   }
@@ -91,6 +94,7 @@ return class Stage {
       machine?.step(state.error?.step);
     }
     this.arrows.forEach((each) => this.follow(each));
+    this.steer();
     this.arrange();
   }
 
@@ -104,9 +108,11 @@ return class Stage {
 
   /* "overlay" (the hidden robot within the real one, which is pale), "beside", "real", "hidden" or "none". */
   layout(mode) {
+    const fresh = mode !== this.mode;
     this.mode = mode;
     this.arrange();
     this.beside();
+    if (fresh && !this.sight.turned) this.fit();
     this.dirty();
   }
 
@@ -134,16 +140,17 @@ return class Stage {
     clear(this.names);
     Object.values(this.sides).forEach((side) => side.position.set(0, 0, 0));
     if (this.mix !== "beside") return;
-    const { across, up } = this.axes(), wide = this.parent.clientWidth >= this.parent.clientHeight, way = wide ? across : up;
-    const [low, high] = this.span([this.machines.real.group, this.machines.hidden.group], way);
-    const words = { real: "real robot", hidden: "hidden robot" }, size = 0.13 * this.record.length;
-    for (const [key, sign] of [["real", wide ? -1 : 1], ["hidden", wide ? 1 : -1]]) {
-      const side = this.sides[key], [bottom] = this.span([this.machines[key].group], up);
-      const [left, right] = this.span([this.machines[key].group], across);
-      side.position.copy(way).multiplyScalar(0.56 * sign * (high - low) + (wide ? 0 : 0.8 * sign * size));
-      const name = label(words[key], Colours.of("background"), size), middle = this.middle([this.machines[key].group]);
-      name.position.copy(middle).addScaledVector(up, bottom - middle.dot(up) - 0.9 * size).addScaledVector(across, (left + right) / 2 - middle.dot(across));
-      name.position.add(side.position);
+    const { across, up } = this.sight, wide = this.parent.clientWidth >= this.parent.clientHeight;
+    const all = Sight.corners([this.machines.real.group, this.machines.hidden.group]), extent = [across, up].map((axis) => Sight.span(all, axis));
+    const size = 0.05 * Math.max(...extent.map(([low, high]) => high - low));
+    for (const [key, words, sign] of [["real", "real robot", wide ? -1 : 1], ["hidden", "hidden robot", wide ? 1 : -1]]) {
+      const corners = Sight.corners([this.machines[key].group]), [left, right] = Sight.span(corners, across), [bottom, top] = Sight.span(corners, up);
+      const [low, high] = wide ? [left, right] : [bottom - 2 * size, top], way = wide ? across : up;
+      const shift = sign * (wide ? size : 0.3 * size) - (sign > 0 ? low : high), name = label(words, Colours.of("background"), size);
+      this.sides[key].position.copy(way).multiplyScalar(shift);
+      const middle = new THREE.Box3().setFromPoints(corners).getCenter(new THREE.Vector3());
+      name.position.copy(middle).addScaledVector(up, bottom - middle.dot(up) - size).addScaledVector(across, (left + right) / 2 - middle.dot(across));
+      name.position.add(this.sides[key].position);
       this.names.add(name);
     }
   }
@@ -171,6 +178,59 @@ return class Stage {
     this.dirty();
   }
 
+  /* Lost freedoms (twists of points) as arrows that move forth and back, still where motion is reduced. */
+  lost(records) {
+    clear(this.parts.lost);
+    this.arrowsOfLost = records.length ? new LostArrows(records, this.record) : null;
+    if (this.arrowsOfLost) {
+      this.parts.lost.add(this.arrowsOfLost.group);
+      this.arrowsOfLost.swing(0);
+    }
+    this.dirty();
+  }
+
+  /* The ellipsoid of the error at the platform, magnified by `factor`, null for none. */
+  ellipsoid(record) {
+    clear(this.parts.ellipsoid);
+    this.factor = null;
+    if (record) {
+      const { mesh, factor } = ellipsoid(record, this.record.length);
+      this.factor = factor;
+      this.parts.ellipsoid.add(mesh);
+    }
+    this.dirty();
+  }
+
+  /* A plane of values, null for none; its handle tells `ondrag` the value `at` (or the way, m) to which it is drawn. */
+  plane(record, ondrag = () => {}) {
+    clear(this.parts.plane);
+    this.sheet = record && new Plane(record, this.record.radius);
+    this.onplane = ondrag;
+    if (this.sheet) this.parts.plane.add(this.sheet.group);
+    if (this.pulled && this.sheet) this.sheet.slide(this.pulled.wanted);
+    this.dirty();
+  }
+
+  /* Handles at the platform, of its freedoms; `ondrag` is told the place to which it is dragged. */
+  gizmo(on, _, ondrag = () => {}) {
+    this.handles?.clear();
+    this.handles = null;
+    const { real } = this.machines, freedoms = this.record?.freedoms;
+    if (on && freedoms && this.renderer && real?.places) {
+      this.handles = new Gizmo({ camera: this.sight.camera, canvas: this.canvas, world: this.sides.real, freedoms, ondrag,
+        onchange: () => this.dirty(), onhold: (held) => this.sight.hold(held) });
+      this.steer();
+    }
+    this.dirty();
+  }
+
+  /* The handles go with the platform. */
+  steer() {
+    if (!this.handles) return;
+    const { record, places } = this.machines.real, { link, place } = record.frames[record.frames.length - 1];
+    this.handles.place(places[link], place);
+  }
+
   /* All that is seen now: its meaning, colour and words; `now` where the platform has that colour. */
   legend() {
     if (!this.record) return [];
@@ -183,11 +243,22 @@ return class Stage {
     if (this.parts.ghosts.children.length) keys.push("mode");
     if (this.parts.goal.children.length) keys.push("goal");
     if (shown.length) keys.push("frame");
+    if (this.factor) keys.push("ellipsoid");
     const step = Colours.step(this.now?.error?.step);
-    const scale = !roles.has("platform") ? [] : step === "unknown" ? ["unknown"] : [0, 1, 2, 3, 4].map((k) => `step${k}`);
-    const words = (key) => this.record.scale?.[Number(key.slice(4))]?.words ?? Colours.words(key);
-    return [...keys.map((key) => ({ key, colour: Colours.of(key), words: Colours.words(key), now: false })),
-            ...scale.map((key) => ({ key, colour: Colours.of(key), words: key === "unknown" ? Colours.words(key) : words(key), now: key === step }))];
+    const all = [0, 1, 2, 3, 4].map((k) => `step${k}`);
+    const scale = this.sheet ? all : !roles.has("platform") ? this.arrowsOfLost ? ["step4"] : [] : step === "unknown" ? [] : all;
+    if (roles.has("platform") && step === "unknown") scale.push("unknown");
+    return [...keys, ...scale].map((key) => ({ key, colour: Colours.of(key), words: this.words(key), now: roles.has("platform") && key === step }));
+  }
+
+  /* What a colour means here: the scale with its thresholds, the ellipsoid with how large it is drawn. */
+  words(key) {
+    const { names, edges, unit } = this.record.scale ?? {};
+    if (key === "ellipsoid") return `${Colours.words(key)} for 0.1°${this.factor > 1 ? `, drawn ${this.factor} times as large` : ""}`;
+    if (!names || !key.startsWith("step")) return Colours.words(key);
+    const step = Number(key.slice(4)), sign = unit === "deg" ? "°" : ` ${unit}`;
+    const range = step === 0 ? `up to ${edges[0]}` : step === edges.length ? `more than ${edges[step - 1]}` : `${edges[step - 1]} to ${edges[step]}`;
+    return `${names[step]}: ${range}${sign} per 0.1°${step === edges.length ? ", or a freedom is lost" : ""}`;
   }
 
   /* The picture as a PNG blob, null where there is no WebGL. */
@@ -197,70 +268,11 @@ return class Stage {
     return new Promise((done) => { this.canvas.toBlob((blob) => { this.dirty(); done(blob); }, "image/png"); });
   }
 
-  /* Axes of the first view: a plane of motion from before it, a robot in space from its side and a little above. */
-  axes() {
-    const n = this.record.normal && vector(this.record.normal), up = new THREE.Vector3(0, 0, 1);
-    let from = new THREE.Vector3(0.6, -1.6, 0.62);
-    if (n) {
-      if (n.z < -0.1 || (n.z <= 0.1 && n.y > 0)) n.negate();
-      if (n.z > 0.95) up.set(0, 1, 0);
-      up.addScaledVector(n, -up.dot(n)).normalize();
-      from = n.clone().addScaledVector(up, n.z > 0.7 ? -0.4 : 0.25);
-    }
-    from.normalize();
-    const across = up.clone().cross(from).normalize();
-    return { from, across, pole: up.clone(), up: from.clone().cross(across) };
-  }
-
   /* The camera to where everything is seen. */
   fit() {
     if (!this.record || !this.renderer) return;
-    const { from, across, up, pole } = this.axes(), away = this.away([this.sides.real, this.sides.hidden, this.names], across, up, from);
-    this.camera.up.copy(pole);
-    this.controls?.dispose();
-    this.controls = new THREE.OrbitControls(this.camera, this.canvas);
-    this.controls.addEventListener("change", () => this.dirty());
-    this.controls.addEventListener("start", () => { this.turned = true; });
-    this.controls.target.copy(away.target);
-    this.camera.position.copy(away.target).addScaledVector(from, away.distance);
-    Object.assign(this.camera, { near: 0.01 * away.distance, far: 100 * away.distance });
-    this.camera.updateProjectionMatrix();
-    this.controls.update();
-    this.turned = false;
+    this.sight.fit([this.sides.real, this.sides.hidden, this.names]);
     this.dirty();
-  }
-
-  /* From how far and around which point objects fill the pane. */
-  away(objects, across, up, from) {
-    const ends = [across, up, from].map((axis) => this.span(objects, axis)), target = new THREE.Vector3();
-    [across, up, from].forEach((axis, i) => target.addScaledVector(axis, (ends[i][0] + ends[i][1]) / 2));
-    const [width, height, depth] = ends.map(([low, high]) => high - low);
-    const wide = this.parent.clientWidth / Math.max(1, this.parent.clientHeight);
-    return { target, distance: 0.55 * Math.max(height, width / wide, 1e-6) / Math.tan(HALF) + 0.5 * depth };
-  }
-
-  /* How far objects reach along an axis. */
-  span(objects, axis) {
-    return this.corners(objects).reduce(([low, high], p) => [Math.min(low, p.dot(axis)), Math.max(high, p.dot(axis))], [Infinity, -Infinity]);
-  }
-
-  middle(objects) {
-    return new THREE.Box3().setFromPoints(this.corners(objects)).getCenter(new THREE.Vector3());
-  }
-
-  /* Corners of all that is drawn of objects, in the world. */
-  corners(objects) {
-    const found = [];
-    this.world.updateMatrixWorld(true);
-    objects.forEach((object) => object.traverseVisible((mesh) => {
-      if (mesh.isSprite) found.push(new THREE.Vector3().setFromMatrixPosition(mesh.matrixWorld));
-      if (!mesh.isMesh) return;
-      if (!mesh.geometry.boundingBox) mesh.geometry.computeBoundingBox();
-      const { min, max } = mesh.geometry.boundingBox;
-      for (let i = 0; i < 8; i += 1)
-        found.push(new THREE.Vector3(i & 1 ? max.x : min.x, i & 2 ? max.y : min.y, i & 4 ? max.z : min.z).applyMatrix4(mesh.matrixWorld));
-    }));
-    return found.length ? found : [new THREE.Vector3()];
   }
 
   /* The pane has another size: all is seen again, unless somebody has turned the view. */
@@ -269,9 +281,8 @@ return class Stage {
     if (!width || !height) return;
     this.renderer.setPixelRatio(Math.min(2, window.devicePixelRatio));
     this.renderer.setSize(width, height, false);
-    this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
-    if (this.record && !this.turned) { this.beside(); this.fit(); }
+    this.sight.pane(width, height);
+    if (this.record && !this.sight.turned) { this.beside(); this.fit(); }
     this.dirty();
   }
 
@@ -280,40 +291,80 @@ return class Stage {
     if (this.renderer && !this.asked) this.asked = requestAnimationFrame((time) => { this.asked = 0; this.draw(null, time); });
   }
 
-  draw(ground = null) {
+  draw(ground = null, time = 0) {
+    if (this.arrowsOfLost && !this.reduced) {
+      this.arrowsOfLost.swing(time / 1000);
+      if (!ground) this.dirty();
+    }
     this.world.background = ground && new THREE.Color(ground);
-    this.renderer.render(this.world, this.camera);
+    this.renderer.render(this.world, this.sight.camera);
     this.drawn = (this.drawn ?? 0) + 1;
   }
 
   listen() {
     let down = null;
-    this.canvas.addEventListener("pointerdown", (event) => { down = event.isPrimary ? event : null; });
+    this.canvas.addEventListener("pointerdown", (event) => {
+      down = event.isPrimary ? event : null;
+      if (down && this.sheet && !this.sight.held && this.under(event)?.kind === "plane") this.pull(event);
+    });
+    this.canvas.addEventListener("pointercancel", () => { down = null; this.release(); });
     this.canvas.addEventListener("pointerup", (event) => {
-      if (down && Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) < CLICK) this.click(event);
+      if (this.pulled) this.release();
+      else if (down && !this.sight.held && Math.hypot(event.clientX - down.clientX, event.clientY - down.clientY) < CLICK) this.click(event);
       down = null;
     });
     this.canvas.addEventListener("pointermove", (event) => {
+      if (this.pulled && event.isPrimary) this.drawPlane(event);
       if (event.pointerType === "mouse" && !event.buttons) this.canvas.classList.toggle("clickable", Boolean(this.under(event)));
     });
-    this.canvas.addEventListener("keydown", (event) => this.key(event));
+    this.canvas.addEventListener("keydown", (event) => {
+      if (event.key !== "Home") return;
+      this.fit();
+      event.preventDefault();
+    });
     this.canvas.addEventListener("dblclick", () => this.fit());
   }
 
   click(event) {
     const found = this.under(event);
     if (found?.kind === "mode") this.onghost(found.name);
-    else if (found) this.onpick(found.kind, found.name);
+    else if (found?.kind === "leg") this.onpick(found.kind, found.name);
+  }
+
+  /* The plane is held by its handle: where along its normal, and what it is asked at. */
+  pull(event) {
+    const { sheet } = this, grip = sheet.grip(), along = sheet.along(this.sight.ray(event.clientX, event.clientY).ray, grip);
+    if (along === null) return;
+    this.pulled = { grip, along, at: sheet.record.at ?? 0, from: sheet.height(), wanted: sheet.height(), asked: 0 };
+    this.sight.hold(true);
+    this.canvas.setPointerCapture(event.pointerId);
+  }
+
+  drawPlane(event) {
+    const { pulled, sheet } = this, along = sheet?.along(this.sight.ray(event.clientX, event.clientY).ray, pulled.grip);
+    if (along === null || along === undefined) return;
+    pulled.wanted = pulled.from + along - pulled.along;
+    sheet.slide(pulled.wanted);
+    this.dirty();
+    if (performance.now() - pulled.asked < ASK_EACH) return;
+    pulled.asked = performance.now();
+    this.onplane(pulled.at + pulled.wanted - pulled.from);
+  }
+
+  release() {
+    const { pulled } = this;
+    if (!pulled) return;
+    this.pulled = null;
+    this.sight.hold(false);
+    this.onplane(pulled.at + pulled.wanted - pulled.from);
   }
 
   /* What can be picked below the pointer, or close to it: a finger is not as sharp as a mouse. */
   under(event) {
-    const box = this.canvas.getBoundingClientRect(), near = NEAR[event.pointerType] ?? NEAR.mouse, ray = new THREE.Raycaster();
+    const near = NEAR[event.pointerType] ?? NEAR.mouse;
     const tries = [[0, 0], ...[0.5, 1].flatMap((r) => [...Array(8).keys()].map((k) => [r * near * Math.cos(k * Math.PI / 4), r * near * Math.sin(k * Math.PI / 4)]))];
     for (const [dx, dy] of tries) {
-      const x = 2 * (event.clientX + dx - box.left) / box.width - 1, y = 1 - 2 * (event.clientY + dy - box.top) / box.height;
-      ray.setFromCamera(new THREE.Vector2(x, y), this.camera);
-      const hits = [];
+      const ray = this.sight.ray(event.clientX + dx, event.clientY + dy), hits = [];
       Object.values(this.sides).forEach((side) => side.traverseVisible((each) => { if (each.userData.pick) each.raycast(ray, hits); }));
       hits.sort((a, b) => Boolean(b.object.isSprite) - Boolean(a.object.isSprite) || a.distance - b.distance);
       if (hits.length) return hits[0].object.userData.pick;
@@ -321,26 +372,5 @@ return class Stage {
     return null;
   }
 
-  /* Arrow keys turn the view by 10°, plus and minus go nearer and away, Home shows all. */
-  key(event) {
-    if (!this.controls) return;
-    const step = Math.PI / 18, away = this.camera.position.clone().sub(this.controls.target);
-    const across = this.camera.up.clone().cross(away).normalize(), angle = away.angleTo(this.camera.up);
-    const tilt = (by) => { if (angle + by > 0.05 && angle + by < Math.PI - 0.05) away.applyAxisAngle(across, by); };
-    const keys = {
-      ArrowLeft: () => away.applyAxisAngle(this.camera.up, -step), ArrowRight: () => away.applyAxisAngle(this.camera.up, step),
-      ArrowUp: () => tilt(-step), ArrowDown: () => tilt(step), "+": () => away.multiplyScalar(0.85), "-": () => away.multiplyScalar(1 / 0.85),
-    };
-    if (event.key === "Home") this.fit();
-    else if (!keys[event.key] || event.ctrlKey || event.metaKey || event.altKey) return;
-    else {
-      keys[event.key]();
-      this.turned = true;
-      this.camera.position.copy(this.controls.target).add(away);
-      this.controls.update();
-    }
-    event.preventDefault();
-    this.dirty();
-  }
 };
 })();
