@@ -38,7 +38,7 @@ def error(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
     no bound."""
     unit = unit_of(setting)
     if not all(isinstance(each, Direction) for each in setting.observed):
-        return nothing(unit, "not told: what is watched is no direction")
+        return {**nothing(unit, "not told: what is watched is no direction"), "step": None}
     metres, radians = attained(at, setting.samples.question, np.full(len(setting.observed), CONE))
     return told(finite(1e3 * metres), finite(math.degrees(radians)), unit)
 

@@ -56,6 +56,7 @@ class Panel {
 
   show(state) {
     this.stage.state(state);
+    $("error").textContent = state.error?.words ?? "";
     $("now").textContent = state.distance === null ? "not known" : state.distance.toPrecision(3);
   }
 
@@ -150,8 +151,8 @@ class Panel {
   /* What each colour means, of all that is shown. */
   legend() {
     $("key").replaceChildren();
-    for (const { colour, words, now } of this.stage.legend()) {
-      const item = element("span", $("key"), undefined, { className: now ? "now" : "" });
+    for (const { key, colour, words, now } of this.stage.legend()) {
+      const item = element("span", $("key"), undefined, { className: (now ? "now " : "") + (key.startsWith("step") ? "wide" : "") });
       element("i", item).style.background = colour;
       item.append(words);
     }

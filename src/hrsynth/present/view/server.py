@@ -58,7 +58,7 @@ class Session:
                 self.here, reached = mover.home, wanted
             else:
                 self.here, reached = mover.sent(self.here, wanted)
-            reply: dict[str, Any] = {"state": mover.state(self.here).scene(),
+            reply: dict[str, Any] = {"state": mover.shown(self.here).scene(),
                                      "stopped": bool(np.max(np.abs(reached - wanted), initial=0.0) > SLIDER_ARRIVED)}
             if asked.get("modes") and self.found.mode_outlines:
                 others, _ = mode_outlines(self.found.setting, self.here.real)

@@ -6,7 +6,7 @@ A link's place is its displacement from the zero configuration: position and uni
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -25,6 +25,7 @@ from ...kinematics.tasks import Target, solve, system
 from ...mechanism import Mechanism
 from ...results import Value
 from ...tolerances import FOLLOWED, SOLVED
+from ..studio.scale import error
 from .shapes import PAGE_DIGITS
 
 REAL, HIDDEN = "real", "hidden"
@@ -38,16 +39,18 @@ STEPS = 10
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ViewState(Value):
-    """The places (links, 7) of each machine's links, and the smallest singular value of Mᵀ (characteristic lengths;
-    None where Mᵀ does not exist)."""
+    """The places (links, 7) of each machine's links, the smallest singular value of Mᵀ (characteristic lengths; None
+    where Mᵀ does not exist), and how wrong the platform can be there (:func:`.error`), where that was asked."""
 
     places: Mapping[str, Array]
     distance: float | None
+    error: Mapping[str, Any] | None = None
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
         return {**{key: page_values(places) for key, places in self.places.items()},
-                "distance": None if self.distance is None else float(f"{self.distance:.5g}")}
+                "distance": None if self.distance is None else float(f"{self.distance:.5g}"),
+                **({} if self.error is None else {"error": dict(self.error)})}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -109,6 +112,10 @@ class Mover(Value):
             q = at.hidden
             places[HIDDEN] = displacements(self.hidden.mechanism, lambda link: self.hidden.pose(q, link))
         return ViewState(places, self.examiner.classify(at.real).distances.type2)
+
+    def shown(self, at: Posed) -> ViewState:
+        """The same with the error there."""
+        return replace(self.state(at), error=error(self.setting, at.real))
 
     def sent(self, here: Posed, values: Array) -> tuple[Posed, Array]:
         """Where the robot comes to from ``here`` when the platform is sent to coordinates (n,), and those there."""
@@ -178,7 +185,7 @@ class Mover(Value):
         posed = [*reversed(down), home, *up]
         values = [value for value, _ in ways[start - len(down) : start + len(up) + 1]]
         return Slider(self.coordinates.names[index], "rad" if turns else "m", tuple(values),
-                      tuple(map(self.state, posed)), len(down))
+                      tuple(map(self.shown, posed)), len(down))
 
     def followed(self, start: Posed, way: Iterable[ClosedConfiguration]) -> list[Posed]:
         """The way with the hidden robot beside the real one, as far as it can follow."""

@@ -13,12 +13,14 @@ from ...analysis.derive import Derivation, derive
 from ...analysis.observed import LegsLike, ObservedRobot, RobotLike
 from ...analysis.question import question
 from ...geometry.vectors import Array, oriented
+from ...kinematics.coordinates import Coordinates
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
 from ...mechanism.observation import Direction, Observation
 from ...progress import tell
 from ...results import Result, Value
 from ..outputs import OUTPUTS, function
+from ..studio.scale import scale, unit_of
 from .meshes import meshes
 from .mode_outlines import ModeOutline, mode_outlines
 from .shapes import PAGE_DIGITS, RADIUS, Drawer, Shape
@@ -113,7 +115,7 @@ class View(Result, shown_as="view"):
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
         return {
-            **stage(self.setting, self.machines, self.arrows), "largest": self.largest,
+            **stage(self.setting, self.machines, self.arrows), "scale": scale(unit_of(self.setting)),
             "home": self.home.scene(), "sliders": [slider.scene() for slider in self.sliders],
             "ghosts": [outline.scene() for outline in self.mode_outlines], "notes": list(self.notes),
         }
@@ -140,7 +142,7 @@ def view(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, 
     tell("modes")
     found, notes = mode_outlines(setting)
     shapes, missing = meshes(setting)
-    home = mover.state(mover.home)
+    home = mover.shown(mover.home)
     states = (home, *(state for slider in sliders for state in slider.states))
     machines = [machine_of(REAL, setting, setting.mechanism, str(setting.anatomy.architecture()), states, shapes)]
     if derivation is not None and other is not None:
@@ -154,15 +156,26 @@ def view(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, 
 
 def stage(setting: ObservedRobot, machines: Sequence[Machine], arrows: Iterable[Arrow]) -> dict[str, Any]:
     """What any page is given of what stands on its stage."""
-    mechanism, motion, normal = setting.mechanism, setting.motion, plane_normal(setting.motion)
+    mechanism, normal = setting.mechanism, plane_normal(setting.motion)
     places = {name: i for i, name in enumerate(mechanism.links)}
     return {"name": setting.robot.name, "length": mechanism.length, "radius": _radius(mechanism),
-            "freedoms": {"translations": np.round(motion.translations.T, PAGE_DIGITS).tolist(),
-                         "rotations": np.round(motion.rotations.T, PAGE_DIGITS).tolist()},
+            "freedoms": {key: np.round(rows, PAGE_DIGITS).tolist() for key, rows in freedoms(setting).items()},
             "normal": None if normal is None else np.round(normal, PAGE_DIGITS).tolist(),
             "machines": [machine.scene() for machine in machines],
             "arrows": [{"leg": a.leg, "link": places[a.link], "ends": np.round(a.ends, PAGE_DIGITS).tolist()}
                        for a in arrows]}
+
+
+def freedoms(setting: ObservedRobot) -> dict[str, Array]:
+    """The directions (k, 3) along which the platform is moved, and those about which it is turned: as many together as
+    it has freedoms, those of its coordinates where it moves along or turns about more."""
+    motion = setting.motion
+    places = np.array(Coordinates.of(setting.everything.start, setting.everything.question, motion).places, dtype=int)
+    found = {}
+    for key, span, at in (("translations", motion.translations, places[places < 3]),
+                          ("rotations", motion.rotations, places[places >= 3] - 3)):
+        found[key] = span.T[: len(at)] if len(at) in (0, span.shape[1]) else np.eye(3)[at]
+    return found
 
 
 def machine_of(key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, states: Sequence[ViewState],

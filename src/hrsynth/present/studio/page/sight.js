@@ -38,8 +38,10 @@ return class Sight {
     camera.up.copy(this.pole);
     this.controls?.dispose();
     this.controls = new THREE.OrbitControls(camera, this.canvas);
-    this.controls.addEventListener("change", this.onchange);
-    this.controls.addEventListener("start", () => { this.turned = true; });
+    let touched = false;
+    this.controls.addEventListener("start", () => { touched = true; });
+    this.controls.addEventListener("end", () => { touched = false; });
+    this.controls.addEventListener("change", () => { this.turned ||= touched; this.onchange(); });
     this.controls.target.copy(target);
     camera.position.copy(target).addScaledVector(this.from, away);
     Object.assign(camera, { near: 0.01 * away, far: 100 * away });
