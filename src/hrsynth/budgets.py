@@ -202,6 +202,14 @@ TUBE_RADII = 4
 """Radii of a tube that are tried, each after the one before was too narrow."""
 TUBE_WIDER = 1.2
 """How much wider than what a linear estimate asks for a tube is tried."""
+BACK_CELLS = 256
+"""Cells of all motors together over which the way back, from the platform to the motors, is looked at."""
+BACK_TRIALS = 1000
+"""Sets of cells that are tried together, at most, to prove that no two motors in a box have one pose."""
+BACK_SIZES = 12
+"""Boxes that are tried for the way back, each 0.7 of the one before."""
+BACK_SIDES = 6
+"""How often a side of such a box is moved out."""
 FARTHEST_MOTOR = 1e6
 """Coordinate (m, rad) up to which a motor outside of all loops is taken where it has no limits."""
 

@@ -143,6 +143,15 @@ def test_a_four_bar_part_of_a_turn() -> None:
     assert np.isnan(p[:4]).all()
 
 
+def test_code_tells_where_motors_are_the_only_ones() -> None:
+    found = exported(four_bar(), 0.4)
+    assert found.proof.back is not None
+    made = module_of(found.code)
+    (low,), (high,) = found.proof.back
+    assert made.unique([[low], [0.0], [high], [high + 1e-9], [np.nan]]).tolist() == [True, True, True, False, False]
+    assert found.to_dict()["back"] == [[low], [high]]
+
+
 @pytest.mark.slow
 def test_a_four_bar_stays_on_its_branch_all_round(tmp_path: Path) -> None:
     robot = four_bar()

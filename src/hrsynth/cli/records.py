@@ -501,6 +501,9 @@ class Branch(OfRobot):
     box: str
     tried: int
     parts: list[BranchPartRecord]
+    back: Annotated[Array | None, "low and high of a box of all motors, no two of which give the platform one pose "
+                                  "(proved); null without a proof"]
+    regular: Annotated[bool, "whether the proved box has no Type 1 singularity (proved)"]
 
 
 class MissRecord(TypedDict):
@@ -653,6 +656,7 @@ class Exported(OfRobot, WrittenTo):
     held: list[str]
     legs: list[str]
     cells: int
+    back: Annotated[Array | None, "low and high of motors, no two of which give the platform one pose (proved)"]
     parts: list[ExportedPart]
 
 

@@ -53,6 +53,7 @@ class ExportedCode(Result, shown_as="export"):
         """The record of the command line, without the command's own fields."""
         return {"lang": self.lang, "motors": list(self.proof.motors), "passive": list(self.proof.passive),
                 "held": list(self.proof.held), "legs": list(self.legs), "cells": self.cells,
+                "back": None if self.proof.back is None else [each.tolist() for each in self.proof.back],
                 "parts": [{"motors": list(part.motors), "share": part.share,
                            "proved": [each.tolist() for each in part.proved]} for part in self.proof.parts]}
 

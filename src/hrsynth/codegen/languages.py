@@ -43,6 +43,7 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
         "m": len(branch.motors), "p": len(branch.passive), "c": len(source.cut), "d": d, "steps": NEWTON_STEPS_AT_RUN,
         "inverse": INVERSE_STEPS_AT_RUN, "parts": source.parts, "functions": functions,
         "lower": [float(x) for x in branch.lower], "upper": [float(x) for x in branch.upper],
+        "back": [[float(x) for x in end] for end in branch.back or ()],
         "motor_names": source.names(branch.motors), "passive_names": [*source.names(branch.passive), *source.cut],
         "direction_names": [observation.leg for observation in source.observed],
         "length": repr(float(mechanism.length)), "near": GENERATED_NEAR, "last_step": GENERATED_LAST_STEP,

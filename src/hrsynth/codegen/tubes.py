@@ -52,6 +52,8 @@ class TubedBranch(Value):
     lower: Array
     upper: Array
     parts: tuple[TubePart, ...]
+    back: tuple[Array, Array] | None
+    """The box of motors (m,) in which no two are proved to have one pose."""
 
     @classmethod
     def of(cls, proof: BranchProof) -> TubedBranch:
@@ -73,7 +75,7 @@ class TubedBranch(Value):
             low, high = proof.robot.limited.get(system.coordinates[i].joint, (-np.inf, np.inf))
             if not np.isfinite(lower[place]):  # in no loop
                 lower[place], upper[place] = max(low, -FARTHEST_MOTOR), min(high, FARTHEST_MOTOR)
-        return cls(system.metric, motors, lower, upper, tuple(parts))
+        return cls(system.metric, motors, lower, upper, tuple(parts), proof.back)
 
     @property
     def passive(self) -> tuple[int, ...]:

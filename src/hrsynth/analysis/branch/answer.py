@@ -129,6 +129,11 @@ class BranchProof(Result, shown_as="branch"):
     passive: tuple[str, ...]
     held: tuple[str, ...]
     parts: tuple[BranchPart, ...]
+    back: tuple[Array, Array] | None
+    """A box of all motors (m, rad), low and high (n,) each, about the zero configuration, in which no two are proved to
+    give the platform one pose; None where there is no proof."""
+    regular: bool
+    """Whether no motors in the proved box are proved to be at a Type 1 singularity."""
     box: str
     """Where the box comes from: the file's limits, the caller, a default."""
     tried: int
@@ -139,6 +144,15 @@ class BranchProof(Result, shown_as="branch"):
         """The robot: what is compared besides the record."""
         return self.robot
 
+    @property
+    def proved(self) -> tuple[Array, Array]:
+        """The boxes of all parts together, low and high in the order of ``motors``; infinite where no loop has to do
+        with a motor."""
+        found = np.full((2, len(self.motors)), np.inf) * [[-1], [1]]
+        for part in self.parts:
+            found[:, [self.motors.index(name) for name in part.motors]] = part.proved
+        return found[0], found[1]
+
     def headline(self) -> str:
         """The robot, and how much of the box is proved."""
         return f"{self.robot.name}, {len(self.motors)} motors, {len(self.passive)} passive coordinates: " + "; ".join(
@@ -148,4 +162,5 @@ class BranchProof(Result, shown_as="branch"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
         return {"motors": list(self.motors), "passive": list(self.passive), "held": list(self.held), "box": self.box,
-                "tried": self.tried, "parts": [each.to_dict() for each in self.parts]}
+                "tried": self.tried, "parts": [each.to_dict() for each in self.parts],
+                "back": None if self.back is None else [each.tolist() for each in self.back], "regular": self.regular}

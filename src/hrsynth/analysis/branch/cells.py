@@ -44,6 +44,11 @@ class BranchTube:
         """The middle of the tube (p,) at q (n,)."""
         return np.asarray(self.x + self.slopes @ (q - self.centre))
 
+    def lies_in(self, other: BranchTube) -> bool:
+        """Whether all of it lies inside another tube, whose cell holds its own."""
+        off = np.abs(self.x - other.at(self.centre)) + np.abs(self.slopes - other.slopes) @ self.half + self.radius
+        return bool(np.all(off < other.radius * (1 - AFFINE_ROUNDING)))
+
 
 @dataclass(eq=False)
 class TubeTrial:
@@ -126,7 +131,7 @@ def _prove_layer(trial: TubeTrial, layer: Sequence[LoopBlock]) -> None:
 def _prove_block(trial: TubeTrial, block: LoopBlock) -> None:
     """As above for one block."""
     own = [trial.part.place[i] for i in block.unknowns]
-    equations = block.equations if block.loop is None else _turning(trial, block)
+    equations = block.equations if block.loop is None else turning(trial, block)
     at = derivatives(trial, equations, own, trial.radius)
     A = at.by_own
     try:
@@ -262,7 +267,7 @@ def _matrix(rows: Sequence[AffineForms]) -> AffineForms:
     return AffineForms(np.stack([row.v for row in rows], axis=-2), np.stack([row.r for row in rows], axis=-2))
 
 
-def _turning(trial: TubeTrial, block: LoopBlock) -> tuple[LoopEquation, ...]:
+def turning(trial: TubeTrial, block: LoopBlock) -> tuple[LoopEquation, ...]:
     """The equations that turn a rod to where its loop closes: none across its direction at the cell's middle."""
     loop = block.loop
     assert loop is not None

@@ -15,6 +15,7 @@ from ...tolerances import CLOSED
 from ..observed import RobotLike, as_robot
 from ..question import question
 from .answer import BranchCell, BranchPart, BranchProof
+from .back import way_back
 from .cells import prove_all
 from .ends import toggles, turns
 from .growth import CellGrid, Growth, largest_box
@@ -51,17 +52,20 @@ def branch(robot: RobotLike, box: BoxLike | None = None, *, effort: int = BRANCH
         raise BadRequest(f"{mechanism.name}: motors", 0, "one or more: --motors names them")
     system, parts, held = _shaped(mechanism, motors, box)
     intervals, source = _box(system, box)
-    found, tried = [], 0
+    found, grown = [], []
     for part in parts:
         growth = Growth(part, _grid(part, intervals), np.zeros(len(part.driven)), np.zeros(len(part.unknowns)),
                         _depth(part), effort, COARSEST_BRANCH_CELL * _reach(part, intervals)).run()
-        tried += growth.tried
+        grown.append(growth)
         found.append(_answer(part, growth))
         tell("parts")
-    names = system.names
+    back, regular = way_back(system, grown)
+    units, names = system.units[list(system.driven)], system.names
     passive = tuple(names[i] for part in parts for i in part.unknowns)
     return BranchProof(mechanism, system, tuple(names[i] for i in system.driven), passive,
-                       tuple(names[i] for i in held), tuple(found), source, tried)
+                       tuple(names[i] for i in held), tuple(found),
+                       None if back is None else (back[0] * units, back[1] * units), regular, source,
+                       sum(growth.tried for growth in grown))
 
 
 Shaped = tuple[LoopSystem, tuple[LoopPart, ...], tuple[int, ...]]

@@ -20,7 +20,27 @@ def branch(found: BranchProof) -> str:
         rows += _part(part)
     if not found.parts:
         rows.append(("branch", "no loops: the motors are all there is"))
-    return listing(rows)
+    return listing(rows + _back(found))
+
+
+def _back(found: BranchProof) -> Rows:
+    """The way back, from the platform to the motors."""
+    if not all(part.cells for part in found.parts):
+        return []
+    rows: Rows = [("", "")]
+    if found.back is None:
+        rows.append(("way back", "undecided: the motors of a pose are found, others in the box may have the same"))
+    else:
+        (low, high), (least, most) = found.back, found.proved
+        whole = bool((low == least).all() and (high == most).all())
+        rows.append(("way back", "no two motors in the proved box have one pose of the platform, proved" if whole else
+                     "no two motors in a part of the proved box have one pose of the platform, proved"))
+        if not whole:
+            rows.append(("that part", [f"{name} {a:.6g} to {b:.6g}" for name, a, b in
+                                       zip(found.motors, low, high, strict=True)]))
+    if found.regular:
+        rows.append(("Type 1", "no such singularity in the proved box, proved"))
+    return rows
 
 
 def _part(part: BranchPart) -> Rows:

@@ -157,6 +157,10 @@ def exported(found: ExportedCode) -> str:
         rows.append(("answers for", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
                                      zip(part.motors, *part.proved, strict=True)]
                      + [f"and in all of {part.in_cells}, {100 * part.share:.4g} % of the box"]))
+    if proof.back is not None:
+        rows.append(("way back", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
+                                  zip(proof.motors, *proof.back, strict=True)]
+                     + ["no two motors in this box have one pose of the platform, proved"]))
     return listing([*rows, ("size", f"{len(found.code.encode()) / 1024:.0f} kB")])
 
 
