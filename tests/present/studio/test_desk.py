@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+import time
 from base64 import b64decode
 from pathlib import Path
 from typing import Any
@@ -12,7 +13,8 @@ import numpy as np
 import pytest
 
 import hrsynth
-from hrsynth import check, legs, load, modes, observe, shipped
+import strategies
+from hrsynth import check, legs, load, modes, observe, save, shipped
 from hrsynth.cli import main
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.mechanism.observation import Direction
@@ -233,3 +235,69 @@ def run(command: str, capsys: pytest.CaptureFixture[str]) -> dict[str, Any]:
         main([*shlex.split(command)[1:], "--json"])
     assert ended.value.code in (0, None)
     return json.loads(capsys.readouterr().out)
+
+
+def test_a_tilted_planar_robot_turns_about_the_normal_of_its_plane(tmp_path: Path):
+    rng = np.random.default_rng(1)
+    robot = strategies.transformed(load("3rrr_m1"), strategies.random_rotation(rng), rng.normal(size=3))
+    save(robot, tmp_path / "tilted.urdf")
+    desk, normal = Desk(folder=tmp_path), observe(robot).motion.normal
+    asked = {"robot": {"source": "folder:tilted.urdf"}}
+    scene = desk.answer({"ask": "open", **asked})
+    assert [each["name"] for each in scene["sliders"]][-1] == "phi"
+    assert abs(normal @ scene["normal"]) == pytest.approx(1.0)
+    values = [*scene["values"][:2], 0.3]
+    moved = desk.answer({"ask": "move", **asked, "values": values})
+    place = np.array(moved["state"]["real"][scene["machines"][0]["links"].index(robot.platform)])
+    assert 2 * np.arctan2(place[3:6] @ normal, place[6]) == pytest.approx(0.3, abs=1e-6)
+    assert not moved["stopped"]
+
+
+@pytest.mark.slow
+def test_the_sliders_of_a_platform_of_five_freedoms_are_alive():
+    robot = {"source": "example:cassie", "options": {"base": "pelvis", "platform": "left-foot"}}
+    scene = DESK.answer({"ask": "open", "robot": robot})
+    assert len(scene["sliders"]) == 5
+    for number, slider in enumerate(scene["sliders"]):
+        reach = max(slider["max"] - slider["home"], slider["home"] - slider["min"])
+        assert reach > (0.5 if slider["unit"] == "rad" else 0.05)
+        way = 1 if slider["max"] - slider["home"] == reach else -1
+        values = [*scene["values"]]
+        values[number] += way * 0.3 * reach
+        moved = DESK.answer({"ask": "move", "robot": robot, "values": values})
+        assert not moved["stopped"]
+        assert moved["residual"] < CLOSED
+
+
+def test_what_was_guessed_of_a_foreign_file_is_told_and_can_be_changed(tmp_path: Path):
+    save(load("rrrrr_m1"), tmp_path / "foreign.xml")
+    desk, source = Desk(uploads=tmp_path), {"source": "file:foreign.xml"}
+    found = desk.answer({"ask": "open", "robot": source})
+    assert found["dialect"] == "MJCF"
+    guesses = {each["name"]: each for each in found["guesses"]}
+    assert all(each["found"] == each["candidates"][0] for each in guesses.values())
+    other = guesses["unit"]["candidates"].index("mm")
+    small = desk.answer({"ask": "open", "robot": {**source, "options": {
+        "unit": guesses["unit"]["candidates"][other]}}})
+    assert small["length"] == pytest.approx(found["length"] / 1000, rel=1e-6)
+    wrong = next(each for each in guesses["platform"]["candidates"][1:])
+    changed = desk.answer({"ask": "open", "robot": {**source, "options": {"platform": wrong}}})
+    assert changed["failed"] or changed["command"].endswith(f"--platform {wrong}")
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", list(shipped()))
+def test_a_drag_is_answered_twenty_times_a_second(robot: str):
+    scene = ask("open", robot)
+    ask("move", robot, hidden=True)
+    for number, slider in enumerate(scene["sliders"]):
+        values, here, seconds = [*scene["values"]], None, []
+        for _ in range(10):
+            values[number] += (slider["max"] - slider["home"]) / 30
+            began = time.process_time()
+            moved = DESK.answer({"ask": "move", "robot": {"source": f"shipped:{robot}"}, "values": values,
+                                 "here": here, "hidden": True})
+            seconds.append(time.process_time() - began)
+            here = moved["here"]
+            assert moved["residual"] < CLOSED
+        assert np.median(seconds) < 0.05

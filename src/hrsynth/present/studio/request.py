@@ -159,6 +159,11 @@ class Request(Value):
         other = self.derivation.hidden if hidden and not self.blind else None
         return _mover(self.setting, other)
 
+    @property
+    def ends(self) -> tuple[tuple[Posed, Posed], ...]:
+        """Where each of the platform's coordinates alone comes to, whatever is watched."""
+        return _mover(observe(self.mechanism, None, self.camera), None).ends
+
     # Where it is
 
     def here(self, mover: Mover) -> Posed:
@@ -238,7 +243,7 @@ def _options(found: Any) -> tuple[tuple[str, Any], ...]:
         elif name in TEXTS:
             set_[name] = _text(name, value)
         elif name == "tolerance":
-            set_[name] = _number(name, value, 0.0, math.inf)
+            set_[name] = _number(name, value, 0.0, 1.0)
         elif value is not True:
             raise BadRequest(name, value, "true or false")
         else:

@@ -107,11 +107,15 @@ class Mover(Value):
 
     def state(self, at: Posed) -> ViewState:
         """What the page shows of a configuration."""
+        return ViewState(self.places(at), self.examiner.classify(at.real).distances.type2)
+
+    def places(self, at: Posed) -> dict[str, Array]:
+        """The places (links, 7) of each machine's links."""
         places = {REAL: displacements(self.setting.mechanism, at.real.pose)}
         if self.hidden is not None and at.hidden is not None:
             q = at.hidden
             places[HIDDEN] = displacements(self.hidden.mechanism, lambda link: self.hidden.pose(q, link))
-        return ViewState(places, self.examiner.classify(at.real).distances.type2)
+        return places
 
     def shown(self, at: Posed) -> ViewState:
         """The same with the error there."""

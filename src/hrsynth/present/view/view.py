@@ -144,9 +144,11 @@ def view(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, 
     shapes, missing = meshes(setting)
     home = mover.shown(mover.home)
     states = (home, *(state for slider in sliders for state in slider.states))
-    machines = [machine_of(REAL, setting, setting.mechanism, str(setting.anatomy.architecture()), states, shapes)]
+    machines = [machine_of(REAL, setting, setting.mechanism, str(setting.anatomy.architecture()),
+                           [state.places[REAL] for state in states], shapes)]
     if derivation is not None and other is not None:
-        machines.append(machine_of(HIDDEN, setting, other, str(derivation.hidden_architecture), states, shapes))
+        machines.append(machine_of(HIDDEN, setting, other, str(derivation.hidden_architecture),
+                                   [state.places[HIDDEN] for state in states], shapes))
     elif hidden:
         notes = (*notes, "every leg is blind: there is no hidden robot")
     arrows = tuple(arrows_of(setting, setting.observed))
@@ -178,13 +180,13 @@ def freedoms(setting: ObservedRobot) -> dict[str, Array]:
     return found
 
 
-def machine_of(key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, states: Sequence[ViewState],
+def machine_of(key: str, setting: ObservedRobot, mechanism: Mechanism, words: str, places: Sequence[Array],
                meshes: Sequence[Shape]) -> Machine:
-    """A mechanism to be drawn, ``key`` real or hidden, its rails as long as it slides in the ``states``."""
+    """A mechanism to be drawn, ``key`` real or hidden, its rails as long as it slides in the ``places`` (links, 7)."""
     real = setting.mechanism
     kept = tuple(shape for shape in meshes if shape.link in mechanism.links)
     drawer = Drawer(mechanism, real, setting.anatomy.platform, _radius(real), kept)
-    shapes = drawer.shapes(_travels(drawer, key, states))
+    shapes = drawer.shapes(_travels(drawer, places))
     frames = tuple((link, place(mechanism.links[link].pose)) for link in (mechanism.base, mechanism.platform))
     legs = {link: leg.label for leg in setting.anatomy.legs for link in leg.links}
     return Machine(key, words, tuple(mechanism.links), setting.anatomy.platform, shapes, frames,
@@ -195,14 +197,14 @@ def _radius(mechanism: Mechanism) -> float:
     return RADIUS * mechanism.length
 
 
-def _travels(drawer: Drawer, key: str, states: Sequence[ViewState]) -> dict[str, tuple[float, float]]:
+def _travels(drawer: Drawer, states: Sequence[Array]) -> dict[str, tuple[float, float]]:
     """How far each joint on the base slides, with a margin for its carriage (m)."""
     from scipy.spatial.transform import Rotation
 
     links = {name: i for i, name in enumerate(drawer.mechanism.links)}
     found = {}
     for joint in drawer.sliders():
-        places = np.array([state.places[key][links[joint.successor]] for state in states])
+        places = np.array([state[links[joint.successor]] for state in states])
         moved = Rotation.from_quat(places[:, 3:]).apply(np.array(joint.point)) + places[:, :3] - joint.point
         ways = moved @ joint.axis
         margin = MARGIN * drawer.radius

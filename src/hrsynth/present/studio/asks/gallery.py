@@ -56,6 +56,11 @@ def flat(robot: Mechanism) -> Array | None:
 
 
 def files(request: Request) -> list[str]:
-    """The robot files of the folder, by name."""
+    """The robot files of the folder, by name; links that lead out of it are none."""
     assert request.folder is not None
-    return sorted(path.name for path in request.folder.iterdir() if path.suffix.lower() in ENDINGS and path.is_file())
+    try:
+        named = [path.name for path in request.folder.iterdir() if path.suffix.lower() in ENDINGS and path.is_file()]
+    except OSError:
+        return []
+    top = request.folder.resolve()
+    return sorted(name for name in named if (top / name).resolve().is_relative_to(top))

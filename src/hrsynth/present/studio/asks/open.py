@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 from ....analysis.observed import ObservedRobot
@@ -14,7 +14,7 @@ from ....mechanism.legs import Leg
 from ....mechanism.sensors import default_observation, reason
 from ...view.meshes import meshes
 from ...view.shapes import PAGE_DIGITS
-from ...view.states import REAL, Mover
+from ...view.states import REAL, Mover, Posed
 from ...view.view import arrows_of, machine_of, stage
 from ..commands import lines
 from ..request import Request
@@ -46,23 +46,23 @@ def scene(request: Request) -> dict[str, Any]:
     setting, mover = request.setting, request.mover()
     known = {each.leg: each for each in (*setting.segments, *setting.observed)}
     shapes, missing = meshes(setting)
-    ends = [mover.state(each) for pair in mover.ends for each in pair]
+    places = [mover.places(each)[REAL] for each in (mover.home, *(end for pair in request.ends for end in pair))]
     words = str(setting.anatomy.architecture())
-    machine = machine_of(REAL, setting, setting.mechanism, words, [mover.state(mover.home), *ends], shapes)
+    machine = machine_of(REAL, setting, setting.mechanism, words, places, shapes)
     here = request.here(mover)
     return {
         **stage(setting, [machine], arrows_of(setting, known.values())),
         "words": f"{words}, {setting.dof} freedoms",
         "legs": [_leg(request, setting, leg) for leg in setting.anatomy.legs],
-        "sliders": sliders(mover), "scale": scale(unit_of(setting)), **told(request, mover, here),
+        "sliders": sliders(mover, request.ends), "scale": scale(unit_of(setting)), **told(request, mover, here),
         "notes": [*map(str, setting.robot.notes), *setting.beside(), *missing], **lines(request, "derive")}
 
 
-def sliders(mover: Mover) -> list[dict[str, Any]]:
+def sliders(mover: Mover, ends: Sequence[tuple[Posed, Posed]]) -> list[dict[str, Any]]:
     """A slider for each freedom, as far as it goes alone from home."""
     made = []
     coordinates = mover.coordinates
-    for number, (name, place, pair) in enumerate(zip(coordinates.names, coordinates.places, mover.ends, strict=True)):
+    for number, (name, place, pair) in enumerate(zip(coordinates.names, coordinates.places, ends, strict=True)):
         low, high = (float(mover.read(each)[number]) for each in pair)
         home = float(coordinates.values[number])
         low, high = sorted((min(low, home), max(high, home)))

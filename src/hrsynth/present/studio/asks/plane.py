@@ -59,7 +59,7 @@ def answer(request: Request) -> dict[str, Any]:
     at = request.number("at", -FARTHEST_POSE, FARTHEST_POSE)
     if at is not None and third:
         values[third[0]] = at
-    ranges = [(float(mover.read(mover.ends[i][0])[i]), float(mover.read(mover.ends[i][1])[i])) for i in pair]
+    ranges = [np.array([mover.read(end)[i] for end in request.ends[i]]) for i in pair]
     mapper, unit = Mapper(setting, np.full(len(setting.observed), CONE)), unit_of(setting)
     known = mapper.batch is not None and _at_batch(mover, here.real)
     cells = size if known else min(size, LARGEST_STUDIO_SWEEP)
@@ -73,7 +73,7 @@ def answer(request: Request) -> dict[str, Any]:
     given: dict[str, Any] = {"cone": CONE_TEXT, option: text}
     same = lines(request, "accuracy", "--cone", CONE_TEXT, f"--{option}", text, **given)
     place = _placer(mover, pair, values)
-    (a, b), (c, d) = ranges
+    (a, b), (c, d) = (map(float, ends) for ends in ranges)
     return {"corners": [place(x, y).tolist() for x, y in ((a, c), (b, c), (b, d), (a, d))], "n": cells,
             "values": nested(found.values.T), "unit": unit if kind == ACCURACY else "",
             "steps": list(STEPS[unit] if kind == ACCURACY else DISTANCES),
@@ -100,7 +100,7 @@ def _at_batch(mover: Mover, at: ClosedConfiguration) -> bool:
 
 
 def together(mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], values: Array,
-             ranges: list[tuple[float, float]], size: int) -> Grid | None:
+             ranges: list[Array], size: int) -> Grid | None:
     """The plane as a grid of poses, None where the parts of a pose do not say it."""
     names, motion = mover.coordinates.names, mover.setting.motion
     turns = [i for i, name in enumerate(names) if name not in SCALARS]
@@ -111,7 +111,7 @@ def together(mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], val
         zip(names, values, strict=True)) if i not in pair and i not in turns}
     if turns:
         parts["rpy"] = motion.pose(here.pose(motion.link)).rpy
-    axes = tuple((names[i], np.linspace(*ends, size)) for i, ends in zip(pair, ranges, strict=True))
+    axes = tuple((names[i], np.linspace(ends[0], ends[1], size)) for i, ends in zip(pair, ranges, strict=True))
     return Grid(axes, Pose(**parts))
 
 
@@ -137,11 +137,11 @@ def by_batch(mapper: Mapper, grid: Grid, kind: str, unit: str) -> PoseField:
 
 
 def one_by_one(mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], values: Array,
-               ranges: list[tuple[float, float]], size: int, kind: str, unit: str) -> PoseField:
+               ranges: list[Array], size: int, kind: str, unit: str) -> PoseField:
     """The plane pose by pose, each led to from a neighbour, in the working mode of ``here``."""
     setting, motion, question = mover.setting, mover.setting.motion, mover.setting.samples.question
     aims = []
-    axes = [np.linspace(*ends, size) for ends in ranges]
+    axes = [np.linspace(ends[0], ends[1], size) for ends in ranges]
     for point in np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 2):
         wanted = values.copy()
         wanted[list(pair)] = point

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from functools import lru_cache
 from itertools import combinations
 from typing import Any
@@ -16,7 +17,7 @@ from ....analysis.posture import ConfigurationAnalysis
 from ....analysis.verdict import CONTROLLABLE, Verdict, verdict_of
 from ....budgets import REMEMBERED
 from ....constraints.condition import always
-from ....errors import HrsynthError
+from ....errors import HrsynthError, RankUndecided
 from ....kinematics.configuration import ClosedConfiguration
 from ....mechanism.observation import Direction, labels_of
 from ....tolerances import NAMED
@@ -67,10 +68,9 @@ def hidden(request: Request) -> dict[str, Any] | None:
     if found.hidden is None:
         return None
     mover = request.mover(hidden=True)
-    posed = [each for each in (mover.home, *(mover.joined(end.real) for pair in mover.ends for end in pair))
-             if each.hidden is not None]
-    return machine_of(HIDDEN, request.setting, found.hidden, str(found.hidden_architecture),
-                      [mover.state(each) for each in posed], ()).scene()
+    posed = [mover.home, *(mover.joined(end.real) for pair in request.ends for end in pair)]
+    places = [mover.places(each)[HIDDEN] for each in posed if each.hidden is not None]
+    return machine_of(HIDDEN, request.setting, found.hidden, str(found.hidden_architecture), places, ()).scene()
 
 
 def hidden_words(request: Request) -> str:
@@ -107,9 +107,9 @@ def smallest(setting: ObservedRobot) -> tuple[Verdict, ...]:
         found = []
         for chosen in combinations(labels, size):
             samples = restricted(setting.everything, [each for each in setting.observed if each.leg in chosen])
-            verdict = verdict_of(setting, chosen, samples)
-            if verdict.rank == best:
-                found.append(verdict)
+            if max(member.relation.rank for member in samples.members) == best:
+                with suppress(RankUndecided):
+                    found.append(verdict_of(setting, chosen, samples))
         if found:
             return tuple(found)
     return ()
