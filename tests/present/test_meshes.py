@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from hrsynth import load, view
+from hrsynth import load, save, view
 from hrsynth.description import shipped
 from hrsynth.present.view.view import View
 
@@ -82,3 +82,23 @@ def test_a_mesh_that_is_none_is_a_note(tmp_path: Path):
     found = with_visuals(tmp_path, prox_1=mesh("part.stl"))
     assert sum("cannot be read" in note for note in found.notes) == 1
     assert rods(found, "prox_1") == 1
+
+
+@pytest.mark.parametrize("ending", ["xml", pytest.param("sdf", marks=pytest.mark.slow),
+                                    pytest.param("usda", marks=pytest.mark.slow)])
+def test_a_robot_of_another_dialect_is_drawn_with_the_same_shapes(tmp_path: Path, ending: str):
+    import trimesh
+
+    trimesh.creation.box(extents=SIZE).export(tmp_path / "part.stl")
+    rod = '<origin xyz="0.1 0.02 0" rpy="0.3 1 0"/><geometry><cylinder radius="0.01" length="0.2"/></geometry>'
+    own = with_visuals(tmp_path, platform=BOX, prox_1=mesh("part.stl", "2 2 2"), dist_2=f"<visual>{rod}</visual>")
+    target = tmp_path / f"other.{ending}"
+    save(load(tmp_path / "robot.urdf"), target)
+    if ending == "usda":
+        pytest.importorskip("pxr")
+    foreign = view(load(target))
+    assert foreign.notes == own.notes
+    for link in ("platform", "prox_1", "dist_2"):
+        (points,), (there,) = meshed(own, link), meshed(foreign, link)
+        assert np.sort(there, axis=0) == pytest.approx(np.sort(points, axis=0), abs=1e-6)
+        assert rods(foreign, link) == 0

@@ -224,6 +224,22 @@ def test_a_plane_has_cells_of_the_scales_colours_and_is_drawn_along_its_normal(o
     assert ask(tab, "stage.sheet.group.position.toArray()") == pytest.approx([0, 0, above], abs=0.002)
 
 
+def test_a_plane_across_no_direction_has_no_handle_and_a_falling_scale_is_told(open_page):
+    tab = open_page("3rrr_m1")
+    record = {**PLANE, "normal": None, "falling": True, "steps": [0.01, 0.03, 0.1, 0.3],
+              "values": [[0.005, 0.02], [0.05, 0.2], [0.5, None]]}
+    ask(tab, f"stage.plane({json.dumps(record)})")
+    rgba = np.array(ask(tab, "[...stage.sheet.cells().image.data]")).reshape(6, 4)
+    shown = ["#" + bytes(row[:3].tolist()).hex() for row in rgba[:5]]
+    assert shown == ask(tab, "Colours.steps")[::-1], "near a singularity is worst"
+    legend = {each["key"]: each["words"] for each in ask(tab, "stage.legend()")}
+    assert "distance on the plane more than 0.3" in legend["step0"]
+    assert "distance on the plane up to 0.01" in legend["step4"]
+    assert ask(tab, "stage.sheet.handle.length") == 0
+    corners = np.array(ask(tab, "[...stage.sheet.group.children[0].geometry.attributes.position.array]")).reshape(4, 3)
+    assert np.ptp(corners, axis=0)[:2] == pytest.approx([0.2 * 2, 0.2 * 1.5]), "cells lie about their values"
+
+
 def test_an_ellipsoid_is_magnified_by_what_the_legend_says(open_page):
     tab = open_page("delta")
     axes = np.array([[2e-3, 1e-3, 0], [-0.5e-3, 1e-3, 0], [0, 0, 0]])

@@ -74,9 +74,12 @@ def answer(request: Request) -> dict[str, Any]:
     same = lines(request, "accuracy", "--cone", CONE_TEXT, f"--{option}", text, **given)
     place = _placer(mover, pair, values)
     (a, b), (c, d) = (map(float, ends) for ends in ranges)
+    across = mover.coordinates.places[third[0]] if third else None
     return {"corners": [place(x, y).tolist() for x, y in ((a, c), (b, c), (b, d), (a, d))], "n": cells,
             "values": nested(found.values.T), "unit": unit if kind == ACCURACY else "",
-            "steps": list(STEPS[unit] if kind == ACCURACY else DISTANCES),
+            "steps": list(STEPS[unit] if kind == ACCURACY else DISTANCES), "falling": kind == DISTANCE,
+            "at": float(values[third[0]]) if third else None,
+            "normal": np.eye(3)[across].tolist() if across is not None and across < 3 else None,
             "locus": [[place(*point).tolist() for point in segment] for segment in found.locus],
             "words": _words(kind, unit, found), "of": [mover.coordinates.names[i] for i in pair], **same}
 

@@ -1,7 +1,7 @@
 "use strict";
 /* What is drawn over a robot: lost freedoms as moving arrows, the error's ellipsoid, a plane of values with its locus. */
 const Overlays = (() => {
-const { BEHIND, arrow, bent, label, material, vector } = Solids;
+const { BEHIND, arrow, bent, cylinder, label, material, stretch, vector } = Solids;
 const SWING = 0.2, TURN = 0.42, PERIOD = 2.6;  /* characteristic lengths, rad, s */
 const NEAR_AXIS = 1.5;  /* characteristic lengths from the point within which an axis is drawn at itself */
 
@@ -106,30 +106,35 @@ function ellipsoid({ center, axes }, length) {
 }
 
 /* A plane of values: `corners` c0 to c3 round it, `values` by rows from the side c0 c1 to the side c3 c2; cells of the
-   scale's colours, of none where a value is null; the locus as lines; a handle to draw it along its normal. */
+   scale's colours about where the values are, none where a value is null; the locus as lines; a handle to draw it along
+   `normal`, the way of the third coordinate, none where that is null. */
 class Plane {
   constructor(record, radius) {
     this.record = record;
     this.group = new THREE.Group();
     const c = record.corners.map(vector), across = c[1].clone().sub(c[0]), up = c[3].clone().sub(c[0]);
-    this.corner = c[0];
-    this.normal = record.normal ? vector(record.normal).normalize() : across.clone().cross(up).normalize();
+    const [rows, columns] = [record.values.length, record.values[0].length];
+    this.corner = c[0].clone();
+    this.normal = record.normal ? vector(record.normal) : across.clone().cross(up).normalize();
+    [[-1, -1], [1, -1], [1, 1], [-1, 1]].forEach(([i, j], k) => c[k].addScaledVector(across, i / (2 * Math.max(1, columns - 1)))
+      .addScaledVector(up, j / (2 * Math.max(1, rows - 1))));
     const geometry = new THREE.BufferGeometry();
     geometry.setAttribute("position", new THREE.Float32BufferAttribute(c.flatMap((p) => p.toArray()), 3));
     geometry.setAttribute("uv", new THREE.Float32BufferAttribute([0, 0, 1, 0, 1, 1, 0, 1], 2));
     geometry.setIndex([0, 1, 2, 0, 2, 3]);
     const look = new THREE.MeshBasicMaterial({ map: this.cells(), ...BEHIND, opacity: 0.8, side: THREE.DoubleSide });
-    const frame = material(Colours.of("frame")), edge = [...c, c[0]];
-    this.group.add(new THREE.Mesh(geometry, look), line(edge, 0.3 * radius, frame));
+    const frame = material(Colours.of("frame"));
+    this.group.add(new THREE.Mesh(geometry, look), line([...c, c[0]], 0.3 * radius, frame));
     const end = this.normal.clone().multiplyScalar(8 * radius), middle = c[1].clone().lerp(c[2], 0.5);
-    this.handle = [...arrow(middle, middle.clone().add(end), 0.8 * radius, frame),
-                   ...arrow(middle, middle.clone().sub(end), 0.8 * radius, frame)];
-    this.group.add(...this.handle);
-    for (const way of record.locus ?? []) if (way.length > 1) {
-      const points = way.map(vector), rim = new THREE.MeshBasicMaterial({ color: Colours.of("background"), side: THREE.BackSide });
-      this.group.add(line(points, 0.85 * radius, rim), line(points, 0.45 * radius, material(Colours.of("step4"))));
-    }
+    this.handle = record.normal === null ? [] : [1, -1].flatMap((way) => arrow(middle, middle.clone().addScaledVector(end, way), 0.8 * radius, frame));
     this.handle.forEach((each) => { each.userData.pick = { kind: "plane", name: "plane" }; });
+    this.group.add(...this.handle);
+    const rim = new THREE.MeshBasicMaterial({ color: Colours.of("background"), side: THREE.BackSide });
+    const locus = material(Colours.of("step4"));
+    for (const way of record.locus ?? []) {
+      const points = way.map(vector);
+      this.group.add(line(points, 0.85 * radius, rim), line(points, 0.45 * radius, locus));
+    }
   }
 
   cells() {
@@ -168,10 +173,8 @@ class Plane {
 
 /* A line through points, as thick as a rod. */
 function line(points, radius, look) {
-  const ways = new THREE.CurvePath();
-  points.slice(1).forEach((p, i) => { if (p.distanceTo(points[i]) > 1e-12) ways.add(new THREE.LineCurve3(points[i], p)); });
   const group = new THREE.Group();
-  ways.curves.forEach((each) => group.add(Solids.stretch(new THREE.Mesh(Solids.cylinder(radius), look), each.v1, each.v2)));
+  points.slice(1).forEach((p, i) => group.add(stretch(new THREE.Mesh(cylinder(radius), look), points[i], p)));
   return group;
 }
 

@@ -256,9 +256,10 @@ return class Stage {
     const { names, edges, unit } = this.record.scale ?? {};
     if (key === "ellipsoid") return `${Colours.words(key)} for 0.1°${this.factor > 1 ? `, drawn ${this.factor} times as large` : ""}`;
     if (!names || !key.startsWith("step")) return Colours.words(key);
-    const step = Number(key.slice(4)), sign = unit === "deg" ? "°" : ` ${unit}`;
-    const range = step === 0 ? `up to ${edges[0]}` : step === edges.length ? `more than ${edges[step - 1]}` : `${edges[step - 1]} to ${edges[step]}`;
-    return `${names[step]}: ${range}${sign} per 0.1°${step === edges.length ? ", or a freedom is lost" : ""}`;
+    const step = Number(key.slice(4)), sign = unit === "deg" ? "°" : ` ${unit}`, { falling, steps } = this.sheet?.record ?? {};
+    const range = (k, e) => k === 0 ? `up to ${e[0]}` : k === e.length ? `more than ${e[k - 1]}` : `${e[k - 1]} to ${e[k]}`;
+    return `${names[step]}: ${range(step, edges)}${sign} per 0.1°${step === edges.length ? ", or a freedom is lost" : ""}`
+      + (falling ? `; distance on the plane ${range(steps.length - step, steps)}` : "");
   }
 
   /* The picture as a PNG blob, null where there is no WebGL. */
