@@ -128,7 +128,7 @@ class Plane {
     const end = this.normal.clone().multiplyScalar(8 * radius), middle = c[1].clone().lerp(c[2], 0.5);
     this.handle = record.normal === null ? [] : [1, -1].flatMap((way) => arrow(middle, middle.clone().addScaledVector(end, way), 0.8 * radius, frame));
     this.handle.forEach((each) => { each.userData.pick = { kind: "plane", name: "plane" }; });
-    this.group.add(...this.handle);
+    this.handle.forEach((each) => this.group.add(each));
     const rim = new THREE.MeshBasicMaterial({ color: Colours.of("background"), side: THREE.BackSide });
     const locus = material(Colours.of("step4"));
     for (const way of record.locus ?? []) {
