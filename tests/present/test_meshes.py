@@ -68,6 +68,20 @@ def test_mesh_files_beside_the_robot_are_read(tmp_path: Path, address: str):
     assert not any("visual" in note for note in found.notes)
 
 
+@pytest.mark.parametrize("ending", [
+    ".xml", pytest.param(".sdf", marks=pytest.mark.slow), pytest.param(".usda", marks=pytest.mark.slow)])
+def test_other_dialects_show_the_same_meshes(ending: str, tmp_path: Path):
+    import trimesh
+
+    trimesh.creation.box(extents=SIZE).export(tmp_path / "part.stl")
+    first = with_visuals(tmp_path, prox_1=mesh("part.stl"), platform=mesh("part.stl", "2 1 3"))
+    save(load(tmp_path / "robot.urdf"), tmp_path / f"other{ending}")
+    second = view(load(tmp_path / f"other{ending}"))
+    for link in ("prox_1", "platform"):
+        (one,), (other,) = meshed(first, link), meshed(second, link)
+        assert np.sort(other, axis=0) == pytest.approx(np.sort(one, axis=0), abs=1e-9)
+
+
 @pytest.mark.parametrize("address", [
     "missing.stl", pytest.param("package://none/missing.dae", marks=pytest.mark.slow),
     pytest.param("http://robots.invalid/part.stl", marks=pytest.mark.slow)])

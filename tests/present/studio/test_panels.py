@@ -142,11 +142,11 @@ def test_sliders_move_the_robot_and_home_brings_it_back(tab: Tab, address: str):
 
 
 def test_a_mode_is_flown_to_and_back(tab: Tab, address: str):
-    page = opened(tab, address, "3rrr_m1")
+    page = opened(tab, address, "rrrrr_m1")
     before = page.evaluate("() => studio.values")
     panel = show(page, "modes")
     answered(page)
-    panel.locator(".modes button:enabled").first.click()
+    panel.locator(".modes button:enabled").last.click()
     page.wait_for_timeout(900)
     answered(page)
     assert page.evaluate("() => studio.values") != pytest.approx(before, abs=1e-3)

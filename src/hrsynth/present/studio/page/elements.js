@@ -52,7 +52,7 @@ function tick(words, checked, onchange) {
 function written(value, unit) {
   if (value === null || value === undefined) return "";
   const words = unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)} ${unit}`;
-  return words.replace(/^-(?=[0.]+(\D|$))/, "");
+  return words.replace(/^-(?=0\.0+[^0-9])/, "");
 }
 
 /* A slider with its label and what it stands at; `read` sets it without a call of `onmove`. */

@@ -57,9 +57,14 @@ class LegsPanel extends Panel {
     this.refresh();
   }
 
-  settled() { this.refresh(); }
+  /* Elsewhere other freedoms may be lost: asked when it is looked at. */
+  settled() {
+    this.stale = true;
+    this.entered();
+  }
 
   async refresh() {
+    this.stale = false;
     const found = await this.ask("watch", "Deriving the hidden robot");
     if (!found) return;
     this.found = found;
@@ -89,7 +94,7 @@ class LegsPanel extends Panel {
 
   async play(index) {
     this.stop();
-    const found = await this.ask("play", "Following the lost freedom", { lost: index });
+    const found = await this.ask("play", "Following the lost freedom", { lost: index, hidden: this.studio.sees });
     if (!found) return;
     this.played.textContent = found.words;
     this.player.load(found.frames, LegsPanel.SECONDS);
@@ -104,6 +109,7 @@ class LegsPanel extends Panel {
 
   entered() {
     if (!this.studio.isShown(this.key)) return;
+    if (this.stale) this.refresh();
     this.studio.stage.lost(this.found?.lost || []);
     this.studio.stage.ellipsoid(this.found?.ellipsoid || null);
     this.studio.relegend();

@@ -15,7 +15,10 @@ class ModesPanel extends Panel {
 
   opened() { this.forget(); }
 
-  rewatched() { this.forget(); this.entered(); }
+  rewatched() {
+    this.forget();
+    if (this.studio.isShown(this.key)) this.entered();
+  }
 
   /* Other poses from here are other modes: those that are listed belong to where they were asked. */
   settled() { if (this.origin && this.studio.here !== this.origin && !this.flown) this.words.textContent = "These belong to an earlier pose. Find them again."; }

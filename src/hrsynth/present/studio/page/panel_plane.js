@@ -27,7 +27,7 @@ class PlanePanel extends Panel {
 
   layout(pairs) {
     this.controls.replaceChildren(
-      choice("Shown", [["accuracy", "error of the platform (mm per 0.1°)"], ["distance", "distance to a singularity"]], this.kind, (kind) => { this.kind = kind; this.refresh(); }),
+      choice("Shown", [["accuracy", "error of the platform per 0.1°"], ["distance", "distance to a singularity (smallest singular value)"]], this.kind, (kind) => { this.kind = kind; this.refresh(); }),
       choice("Plane of", pairs, this.of, (of) => { this.of = of; this.layout(pairs); this.refresh(); }));
     const third = this.ways.find(({ name }) => !this.of?.includes(name));
     this.at = null;
@@ -41,10 +41,24 @@ class PlanePanel extends Panel {
     const fields = { kind: this.kind, of: this.of, at: this.at?.value ?? null, size: PlanePanel.SIZE };
     const found = await this.ask("plane", "Computing the plane", fields);
     if (!found) return;
-    this.record = found;
+    found.falling = fields.kind === "distance";
+    this.record = { ...found, at: fields.at };
+    this.thresholds(found);
     this.words.textContent = found.words;
     this.same.show(found);
     this.draw();
+  }
+
+  /* What the plane's colours stand for. */
+  thresholds({ steps, unit, falling }) {
+    const edges = falling ? [...steps].reverse() : steps, last = edges.length, sign = unit === "deg" ? "°" : unit && ` ${unit}`;
+    const range = (k) => falling ? (k === 0 ? `more than ${edges[0]}` : k === last ? `up to ${edges[last - 1]}: singular, or nearly` : `${edges[k]} to ${edges[k - 1]}`)
+      : (k === 0 ? `up to ${edges[0]}${sign}` : k === last ? `more than ${edges[last - 1]}${sign}, or a freedom is lost` : `${edges[k - 1]} to ${edges[k]}${sign}`);
+    this.scale.replaceChildren(...Colours.steps.map((colour, k) => {
+      const swatch = element("i", { "aria-hidden": "true" });
+      swatch.style.background = colour;
+      return element("li", {}, swatch, range(k));
+    }));
   }
 
   /* The stage tells where the plane was dragged to. */

@@ -90,10 +90,10 @@ class RobotPanel extends Panel {
     this.status.fail(`${record.name}: ${record.failed}`);
   }
 
-  /* What the file leaves open; of a shipped robot nobody needs to look at it. */
-  guessed({ guesses, dialect }, robot) {
+  /* What the file leaves open: shown at once where somebody has just brought the file. */
+  guessed({ guesses, dialect, failed }, robot) {
     this.guesses.hidden = !guesses?.length;
-    this.guesses.open = !robot.source.startsWith("shipped:");
+    this.guesses.open = Boolean(failed) || /^(file|folder):/.test(robot.source);
     this.guesses.replaceChildren(element("summary", { textContent: `What was read into the file (${dialect})` }),
       element("p", { textContent: "Choose otherwise where this is wrong: the robot is then opened anew." }),
       ...(guesses || []).map((guess) => this.guess(guess, robot)));

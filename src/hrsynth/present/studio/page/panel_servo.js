@@ -54,7 +54,7 @@ class ServoPanel extends Panel {
 
   async go() {
     this.clear();
-    const found = await this.ask("servo", "Running the loop", { here: this.ends.start?.here ?? null, goal: this.ends.goal.values });
+    const found = await this.ask("servo", "Running the loop", { here: this.ends.start?.here ?? null, goal: this.ends.goal.values, hidden: this.studio.sees });
     if (!found) return;
     this.found = found;
     this.words.textContent = found.words;
@@ -66,7 +66,7 @@ class ServoPanel extends Panel {
   }
 
   frame(frame, index) {
-    this.studio.draw(frame.state ?? frame);
+    this.studio.draw(frame);
     this.picture.show(frame, index);
     this.now.textContent = `${frame.t.toFixed(2)} s, error ${Number(frame.e).toPrecision(2)}`;
   }
@@ -95,7 +95,7 @@ class CameraPicture {
   clear() { this.root.hidden = true; }
 
   load({ frames, desired }) {
-    const all = [...frames.flatMap(({ image }) => image), ...(desired || [])].flat().filter((p) => p?.every(Number.isFinite));
+    const all = [...frames.flatMap(({ image }) => image), ...(desired || [])].filter(Boolean).flat();
     this.root.hidden = !all.length;
     if (!all.length) return;
     const [u, v] = [0, 1].map((i) => all.map((p) => p[i]));
@@ -119,6 +119,7 @@ class CameraPicture {
   }
 
   put(line, pair) {
+    line.classList.toggle("gone", !pair);
     if (!pair) return;
     ["x1", "y1", "x2", "y2"].forEach((name, i) => line.setAttribute(name, pair.flat()[i]));
   }

@@ -170,11 +170,12 @@ class Studio {
     else if (!there) this.stage.layout("real");
   }
 
-  arrange(layout) {
+  /* The hidden robot's places come with the next state; then all of it is brought into sight. */
+  async arrange(layout) {
     this.layout = layout;
     this.sees = layout !== "real";
-    this.stage.layout(layout);
-    if (this.sees) this.move({ values: this.values });
+    if (this.sees) await this.move({});
+    this.stage.layout(this.layout);
     this.stage.fit();
     this.relegend();
   }
