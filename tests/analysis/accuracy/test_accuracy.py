@@ -12,7 +12,7 @@ from hypothesis import HealthCheck, assume, given, settings
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy, errors_at, sees_all
 from hrsynth.analysis.accuracy.cones import half_angles
 from hrsynth.analysis.accuracy.error_map import Mapper
-from hrsynth.analysis.accuracy.pose_errors import _descended, _width, reading
+from hrsynth.analysis.accuracy.pose_errors import _descended, _width, attained, error_axes, reading
 from hrsynth.analysis.accuracy.sampled import sampled
 from hrsynth.analysis.accuracy.singular_search import singular_poses
 from hrsynth.analysis.observed import ObservedRobot
@@ -263,3 +263,21 @@ def test_the_least_error_is_the_least_of_many_directions() -> None:
         views = rng.normal(size=(d, 20_000))
         views /= np.linalg.norm(views, axis=0)
         assert _width(blocks, _descended(blocks)[:, None])[0] <= _width(blocks, views).min() * (1 + 1e-6)
+
+
+@pytest.mark.parametrize("name", ["quattro", "3rrr_m1", "3rps", "prrrp_parallel", "gough_stewart"])
+def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
+    setting = ObservedRobot.of(name)
+    cones = np.full(len(setting.observed), 1e-3)
+    for at in (setting.everything.start, *setting.configurations[:4]):
+        found, bounds = attained(at, setting.samples.question, cones), errors_at(setting, cones, at)
+        for bound, met in zip((bounds.position, bounds.orientation), found, strict=True):
+            assert np.isinf(met) == np.isinf(bound.largest)
+            if np.isfinite(met):
+                assert (1 - bound.gap) * bound.largest * (1 - 1e-6) <= met <= bound.largest * (1 + 1e-9) + 1e-15
+        axes = error_axes(at, setting.samples.question, cones)
+        assert (axes is None) == np.isinf(found[0])
+        if axes is not None:
+            assert np.linalg.norm(axes[0]) == pytest.approx(found[0], rel=1e-9)
+            products = axes @ axes.T
+            assert products == pytest.approx(np.diag(np.diag(products)), abs=1e-9 * products[0, 0])

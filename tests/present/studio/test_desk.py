@@ -165,6 +165,15 @@ def test_a_plane_has_the_errors_that_moving_there_shows(robot: str, of: str):
     assert np.shape(found["corners"]) == (4, 3)
 
 
+def test_in_another_mode_no_command_is_told_that_gives_something_else():
+    other = ask("modes", "rrrrr_m1")["modes"][1]["here"]
+    found = ask("modes", "rrrrr_m1", here=other)
+    assert len(found["modes"]) == 2
+    assert (found["command"], found["python"]) == ("", "")
+    plane = ask("plane", "rrrrr_m1", here=other, size=2)
+    assert plane["command"] == ""
+
+
 @pytest.mark.slow
 def test_a_servo_run_ends_where_the_camera_sees_the_goal():
     home = [each["home"] for each in ask("open", "rrrrr_m1")["sliders"]]
@@ -204,7 +213,8 @@ def test_what_is_exported_is_the_file_that_its_name_says(kind: str, tmp_path: Pa
 @pytest.mark.parametrize(("what", "robot", "fields"), [
     ("open", "rrrrr_m1", {}), ("watch", "prrrp_parallel", {"watch": ["1"]}),
     ("modes", "rrrrr_m1", {"watch": ["2", "1"]}),
-    ("plane", "3upu", {"of": "xy", "size": 4}), ("answer", "rrrrr_m1", {}),
+    ("plane", "3upu", {"of": "xy", "size": 4}),
+    ("plane", "3upu", {"of": "xz", "size": 3, "kind": "distance"}), ("answer", "rrrrr_m1", {}),
     pytest.param("servo", "rrrrr_m1", {"goal": [0.03, 0.24]}, marks=pytest.mark.slow),
 ])
 def test_the_command_and_the_line_of_python_give_what_the_panel_shows(what: str, robot: str, fields: dict[str, Any],
@@ -220,7 +230,7 @@ def test_the_command_and_the_line_of_python_give_what_the_panel_shows(what: str,
         elif what == "modes":
             assert len(record["modes"]) == len(found["modes"])
         elif what == "plane":
-            told = np.array(record["position_mm"]).T
+            told = np.array(record["position_mm"] if "position_mm" in record else record["grid"]["type2"]).T
             assert told == pytest.approx(np.array(found["values"]), rel=1e-6)
         elif what == "answer":
             assert found["watch"] in record["minimal"]

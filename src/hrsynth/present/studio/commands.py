@@ -5,9 +5,17 @@ from __future__ import annotations
 import shlex
 from typing import Any
 
+import numpy as np
+
 from ...analysis.observed import ObservedRobot
+from ...batch.reach import reach
+from ...errors import HrsynthError
 from ...kinematics.configuration import ClosedConfiguration
+from ...tolerances import AS_PRINTED
 from .request import Request
+
+NONE = {"command": "", "python": ""}
+"""Of an answer that no command gives."""
 
 
 def lines(request: Request, name: str, *options: str, watching: bool = True, **given: Any) -> dict[str, str]:
@@ -44,6 +52,22 @@ def at_pose(setting: ObservedRobot, at: ClosedConfiguration) -> str:
     """The platform's pose as an option says it, to nine digits."""
     given = setting.motion.pose(at.pose(setting.motion.link)).given
     return ",".join(f"{name}={'/'.join(map(digits, values))}" for name, values in given.items())
+
+
+def same_at(setting: ObservedRobot, *at: ClosedConfiguration) -> bool:
+    """Whether a command that is told the poses of these configurations is at them: not at those of another mode, or to
+    which no small steps lead from the zero configuration."""
+    drawn, motion = setting.everything, setting.motion
+    for each in at:
+        if np.array_equal(each.q, drawn.start.q):
+            continue
+        try:
+            there = reach(drawn.start, drawn.question, motion.pose(each.pose(motion.link)), motion)
+        except HrsynthError:
+            return False
+        if np.linalg.norm(drawn.question.target(there).rows(each.twin, each.q)[0]) > AS_PRINTED:
+            return False
+    return True
 
 
 def digits(value: float) -> str:

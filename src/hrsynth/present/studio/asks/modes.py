@@ -11,7 +11,7 @@ from ....mechanism.pose import ModeNumber
 from ...text.poses import all_of, assembly
 from ...view.mode_outlines import outline
 from ...view.states import Posed
-from ..commands import at_pose, lines
+from ..commands import NONE, at_pose, lines, same_at
 from ..request import Request
 
 
@@ -21,8 +21,9 @@ def answer(request: Request) -> dict[str, Any]:
     here = request.here(request.mover())
     found = modes(setting, at=here.real)
     pose = at_pose(setting, here.real)
+    same = lines(request, "modes", "--at", pose, at=pose) if same_at(setting, here.real) else NONE
     return {"modes": [_mode(request, found, number, mode) for number, mode in enumerate(found.modes, 1)],
-            "words": words(found), **lines(request, "modes", "--at", pose, at=pose)}
+            "words": words(found), **same}
 
 
 def words(found: AssemblyModes) -> str:

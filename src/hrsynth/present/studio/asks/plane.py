@@ -24,7 +24,7 @@ from ....mechanism.pose import SCALARS, Grid, Pose
 from ....results import Value
 from ....tolerances import ON_LOCUS, SAME_RELATION
 from ...view.states import Mover
-from ..commands import at_pose, digits, lines
+from ..commands import NONE, digits, lines, same_at
 from ..request import Request
 from ..scale import CONE, CONE_TEXT, SIGNS, STEPS, rounded, unit_of
 
@@ -68,10 +68,11 @@ def answer(request: Request) -> dict[str, Any]:
         found = by_batch(mapper, grid, kind, unit)
     else:
         found = one_by_one(mover, here.real, pair, values, ranges, cells, kind, unit)
-    text = at_pose(setting, here.real) if grid is None else grid_text(grid)
-    option = "at" if grid is None else "grid"
-    given: dict[str, Any] = {"cone": CONE_TEXT, option: text}
-    same = lines(request, "accuracy", "--cone", CONE_TEXT, f"--{option}", text, **given)
+    same = NONE
+    if grid is not None and (known or same_at(setting, here.real)):
+        text = grid_text(grid)
+        same = (lines(request, "accuracy", "--cone", CONE_TEXT, "--grid", text, cone=CONE_TEXT, grid=text)
+                if kind == ACCURACY else lines(request, "check", "--grid", text, grid=text))
     place = _placer(mover, pair, values)
     (a, b), (c, d) = (map(float, ends) for ends in ranges)
     across = mover.coordinates.places[third[0]] if third else None

@@ -46,7 +46,7 @@ def _there_and_back(way: list[Posed]) -> list[Posed]:
 def _words(name: str, question: Measurement, here: Posed, way: list[Posed]) -> str:
     """What is played, and how well the directions stay."""
     if not way:
-        return f"{name}: it begins here and cannot be followed, the watched directions stay to first order only"
+        return f"{name}: no motion along it was found, the watched directions stay to first order only"
     held = Held.at(here.real.twin, here.real.q, question.reference, question.observations)
     worst = max(float(np.linalg.norm(system(each.real.twin, each.real.q, held)[0])) for each in way)
     return f"{name}: the watched directions stay, loops and directions to {worst:.0e}"

@@ -12,7 +12,7 @@ from ....geometry.vectors import Array
 from ....simulation.camera import Camera, Cylinder, cylinders, placed
 from ....simulation.servo import ServoTask
 from ....tolerances import SLIDER_ARRIVED
-from ..commands import at_pose, lines
+from ..commands import NONE, at_pose, lines, same_at
 from ..request import Request
 from .move import state
 
@@ -43,10 +43,11 @@ def answer(request: Request) -> dict[str, Any]:
                "e": found.run.commands[i].size, "image": image(eye, reference, rods, posed.real.pose)}
               for i, posed in zip(chosen, way, strict=False)]
     poses = [at_pose(setting, each.real) for each in (start, end)]
+    same = lines(request, "servo", "--from", poses[0], "--to", poses[1], start=poses[0], goal=poses[1])
     return {"frames": frames, "desired": image(eye, reference, rods, end.real.pose),
             "size": [eye.width, eye.height], "kind": found.ended,
             "words": f"Ended in: {found.ended} ({found.ending.reason}), after {found.run.times[-1]:.3g} s",
-            **lines(request, "servo", "--from", poses[0], "--to", poses[1], start=poses[0], goal=poses[1])}
+            **(same if same_at(setting, start.real, end.real) else NONE)}
 
 
 def image(eye: Camera, reference: str, rods: tuple[Cylinder, ...], poses: Poses) -> list[list[list[float]] | None]:

@@ -36,7 +36,8 @@ MOST_SETS = 10
 def answer(request: Request) -> dict[str, Any]:
     """All that follows from which legs are watched, at ``here``."""
     setting = request.setting
-    sets = [{"legs": list(each.legs), "words": each.verdict} for each in smallest(all_legs(setting))[:MOST_SETS]]
+    sets = [{"legs": list(each.legs), "words": each.verdict} for each in smallest(all_legs(setting))[:MOST_SETS]
+            if each.rank]
     if request.blind:
         return {"verdict": {"controllable": False, "words": "no leg is watched", "certainty": ""}, "rank": 0,
                 "dof": setting.dof, "lost": [], "hidden": None, "hidden_words": "", "condition": "", "sets": sets,
@@ -56,7 +57,7 @@ def answer(request: Request) -> dict[str, Any]:
 
 
 def lost(freedom: Freedom, point: list[float]) -> dict[str, Any]:
-    """A lost freedom; its ``kind`` is translation or rotation."""
+    """A lost freedom; its ``kind`` is translation or rotation (a screw is one too)."""
     turns = bool(np.linalg.norm(freedom.twist[3:]) > NAMED)
     return {"words": freedom.name, "twist": freedom.to_dict()["twist"], "point": point,
             "kind": "rotation" if turns else "translation"}
