@@ -10,6 +10,7 @@ from dataclasses import dataclass
 from functools import cached_property, lru_cache
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import LoopsNotClosed
 from ..geometry.ranks import Rank, Spectrum, spectrum
@@ -89,8 +90,8 @@ class _AlikeObservations:
     kind: type[Observation]
     view: int
     members: list[int]
-    observations: list[Observation]
-    at: list[int]
+    observations: tuple[Observation, ...]
+    at: NDArray[np.intp]
 
 
 @lru_cache(maxsize=512)
@@ -103,6 +104,6 @@ def _grouped(reference: str, observations: tuple[Observation, ...], links: tuple
     groups = []
     for kind, view in dict.fromkeys((type(o), name) for o, name in zip(observations, seen, strict=True)):
         members = [i for i, o in enumerate(observations) if (type(o), seen[i]) == (kind, view)]
-        chosen = [observations[i] for i in members]
-        groups.append(_AlikeObservations(kind, place[view], members, chosen, [place[o.link] for o in chosen]))
+        chosen = tuple(observations[i] for i in members)
+        groups.append(_AlikeObservations(kind, place[view], members, chosen, np.array([place[o.link] for o in chosen])))
     return names, groups

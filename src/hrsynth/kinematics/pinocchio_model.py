@@ -252,7 +252,11 @@ class PinocchioModel:
         """Poses (k, 4, 4) and velocities (k, 6, nv) of several links at once."""
         X = self.poses(q, links)
         V = self.data.J * self._several[links][2]
-        V[:, :3] += cross(V[:, 3:], X[:, :3, 3, None] / self.length, axis=-2)
+        x, y, z = (X[:, :3, 3] / self.length).T[:, :, None]
+        u, v, w = V[:, 3], V[:, 4], V[:, 5]
+        V[:, 0] += v * z - w * y  # the origin's velocity: ω × p more than that of the point at the base's origin
+        V[:, 1] += w * x - u * z
+        V[:, 2] += u * y - v * x
         return X, V
 
     def poses(self, q: Array, links: tuple[str, ...]) -> Array:

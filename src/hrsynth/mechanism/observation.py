@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from typing import ClassVar
 
 import numpy as np
@@ -102,9 +103,8 @@ class Direction(Observation):
     @classmethod
     def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
                  V_links: Array) -> tuple[Array, Array]:
-        directions = np.array([o.direction for o in observations if isinstance(o, Direction)])
         seen = X_reference[:3, :3].T
-        u = np.matmul(X_links[:, :3, :3], directions[:, :, None])[:, :, 0]
+        u = np.matmul(X_links[:, :3, :3], _directions(tuple(observations)))[:, :, 0]
         crosses = np.zeros((3, 3, len(u)))
         crosses[1, 2], crosses[2, 0], crosses[0, 1] = u.T
         crosses -= crosses.transpose(1, 0, 2)
@@ -116,6 +116,12 @@ class Direction(Observation):
         if not found and isinstance(other, Direction) and np.max(np.abs(self.direction - other.direction)) > tolerance:
             found.append(f"direction of leg {self.leg}: {self.direction} / {other.direction}")
         return found
+
+
+@lru_cache(maxsize=512)
+def _directions(observations: tuple[Observation, ...]) -> Array:
+    """The directions (k, 3, 1) of observations, in their links."""
+    return frozen([o.direction[:, None] for o in observations if isinstance(o, Direction)])
 
 
 @dataclass(frozen=True, eq=False, repr=False)
