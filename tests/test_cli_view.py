@@ -63,4 +63,4 @@ def test_a_port_that_is_taken_is_refused(capfd: pytest.CaptureFixture[str]):
         taken.bind(("127.0.0.1", 0))
         taken.listen()
         port = str(taken.getsockname()[1])
-        assert_refused(ask(capfd, "rrrrr_m1", "--no-open", "--port", port), 2, "cannot serve the view")
+        assert_refused(ask(capfd, "rrrrr_m1", "--no-open", "--port", port), 2, "cannot serve the page")

@@ -35,6 +35,7 @@ if TYPE_CHECKING:
     from .description import examples, load, save, shipped
     from .linting.lint import lint
     from .present.show import draw, html, text
+    from .present.studio.server import studio
     from .present.view.view import view
     from .progress import following
     from .selection.select import select
@@ -43,7 +44,7 @@ if TYPE_CHECKING:
 __version__ = "0.2.0"
 __all__ = ["__version__", "accuracy", "advise", "atlas", "branch", "catalog", "certificate", "check", "derive", "draw",
            "examples", "export", "following", "forget", "html", "legs", "lint", "load", "map", "modes", "observe",
-           "path", "save", "select", "servo", "shipped", "singular", "text", "verify", "view"]
+           "path", "save", "select", "servo", "shipped", "singular", "studio", "text", "verify", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
@@ -71,6 +72,7 @@ _HOME = {
     "servo": ".simulation.servo",
     "shipped": ".description",
     "singular": ".analysis.singularity.singular",
+    "studio": ".present.studio.server",
     "text": ".present.show",
     "verify": ".certificates",
     "view": ".present.view.view",

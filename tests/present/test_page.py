@@ -15,6 +15,7 @@ import pytest
 
 from browser import Tab
 from hrsynth.present.view import page
+from present.studio_client import soon
 from present.views import FIVE, seen, serving
 
 READY = "document.body.dataset.ready == 'yes'"
@@ -112,25 +113,26 @@ def test_the_panel_says_what_is_shown_and_fits_a_narrow_window(tab: Tab, tmp_pat
 @pytest.fixture
 def address() -> Iterator[str]:
     """A server of the five-bar's view."""
-    with serving(seen("rrrrr_m1")) as told:
-        yield told
+    pytest.importorskip("uvicorn")
+    with serving(seen("rrrrr_m1")) as server:
+        yield server.address
 
 
 @pytest.mark.browser
 def test_with_a_server_sliders_move_the_robot_together(tab: Tab, address: str):
     tab.page.set_viewport_size(SIZE)
-    tab.open(address, READY)
-    home = drawn(tab)
-    push(tab, 0, "PageUp", 2)
-    tab.page.wait_for_timeout(300)
-    one = drawn(tab)
-    push(tab, 1, "PageDown", 2)
-    tab.page.wait_for_timeout(300)
-    both = drawn(tab)
-    assert min(changed(home, one), changed(one, both), changed(home, both)) > 0.003
+    tab.open(address)
+    known = tab.page.evaluate
+    assert soon(lambda: known("() => window.studio?.layout === 'overlay' && Boolean(studio.state.hidden)"), 60)
+    home = known("() => studio.values")
+    for number, key in enumerate(("PageUp", "PageDown")):
+        push(tab, number, key, 2)
+        assert soon(lambda number=number: known("() => !studio.moving && studio.values")[number] != home[number])
+    one, other = (b - a for a, b in zip(home, known("() => studio.values"), strict=True))
+    assert one > 0 > other
+    assert tab.page.get_by_role("tab").count() == 0
     tab.page.get_by_role("button", name="Home").click()
-    tab.page.wait_for_timeout(300)
-    assert changed(home, drawn(tab)) == 0
+    assert soon(lambda: known("() => !studio.moving && studio.values") == pytest.approx(home))
 
 
 def test_the_page_is_whole_and_asks_for_nothing():

@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
-from queue import Queue
-from threading import Thread
 
 import numpy as np
 
 from hrsynth import load, view
 from hrsynth.mechanism import Joint, JointType, Mechanism
-from hrsynth.present.view.server import Server, serve
+from hrsynth.present.studio.server import StudioServer, view_server
 from hrsynth.present.view.states import ViewState
 from hrsynth.present.view.view import Machine, View
 
@@ -27,15 +25,11 @@ def seen(name: str) -> View:
 
 
 @contextmanager
-def serving(found: View) -> Iterator[str]:
-    """The address of a server of a view."""
-    told: Queue[tuple[Server, str]] = Queue()
-    thread = Thread(target=serve, args=(found, 0, lambda *ready: told.put(ready)), daemon=True)
-    thread.start()
-    server, address = told.get(timeout=20)
-    yield address
-    server.shutdown()
-    thread.join()
+def serving(found: View) -> Iterator[StudioServer]:
+    """The server of a view."""
+    server = view_server(found, open_=False)
+    yield server
+    server.stop()
 
 
 def mechanism_of(found: View, machine: Machine) -> Mechanism:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import inspect
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -31,6 +30,7 @@ from .options import (
     warn,
 )
 from .progress import Progress
+from .studio import PORT, serve
 
 
 @dataclass(frozen=True)
@@ -63,7 +63,7 @@ class Question:
         files = {each: values.pop(each.option) for each in OUTPUTS[self.name].files if each.option is not None}
         for each, path in files.items():
             each.require(path, values)
-        source = values["robot"]
+        source = {each.name: values[each.name] for each in SOURCE}
         more = {each.record: None for each in files if each.record is not None}
         writers = []
         with Progress() as progress, following(progress.tell):
@@ -79,7 +79,7 @@ class Question:
                     warn(why)
                     files[each] = None
                     continue
-                require_other(path, source, mechanism.file)
+                require_other(path, source["robot"], mechanism.file)
                 writer, told = each.writer(found, path, values)
                 writers.append(writer)
                 more |= told
@@ -89,7 +89,7 @@ class Question:
         if json:
             typer.echo(record(self.name, mechanism.name, {**found.to_dict(), **more, **written}))
         elif self.shows is not None and not any(written.values()):
-            self.shows(found, **values)
+            self.shows(found, source=source, **values)
         else:
             typer.echo(painted(text(found)))
             for each, path in files.items():
@@ -122,21 +122,12 @@ def _deprecated(_: Any, seconds: float | None, **__: Any) -> None:
         warn("--seconds is deprecated, what it leaves out depends on the machine: try --examine")
 
 
-def _served(found: Any, port: int, open_: bool, **_: Any) -> None:
+def _served(found: Any, source: dict[str, Any], port: int, open_: bool, **_: Any) -> None:
     """Serve a view until Ctrl-C, and open its page in the browser."""
     from ..present.show import text
-    from ..present.view.server import serve
+    from ..present.studio.server import view_server
 
-    def ready(server: object, address: str) -> None:
-        typer.echo(f"{text(found)}\nThe view is served at {address} (Ctrl-C ends it).")
-        sys.stdout.flush()
-        if open_:
-            import threading
-            import webbrowser
-
-            threading.Thread(target=webbrowser.open, args=(address,), daemon=True).start()
-
-    serve(found, port, ready)
+    serve(view_server(found, port, open_, source), f"{text(found)}\nThe view")
 
 
 def _file(command: str, option: str = "output") -> Option:
@@ -266,7 +257,7 @@ QUESTIONS = (
     Question("view", "A 3D view in the browser: sliders that keep the loops closed, what is observed, assembly modes.",
              (*WATCHED, flag("hidden", "The hidden robot too, its virtual actuators highlighted."),
               _file("view", "static"),
-              Option("port", "Port of the server (default: any that is free).", None, int, 0, low=0, high=65535),
+              PORT,
               Option("open_", "Open the page in the browser.", None, bool, True, ("--open/--no-open",))),
              ("quattro --observe 1,4 --hidden", "quattro --observe 1,4 --static quattro.html"),
              shows=_served),

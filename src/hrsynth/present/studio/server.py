@@ -11,12 +11,13 @@ import threading
 import time
 import webbrowser
 from collections.abc import Iterable
+from dataclasses import replace
 from http import HTTPStatus
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ...budgets import FAREWELL_SECONDS, LARGEST_ASK, MOST_CONNECTIONS, SENDER_SECONDS
-from ...errors import BadRequest, FileTooLarge, MissingExtra
+from ...errors import BadRequest, FileTooLarge, HrsynthError, MissingExtra
 from .guard import HOST, Guard
 from .processes import DESK, ForkServer
 from .tabs import Opening, Tabs
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
     from starlette.requests import Request
     from starlette.responses import Response
     from uvicorn import Server
+
+    from ...mechanism import Mechanism
+    from ..view.view import View
 
 PAGE = Path(__file__).parent / "page"
 TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=utf-8",
@@ -60,6 +64,42 @@ def studio(robot: str | Path | None = None, observe: Iterable[str | int] | str |
     if open_:
         server.show()
     return server
+
+
+def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str, Any] | None = None) -> StudioServer:
+    """Serve the page without its panels, of a view; ``source``: the robot and its options as the command line has them.
+    Raises as :func:`studio`."""
+    from ...description.overrides import names
+
+    robot = found.setting.robot
+    if source is not None:
+        lists = {"motors": names(source["motors"]), "freeze": names(source["freeze"] or None)}
+        options = {name: value for name, value in {**source, **lists}.items() if name != "robot" and value}
+        given: dict[str, Any] | None = {"robot": source["robot"], "options": options}
+    else:
+        given = _as_read(robot)
+    first = {"watch": [seen.link for seen in found.setting.observed], "camera": found.setting.robot.camera,
+             "hidden": found.derivation is not None}
+    server = StudioServer(Opening(given=given, mechanism=robot if given is None else None, first=first, panels=False),
+                          port)
+    if open_:
+        server.show()
+    return server
+
+
+def _as_read(robot: Mechanism) -> dict[str, Any] | None:
+    """A robot by its file, or the name of a shipped one, where it is just what that says."""
+    from ...description import load, shipped
+
+    if robot.file is None:
+        return None
+    known = {path.resolve(): name for name, path in shipped().items()}
+    name = known.get(Path(robot.file).resolve(), robot.file)
+    try:
+        read = load(name)
+    except HrsynthError:
+        return None
+    return {"robot": name, "options": {}} if replace(robot, camera=read.camera) == read else None
 
 
 def application(tabs: Tabs) -> Any:
@@ -169,7 +209,8 @@ def made(opening: Opening, port: int, forks: ForkServer) -> tuple[Server, Guard,
             super().connection_lost(exc)
 
     folder = tempfile.TemporaryDirectory(prefix="hrsynth-", ignore_cleanup_errors=True)
-    guard = Guard(application(Tabs(forks, opening, Path(folder.name))), port)
+    tabs = Tabs(forks, opening.written(Path(folder.name)), Path(folder.name))
+    guard = Guard(application(tabs), port)
     config = uvicorn.Config(
         guard, http=PatientProtocol, ws=WebSocketsSansIOProtocol, lifespan="off", loop="asyncio", log_config=None,
         log_level="debug" if os.environ.get("HRSYNTH_DEBUG") else "critical", access_log=False, server_header=False,

@@ -9,7 +9,7 @@ import asyncio
 import json
 import secrets
 import shutil
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +20,8 @@ from .uploads import UploadFolder
 if TYPE_CHECKING:
     from starlette.websockets import WebSocket
 
+    from ...mechanism import Mechanism
+
 TRY_LATER = 1013
 """How a socket is closed where too many are open."""
 MOVE, CANCEL = "move", "cancel"
@@ -27,14 +29,25 @@ MOVE, CANCEL = "move", "cancel"
 
 @dataclass(frozen=True)
 class Opening:
-    """What a server was opened with: a folder of robots, a robot with its options as ``given`` (what ``Desk`` takes),
-    what the page does with it first (``watch``, ``camera``, ``hidden``), and whether there are ``panels`` or only the
-    view."""
+    """What a server was opened with: a folder of robots, a robot with its options as ``given`` (what ``Desk`` takes) or
+    as a ``mechanism``, what the page does with it first (``watch``, ``camera``, ``hidden``), and whether there are
+    ``panels`` or only the view."""
 
     folder: Path | None = None
     given: dict[str, Any] | None = None
+    mechanism: Mechanism | None = None
     first: dict[str, Any] = field(default_factory=dict)
     panels: bool = True
+
+    def written(self, folder: Path) -> Opening:
+        """The same with the mechanism as a file in a folder, for processes that read it."""
+        if self.mechanism is None:
+            return self
+        from ...description import save
+
+        file = folder / "robot.urdf"
+        save(self.mechanism, file, "native")
+        return replace(self, mechanism=None, given={"robot": str(file), "options": {"as_written": True}})
 
     def message(self, tab: str) -> str:
         """What a tab is told first."""

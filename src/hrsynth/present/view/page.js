@@ -12,7 +12,7 @@ function element(kind, parent, text, fields = {}) {
 const ASSEMBLY = { yes: "", no: " (cannot be assembled)", "beyond limits": " (only beyond limits)", "not found": " (assembly not found)" };
 const written = (value, unit) => unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)} m`;
 
-/* The sliders: stored configurations, one coordinate at a time, or any of them solved by the server. */
+/* The sliders: stored configurations, one coordinate at a time. */
 class Panel {
   constructor(stage) {
     this.stage = stage;
@@ -30,13 +30,10 @@ class Panel {
     const box = element("label", $("sliders"), undefined, { className: "slider" });
     element("span", box, record.name);
     const output = element("output", box, written(this.values[i], record.unit));
-    const last = record.values.length - 1, ends = [record.values[0], record.values[last]];
-    const input = element("input", box, undefined, scene.live
-      ? { type: "range", min: ends[0], max: ends[1], step: (ends[1] - ends[0]) / 400 || 1, value: this.values[i] }
-      : { type: "range", min: 0, max: last, step: 1, value: record.home });
+    const last = record.values.length - 1;
+    const input = element("input", box, undefined, { type: "range", min: 0, max: last, step: 1, value: record.home });
     input.disabled = last === 0;
-    input.oninput = () => scene.live ? this.send(i, Number(input.value)) : this.pick(i, Number(input.value));
-    if (scene.live) input.onchange = () => this.send(i, Number(input.value), true);
+    input.oninput = () => this.pick(i, Number(input.value));
     return { record, input, output };
   }
 
@@ -66,8 +63,8 @@ class Panel {
     this.reveal();
   }
 
-  reveal(fresh = true) {
-    const here = fresh && !this.stale;
+  reveal() {
+    const here = !this.stale;
     this.stage.ghosts(here ? this.ghosts.filter((_, i) => this.chosen[i]) : []);
     this.stage.layout(this.layout());
     this.stage.directions(this.shown.arrows?.checked ?? true);
@@ -92,31 +89,8 @@ class Panel {
   }
 
   home() {
-    scene.sliders.forEach((record, i) => { this.sliders[i].input.value = scene.live ? record.values[record.home] : record.home; this.read(i, record.values[record.home]); });
-    if (scene.live) this.send(null);
-    else this.settle(scene.home, true);
-  }
-
-  /* One question at a time; of what was asked meanwhile the last is asked next. Modes are asked for at rest. */
-  async send(i, value, modes = false) {
-    if (i !== null) this.read(i, value);
-    this.next = { values: this.values.slice(), home: i === null, modes: modes || i === null };
-    if (this.busy) return;
-    this.busy = true;
-    while (this.next) {
-      const asked = this.next;
-      this.next = null;
-      const found = await fetch("pose", { method: "POST", body: JSON.stringify(asked) }).then((reply) => reply.json(), () => null);
-      if (found) this.answered(found);
-      $("status").textContent = !found ? "The server has ended." : found.stopped ? "The robot goes no further that way." : "";
-    }
-    this.busy = false;
-  }
-
-  answered({ state, ghosts }) {
-    this.show(state);
-    if (ghosts) this.modes(ghosts);
-    else this.reveal(false);
+    scene.sliders.forEach((record, i) => { this.sliders[i].input.value = record.home; this.read(i, record.values[record.home]); });
+    this.settle(scene.home, true);
   }
 
   toggles() {

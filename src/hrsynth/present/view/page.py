@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from .view import View
 
@@ -25,15 +24,14 @@ def inline(found: View) -> str:
             'style="width: 100%; height: 560px; border: 0"></iframe>')
 
 
-def page(found: View, *, live: bool = False) -> str:
-    """The page; ``live`` where a server answers its sliders."""
+def page(found: View) -> str:
+    """The page."""
     from jinja2 import Environment, StrictUndefined
 
     def text(*files: Path) -> str:
         return "".join(file.read_text(encoding="utf-8") for file in files)
 
-    scene: dict[str, Any] = {**found.scene(), "live": live}
     template = Environment(autoescape=True, undefined=StrictUndefined).from_string(text(FOLDER / "page.html"))
-    return template.render(robot=found.setting.robot.name, scene=scene,
+    return template.render(robot=found.setting.robot.name, scene=found.scene(),
                            style=text(FOLDER / "page.css", STAGE / "stage.css"), three=text(STAGE / "three.min.js"),
                            script=text(*(STAGE / name for name in SCRIPTS), FOLDER / "page.js"))

@@ -98,7 +98,7 @@ class View(Result, shown_as="view"):
     def serve(self, port: int = 0, *, open_: bool = True) -> Any:
         """Serve the view on this machine, where all sliders move together, and open it in the browser: a server with
         ``address`` and ``stop()``. Port 0 is any that is free. Raises ``BadRequest``."""
-        return function("view.server:served")(self, port, open_)
+        return function("studio.server:view_server")(self, port, open_)
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""

@@ -56,7 +56,7 @@ class Studio {
   }
 
   /* Another robot; the one that is shown stays until the new one is read. */
-  async open(robot, { watch = null, camera = null } = {}) {
+  async open(robot, { watch = null, camera = null, hidden = false } = {}) {
     const given = { source: robot.source, options: robot.options || {} };
     const { status } = this.panels.robot || this.panels.move;
     const scene = await status.during(this.link.ask("open", { robot: given, watch, camera, here: null }), "Reading the robot", () => this.link.cancel("open"));
@@ -77,6 +77,17 @@ class Studio {
     this.relegend();
     this.say(`${scene.name} is open: ${scene.words}.`);
     this.answer();
+    if (hidden) this.reveal();
+  }
+
+  /* The hidden robot over the real one, where no panel asks for it. */
+  async reveal() {
+    const found = await this.panels.move.ask("watch", "Deriving the hidden robot");
+    if (!found?.hidden) return;
+    this.stage.hidden(found.hidden);
+    this.hasHidden(true);
+    this.layouts.querySelector("input[value=overlay]").checked = true;
+    this.arrange("overlay");
   }
 
   /* A robot that could not be opened: what was shown stays, and so does what the panel says of it. */
