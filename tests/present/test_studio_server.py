@@ -431,7 +431,7 @@ def test_the_first_message_says_what_was_opened(tmp_path: Path):
     made = StudioServer(Opening(tmp_path, {"robot": "3rrr_m1", "options": {}}, first, panels=False), desk=DESK)
     try:
         with opened(made) as page:
-            assert {**page.start, "tab": ""} == {"start": {"source": "given", "options": {}, **first}, "tab": "",
+            assert {**page.start, "tab": ""} == {"start": {"source": "given", "options": {}}, "tab": "", **first,
                                                  "folder": True, "panels": False}
             found = page.ask("open")["answer"]
             assert (found["folder"], found["given"]) == (str(tmp_path), {"robot": "3rrr_m1", "options": {}})

@@ -25,9 +25,8 @@ FIVE_BAR = "rrrrr_m1"
 
 def told(page: Page, kind: str, **fields: Any) -> dict[str, Any]:
     """An answer about the robot of the view, watched as the page was told."""
-    start = page.start["start"]
-    robot = {"source": start["source"], "options": start["options"]}
-    answer = page.ask(kind, **{"robot": robot, "watch": start["watch"], "camera": start["camera"], **fields})
+    start = page.start
+    answer = page.ask(kind, **{"robot": start["start"], "watch": start["watch"], "camera": start["camera"], **fields})
     assert "answer" in answer, answer
     return answer["answer"]
 
@@ -44,7 +43,7 @@ def test_several_coordinates_at_once_with_closed_loops(name: str):
     found = seen(name)
     mechanism = found.setting.mechanism
     with serving(found) as server, opened(server) as page:
-        assert (page.start["panels"], page.start["start"]["hidden"]) == (False, True)
+        assert (page.start["panels"], page.start["hidden"]) == (False, True)
         scene = told(page, "open")
         home = np.array([slider["home"] for slider in scene["sliders"]])
         assert len(home) == len(found.sliders)
@@ -95,7 +94,8 @@ BOMBS = {"laughs.urdf": LAUGHS, "laughs.xml": LAUGHS.replace("robot", "mujoco"),
          "many.urdf": '<robot name="x">' + '<link name="a"/>' * 400_000 + "</robot>",
          "laughs.yaml": "a: &a [x,x,x,x,x,x,x,x,x]\n" + "".join(
              f"{b}: &{b} [{','.join([f'*{a}'] * 9)}]\n" for a, b in zip("abcdefgh", "bcdefghi", strict=True)),
-         "xacro.xacro": '<robot xmlns:xacro="http://ros.org/wiki/xacro" name="x"><xacro:include filename="/etc/passwd"/>'
+         "xacro.xacro": '<robot xmlns:xacro="http://ros.org/wiki/xacro" name="x">'
+                        '<xacro:include filename="/etc/passwd"/>'
                         '<link name="${open(\'/etc/passwd\').read()}"/></robot>'}
 
 

@@ -51,8 +51,9 @@ class Opening:
 
     def message(self, tab: str) -> str:
         """What a tab is told first."""
-        start = None if self.given is None else {"source": "given", "options": {}, **self.first}
-        return json.dumps({"tab": tab, "start": start, "folder": self.folder is not None, "panels": self.panels})
+        start = None if self.given is None else {"source": "given", "options": {}}
+        return json.dumps({"tab": tab, "start": start, "folder": self.folder is not None, "panels": self.panels,
+                           **self.first})
 
 
 class BrowserTab:

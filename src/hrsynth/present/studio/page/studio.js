@@ -15,7 +15,7 @@ class Studio {
     document.addEventListener("keydown", (event) => { if (event.key === "Escape") this.stop(); });
   }
 
-  begin({ start, panels, watch, camera }) {
+  begin({ start, panels, watch, camera, hidden }) {
     const kinds = panels ? [RobotPanel, MovePanel, LegsPanel, ModesPanel, PlanePanel, ServoPanel, ExportPanel] : [MovePanel, ModesPanel];
     const made = kinds.map((Kind) => new Kind(this));
     this.panels = Object.fromEntries(made.map((panel) => [panel.key, panel]));
@@ -24,7 +24,7 @@ class Studio {
     else $("panels").append(...made.map(({ root }) => root));
     this.show(start ? "move" : "robot");
     this.panels.robot?.fill();
-    if (start) this.open(start, { watch, camera });
+    if (start) this.open(start, { watch, camera, hidden });
     else { this.kept(); this.ready(); }
   }
 
