@@ -127,7 +127,7 @@ def test_with_a_server_sliders_move_the_robot_together(tab: Tab, address: str):
     home = known("() => studio.values")
     for number, key in enumerate(("PageUp", "PageDown")):
         push(tab, number, key, 2)
-        assert soon(lambda number=number: known("() => studio.moving || studio.values[%d]" % number)
+        assert soon(lambda number=number: known(f"() => studio.moving || studio.values[{number}]")
                     not in (True, home[number]))
     one, other = (b - a for a, b in zip(home, known("() => studio.values"), strict=True))
     assert one > 0 > other
