@@ -428,7 +428,7 @@ def test_a_socket_of_another_page_is_refused_by_a_client_too(server: StudioServe
 
 def test_the_first_message_says_what_was_opened(tmp_path: Path):
     first = {"watch": ["1"], "camera": None}
-    made = StudioServer(Opening(tmp_path, {"robot": "3rrr_m1", "options": {}}, first, panels=False), desk=DESK)
+    made = StudioServer(Opening(tmp_path, {"robot": "3rrr_m1", "options": {}}, first=first, panels=False), desk=DESK)
     try:
         with opened(made) as page:
             assert {**page.start, "tab": ""} == {"start": {"source": "given", "options": {}}, "tab": "", **first,
