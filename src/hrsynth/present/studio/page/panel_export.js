@@ -5,7 +5,7 @@ class ExportPanel extends Panel {
   constructor(studio) {
     super(studio, "export", "Export");
     const offers = [["page", "Page", "the robot in 3D with its sliders, one file that needs no network"],
-      ["report", "Report", "the derivation with its proofs, to be read and printed"],
+      ["report", "Report", "the derivation, step by step, to be read and printed"],
       ["figure", "Figure", "robot and hidden robot side by side, for a paper"],
       ["robot", "Robot file", "what was read, in hrsynth's own words"]];
     this.body.append(element("ul", { className: "offers" },
