@@ -9,6 +9,8 @@ THREE ?= 0.187.0
 VENV := .venv
 BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip --quiet --quiet --no-input --disable-pip-version-check
+# what is compiled once is not compiled again in each process that a test starts
+unexport PYTHONDONTWRITEBYTECODE
 # one thread a test process: the matrices are small, and the processes share the cores
 PYTEST = OMP_NUM_THREADS=1 $(BIN)/pytest -q -n $(JOBS)
 LOCK = $(BIN)/uv pip compile --quiet --universal --python-version 3.11 --generate-hashes --no-emit-index-url \

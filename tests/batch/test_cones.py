@@ -32,14 +32,17 @@ def forms(kind: str, rng: np.random.Generator) -> tuple[Array, Array]:
 
 def climbed(B: Array, C: Array, rng: np.random.Generator) -> Array:
     """The best end (n,) of w ← Bw / √(wᵀBw) + Cw / √(wᵀCw), normalised, from 40 random starts."""
-    w = rng.normal(size=(40, len(B), 3))
+    w = rng.normal(size=(40, len(B), 3)).transpose(1, 0, 2)
+
+    def sizes() -> list[tuple[Array, Array]]:
+        """Fw and √(wᵀFw) of both forms F."""
+        pulls = [w @ form for form in (B, C)]
+        return [(pull, np.sqrt(np.maximum(np.einsum("nsi,nsi->ns", w, pull), 1e-300))) for pull in pulls]
+
     for _ in range(600):
-        pull = np.zeros_like(w)
-        for form in (B, C):
-            there = np.einsum("nij,snj->sni", form, w)
-            pull += there / np.sqrt(np.maximum(np.einsum("sni,sni->sn", w, there), 1e-300))[..., None]
-        w = pull / np.linalg.norm(pull, axis=2, keepdims=True)
-    return np.max(sum(np.sqrt(np.einsum("sni,nij,snj->sn", w, form, w)) for form in (B, C)), axis=0)
+        pull = sum(there / size[..., None] for there, size in sizes())
+        w = pull / np.sqrt(np.einsum("nsi,nsi->ns", pull, pull))[..., None]
+    return np.max(sum(size for _, size in sizes()), axis=1)
 
 
 def entries(B: Array) -> Array:

@@ -43,12 +43,17 @@ def directions(P: Array, legs: list[int]) -> Array:
     return np.array(found)
 
 
+def across(a: Array, b: Array) -> Array:
+    """a × b row by row; ``numpy.cross`` takes five times as long for a few."""
+    return a[:, [1, 2, 0]] * b[:, [2, 0, 1]] - a[:, [2, 0, 1]] * b[:, [1, 2, 0]]
+
+
 def rested(P: Array, legs: list[int], way: Array, parts: int) -> tuple[Array, bool]:
     """The position of the best fit led there in equal parts by a general minimiser, and whether it never jumped."""
     u, smooth = directions(P, legs), True
     for part in np.linspace(0, 1, parts + 1)[1:]:
         wanted = tilted(u, part * way)
-        found = minimize(lambda x, w=wanted: 1e3 * np.sum(np.cross(directions(x, legs), w) ** 2), P, tol=1e-12)
+        found = minimize(lambda x, w=wanted: 1e3 * np.sum(across(directions(x, legs), w) ** 2), P, tol=1e-12)
         smooth &= bool(np.linalg.norm(found.x - P) < 0.05)
         P = found.x
     return P, smooth
