@@ -442,6 +442,34 @@ def test_the_first_message_says_what_was_opened(tmp_path: Path):
     assert soon(lambda: not alive(process) and not Path(made.folder.name).exists())
 
 
+@pytest.mark.slow
+def test_thousands_of_questions_and_many_tabs_leave_nothing(server: StudioServer):
+    """Memory of the server, of what forks and of what answers; open files."""
+    def size(process: int | str) -> float:
+        found = re.search(r"VmRSS:\s+(\d+)", Path(f"/proc/{process}/status").read_text())
+        assert found
+        return int(found[1]) / 1024
+
+    def files() -> int:
+        return len(os.listdir("/proc/self/fd")) + len(os.listdir(f"/proc/{server.forks.process.pid}/fd"))
+
+    if not Path("/proc/self/status").is_file():
+        pytest.skip("no /proc here")
+    assert soon(lambda: server_tabs(server) == [])
+    with opened(server) as page:
+        before = files()
+        processes = [os.getpid(), server.forks.process.pid, page.ask("move")["answer"]["process"]]
+        for number in range(3000):
+            page.ask("move" if number % 2 else "echo", text="x" * 2000)
+            if number == 500:
+                at_first = [size(each) for each in processes]
+        assert all(size(each) < first + 3 for each, first in zip(processes, at_first, strict=True))
+    for _ in range(20):
+        with opened(server) as page:
+            page.ask("move")
+    assert soon(lambda: files() < before)
+
+
 def test_processes_come_back_where_their_source_was_ended():
     made = StudioServer(Opening(), desk=DESK)
     try:

@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 
 from ...budgets import FAREWELL_SECONDS, LARGEST_ASK, MOST_CONNECTIONS, SENDER_SECONDS
 from ...errors import BadRequest, FileTooLarge, HrsynthError, MissingExtra
+from ...results import spelled
 from .guard import HOST, Guard
 from .processes import DESK, ForkServer
 from .tabs import Opening, Tabs
@@ -37,6 +38,7 @@ TYPES = {".html": "text/html; charset=utf-8", ".js": "text/javascript; charset=u
 MAIN = "studio.html"
 
 
+@spelled
 def studio(robot: str | Path | None = None, observe: Iterable[str | int] | str | None = None,
            camera: str | None = None, *, port: int = 0, open_: bool = True) -> StudioServer:
     """Serve the page to work in on this machine, with a robot, a folder of robots or nothing, and open it in the
