@@ -51,14 +51,15 @@ def which(verdict: Verdict) -> str:
         return f"Watch {legs}."
     if not verdict.rank:
         return "Watching the legs does not help: their directions do not change when the platform moves."
-    return (f"Watching the legs is not enough: {legs} {'sees' if len(verdict.legs) == 1 else 'see'} as much as all of "
-            f"them, but {_listed([each.name for each in verdict.lost])} stay{'s' * (len(verdict.lost) == 1)} unseen "
-            f"({verdict.dof - verdict.rank} of {verdict.dof} freedoms).")
+    return (f"Watching legs is not enough: even with all of them {_listed([each.name for each in verdict.lost])} "
+            f"stay{'s' * (len(verdict.lost) == 1)} unseen ({verdict.dof - verdict.rank} of {verdict.dof} freedoms).")
 
 
 def blind(verdict: Verdict) -> list[str]:
     """What follows where a freedom is not seen."""
-    return ["However well the directions are measured, the platform can then be anywhere along what is not seen.",
+    legs = named(verdict.legs)
+    seen = f"{legs[0].upper()}{legs[1:]} see{'s' * (len(verdict.legs) == 1)} as much as all of them together."
+    return [seen if verdict.rank else "However well the directions are measured, they say nothing of the platform.",
             "Something else must be measured as well: the command advise lists what would do."]
 
 

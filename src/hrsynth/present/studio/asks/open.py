@@ -52,7 +52,7 @@ def scene(request: Request) -> dict[str, Any]:
     here = request.here(mover)
     return {
         **stage(setting, [machine], arrows_of(setting, known.values())),
-        "words": f"{words}, {setting.dof} freedoms",
+        "words": f"{words}, {setting.dof} freedom{'s' * (setting.dof != 1)}",
         "legs": [_leg(request, setting, leg) for leg in setting.anatomy.legs],
         "sliders": sliders(mover, request.ends), "scale": scale(unit_of(setting)), **told(request, mover, here),
         "notes": [*map(str, setting.robot.notes), *setting.beside(), *missing], **lines(request, "derive")}

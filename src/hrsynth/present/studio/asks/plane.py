@@ -22,7 +22,7 @@ from ....kinematics.coordinates import Coordinates
 from ....kinematics.steps import track
 from ....mechanism.pose import SCALARS, Grid, Pose
 from ....results import Value
-from ....tolerances import ON_LOCUS, SAME_RELATION
+from ....tolerances import ON_LOCUS, SAME_RELATION, SLIDER_ARRIVED
 from ...view.states import Mover
 from ..commands import NONE, digits, lines, same_at
 from ..request import Request
@@ -56,10 +56,13 @@ def answer(request: Request) -> dict[str, Any]:
     size = request.count("size", 2, LARGEST_STUDIO_PLANE) or SIZE
     values = mover.read(here)
     third = [i for i in range(len(values)) if i not in pair]
+    ranges = [_range(request, mover, i) for i in pair]
     at = request.number("at", -FARTHEST_POSE, FARTHEST_POSE)
     if at is not None and third:
+        low, high = _range(request, mover, third[0])
+        if not low - SLIDER_ARRIVED <= at <= high + SLIDER_ARRIVED:
+            raise BadRequest("at", at, f"{low:.6g} to {high:.6g}")
         values[third[0]] = at
-    ranges = [np.array([mover.read(end)[i] for end in request.ends[i]]) for i in pair]
     mapper, unit = Mapper(setting, np.full(len(setting.observed), CONE)), unit_of(setting)
     known = mapper.batch is not None and _at_batch(mover, here.real)
     cells = size if known else min(size, LARGEST_STUDIO_SWEEP)
@@ -85,9 +88,16 @@ def answer(request: Request) -> dict[str, Any]:
             "words": _words(kind, unit, found), "of": [mover.coordinates.names[i] for i in pair], **same}
 
 
+def _range(request: Request, mover: Mover, index: int) -> Array:
+    """The least and the largest value of a coordinate's slider, (2,)."""
+    return np.sort([mover.read(end)[index] for end in request.ends[index]])
+
+
 def _pair(mover: Mover, said: str | None) -> tuple[int, int]:
     """The two coordinates that are named, one name after the other; the first two where none are."""
     names = mover.coordinates.names
+    if len(names) < 2:
+        raise BadRequest("a plane of a platform with fewer than two freedoms", said)
     found = [pair for pair in permutations(range(len(names)), 2) if said in (None, names[pair[0]] + names[pair[1]])]
     if not found:
         raise BadRequest("of", said, [names[i] + names[j] for i, j in permutations(range(len(names)), 2)])
