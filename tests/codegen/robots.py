@@ -15,6 +15,7 @@ from types import ModuleType
 import numpy as np
 import pytest
 
+from hrsynth.codegen.export import ExportedCode
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.tasks import solve
@@ -23,6 +24,45 @@ from hrsynth.mechanism.builder import Builder
 
 BARS = (1.0, 0.5, 1.2, 0.8)
 """A crank that turns all round."""
+MAIN = """
+#define EIGEN_RUNTIME_NO_MALLOC
+#include "robot.hpp"
+#include <cstdio>
+#include <cstdlib>
+#include <new>
+static long allocations = 0;
+void* operator new(std::size_t size) { ++allocations; return std::malloc(size); }
+void operator delete(void* p) noexcept { std::free(p); }
+void operator delete(void* p, std::size_t) noexcept { std::free(p); }
+using namespace NAME;
+template <class M> void print(const M& m) {
+  for (int i = 0; i < m.rows(); ++i)
+    for (int k = 0; k < m.cols(); ++k) std::printf("%.17g ", m(i, k));
+}
+int main() {
+  int n = 0;
+  if (std::scanf("%d", &n) != 1) return 2;
+  Eigen::internal::set_is_malloc_allowed(false);
+  long made = 0;
+  for (int row = 0; row < n; ++row) {
+    Motors q;
+    for (int i = 0; i < MOTORS; ++i) if (std::scanf("%lf", &q[i]) != 1) return 3;
+    Solution at;
+    Jacobians rates;
+    at.passive.setZero(); at.rotation.setZero(); at.position.setZero();
+    rates.passive.setZero(); rates.platform.setZero(); rates.motors.setZero();
+    const long before = allocations;
+    const Status status = jacobians(q, at, rates);
+    Motors back = q * 0.9;
+    const Status led = status == Status::ok ? inverse(at.rotation, at.position, back) : status;
+    made += allocations - before;
+    std::printf("%d %d ", int(status), int(led));
+    print(at.passive); print(at.position); print(at.rotation); print(rates.platform); print(rates.passive); print(back);
+    std::printf("\\n");
+  }
+  return made == 0 ? 0 : 4;
+}
+"""
 FLAGS = ["-std=c++17", "-O1", "-Wall", "-Wextra", "-Werror", "-fno-exceptions"]
 
 
@@ -42,6 +82,49 @@ def four_bar(start: float = 0.3, bars: tuple[float, ...] = BARS, side: float = 1
     b.joint("pivot", "R", "base", "rocker", B, axis=(0, 0, 1))
     b.joint("tip", "R", "coupler", "rocker", C, axis=(0, 0, 1), loop=True)
     return b.build(platform="coupler")
+
+
+def geared_five_bar() -> Mechanism:
+    """A five-bar of one motor: a gear leads the other crank."""
+    b = Builder("geared")
+    for name in ("base", "one", "two", "left", "right"):
+        b.link(name)
+    for name, near, far, at in (("motor", "base", "one", (0, 0, 0)), ("far", "base", "two", (1, 0, 0)),
+                                ("knee", "one", "left", (-0.3, 0.6, 0)), ("elbow", "two", "right", (1.2, 0.5, 0))):
+        b.joint(name, "R", near, far, at, axis=(0, 0, 1), motor=name == "motor")
+    b.joint("tip", "R", "left", "right", (0.4, 1.3, 0), axis=(0, 0, 1), loop=True)
+    b.coupling("gear", "one", "two", -0.7)
+    return b.build(platform="left")
+
+
+def screw_lever() -> Mechanism:
+    """A spindle whose nut (20 mm a radian) pushes a lever."""
+    b = Builder("screw")
+    for name in ("base", "spindle", "nut", "rod", "lever"):
+        b.link(name)
+    b.joint("motor", "R", "base", "spindle", (0, 0, 0), axis=(1, 0, 0), motor=True)
+    b.joint("slide", "P", "base", "nut", (0.1, 0, 0), axis=(1, 0, 0))
+    b.joint("pin", "R", "nut", "rod", (0.3, 0, 0), axis=(0, 0, 1))
+    b.joint("pivot", "R", "base", "lever", (1, 0, 0), axis=(0, 0, 1))
+    b.joint("end", "R", "rod", "lever", (0.8, 0.7, 0), axis=(0, 0, 1), loop=True)
+    b.coupling("thread", "spindle", "nut", 0.02)
+    return b.build(platform="lever")
+
+
+def box_of(robot: Mechanism, half: float) -> dict[str, tuple[float, float]]:
+    """A box of motors, half as wide as ``half`` rad or half characteristic lengths."""
+    return {name: ((-half, half) if not joint.type.slides else (-half * robot.length, half * robot.length))
+            for name, joint in robot.joints.items() if joint.actuated}
+
+
+def inside(found: ExportedCode, count: int, seed: int = 0) -> Array:
+    """Random motors in the proved box."""
+    rng = np.random.default_rng(seed)
+    q = np.zeros((count, len(found.proof.motors)))
+    for part in found.proof.parts:
+        q[:, [found.proof.motors.index(name) for name in part.motors]] = rng.uniform(*part.proved, (count,
+                                                                                                    len(part.motors)))
+    return q
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 import hrsynth
-from codegen.robots import BARS, answered, compiled, eigen, four_bar, module_of, own_pose
+from codegen.robots import BARS, MAIN, answered, box_of, compiled, eigen, four_bar, inside, module_of, own_pose
 from hrsynth.codegen.export import ExportedCode, export
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import Array
@@ -23,66 +23,10 @@ from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from strategies import planar, random_rotation, transformed
 
-MAIN = """
-#define EIGEN_RUNTIME_NO_MALLOC
-#include "robot.hpp"
-#include <cstdio>
-#include <cstdlib>
-#include <new>
-static long allocations = 0;
-void* operator new(std::size_t size) { ++allocations; return std::malloc(size); }
-void operator delete(void* p) noexcept { std::free(p); }
-void operator delete(void* p, std::size_t) noexcept { std::free(p); }
-using namespace NAME;
-template <class M> void print(const M& m) {
-  for (int i = 0; i < m.rows(); ++i)
-    for (int k = 0; k < m.cols(); ++k) std::printf("%.17g ", m(i, k));
-}
-int main() {
-  int n = 0;
-  if (std::scanf("%d", &n) != 1) return 2;
-  Eigen::internal::set_is_malloc_allowed(false);
-  long made = 0;
-  for (int row = 0; row < n; ++row) {
-    Motors q;
-    for (int i = 0; i < MOTORS; ++i) if (std::scanf("%lf", &q[i]) != 1) return 3;
-    Solution at;
-    Jacobians rates;
-    at.passive.setZero(); at.rotation.setZero(); at.position.setZero();
-    rates.passive.setZero(); rates.platform.setZero(); rates.motors.setZero();
-    const long before = allocations;
-    const Status status = jacobians(q, at, rates);
-    Motors back = q * 0.9;
-    const Status led = status == Status::ok ? inverse(at.rotation, at.position, back) : status;
-    made += allocations - before;
-    std::printf("%d %d ", int(status), int(led));
-    print(at.passive); print(at.position); print(at.rotation); print(rates.platform); print(rates.passive); print(back);
-    std::printf("\\n");
-  }
-  return made == 0 ? 0 : 4;
-}
-"""
-
-
-def box_of(robot: Mechanism, half: float) -> dict[str, tuple[float, float]]:
-    """A box of motors, half as wide as ``half`` rad or half characteristic lengths."""
-    return {name: ((-half, half) if not joint.type.slides else (-half * robot.length, half * robot.length))
-            for name, joint in robot.joints.items() if joint.actuated}
-
 
 @cache
 def exported(robot: Mechanism, half: float, lang: str = "numpy") -> ExportedCode:
     return export(robot, lang, box_of(robot, half))
-
-
-def inside(found: ExportedCode, count: int, seed: int = 0) -> Array:
-    """Random motors in the proved box."""
-    rng = np.random.default_rng(seed)
-    q = np.zeros((count, len(found.proof.motors)))
-    for part in found.proof.parts:
-        q[:, [found.proof.motors.index(name) for name in part.motors]] = rng.uniform(*part.proved, (count,
-                                                                                                    len(part.motors)))
-    return q
 
 
 def assert_agrees(robot: Mechanism, found: ExportedCode, made: ModuleType, count: int) -> None:

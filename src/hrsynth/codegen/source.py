@@ -68,8 +68,9 @@ class Source(Value):
 
 def _part(branch: TubedBranch, tracer: FormulaTracer, part: TubePart) -> SourcePart:
     driven = [branch.motors.index(i) for i in part.driven]
+    rows, every, sparse = _rows(branch, part)
+    part = part.ordered(sparse)
     unknowns = [branch.passive.index(i) for i in part.unknowns]
-    rows, every = _rows(branch, part)
     equations, slopes = tracer.loops(rows, part.unknowns, part.driven)
     lower, upper = branch.lower[driven], branch.upper[driven]
     root, nodes = cell_tree(lower, upper, [(cell.lower, cell.upper) for cell in part.cells])
@@ -85,9 +86,9 @@ def _floats(values: Any) -> Any:
     return tuple(map(_floats, values)) if isinstance(values, tuple) else float(values)
 
 
-def _rows(branch: TubedBranch, part: TubePart) -> tuple[list[int], list[int]]:
+def _rows(branch: TubedBranch, part: TubePart) -> tuple[list[int], list[int], list[int]]:
     """As many equations as unknowns, the firmest at the middles of the part's cells together; all that have to do with
-    the unknowns."""
+    the unknowns; the unknowns' places, those that few of the equations know first, so that elimination fills little."""
     from scipy.linalg import qr
 
     units = np.array([branch.unit(i) for i in part.unknowns])
@@ -109,4 +110,5 @@ def _rows(branch: TubedBranch, part: TubePart) -> tuple[list[int], list[int]]:
             chosen.append(int(k))
         if len(chosen) == len(part.unknowns):
             break
-    return sorted(every[k] for k in chosen), every
+    sparse = np.argsort(np.count_nonzero(stacked[0][[every[k] for k in chosen]], axis=0), kind="stable")
+    return sorted(every[k] for k in chosen), every, sparse.tolist()

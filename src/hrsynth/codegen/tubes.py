@@ -3,7 +3,8 @@ in metres and radians (docs/pages/theory.md, section 12)."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -40,6 +41,13 @@ class TubePart(Value):
     driven: tuple[int, ...]
     unknowns: tuple[int, ...]
     cells: tuple[TubeCell, ...]
+
+    def ordered(self, places: Sequence[int]) -> TubePart:
+        """The same with its unknowns in another order."""
+        own = list(places)
+        return TubePart(self.driven, tuple(self.unknowns[k] for k in own), tuple(
+            replace(each, middle=each.middle[own], slopes=each.slopes[own], radius=each.radius[own])
+            for each in self.cells))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -1,0 +1,96 @@
+"""Generated code against the package's own kinematics (Pinocchio's model, closed by Gauss-Newton) at many points."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hrsynth
+from codegen.robots import (
+    MAIN,
+    Motors,
+    answered,
+    box_of,
+    compiled,
+    four_bar,
+    geared_five_bar,
+    module_of,
+    own_pose,
+    screw_lever,
+)
+from hrsynth.codegen.export import export
+from hrsynth.geometry.vectors import Array
+from hrsynth.kinematics.pinocchio_model import PinocchioModel
+from hrsynth.kinematics.tasks import solve
+from hrsynth.mechanism import Mechanism
+from strategies import random_rotation, transformed
+
+
+def along(low: Array, high: Array, count: int) -> Array:
+    """Points (count, n) of a curve through all of a box, near to each other, from its middle on."""
+    t = np.linspace(0, 2 * np.pi, count)
+    turns = np.sqrt([2, 3, 5, 7, 11, 13][: len(low)]) * (1 if len(low) == 1 else max(2.0, (count / 400) ** 0.5))
+    return np.asarray((low + high) / 2 + 0.9999 * (high - low) / 2 * np.sin(t[:, None] * turns))
+
+
+def own_poses(robot: Mechanism, motors: tuple[str, ...], q: Array) -> Array:
+    """The platform's poses (n, 4, 4), each found from the one before; the first is led to from zero."""
+    twin, found = PinocchioModel(robot), np.zeros((len(q), 4, 4))
+    here = twin.q0
+    for s in np.linspace(0, 1, 20):
+        here, _ = solve(twin, here, Motors(dict(zip(motors, s * q[0], strict=True))), tolerance=1e-13)
+    for k, row in enumerate(q):
+        here, left = solve(twin, here, Motors(dict(zip(motors, row, strict=True))), tolerance=1e-14, iterations=60)
+        assert left < 1e-12
+        found[k] = twin.pose(here, robot.platform)
+    np.testing.assert_allclose(found[-1], own_pose(twin, dict(zip(motors, q[-1], strict=True)), 40), atol=1e-11)
+    return found
+
+
+def made(name: str) -> Mechanism:
+    """A robot; those that are not shipped in a tilted base."""
+    own = {"four_bar": four_bar, "geared": geared_five_bar, "screw": screw_lever}
+    if name not in own:
+        return hrsynth.load(name)
+    rng = np.random.default_rng(0)
+    return transformed(own[name](), random_rotation(rng), rng.normal(size=3))
+
+
+HALF = {"four_bar": 1.0, "geared": 0.5, "screw": 4.0, "rrrrr_m1": 0.1, "prrrp_m1": 0.05, "3rrr_m1": 0.02, "3rps": 0.01,
+        "delta": 0.1, "quattro": 0.0005, "gough_stewart": 0.001}
+"""Half the width of each motor's interval (rad, or characteristic lengths)."""
+
+
+def differs(name: str, count: int, folder: Path | None) -> float:
+    """The largest difference of poses (1, or characteristic lengths) at points of a curve, in a random order."""
+    robot = made(name)
+    found = export(robot, "numpy", box_of(robot, HALF[name]))
+    q = along(*found.proof.proved, count)
+    X = own_poses(robot, found.proof.motors, q)
+    order = np.random.default_rng(1).permutation(count)
+    module = module_of(found.code)
+    status, x, R, p = module.forward(q[order])
+    assert np.all(status == 0)
+    off = max(np.abs(R - X[order, :3, :3]).max(), np.abs(p - X[order, :3, 3]).max() / robot.length)
+    if folder is not None:
+        code = export(robot, "c++", box_of(robot, HALF[name])).code
+        rows = answered(compiled(folder, code, MAIN, "-DNAME=" + "_" * robot.name[0].isdigit() + robot.name), q[order])
+        assert np.all(rows[:, 0] == 0)
+        first = 2 + x.shape[1]
+        off = max(off, np.abs(rows[:, first + 3 : first + 12].reshape(-1, 3, 3) - X[order, :3, :3]).max(),
+                  np.abs(rows[:, first : first + 3] - X[order, :3, 3]).max() / robot.length,
+                  np.abs(rows[:, 2:first] - x).max())
+    return float(off)
+
+
+@pytest.mark.parametrize("name", ["geared", "screw"])
+def test_couplings_inside_a_branch(name: str) -> None:
+    assert differs(name, 300, None) < 1e-12
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("name", HALF)
+def test_a_hundred_thousand_points(name: str, tmp_path: Path) -> None:
+    assert differs(name, 100_000, tmp_path) < 1e-12
