@@ -34,7 +34,8 @@ def serve(server: StudioServer, what: str) -> None:
 
     if threading.current_thread() is threading.main_thread():
         for number in (signal.SIGTERM, signal.SIGHUP):
-            signal.signal(number, end)
+            if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup leaves it
+                signal.signal(number, end)
     try:
         typer.echo(f"{what} is served at {server.address} (Ctrl-C ends it).")
         sys.stdout.flush()

@@ -39,10 +39,10 @@ MAIN = "studio.html"
 
 
 @spelled
-def studio(robot: str | Path | None = None, observe: Iterable[str | int] | str | None = None,
+def studio(robot: str | Path | Mechanism | None = None, observe: Iterable[str | int] | str | None = None,
            camera: str | None = None, *, port: int = 0, open_: bool = True) -> StudioServer:
     """Serve the page to work in on this machine, with a robot, a folder of robots or nothing, and open it in the
-    browser: a server with ``address`` and ``stop()``. Port 0 is any that is free.
+    browser: a server with ``address`` and ``stop()``, which also ends with this process. Port 0 is any that is free.
 
     Raises ``BadRequest`` for a name of no robot and a port that cannot be had, ``BadRobotFile`` for a file that there
     is none, ``MissingExtra``.
@@ -53,15 +53,20 @@ def studio(robot: str | Path | None = None, observe: Iterable[str | int] | str |
     from ...description import file_of
     from ...description.overrides import names
     from ...description.xml import content
+    from ...mechanism import Mechanism
 
-    here = Opening()
-    if robot is not None and Path(robot).is_dir():
+    watched = names(observe if observe is None or isinstance(observe, str) else map(str, observe))
+    first = {"camera": camera, "watch": None if watched in (None, ("all",)) else list(watched)}
+    if robot is None:
+        here = Opening()
+    elif isinstance(robot, Mechanism):
+        given = _as_read(robot)
+        here = Opening(given=given, mechanism=robot if given is None else None, first=first)
+    elif Path(robot).is_dir():
         here = Opening(folder=Path(robot))
-    elif robot is not None:
+    else:
         content(file_of(robot))
-        watched = names(observe if observe is None or isinstance(observe, str) else map(str, observe))
-        here = Opening(given={"robot": str(robot), "options": {}}, first={
-            "camera": camera, "watch": None if watched in (None, ("all",)) else list(watched)})
+        here = Opening(given={"robot": str(robot), "options": {}}, first=first)
     server = StudioServer(here, port)
     if open_:
         server.show()
@@ -74,12 +79,13 @@ def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str
     from ...description.overrides import names
 
     robot = found.setting.robot
-    if source is not None:
-        lists = {"motors": names(source["motors"]), "freeze": names(source["freeze"] or None)}
-        options = {name: value for name, value in {**source, **lists}.items() if name != "robot" and value}
-        given: dict[str, Any] | None = {"robot": source["robot"], "options": options}
-    else:
+    if source is None or "/" in (source["keyframe"] or ""):  # the page names no files
         given = _as_read(robot)
+    else:
+        lists = {"motors": names(source["motors"]), "freeze": names(source["freeze"] or None)}
+        options = {name: value for name, value in {**source, **lists}.items()
+                   if name != "robot" and value not in (None, "", []) and value is not False}
+        given = {"robot": source["robot"], "options": options}
     first = {"watch": [seen.link for seen in found.setting.observed], "camera": found.setting.robot.camera,
              "hidden": found.derivation is not None}
     server = StudioServer(Opening(given=given, mechanism=robot if given is None else None, first=first, panels=False),

@@ -72,15 +72,8 @@ def fork_on_request(control: socket.socket, desk: Callable[..., Any]) -> None:
                 for pid in children:
                     _kill(pid)
                 return
-            channel = socket.socket(fileno=numbers[0])
-            with contextlib.suppress(OSError):  # no process to be had: the other end sees the channel closed
-                pid = os.fork()
-                if pid == 0:
-                    _child(channel, [control, woken, waker, *children.values()], desk)
-                os.setpgid(pid, pid)
-                children[pid] = channel
-                continue
-            channel.close()
+            for number in numbers:
+                _fork(socket.socket(fileno=number), children, [control, woken, waker], desk)
 
 
 def _warm(desk: Callable[..., Any], kind: str) -> None:
@@ -88,6 +81,21 @@ def _warm(desk: Callable[..., Any], kind: str) -> None:
     with contextlib.suppress(Exception):
         desk(None, None, None).answer({"n": 0, "ask": kind, "robot": {"source": "shipped:" + SMALL}})
     gc.freeze()
+
+
+def _fork(channel: socket.socket, children: dict[int, socket.socket], others: list[socket.socket],
+          desk: Callable[..., Any]) -> None:
+    """A child at a channel; where no process is to be had the other end sees the channel closed."""
+    try:
+        pid = os.fork()
+    except OSError:
+        channel.close()
+        return
+    if pid == 0:
+        _child(channel, [*others, *children.values()], desk)
+    children[pid] = channel
+    with contextlib.suppress(OSError):  # it may have done so itself
+        os.setpgid(pid, pid)
 
 
 def _kill(pid: int) -> None:
@@ -107,7 +115,8 @@ def _child(channel: socket.socket, others: list[socket.socket], desk: Callable[.
         for each in others:
             each.close()
         for limit, amount in ((resource.RLIMIT_AS, WORKER_BYTES), (resource.RLIMIT_CORE, 0)):
-            resource.setrlimit(limit, (amount, amount))
+            with contextlib.suppress(ValueError, OSError):  # less is allowed already, or the system has no such limit
+                resource.setrlimit(limit, (amount, amount))
         answer_all(channel, desk)
         status = 0
     finally:
