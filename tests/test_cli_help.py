@@ -87,7 +87,7 @@ def test_examples_are_commands(arguments: tuple[str, ...]):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arguments", [each for each in examples() if each[0] not in ("view", "catalog")
+@pytest.mark.parametrize("arguments", [each for each in examples() if each[0] not in ("view", "studio", "catalog")
                                        and not any(part.endswith(".urdf") for part in each[1:2])], ids=" ".join)
 def test_examples_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys, arguments: tuple[str, ...]):
     monkeypatch.chdir(tmp_path)

@@ -90,8 +90,8 @@ def test_the_page_is_told_what_the_command_line_says(capfd: pytest.CaptureFixtur
     assert execute(["convert", "3rrr_m1", file]) == 0
     capfd.readouterr()
     motors = ("shoulder_1", "shoulder_2", "shoulder_3")
-    status, out, err = ask(capfd, file, "--platform", "platform", "--motors", ",".join(motors), "--as-written", "--observe",
-                           "1,dist_2", "--camera", "platform", "--no-open", "--port", "7", "--hidden")
+    status, out, err = ask(capfd, file, "--platform", "platform", "--motors", ",".join(motors), "--as-written",
+                           "--observe", "1,dist_2", "--camera", "platform", "--no-open", "--port", "7", "--hidden")
     assert (status, told[1:]) == (0, ["stopped"]), err
     assert out.endswith("The view is served at http://127.0.0.1:1/x/ (Ctrl-C ends it).\n")
     opening, port = told[0]
