@@ -123,6 +123,18 @@ def test_legs_are_ticked_and_what_follows_is_told(size: str, tab: Tab, address: 
     assert panel.locator(".verdict.good").count() == 1
 
 
+def test_the_error_that_is_shown_is_that_of_the_legs_that_are_watched(tab: Tab, address: str):
+    page = opened(tab, address, "delta")
+    panel = show(page, "legs")
+    for name in ("1", "2"):
+        panel.locator(f"input[value='{name}']").click()
+        answered(page)
+        told = panel.locator(".verdict").inner_text()
+        assert page.locator("#now").inner_text() in told
+        assert page.evaluate("studio.state.error.step") == page.evaluate("studio.panels.legs.found.error.step")
+    assert "no bound" in page.locator("#now").inner_text()
+
+
 def test_sliders_move_the_robot_and_home_brings_it_back(tab: Tab, address: str):
     page = opened(tab, address, "3rrr_m1")
     panel = show(page, "move")

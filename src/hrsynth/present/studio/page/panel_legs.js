@@ -68,6 +68,7 @@ class LegsPanel extends Panel {
     const found = await this.ask("watch", "Deriving the hidden robot");
     if (!found) return;
     this.found = found;
+    this.studio.judge(found.error);
     this.tell(found);
     this.studio.stage.hidden(found.hidden);
     this.studio.hasHidden(Boolean(found.hidden));

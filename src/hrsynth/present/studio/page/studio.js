@@ -155,7 +155,14 @@ class Studio {
   rewatch(names) {
     this.watch = names;
     this.stage.watch(names);
+    this.judge(null);
     this.each("rewatched", names);
+  }
+
+  /* How wrong the platform can be here: nothing is known of other legs until they are asked about. */
+  judge(error) {
+    this.state = { ...this.state, error };
+    this.draw(this.state);
   }
 
   draw(state) {
