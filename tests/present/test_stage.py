@@ -114,6 +114,15 @@ def test_a_mode_that_is_clicked_is_told_by_its_label(open_page):
         assert ask(tab, "told.pop()") == name
 
 
+def test_the_mode_where_the_robot_is_has_no_outline(open_page):
+    tab = open_page("quattro")
+    here = "{label: '9', places: scene.home.real.map((place) => [...place]), reachable: true}"
+    ask(tab, f"stage.ghosts([{here}, scene.ghosts[0]])")
+    assert ask(tab, "stage.parts.ghosts.children.map(({ visible }) => visible)") == [False, True]
+    ask(tab, "stage.state(scene.sliders[0].states[0])")
+    assert ask(tab, "stage.parts.ghosts.children.map(({ visible }) => visible)") == [True, True]
+
+
 def test_nothing_is_drawn_while_nothing_changes(open_page):
     tab = open_page("3rrr_m1")
     before = ask(tab, STILL)

@@ -3,10 +3,10 @@
 
    All places are displacements (x, y, z, qx, qy, qz, qw) of links from the zero configuration, in the base frame; m, rad. */
 const Stage = (() => {
-const { clear, label } = Solids;
+const { clear, label, turn, vector } = Solids;
 const { Machine, Direction, outline } = Robots;
 const { LostArrows, Plane, ellipsoid } = Overlays;
-const CLICK = 6, NEAR = { mouse: 7, pen: 10, touch: 18 }, ASK_EACH = 120;  /* px, px, ms */
+const CLICK = 6, NEAR = { mouse: 7, pen: 10, touch: 18 }, ASK_EACH = 120, SAME = 1e-3;  /* px, px, ms, rad or characteristic lengths */
 const NO_WEBGL = "The 3D picture needs WebGL 2, which this browser does not give: all words and numbers are still there.";
 const LOST = "The graphics card has gone; the picture comes back with it.";
 
@@ -124,6 +124,7 @@ return class Stage {
     real.group.visible = !["hidden", "none"].includes(this.mix);
     if (hidden) hidden.group.visible = both && !["real", "none"].includes(this.mix);
     real.pale(this.mix === "overlay" ? hidden : null);
+    this.parts.ghosts.children.forEach((each) => { each.visible = !this.isHere(each.userData.places); });
     for (const { group, side } of this.arrows)
       group.visible = this.arrowed !== false && group.userData.there && (side === "real" || this.mix === "beside");
     this.dirty();
@@ -161,14 +162,24 @@ return class Stage {
     this.dirty();
   }
 
-  /* Other assembly modes as outlines; a click on one is told as its label. */
+  /* Other assembly modes as outlines, without the one where the robot is; a click on one is told as its label. */
   ghosts(modes) {
     clear(this.parts.ghosts);
     const { real } = this.machines, size = 0.17 * this.record.length;
-    for (const { label: name, places, reachable } of modes)
-      this.parts.ghosts.add(outline(real.record, places, Colours.of("mode"),
-        { name, size, opacity: reachable === false ? 0.16 : 0.3, pick: { kind: "mode", name } }));
-    this.dirty();
+    for (const { label: name, places, reachable } of modes) {
+      const group = outline(real.record, places, Colours.of("mode"),
+        { name, size, opacity: reachable === false ? 0.16 : 0.3, pick: { kind: "mode", name } });
+      group.userData.places = places;
+      this.parts.ghosts.add(group);
+    }
+    this.arrange();
+  }
+
+  /* Whether the robot stands as an outline shows it, as far as the picture can tell. */
+  isHere(places) {
+    const now = this.machines.real.places;
+    return Boolean(now) && places.every((place, i) => !place
+      || vector(place).distanceTo(vector(now[i])) < SAME * this.record.length && turn(place).angleTo(turn(now[i])) < SAME);
   }
 
   /* The outline of the robot at the goal of a run, null for none. */
@@ -240,7 +251,7 @@ return class Stage {
     const seen = this.arrows.filter(({ group }) => group.visible);
     if (seen.some(({ watched }) => watched)) keys.push("watched");
     if (seen.some(({ watched }) => !watched)) keys.push("unwatched");
-    if (this.parts.ghosts.children.length) keys.push("mode");
+    if (this.parts.ghosts.children.some(({ visible }) => visible)) keys.push("mode");
     if (this.parts.goal.children.length) keys.push("goal");
     if (shown.length) keys.push("frame");
     if (this.factor) keys.push("ellipsoid");
