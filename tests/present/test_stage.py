@@ -364,6 +364,27 @@ def test_the_view_is_turned_and_fitted_by_keys(open_page):
     assert "arrow keys" in (canvas.get_attribute("aria-label") or "")
 
 
+@pytest.mark.parametrize("size", [SIZE, {"width": 390, "height": 844}])
+def test_what_lies_on_the_pane_covers_nothing_of_the_robot(open_page, size: dict[str, int]):
+    tab = open_page("3rrr_m1", size)
+    edges = """(() => { const seen = Sight.corners([stage.sides.real, stage.sides.hidden])
+                          .map((p) => p.project(stage.sight.camera).y);
+                        const height = stage.canvas.clientHeight;
+                        return [(1 - Math.max(...seen)) / 2 * height, (1 + Math.min(...seen)) / 2 * height]; })()"""
+    top, bottom = ask(tab, edges)
+    assert top == pytest.approx(bottom, abs=0.1 * size["height"])
+    ask(tab, """for (const [edge, height] of [["top", 80], ["bottom", 40]]) {
+      const bar = document.createElement("div");
+      bar.style.cssText = `position: absolute; ${edge}: 0; left: 0; width: 100%; height: ${height}px`;
+      stage.parent.append(bar);
+      stage.over.push(bar);
+    }
+    stage.fit()""")
+    top, bottom = ask(tab, edges)
+    assert top > 80
+    assert bottom > 40
+
+
 def test_another_robot_takes_the_place_of_the_first_and_gives_back_what_it_held(open_page):
     tab = open_page("delta")
     held = ask(tab, "[stage.renderer.info.memory.geometries, stage.renderer.info.memory.textures]")

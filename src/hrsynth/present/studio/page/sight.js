@@ -7,7 +7,7 @@ const HALF = 13 * Math.PI / 180, ROOM = 0.55;  /* rad; half of the pane's size, 
 return class Sight {
   /* `onchange` after each move of the camera. */
   constructor(canvas, onchange) {
-    Object.assign(this, { canvas, onchange, turned: false, held: false });
+    Object.assign(this, { canvas, onchange, turned: false, held: false, size: [1, 1], shift: 0 });
     this.camera = new THREE.PerspectiveCamera(2 * HALF * 180 / Math.PI, 1, 0.01, 100);
     this.look(null);
     canvas.addEventListener("keydown", (event) => this.key(event));
@@ -28,13 +28,16 @@ return class Sight {
     Object.assign(this, { from, across, pole: up, up: from.clone().cross(across) });
   }
 
-  /* To where objects fill the pane. */
-  fit(objects) {
+  /* To where objects fill the pane, but for so many pixels at its top and bottom. */
+  fit(objects, top = 0, bottom = 0) {
     const { camera } = this, axes = [this.across, this.up, this.from], corners = Sight.corners(objects);
     const ends = axes.map((axis) => Sight.span(corners, axis)), target = new THREE.Vector3();
     axes.forEach((axis, i) => target.addScaledVector(axis, (ends[i][0] + ends[i][1]) / 2));
     const [width, height, depth] = ends.map(([low, high]) => high - low);
-    const away = ROOM * Math.max(height, width / camera.aspect, 1e-6) / Math.tan(HALF) + 0.5 * depth;
+    const free = Math.max(0.3, 1 - (top + bottom) / this.size[1]);
+    const away = ROOM * Math.max(height / free, width / camera.aspect, 1e-6) / Math.tan(HALF) + 0.5 * depth;
+    this.shift = (bottom - top) / 2;
+    this.pane(...this.size);
     camera.up.copy(this.pole);
     this.controls?.dispose();
     this.controls = new THREE.OrbitControls(camera, this.canvas);
@@ -58,8 +61,9 @@ return class Sight {
   }
 
   pane(width, height) {
+    this.size = [width, height];
     this.camera.aspect = width / height;
-    this.camera.updateProjectionMatrix();
+    this.camera.setViewOffset(width, height, 0, this.shift, width, height);
   }
 
   /* The ray from the camera through a point of the page. */

@@ -11,8 +11,10 @@ const NO_WEBGL = "The 3D picture needs WebGL 2, which this browser does not give
 const LOST = "The graphics card has gone; the picture comes back with it.";
 
 return class Stage {
-  constructor(parent, { reduced = false } = {}) {
+  /* `reduced`: nothing moves by itself; `over`: elements that lie on the pane's top or bottom, where nothing is to be seen. */
+  constructor(parent, { reduced = false, over = [] } = {}) {
     this.parent = parent;
+    this.over = over;
     this.reduced = reduced;
     this.onpick = this.onghost = this.onstate = () => {};
     this.machines = {};
@@ -283,7 +285,13 @@ return class Stage {
   /* The camera to where everything is seen. */
   fit() {
     if (!this.record || !this.renderer) return;
-    this.sight.fit([this.sides.real, this.sides.hidden, this.names]);
+    const pane = this.parent.getBoundingClientRect(), covered = { top: 0, bottom: 0 };
+    for (const box of this.over.map((each) => each.getBoundingClientRect())) if (box.height) {
+      const [above, below] = [box.bottom - pane.top, pane.bottom - box.top];
+      if (above < below) covered.top = Math.max(covered.top, above);
+      else covered.bottom = Math.max(covered.bottom, below);
+    }
+    this.sight.fit([this.sides.real, this.sides.hidden, this.names], covered.top, covered.bottom);
     this.dirty();
   }
 

@@ -6,7 +6,7 @@ const $ = (id) => document.getElementById(id);
 class Studio {
   constructor() {
     this.reduced = matchMedia("(prefers-reduced-motion: reduce)").matches;
-    this.stage = new Stage($("pane"), { reduced: this.reduced });
+    this.stage = new Stage($("pane"), { reduced: this.reduced, over: [$("tools"), $("now")] });
     this.stage.onpick = (kind, name) => { if (kind === "leg") this.panels.legs?.toggle(name); };
     this.link = new Link({ onstart: (said) => this.begin(said), onback: () => this.back(), onlost: (refused) => this.lost(refused) });
     this.pending = 0;
