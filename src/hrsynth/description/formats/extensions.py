@@ -122,17 +122,18 @@ def read_plugins(graph: JointGraph, plugins: list[xml.Element], poses: Mapping[s
     another name than the robot's only where their frames coincide; plugins that attach links while the simulation runs
     are told. ``models``: the other models of the file."""
     for plugin in plugins:
-        title = f"{plugin.get('name', '')} {plugin.get('filename', '')}".strip() or "plugin"
+        title = f"{plugin.get('name', '')} {plugin.get('filename', '')}".strip()
+        label = title.partition(" ")[0] or "plugin"
         named = [text for child in plugin.iter() if isinstance(child.tag, str) and _ENDS.search(child.tag)
                  for text in [(child.text or "").strip()] if text in poses]
         if _DETACHABLE.search(title):
             _detachable(graph, plugin, poses, models)
         elif len(dict.fromkeys(named)) == 2:
             pair = ":".join(dict.fromkeys(named))
-            graph.note("open", f"the plugin {title.split(maxsplit=1)[0]!r} names two links; where it holds them together, "
+            graph.note("open", f"the plugin {label!r} names two links; where it holds them together, "
                                f"--close {pair}:fixed (or another type) does so")
         elif _ATTACHER.search(title):
-            graph.note("open", f"the plugin {title.split(maxsplit=1)[0]!r} can hold links together while the simulation runs; "
+            graph.note("open", f"the plugin {label!r} can hold links together while the simulation runs; "
                                "the file does not say which: --close A:B:TYPE where that closes a loop")
 
 
