@@ -10,6 +10,7 @@ import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -482,3 +483,48 @@ def test_processes_come_back_where_their_source_was_ended():
             assert page.ask("open")["answer"]["process"] != first
     finally:
         made.stop()
+
+
+@pytest.mark.browser
+def test_a_browser_keeps_another_pages_script_out(server: StudioServer, page: Page, browser: Any):
+    """A page of another origin in the same browser, which even knows the secret: no answer, no file, no frame."""
+    from http.server import BaseHTTPRequestHandler, HTTPServer
+    from threading import Thread
+
+    class Other(BaseHTTPRequestHandler):
+        def do_GET(self) -> None:
+            self.send_response(200)
+            self.send_header("Content-Type", "text/html")
+            self.end_headers()
+            self.wfile.write(b"<!DOCTYPE html><title>other</title>")
+
+        def log_message(self, format: str, *args: object) -> None:
+            pass
+
+    other = HTTPServer(("127.0.0.1", 0), Other)
+    Thread(target=other.serve_forever, daemon=True).start()
+    tab = browser.new_page()
+    try:
+        tab.goto(f"http://127.0.0.1:{other.server_port}/")
+        found = tab.evaluate("""async ([address, tab]) => {
+            const socket = await new Promise((done) => {
+                const line = new WebSocket(address.replace("http", "ws") + "live");
+                line.onopen = () => done("open");
+                line.onerror = () => done("refused");
+            });
+            const tried = async (path, more) => fetch(address + path, more).then((r) => r.text(), () => "refused");
+            const script = await new Promise((done) => {
+                const made = document.createElement("script");
+                made.onload = () => done("run"); made.onerror = () => done("refused");
+                made.src = address + "studio.js"; document.head.append(made);
+            });
+            return [socket, script, await tried(""), await tried("", { mode: "no-cors" }),
+                    await tried(`upload?tab=${tab}&name=a.urdf`, { method: "POST", body: "x" }),
+                    await tried(`upload?tab=${tab}&name=b.urdf`, { method: "POST", body: "x", mode: "no-cors" })];
+        }""", [server.address, page.start["tab"]])
+        assert [each or "refused" for each in found] == ["refused"] * len(found)
+        assert os.listdir(Path(server.folder.name, page.start["tab"])) == []
+    finally:
+        tab.close()
+        other.shutdown()
+        other.server_close()
