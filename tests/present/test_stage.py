@@ -123,6 +123,17 @@ def test_the_mode_where_the_robot_is_has_no_outline(open_page):
     assert ask(tab, "stage.parts.ghosts.children.map(({ visible }) => visible)") == [True, True]
 
 
+def test_a_hidden_robot_of_unknown_place_is_not_shown_where_it_was(open_page):
+    tab = open_page("quattro")
+    shown = "['real', 'hidden'].map((key) => stage.machines[key].group.visible)"
+    assert ask(tab, shown) == [True, True]
+    ask(tab, "stage.state({ real: scene.sliders[0].states[0].real, error: scene.home.error })")
+    assert ask(tab, shown) == [True, False]
+    assert ask(tab, "stage.machines.real.looks.leg.opacity") == 1, "the real robot is no glass then"
+    ask(tab, "stage.state(scene.home)")
+    assert ask(tab, shown) == [True, True]
+
+
 def test_nothing_is_drawn_while_nothing_changes(open_page):
     tab = open_page("3rrr_m1")
     before = ask(tab, STILL)

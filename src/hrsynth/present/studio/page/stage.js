@@ -88,11 +88,12 @@ return class Stage {
     if (record) this.sides[key].add(this.machines[key].group);
   }
 
-  /* Where all links are now, and the error there. */
+  /* Where all links are now, and the error there; a robot of which the state says nothing is not to be seen. */
   state(state) {
     this.now = state;
     for (const [key, machine] of Object.entries(this.machines)) {
       if (machine && state[key]) machine.move(state[key]);
+      else if (machine) machine.places = null;
       machine?.step(state.error?.step);
     }
     this.arrows.forEach((each) => this.follow(each));
