@@ -102,7 +102,7 @@ def sheet(name: str, file: Path) -> None:
         x += width
         if x + width > WIDTH:
             x, y = 0, y + height
-    made.crop((0, 0, WIDTH, y)).save(file)
+    made.crop((0, 0, WIDTH, y)).save(file, quality=80, method=6)
 
 
 def shown(page: Any) -> Iterator[str]:

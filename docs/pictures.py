@@ -57,6 +57,8 @@ def command(name: str) -> str:
             f"hrsynth {what.command} {what.option} pages")
     if isinstance(what, Family):
         return f"hrsynth {what.command} {what.robot}.urdf -o {name}"
+    if isinstance(what, Panels):
+        return f"hrsynth studio {what.typed}"
     if name.startswith("derivation_"):
         robot, legs = what.split()
         return f'hrsynth.draw(hrsynth.derive("{robot}", observe="{legs}"))'
@@ -79,7 +81,15 @@ class Family:
     robot: str
 
 
-PICTURES: dict[str, str | Page | SitePage | Family] = {
+@dataclass(frozen=True)
+class Panels:
+    """All panels of ``hrsynth studio`` for the robot of a sheet of ``docs/panels.py``, opened as it is ``typed``."""
+
+    robot: str
+    typed: str
+
+
+PICTURES: dict[str, str | Page | SitePage | Family | Panels] = {
     "accuracy_quattro.png": "accuracy quattro --observe 1,4 --cone 0.1deg --plane z=-0.7",
     "atlas_six_poses.png": Family("atlas", "six_poses"),
     "catalog.png": Page("catalog site --group spatial --base-motors --verdict controllable --motion 1T2R", "-o", 1250,
@@ -103,6 +113,12 @@ PICTURES: dict[str, str | Page | SitePage | Family] = {
     "servo_quattro.gif": f"servo quattro --observe 1,4 {FAR} --physics --sense pictures",
     "servo_quattro.png": f"servo quattro --observe 1,4 {FAR}",
     "site.png": SitePage("index.html", 1250, 1250),
+    "studio_3rrr_tilted.webp": Panels("3rrr_tilted", "3rrr_m1_tilted.urdf"),
+    "studio_ankle.webp": Panels("ankle", "ankle.urdf"),
+    "studio_delta.webp": Panels("delta", "delta"),
+    "studio_five_bar_meshes.webp": Panels("five_bar_meshes", "five_bar.xml"),
+    "studio_gough_stewart.webp": Panels("gough_stewart", "gough_stewart"),
+    "studio_quattro.webp": Panels("quattro", "quattro"),
     "view_3rrr.png": view("3rrr_m1"),
     "view_gough_stewart.png": view("gough_stewart --observe 1,3,5"),
     "view_quattro.png": view("quattro --observe 1,4"),
@@ -142,6 +158,10 @@ def made(name: str) -> None:
         with tempfile.TemporaryDirectory() as folder:
             main(folder, what.robot)
             _run(f"{what.command} {folder}/{what.robot}.urdf -o {file}")
+    elif isinstance(what, Panels):
+        import panels
+
+        panels.sheet(what.robot, file)
     elif name.startswith("derivation_"):
         robot, legs = what.split()
         hrsynth.draw(hrsynth.derive(hrsynth.load(robot), legs.split(","))).save(str(file))

@@ -86,7 +86,7 @@ class Slider {
 /* The command and the Python line that give the same, each with a button that copies it. */
 class Same {
   constructor() {
-    this.root = element("details", { className: "same", hidden: true }, element("summary", { textContent: "The same as a command and in Python" }));
+    this.root = element("details", { className: "same", hidden: true }, element("summary", { textContent: "Command and Python line" }));
     this.rows = ["command", "python"].map((key) => this.row(key));
   }
 
@@ -131,6 +131,7 @@ class Status {
     this.clear();
     this.ondrop = ondrop;
     const told = () => {
+      if (this.turn !== turn) return;
       const seconds = Math.round((performance.now() - started) / 1000);
       this.words.textContent = seconds < 2 ? `${words} …` : `${words} … ${seconds} s`;
       this.stop.hidden = !ondrop;

@@ -13,15 +13,20 @@ class ModesPanel extends Panel {
     this.outlines = [];
   }
 
-  opened() { this.forget(); }
+  opened() { this.anew(); }
 
-  rewatched() {
+  rewatched() { this.anew(); }
+
+  anew() {
     this.forget();
     if (this.studio.isShown(this.key)) this.entered();
   }
 
   /* Other poses from here are other modes: those that are listed belong to where they were asked. */
-  settled() { if (this.origin && this.studio.here !== this.origin && !this.flown) this.words.textContent = "These belong to an earlier pose. Find them again."; }
+  settled() {
+    const away = this.origin?.some((value, i) => Math.abs(value - this.studio.values[i]) > 1e-6);
+    if (away && !this.flown) this.words.textContent = "These belong to an earlier pose. Find them again.";
+  }
 
   forget() {
     this.outlines = [];
@@ -34,11 +39,11 @@ class ModesPanel extends Panel {
   }
 
   async refresh() {
-    const here = this.studio.here;
+    const origin = this.studio.values;
     const found = await this.ask("modes", "Listing the modes");
     if (!found) return;
     this.forget();
-    this.origin = here;
+    this.origin = origin;
     this.outlines = found.modes;
     this.words.textContent = found.words;
     this.list.replaceChildren(...found.modes.map((mode) => this.row(mode)));
@@ -78,7 +83,7 @@ class ModesPanel extends Panel {
     if (!this.studio.isShown(this.key)) return;
     this.studio.stage.ghosts(this.outlines);
     this.studio.stage.onghost = (label) => { const mode = this.outlines.find((each) => each.label === label); if (mode?.here) this.fly(mode); };
-    this.studio.relegend();
+    this.studio.refit();
   }
 
   entered() {
@@ -86,5 +91,8 @@ class ModesPanel extends Panel {
     if (!this.outlines.length && this.studio.scene) this.refresh();
   }
 
-  left() { this.studio.stage.ghosts([]); }
+  left() {
+    this.studio.stage.ghosts([]);
+    this.studio.refit();
+  }
 }

@@ -12,7 +12,7 @@ class PlanePanel extends Panel {
   }
 
   opened(scene) {
-    this.record = null;
+    this.record = this.seen = null;
     this.words.textContent = "";
     this.scale.replaceChildren();
     this.same.show(null);
@@ -47,6 +47,8 @@ class PlanePanel extends Panel {
     this.words.textContent = found.words;
     this.same.show(found);
     this.draw();
+    if (fields.of !== this.seen) this.studio.refit();
+    this.seen = fields.of;
   }
 
   /* What the plane's colours stand for. */
@@ -68,8 +70,14 @@ class PlanePanel extends Panel {
     this.studio.relegend();
   }
 
-  entered() { this.draw(); }
+  entered() {
+    this.draw();
+    if (this.record) this.studio.refit();
+  }
 
-  left() { this.studio.stage.plane(null); }
+  left() {
+    this.studio.stage.plane(null);
+    this.studio.refit();
+  }
 }
 PlanePanel.SIZE = 24;  /* points along each side */

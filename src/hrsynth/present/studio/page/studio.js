@@ -65,6 +65,8 @@ class Studio {
     Object.assign(this, { robot: given, camera, scene, here: scene.here ?? null });
     this.watch = scene.legs.filter(({ watched }) => watched).map(({ name }) => name);
     this.values = scene.values ?? scene.sliders.map(({ home }) => home);
+    this.settled = String(this.values);
+    clearTimeout(this.rest);
     $("name").textContent = scene.name;
     $("words").textContent = scene.words;
     document.title = `${scene.name} – hrsynth studio`;
@@ -77,6 +79,7 @@ class Studio {
     this.relegend();
     this.say(`${scene.name} is open: ${scene.words}.`);
     this.answer();
+    this.link.ask("move", this.asked(), "first").catch(() => {});  /* the process that moves it reads the robot now */
     if (hidden) this.reveal();
   }
 
@@ -129,7 +132,13 @@ class Studio {
     this.draw(answer.state);
     this.each("moved", answer);
     clearTimeout(this.rest);
-    if (!this.moving) this.rest = setTimeout(() => this.each("settled"), Studio.REST);
+    if (!this.moving && String(this.values) !== this.settled) this.rest = setTimeout(() => this.settle(), Studio.REST);
+  }
+
+  /* At rest somewhere else than before: what depends on the pose is asked anew. */
+  settle() {
+    this.settled = String(this.values);
+    this.each("settled");
   }
 
   /* Go to a configuration that is known, seen on the way unless motion is to be reduced. */
@@ -195,6 +204,12 @@ class Studio {
     if (this.sees) await this.move({});
     this.stage.layout(this.layout);
     this.stage.fit();
+    this.relegend();
+  }
+
+  /* All of what has come or gone is seen, unless somebody has turned the view. */
+  refit() {
+    if (!this.stage.sight?.turned) this.stage.fit();
     this.relegend();
   }
 
