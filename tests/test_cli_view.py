@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import json
 import socket
+import sys
 from pathlib import Path
 
 import pytest
 
+import hrsynth
 from hrsynth.cli import execute
 
 
@@ -100,3 +102,15 @@ def test_the_page_is_told_what_the_command_line_says(capfd: pytest.CaptureFixtur
         "platform": "platform", "motors": motors, "as_written": True}}
     assert opening.first == {"watch": ["dist_1", "dist_2"], "camera": "platform", "hidden": True}
     assert json.loads(opening.message("t"))["panels"] is False
+
+
+def test_without_what_serves_pages_the_extra_is_named_before_the_work(capfd: pytest.CaptureFixture[str], tmp_path: Path,
+                                                                      monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    monkeypatch.setattr(hrsynth, "view", pytest.fail)
+    assert_refused(ask(capfd, "rrrrr_m1", "--no-open"), 3, 'pip install "hrsynth[studio]"')
+    monkeypatch.undo()
+    monkeypatch.setitem(sys.modules, "uvicorn", None)
+    file = tmp_path / "view.html"
+    assert ask(capfd, "rrrrr_m1", "--static", str(file))[0] == 0
+    assert file.is_file()

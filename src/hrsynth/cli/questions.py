@@ -37,13 +37,15 @@ from .studio import PORT, serve
 class Question:
     """A command: the public function of its ``name``, what it says of itself, its own options, named as the function's
     parameters and those of the files, and examples. ``after`` gets the answer and the options at the end; ``shows``
-    does so instead of printing the text where nothing was written. ``seeded``: whether anything is random."""
+    does so instead of printing the text where nothing was written, and ``needs`` says before the work what it lacks.
+    ``seeded``: whether anything is random."""
 
     name: str
     help: str
     options: tuple[Option, ...]
     examples: tuple[str, ...] = ()
     shows: Callable[..., None] | None = None
+    needs: Callable[[], object] | None = None
     after: Callable[..., None] | None = None
     seeded: bool = True
 
@@ -63,6 +65,8 @@ class Question:
         files = {each: values.pop(each.option) for each in OUTPUTS[self.name].files if each.option is not None}
         for each, path in files.items():
             each.require(path, values)
+        if self.needs is not None and not json and not any(files.values()):
+            self.needs()
         source = {each.name: values[each.name] for each in SOURCE}
         more = {each.record: None for each in files if each.record is not None}
         writers = []
@@ -120,6 +124,13 @@ def _decided(found: Any, at: list[str] | None, **_: Any) -> None:
 def _deprecated(_: Any, seconds: float | None, **__: Any) -> None:
     if seconds is not None:
         warn("--seconds is deprecated, what it leaves out depends on the machine: try --examine")
+
+
+def _servable() -> None:
+    """Raise ``MissingExtra`` where a library that serves pages is missing."""
+    from ..present.studio.server import require_libraries
+
+    require_libraries()
 
 
 def _served(found: Any, source: dict[str, Any], port: int, open_: bool, **_: Any) -> None:
@@ -260,6 +271,6 @@ QUESTIONS = (
               PORT,
               Option("open_", "Open the page in the browser.", None, bool, True, ("--open/--no-open",))),
              ("quattro --observe 1,4 --hidden", "quattro --observe 1,4 --static quattro.html"),
-             shows=_served),
+             shows=_served, needs=_servable),
 )
 """The commands in the order of the help."""

@@ -13,6 +13,7 @@ import webbrowser
 from collections.abc import Iterable
 from dataclasses import replace
 from http import HTTPStatus
+from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -187,15 +188,19 @@ class StudioServer:
         return f"<{type(self).__name__}: {self.address}>"
 
 
+def require_libraries() -> None:
+    """Raise ``MissingExtra`` where what serves the page is not installed."""
+    if None in map(find_spec, ("starlette", "uvicorn", "websockets")):
+        raise MissingExtra("serving a page", "studio")
+
+
 def made(opening: Opening, port: int, forks: ForkServer) -> tuple[Server, Guard, tempfile.TemporaryDirectory[str]]:
     """The server, not started, who guards it, and the folder of what is dropped into its pages."""
-    try:
-        import h11
-        import uvicorn
-        from uvicorn.protocols.http.h11_impl import H11Protocol
-        from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
-    except ImportError:
-        raise MissingExtra("the studio", "studio") from None
+    require_libraries()
+    import h11
+    import uvicorn
+    from uvicorn.protocols.http.h11_impl import H11Protocol
+    from uvicorn.protocols.websockets.websockets_sansio_impl import WebSocketsSansIOProtocol
 
     class PatientProtocol(H11Protocol):
         """A connection on which a request must come in time; each has one."""
