@@ -19,6 +19,8 @@ from hrsynth.cli import main
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.mechanism.observation import Direction
 from hrsynth.present.studio.desk import Desk
+from hrsynth.present.studio.scale import LOST, error
+from hrsynth.present.text.tables import NOT_BOUNDED
 
 DESK = Desk()
 CLOSED = 1e-9
@@ -311,3 +313,10 @@ def test_a_drag_is_answered_twenty_times_a_second(robot: str):
             here = moved["here"]
             assert moved["residual"] < CLOSED
         assert np.median(seconds) < 0.05
+
+
+def test_at_a_singularity_no_error_is_told():
+    for example in hrsynth.singular("3rrr_m1", points=200).examples:
+        told = error(observe("3rrr_m1"), example.configuration)
+        assert (told["mm"], told["step"]) == (None, 4)
+        assert told["words"] in (LOST, NOT_BOUNDED)

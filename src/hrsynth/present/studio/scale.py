@@ -11,6 +11,7 @@ from ...analysis.accuracy.pose_errors import attained, finite
 from ...analysis.observed import ObservedRobot
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.observation import Direction
+from ..text.tables import NOT_BOUNDED, bounded
 
 CONE = math.radians(0.1)
 """Half-angle of the errors of each watched direction (rad)."""
@@ -35,11 +36,13 @@ def step_of(value: float | None, unit: str) -> int:
 
 def error(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
     """What the platform can be wrong by at a configuration, found by an ascent (:func:`.attained`); None where there is
-    no bound."""
+    no bound, or none to first order."""
     unit = unit_of(setting)
     if not all(isinstance(each, Direction) for each in setting.observed):
         return {**nothing(unit, "not told: what is watched is no direction"), "step": None}
     metres, radians = attained(at, setting.samples.question, np.full(len(setting.observed), CONE))
+    if np.isfinite([metres, radians]).all() and not (bounded(metres, at.twin.length) and bounded(radians)):
+        return nothing(unit, NOT_BOUNDED)
     return told(finite(1e3 * metres), finite(math.degrees(radians)), unit)
 
 
@@ -54,7 +57,7 @@ def told(mm: float | None, deg: float | None, unit: str) -> dict[str, Any]:
 
 
 def nothing(unit: str, words: str) -> dict[str, Any]:
-    """The record where nothing is watched."""
+    """The record where there is no error to be told, for a reason."""
     return {"mm": None, "deg": None, "unit": unit, "step": len(NAMES) - 1, "words": words}
 
 

@@ -23,6 +23,7 @@ from ....kinematics.steps import track
 from ....mechanism.pose import SCALARS, Grid, Pose
 from ....results import Value
 from ....tolerances import ON_LOCUS, SAME_RELATION, SLIDER_ARRIVED
+from ...text.tables import NOT_BOUNDED, bounded
 from ...view.states import Mover
 from ..commands import NONE, digits, lines, same_at
 from ..request import Request
@@ -85,7 +86,7 @@ def answer(request: Request) -> dict[str, Any]:
             "at": float(values[third[0]]) if third else None,
             "normal": np.eye(3)[across].tolist() if across is not None and across < 3 else None,
             "locus": [[place(*point).tolist() for point in segment] for segment in found.locus],
-            "words": _words(kind, unit, found), "of": [mover.coordinates.names[i] for i in pair], **same}
+            "words": _words(kind, unit, found, here.real.twin.length), "of": [mover.coordinates.names[i] for i in pair], **same}
 
 
 def _range(request: Request, mover: Mover, index: int) -> Array:
@@ -215,7 +216,7 @@ def _placer(mover: Mover, pair: tuple[int, int], values: Array) -> Callable[[flo
     return place
 
 
-def _words(kind: str, unit: str, found: PoseField) -> str:
+def _words(kind: str, unit: str, found: PoseField, length: float) -> str:
     """How much is reached, and between which values it lies."""
     here = found.values[np.isfinite(found.values)]
     if not here.size:
@@ -223,5 +224,7 @@ def _words(kind: str, unit: str, found: PoseField) -> str:
     part = f"{100 * here.size / found.values.size:.0f} % of these poses are reached"
     if kind == DISTANCE:
         return f"{part}; the smallest singular value of Mᵀ lies between {here.min():.2g} and {here.max():.2g}."
-    worst = f"{rounded(float(here.max()))}{SIGNS[unit]}" if here.max() < FARTHEST_POSE else "no bound"
+    most = float(here.max())
+    near = bounded(most / 1e3, length) if unit == "mm" else bounded(np.radians(most))
+    worst = f"{rounded(most)}{SIGNS[unit]}" if near else f"more, {NOT_BOUNDED}"
     return f"{part}; per 0.1° the platform is wrong by {rounded(float(here.min()))}{SIGNS[unit]} to {worst}."
