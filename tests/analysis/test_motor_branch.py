@@ -258,6 +258,24 @@ def test_a_joint_that_is_idle_at_zero_alone_closes_no_loop(flipped):
         assert not part.cells
 
 
+def test_a_truss_on_the_way_stays_as_it_is():
+    """Three bars that no motor moves, on the rocker: the motor's loop is the only part."""
+    robot = four_bar()
+    b = Builder("truss")
+    for name in (*robot.links, "one", "two"):
+        b.link(name)
+    for joint in robot.joints.values():
+        b.joint(joint.name, "R", *joint.links, at=joint.point, axis=Z, motor=joint.actuated, loop=not joint.in_tree)
+    b.joint("t1", "R", "rocker", "one", (1.2, 0.2, 0), axis=Z)
+    b.joint("t2", "R", "rocker", "two", (1.4, 0.5, 0), axis=Z)
+    b.joint("t3", "R", "one", "two", (1.5, 0.1, 0), axis=Z, loop=True)
+    proof = branch(b.build(platform="one"), "a=-0.1:0.1")
+    assert [part.motors for part in proof.parts] == [("a",)]
+    assert {"t1", "t2"} <= set(proof.held)
+    assert proof.parts[0].share == 1.0
+    assert obeys(proof, np.random.default_rng(0), 2, 5) == 10
+
+
 @pytest.mark.parametrize("ratio", [-1.0, 0.5, 0.1, 7.0])
 def test_a_gear_comes_back_after_whole_turns_alone(ratio):
     """A platform that a motor carries itself; x = ratio q is affine, so that its tube is as thin as tubes are."""

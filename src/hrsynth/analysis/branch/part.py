@@ -153,15 +153,17 @@ def whole(system: LoopSystem, loops: Sequence[JointLoop], gears: Sequence[GearEq
 
 
 def parts_of(system: LoopSystem) -> tuple[tuple[LoopPart, ...], tuple[int, ...]]:
-    """The parts of a system, and the coordinates that are held: those that turn nothing but themselves (idle).
+    """The parts of a system, and the coordinates that are held: those that turn nothing but themselves
+    (idle), and those of loops that no motor has to do with.
 
     Raises ``MotorsNotEnough`` where the platform can move while all that is driven rests, ``BadRequest`` where what is
     driven depends on each other.
     """
     held = _idle(system)
     unknowns = [i for i, each in enumerate(system.coordinates) if not each.driven and i not in held]
-    groups = _groups(system, unknowns)
-    return tuple(_part(system, group) for group in groups), tuple(sorted(held))
+    parts = [_part(system, group) for group in _groups(system, unknowns)]
+    held |= {i for part in parts if not part.driven for i in part.unknowns}
+    return tuple(part for part in parts if part.driven), tuple(sorted(held))
 
 
 def _idle(system: LoopSystem) -> set[int]:
