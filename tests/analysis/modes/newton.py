@@ -79,12 +79,17 @@ def solutions(system: System, starts: int, rng: np.random.Generator, real: bool 
         v[:, :3] += centre
     else:
         v[:, :2] += (centre - system.X_plane[:3, 3]) @ system.X_plane[:3, :2]
+    moving = np.arange(starts)  # those whose last step was no rounding
     for _ in range(rounds):
-        F = equations(system, v)
-        J = np.stack([(equations(system, v + h) - equations(system, v - h)) / 2e-6 for h in 1e-6 * np.eye(n)], axis=2)
+        x = v[moving]
+        F = equations(system, x)
+        J = np.stack([(equations(system, x + h) - equations(system, x - h)) / 2e-6 for h in 1e-6 * np.eye(n)], axis=2)
         step = np.einsum("bij,bj->bi", np.linalg.pinv(J), F)
         step *= np.minimum(1.0, 2.0 * size / np.maximum(np.abs(step).max(axis=1, keepdims=True), 1e-300))
-        v = v - step
+        v[moving] = x - step
+        moving = moving[np.abs(step).max(axis=1) > 1e-13 * min(1.0, size)]
+        if not len(moving):
+            break
     good = (np.abs(equations(system, v)).max(axis=1) < 1e-9 * size) & (np.abs(v).max(axis=1) < 1e4)
     found: list[Batch] = []
     for each in v[good]:
