@@ -38,9 +38,10 @@ class Linkage:
 
     def frames(self, angles: Array) -> list[Array]:
         """The frames (4, 4) of the joints' axes, one after another, the last that of the first joint again."""
-        cos, sin, level, up = np.cos(angles), np.sin(angles), np.cos(self.twists), np.sin(self.twists)
+        sin, up = np.sin(angles), np.sin(self.twists)
+        cos, level = 1 - (1 - np.cos(angles)), 1 - (1 - np.cos(self.twists))  # as Rodrigues' formula rounds them
         links = np.zeros((len(angles), 4, 4))  # Rot(z, θ) Trans(a, 0, d) Rot(x, α)
-        links[:, 0] = np.stack([cos, -sin * level, sin * up, self.lengths * cos], axis=1)
+        links[:, 0] = np.stack([cos, -sin * level, sin * up, self.lengths * np.cos(angles)], axis=1)
         links[:, 1] = np.stack([sin, cos * level, -cos * up, self.lengths * sin], axis=1)
         links[:, 2, 1], links[:, 2, 2], links[:, 2, 3], links[:, 3, 3] = up, level, self.offsets, 1.0
         return list(accumulate(links, np.matmul, initial=np.eye(4)))
