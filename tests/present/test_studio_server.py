@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import re
+import signal
 import socket
 import sys
 import time
@@ -284,6 +285,15 @@ def test_a_cancelled_question_leaves_the_others(page: Page):
     page.send("cancel", of=last + 100)
     answers = {each["n"]: each for each in (page.heard() for _ in range(3))}
     assert [answers[each].get("kind") for each in (first, waiting, last)] == ["Cancelled", "Cancelled", None]
+
+
+def test_a_process_that_ended_at_rest_is_replaced(page: Page):
+    for kind in ("move", "open"):
+        process = page.ask(kind)["answer"]["process"]
+        os.kill(process, signal.SIGKILL)
+        assert soon(lambda process=process: not alive(process))
+        time.sleep(0.2)
+        assert page.ask(kind)["answer"]["process"] != process
 
 
 @pytest.mark.parametrize("message", [

@@ -147,6 +147,8 @@ class WorkerProcess:
 
     async def _started(self) -> tuple[asyncio.StreamReader, asyncio.StreamWriter]:
         """The process, made where there is none, ready to answer."""
+        if self.streams is not None and self.streams[0].at_eof():  # it has ended meanwhile
+            self._end()
         if self.streams is None:
             channel = await asyncio.to_thread(self.forks.channel)
             self.streams = reader, writer = await asyncio.open_unix_connection(sock=channel)
