@@ -39,7 +39,8 @@ def test_the_gallery_has_every_shipped_robot_with_a_picture():
     assert found["files"] == []
 
 
-@pytest.mark.parametrize("robot", ["rrrrr_m1", "3rps", pytest.param("quattro", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("robot", [
+    "rrrrr_m1", *(pytest.param(name, marks=pytest.mark.slow) for name in ("3rps", "quattro"))])
 def test_every_slider_moves_its_own_coordinate_with_closed_loops(robot: str):
     scene = ask("open", robot)
     assert len(scene["sliders"]) == observe(load(robot)).dof
@@ -216,7 +217,7 @@ def test_what_is_exported_is_the_file_that_its_name_says(kind: str, tmp_path: Pa
     ("open", "rrrrr_m1", {}), ("watch", "prrrp_parallel", {"watch": ["1"]}),
     ("modes", "rrrrr_m1", {"watch": ["2", "1"]}),
     ("plane", "3upu", {"of": "xy", "size": 4}),
-    ("plane", "3upu", {"of": "xz", "size": 3, "kind": "distance"}), ("answer", "rrrrr_m1", {}),
+    pytest.param("plane", "3upu", {"of": "xz", "size": 3, "kind": "distance"}, marks=pytest.mark.slow), ("answer", "rrrrr_m1", {}),
     pytest.param("servo", "rrrrr_m1", {"goal": [0.03, 0.24]}, marks=pytest.mark.slow),
 ])
 def test_the_command_and_the_line_of_python_give_what_the_panel_shows(what: str, robot: str, fields: dict[str, Any],

@@ -23,6 +23,7 @@ FIELDS = {"open": ("watch", "camera", "here", "robot"), "move": ("values", "plat
           "modes": ("here", "watch", "camera"), "plane": ("kind", "of", "at", "here", "watch"),
           "servo": ("goal", "here", "watch"), "export": ("kind", "watch"), "gallery": ("robot",)}
 QUICK = {"plane": {"size": 2}, "export": {"kind": "robot"}}
+LONG = ("plane", "servo", "export", "open")
 OPTIONS = ("base", "platform", "motors", "close", "freeze", "keyframe", "unit", "tolerance", "as_written", "observe")
 
 
@@ -45,7 +46,7 @@ def test_the_fuzz_knows_every_question():
     assert tuple(sorted(FIELDS)) == names()
 
 
-@pytest.mark.parametrize("what", [pytest.param(what, marks=pytest.mark.slow) if what in ("plane", "servo") else what
+@pytest.mark.parametrize("what", [pytest.param(what, marks=pytest.mark.slow) if what in LONG else what
                                   for what in sorted(FIELDS)])
 def test_no_field_of_any_question_is_trusted(what: str):
     desk = Desk()

@@ -86,7 +86,8 @@ def answer(request: Request) -> dict[str, Any]:
             "at": float(values[third[0]]) if third else None,
             "normal": np.eye(3)[across].tolist() if across is not None and across < 3 else None,
             "locus": [[place(*point).tolist() for point in segment] for segment in found.locus],
-            "words": _words(kind, unit, found, here.real.twin.length), "of": [mover.coordinates.names[i] for i in pair], **same}
+            "words": _words(kind, unit, found, here.real.twin.length),
+            "of": [mover.coordinates.names[i] for i in pair], **same}
 
 
 def _range(request: Request, mover: Mover, index: int) -> Array:
