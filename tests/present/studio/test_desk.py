@@ -217,7 +217,8 @@ def test_what_is_exported_is_the_file_that_its_name_says(kind: str, tmp_path: Pa
     ("open", "rrrrr_m1", {}), ("watch", "prrrp_parallel", {"watch": ["1"]}),
     ("modes", "rrrrr_m1", {"watch": ["2", "1"]}),
     ("plane", "3upu", {"of": "xy", "size": 4}),
-    pytest.param("plane", "3upu", {"of": "xz", "size": 3, "kind": "distance"}, marks=pytest.mark.slow), ("answer", "rrrrr_m1", {}),
+    pytest.param("plane", "3upu", {"of": "xz", "size": 3, "kind": "distance"}, marks=pytest.mark.slow),
+    ("answer", "rrrrr_m1", {}),
     pytest.param("servo", "rrrrr_m1", {"goal": [0.03, 0.24]}, marks=pytest.mark.slow),
 ])
 def test_the_command_and_the_line_of_python_give_what_the_panel_shows(what: str, robot: str, fields: dict[str, Any],
