@@ -204,8 +204,8 @@ TUBE_WIDER = 1.2
 """How much wider than what a linear estimate asks for a tube is tried."""
 BACK_CELLS = 256
 """Cells of all motors together over which the way back, from the platform to the motors, is looked at."""
-BACK_TRIALS = 1000
-"""Sets of cells that are tried together, at most, to prove that no two motors in a box have one pose."""
+BACK_TRIALS = 5000
+"""Sets of cells and pairs of them that are tried, at most, to prove that no two motors in a box have one pose."""
 BACK_SIZES = 12
 """Boxes that are tried for the way back, each 0.7 of the one before."""
 BACK_SIDES = 6

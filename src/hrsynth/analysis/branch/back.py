@@ -89,6 +89,7 @@ class InjectiveTrial:
     def apart(self, one: tuple[Array, Array], other: tuple[Array, Array]) -> bool:
         """Whether no motors in one box have a pose of others in the other box."""
         own = [self.cells.within(*box) for box in (one, other)]
+        self.tried += 1
         if not all(map(len, own)):
             return False
         (low, high), (low_, high_) = ((self.cells.ends[0][each].min(axis=0), self.cells.ends[1][each].max(axis=0))
@@ -141,35 +142,40 @@ def way_back(system: LoopSystem, grown: Sequence[Growth]) -> tuple[tuple[Array, 
     place = np.argsort(order)
     home, free = np.concatenate([growth.q0 for growth in grown]), False
     cells: PosedCells | None = None
-    while np.prod([len(each.tubes) for each in parts]) <= BACK_CELLS:
+    while _count(parts) <= BACK_CELLS:
         cells = _posed(system, way, parts)
         free = free or all(cells.regular(np.array([k])) for k in range(len(cells.low)))
         if free and InjectiveTrial(cells).one_to_one(low, high):
             return (low[place], high[place]), True
+        if _count(parts) * 2 ** len(home) > BACK_CELLS:
+            break
         parts = [each.halved() for each in parts]
     box = None if cells is None else _part(InjectiveTrial(cells), home, low, high)
     for size in 0.7 ** np.arange(1, BACK_SIZES) if box is None else ():  # fewer cells, which may be smaller
         a, b = home + size * (low - home), home + size * (high - home)
         parts = [each.within(a[own], b[own]) for each, own in zip(parts, sides, strict=True)]
-        while box is None and np.prod([len(each.tubes) for each in parts]) <= BACK_CELLS:
+        while box is None and _count(parts) <= BACK_CELLS:
             cells = _posed(system, way, parts)
             box = (a, b) if InjectiveTrial(cells).one_to_one(a, b) else None
+            if _count(parts) * 2 ** len(home) > BACK_CELLS:
+                break
             parts = [each.halved() for each in parts]
         if box is not None:
             break
     return None if box is None else (box[0][place], box[1][place]), free
 
 
+def _count(parts: Sequence[TubedCells]) -> int:
+    """How many cells of all motors together those of the parts make."""
+    return int(np.prod([len(each.tubes) for each in parts]))
+
+
 def _part(trial: InjectiveTrial, home: Array, low: Array, high: Array) -> tuple[Array, Array] | None:
     """A large box about ``home`` in which no two motors have one pose, part of another: shrunk until it is proved, then
     moved out side by side."""
-    def proved(box: Array) -> bool:
-        trial.tried = 0
-        return trial.one_to_one(box[0], box[1])
-
     whole = np.array([low, high])
     boxes = (home + size * (whole - home) for size in 0.7 ** np.arange(1, BACK_SIZES))
-    box = next((each for each in boxes if proved(each)), None)
+    box = next((each for each in boxes if trial.one_to_one(each[0], each[1])), None)
     if box is None:
         return None
 
@@ -181,7 +187,7 @@ def _part(trial: InjectiveTrial, home: Array, low: Array, high: Array) -> tuple[
         for _ in range(BACK_SIDES):
             wider, part = box.copy(), (least + most) / 2
             wider[side, k] = moved(side, k, part)
-            if proved(wider):
+            if trial.one_to_one(wider[0], wider[1]):
                 least = part
             else:
                 most = part
