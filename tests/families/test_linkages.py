@@ -92,6 +92,21 @@ def test_a_linkage_is_written_by_its_name(tmp_path: Path):
         main(str(tmp_path), "robot")
 
 
+ZERO = {"bennett": [2.195943, -4.285574, -2.195943, -1.997611],
+        "goldberg": [2.325192, -1.84005, -2.047224, -7.584728, 2.863624],
+        "myard": [-4.349778, 1.309885, 0.604093, -2.5375, -1.309885],
+        "sarrus": [84.025747, -104.260548, 20.234801, 17.266767, -28.720018, 11.453251],
+        "line_symmetric_bricard": [-0.579634, -2.852979, -5.880786, -0.579634, 3.430207, 0.4024],
+        "plane_symmetric_bricard": [2.18075, -4.794784, -4.513034, 2.327741, 1.770151, 1.488401],
+        "schatz": [0.415193, -3.797579, -1.219641, 4.453566, -0.960976, 2.293374]}
+
+
+@pytest.mark.parametrize("name", LINKAGES)
+def test_the_zero_configurations_of_linkages_stay(name: str):
+    """What was written from them stays what it was: the angles at zero (rad)."""
+    assert LINKAGES[name]().regular(np.random.default_rng(0)) == pytest.approx(ZERO[name], abs=1e-6)
+
+
 def test_dimensions_that_keep_a_joint_near_to_zero_end_with_the_farthest_angles():
     linkage, zero, _ = drawn("goldberg", 2)
     assert 0.05 < np.abs(np.sin(zero)).min() < 0.1
