@@ -45,15 +45,18 @@ def located(name: str, folder: Path) -> Path | None:
     return None
 
 
-def triangles(name: str, robot: str | None) -> tuple[Array, Any] | None:
-    """The points (n, 3) and triangles (m, 3) of a mesh that the file of a robot names; None where it cannot be read."""
+def triangles(name: str, robot: str | None, within: Path | None = None) -> tuple[Array, Any] | None:
+    """The points (n, 3) and triangles (m, 3) of a mesh that the file of a robot names; None where it cannot be read.
+    With ``within`` only files of that folder are read, also those that lie flat in it."""
     folder = Path(robot).parent if robot else Path()
     path = located(name, folder)
+    if within is not None:
+        path = _fenced(path or within / Path(name).name, within)
     import trimesh
 
     try:
         if path is None:
-            inner = _inner(name, folder)
+            inner = _inner(name, folder, within)
             if inner is None:
                 return None
             solid: Any = trimesh.load(io.BytesIO(inner), file_type="obj", force="mesh", process=False)
@@ -67,10 +70,20 @@ def triangles(name: str, robot: str | None) -> tuple[Array, Any] | None:
     return (points, faces) if len(faces) and np.all(np.isfinite(points)) else None
 
 
-def _inner(name: str, folder: Path) -> bytes | None:
+def _fenced(path: Path, within: Path) -> Path | None:
+    """A file where it lies in a folder, links resolved, or else one of its name there."""
+    for each in (path, within / path.name):
+        if each.is_file() and each.resolve().is_relative_to(within.resolve()):
+            return each
+    return None
+
+
+def _inner(name: str, folder: Path, within: Path | None = None) -> bytes | None:
     """A mesh that lies in a USD file, as the text of an ``.obj`` file."""
     file, sign, prim = name.partition("#")
     path = located(file, folder) if sign else None
+    if path is not None and within is not None:
+        path = _fenced(path, within)
     if path is None:
         return None
     from .formats.usd.stage import mesh

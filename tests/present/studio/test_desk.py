@@ -323,3 +323,27 @@ def test_at_a_singularity_no_error_is_told():
         told = error(observe("3rrr_m1"), example.configuration)
         assert (told["mm"], told["step"]) == (None, 4)
         assert told["words"] in (LOST, NOT_BOUNDED)
+
+
+def test_meshes_of_a_dropped_file_are_those_that_were_dropped_with_it(tmp_path: Path):
+    """Flat beside it, whatever folder it names; none from anywhere else, by no way."""
+    trimesh = pytest.importorskip("trimesh")
+    uploads, elsewhere = tmp_path / "uploads", tmp_path / "elsewhere"
+    for folder in (uploads, elsewhere):
+        folder.mkdir()
+    trimesh.creation.box(extents=(0.03, 0.02, 0.01)).export(elsewhere / "secret.stl")
+    trimesh.creation.box(extents=(0.03, 0.02, 0.01)).export(uploads / "part.stl")
+    (uploads / "link.stl").symlink_to(elsewhere / "secret.stl")
+    text = shipped()["3rrr_m1"].read_text()
+    desk = Desk(uploads=uploads)
+
+    def drawn(name: str) -> int:
+        visual = f'<link name="prox_1"><visual><geometry><mesh filename="{name}"/></geometry></visual></link>'
+        (uploads / "robot.urdf").write_text(text.replace('<link name="prox_1"/>', visual))
+        scene = desk.answer({"ask": "open", "robot": {"source": "file:robot.urdf"}})
+        return sum(shape["kind"] == "mesh" for shape in scene["machines"][0]["shapes"])
+
+    assert [drawn(name) for name in ("part.stl", "meshes/part.stl", "package://arm/meshes/part.stl")] == [1, 1, 1]
+    outside = (str(elsewhere / "secret.stl"), f"file://{elsewhere}/secret.stl", "../elsewhere/secret.stl", "link.stl",
+               "package://elsewhere/secret.stl")
+    assert [drawn(name) for name in outside] == [0] * len(outside)

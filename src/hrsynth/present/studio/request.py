@@ -112,10 +112,17 @@ class Request(Value):
             return _of_file(str(self.given["robot"]), tuple(sorted(own.items())))
         if kind == PREFIX.removesuffix(":"):
             return RobotSource(f"{PREFIX}{name}", options)
-        root = {FILE: self.uploads, FOLDER: self.folder}.get(kind)
-        if root is None:
+        if self.fence is None:
             raise BadRequest("source of a robot", said.get("source"), "shipped:NAME, file:NAME, folder:NAME or given")
-        return _of_file(str(inside(root, name)), options)
+        return _of_file(str(inside(self.fence, name)), options)
+
+    @cached_property
+    def fence(self) -> Path | None:
+        """The folder that all files of a robot must lie in; None for a shipped robot, and for that of the command
+        line."""
+        said = self.fields.get("robot")
+        kind = str(said.get("source", "")).partition(":")[0] if isinstance(said, dict) else ""
+        return {FILE: self.uploads, FOLDER: self.folder}.get(kind)
 
     @cached_property
     def mechanism(self) -> Mechanism:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,8 +17,9 @@ MOST_TRIANGLES = 200_000
 """Triangles of all meshes together beyond which they are left out: the page holds them as text."""
 
 
-def meshes(setting: ObservedRobot) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
-    """The shapes of the file's visuals, on the links of the normal form, and a note where meshes are missing."""
+def meshes(setting: ObservedRobot, within: Path | None = None) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
+    """The shapes of the file's visuals, on the links of the normal form, and a note where meshes are missing; with
+    ``within`` no files are read that do not lie in that folder."""
     robot, mechanism = setting.robot, setting.mechanism
     found, missing, count = [], [], 0
     for name, link in robot.links.items():
@@ -28,7 +30,7 @@ def meshes(setting: ObservedRobot) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
         for solid in content_of(link, robot).solids:
             if solid.role != "visual":
                 continue
-            surface = _surface(solid, robot.file)
+            surface = _surface(solid, robot.file, within)
             if surface is None:
                 missing.append(f"{name}: {solid.file}")
                 continue
@@ -42,12 +44,12 @@ def meshes(setting: ObservedRobot) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
     return tuple(found), note
 
 
-def _surface(solid: Solid, file: str | None) -> tuple[Array, Any] | None:
+def _surface(solid: Solid, file: str | None, within: Path | None) -> tuple[Array, Any] | None:
     """The points (n, 3) and triangles (m, 3) of a visual in its own frame (m), None of a mesh that cannot be read."""
     from trimesh import creation
 
     if solid.file is not None:
-        read = triangles(solid.file, file)
+        read = triangles(solid.file, file, within)
         return None if read is None else (read[0] * np.array(solid.scale), read[1])
     if solid.kind == "box":
         made = creation.box(extents=solid.sizes)

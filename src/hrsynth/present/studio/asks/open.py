@@ -45,7 +45,7 @@ def scene(request: Request) -> dict[str, Any]:
     """What is drawn and moved."""
     setting, mover = request.setting, request.mover()
     known = {each.leg: each for each in (*setting.segments, *setting.observed)}
-    shapes, missing = meshes(setting)
+    shapes, missing = meshes(setting, request.fence)
     places = [mover.places(each)[REAL] for each in (mover.home, *(end for pair in request.ends for end in pair))]
     words = str(setting.anatomy.architecture())
     machine = machine_of(REAL, setting, setting.mechanism, words, places, shapes)
