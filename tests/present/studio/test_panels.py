@@ -140,6 +140,62 @@ def test_the_error_that_is_shown_is_that_of_the_legs_that_are_watched(tab: Tab, 
     assert "no bound" in page.locator("#now").inner_text()
 
 
+def drawn(page: Any) -> Any:
+    """The values of the plane that is drawn."""
+    return page.evaluate("() => studio.panels.plane.record?.values ?? null")
+
+
+def test_a_plane_is_of_the_legs_that_are_watched_and_of_the_pose(tab: Tab, address: str):
+    page = opened(tab, address, "quattro")
+    panel = show(page, "plane")
+    panel.get_by_role("button", name="Draw the plane").click()
+    answered(page)
+    first = drawn(page)
+    show(page, "legs").locator("input[value='2']").click()
+    answered(page)
+    show(page, "plane")
+    answered(page)
+    second = drawn(page)
+    assert second not in (None, first)
+    assert "--observe 1,3,4" in panel.locator(".same code").first.text_content()
+    show(page, "move").get_by_role("slider").last.focus()
+    for _ in range(10):
+        page.keyboard.press("ArrowRight")
+    answered(page)
+    page.wait_for_timeout(500)
+    show(page, "plane")
+    answered(page)
+    assert drawn(page) not in (None, first, second)
+
+
+def test_an_answer_for_other_legs_is_not_shown(tab: Tab, address: str):
+    held: list[Any] = []
+
+    def between(route: Any) -> None:
+        server = route.connect_to_server()
+        route.on_message(lambda message: held.append((server, message)) if '"modes"' in message
+                         else server.send(message))
+        server.on_message(route.send)
+
+    tab.page.route_web_socket(re.compile("/live$"), between)
+    page = opened(tab, address, "delta")
+    show(page, "modes")
+    page.wait_for_timeout(200)
+    show(page, "legs").locator("input[value='3']").click()
+    for server, message in held:
+        server.send(message)
+    answered(page)
+    assert page.locator("#panel-modes .modes li").count() == 0
+
+
+def test_smallest_sets_that_are_not_listed_are_counted(tab: Tab, address: str):
+    page = opened(tab, address, "gough_stewart")
+    panel = show(page, "legs")
+    answered(page)
+    assert panel.locator(".sets button").count() == 10
+    assert "and 10 more" in panel.locator(".sets").inner_text()
+
+
 def test_sliders_move_the_robot_and_home_brings_it_back(tab: Tab, address: str):
     page = opened(tab, address, "3rrr_m1")
     panel = show(page, "move")
@@ -184,6 +240,7 @@ def test_a_run_is_set_played_and_scrubbed(tab: Tab, address: str):
     answered(page)
     assert said(panel) == ""
     assert panel.locator("svg .leg").count() == panel.locator("svg .desired").count() == 3
+    assert re.search(" --start .* --goal ", panel.locator(".same code").first.text_content())
     panel.get_by_role("button", name="Pause").click()
     first = panel.locator("svg .leg").first.get_attribute("x2")
     panel.get_by_role("slider").fill("0")

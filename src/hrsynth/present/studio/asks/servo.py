@@ -43,7 +43,7 @@ def answer(request: Request) -> dict[str, Any]:
                "e": found.run.commands[i].size, "image": image(eye, reference, rods, posed.real.pose)}
               for i, posed in zip(chosen, way, strict=False)]
     poses = [at_pose(setting, each.real) for each in (start, end)]
-    same = lines(request, "servo", "--from", poses[0], "--to", poses[1], start=poses[0], goal=poses[1])
+    same = lines(request, "servo", "--start", poses[0], "--goal", poses[1], start=poses[0], goal=poses[1])
     return {"frames": frames, "desired": image(eye, reference, rods, end.real.pose),
             "size": [eye.width, eye.height], "kind": found.ended,
             "words": f"Ended in: {found.ended} ({found.ending.reason}), after {found.run.times[-1]:.3g} s",

@@ -36,11 +36,12 @@ MOST_SETS = 10
 def answer(request: Request) -> dict[str, Any]:
     """All that follows from which legs are watched, at ``here``."""
     setting = request.setting
-    sets = [{"legs": list(each.legs), "words": each.verdict} for each in smallest(all_legs(setting))[:MOST_SETS]
-            if each.rank]
+    best = [each for each in smallest(all_legs(setting)) if each.rank]
+    sets = {"sets": [{"legs": list(each.legs), "words": each.verdict} for each in best[:MOST_SETS]],
+            "more_sets": max(0, len(best) - MOST_SETS)}
     if request.blind:
         return {"verdict": {"controllable": False, "words": "no leg is watched", "certainty": ""}, "rank": 0,
-                "dof": setting.dof, "lost": [], "hidden": None, "hidden_words": "", "condition": "", "sets": sets,
+                "dof": setting.dof, "lost": [], "hidden": None, "hidden_words": "", "condition": "", **sets,
                 "ellipsoid": None, "error": nothing(unit_of(setting), "no leg is watched"), **lines(request, "legs")}
     derivation, mover = request.derivation, request.mover()
     verdict, here = derivation.verdict, request.here(mover)
@@ -52,7 +53,7 @@ def answer(request: Request) -> dict[str, Any]:
         "rank": posture.hidden.rank, "dof": verdict.dof, "here": STATES[posture.hidden.state],
         "lost": [lost(each, point.tolist()) for each in posture.hidden.lost],
         "hidden": hidden(request), "hidden_words": hidden_words(request), "condition": condition(setting),
-        "sets": sets, "ellipsoid": ellipsoid(setting, here.real), "error": error(setting, here.real),
+        **sets, "ellipsoid": ellipsoid(setting, here.real), "error": error(setting, here.real),
         **lines(request, "derive")}
 
 

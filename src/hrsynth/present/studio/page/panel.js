@@ -11,12 +11,12 @@ class Panel {
       element("h2", { textContent: title }), this.body, this.status.root, this.same.root);
   }
 
-  /* Ask about the robot as it stands; null where nothing came of it. */
+  /* Ask about the robot as it stands; null where nothing came of it, or where meanwhile other legs are watched. */
   async ask(kind, words, fields = {}, channel = kind) {
-    const { studio } = this, robot = studio.robot;
+    const { studio } = this, { robot, watch } = studio;
     const answer = await this.status.during(studio.link.ask(kind, { ...studio.asked(), ...fields }, channel), words,
       () => studio.link.cancel(channel));
-    return robot === studio.robot ? answer : null;
+    return robot === studio.robot && watch === studio.watch ? answer : null;
   }
 
   /* The panel is looked at or no longer; another robot; another place; other legs; at rest; Escape. */

@@ -76,7 +76,7 @@ class LegsPanel extends Panel {
     this.same.show(found);
   }
 
-  tell({ verdict, rank, dof, here, lost, hidden_words: hidden, condition, sets, error }) {
+  tell({ verdict, rank, dof, here, lost, hidden_words: hidden, condition, sets, more_sets: more, error }) {
     const good = verdict.controllable;
     const line = (words, more = {}) => (words ? element("p", { textContent: words, ...more }) : null);
     this.verdict.className = `verdict ${good ? "good" : "bad"}`;
@@ -86,11 +86,12 @@ class LegsPanel extends Panel {
     const head = lost.length ? [element("h3", { textContent: lost.length > 1 ? "Lost freedoms" : "Lost freedom" })] : [];
     this.lost.replaceChildren(...head, ...lost.map(({ words }, i) =>
       element("div", { className: "row" }, element("span", { textContent: words }), button("Play", () => this.play(i), { "aria-label": `Play: ${words}` }))));
-    this.hidden.replaceChildren(element("h3", { textContent: "Hidden robot" }),
-      ...[line(hidden), line(condition)].filter(Boolean));
+    this.hidden.replaceChildren(...(hidden ? [element("h3", { textContent: "Hidden robot" }), line(hidden)] : []),
+      ...(condition ? [element("h3", { textContent: "Where a freedom is lost (Type 2)" }), line(condition)] : []));
     this.sets.replaceChildren(...(sets?.length ? [element("h3", { textContent: "Smallest sets of legs" })] : []),
       ...(sets || []).map(({ legs, words }) => element("div", { className: "row" },
-        button(legs.join(", "), () => this.studio.rewatch(legs), { "aria-label": `Watch ${legs.join(", ")}` }), element("span", { textContent: words }))));
+        button(legs.join(", "), () => this.studio.rewatch(legs), { "aria-label": `Watch ${legs.join(", ")}` }), element("span", { textContent: words }))),
+      ...[line(more ? `and ${more} more, which the command legs lists` : "")].filter(Boolean));
   }
 
   async play(index) {

@@ -12,23 +12,47 @@ class PlanePanel extends Panel {
   }
 
   opened(scene) {
-    this.record = this.seen = null;
-    this.words.textContent = "";
-    this.scale.replaceChildren();
-    this.same.show(null);
+    this.stale = false;
+    this.forget();
     const ways = scene.sliders.filter(({ unit }) => unit !== "rad");
     const across = ways.length >= 2 ? ways : scene.sliders;
     const pairs = across.flatMap((one, i) => across.slice(i + 1).map((other) => [one.name + other.name, `${one.label} and ${other.label}`]));
     this.of = pairs.at(0)?.[0];
     this.ways = across;
     this.layout(pairs);
+  }
+
+  forget() {
+    this.record = this.seen = null;
+    this.words.textContent = "";
+    this.scale.replaceChildren();
+    this.same.show(null);
     this.draw();
+  }
+
+  /* Other legs see otherwise. */
+  rewatched() { this.anew(this.record); }
+
+  /* The coordinates that the plane neither spans nor is drawn along are held where the platform is. */
+  settled() { this.anew(this.record && String(this.record.held) !== String(this.held())); }
+
+  /* A plane of other legs or of another pose is not shown: it is asked for again, as soon as it is looked at. */
+  anew(needed) {
+    if (!needed) return;
+    this.forget();
+    this.stale = true;
+    if (this.studio.isShown(this.key)) this.entered();
+  }
+
+  held() {
+    const third = this.ways.find(({ name }) => !this.of?.includes(name))?.name;
+    return this.studio.scene.sliders.flatMap(({ name }, i) => (this.of?.includes(name) || name === third ? [] : [this.studio.values[i].toFixed(6)]));
   }
 
   layout(pairs) {
     this.controls.replaceChildren(
-      choice("Shown", [["accuracy", "error of the platform per 0.1°"], ["distance", "distance to a singularity (smallest singular value)"]], this.kind, (kind) => { this.kind = kind; this.refresh(); }),
-      choice("Plane of", pairs, this.of, (of) => { this.of = of; this.layout(pairs); this.refresh(); }));
+      choice("Shown", [["accuracy", "error of the platform per 0.1°"], ["distance", "distance to a singularity (smallest singular value)"]], this.kind, (kind) => { this.kind = kind; this.forget(); this.refresh(); }),
+      choice("Plane of", pairs, this.of, (of) => { this.of = of; this.layout(pairs); this.forget(); this.refresh(); }));
     const third = this.ways.find(({ name }) => !this.of?.includes(name));
     this.at = null;
     if (!third) return;
@@ -38,11 +62,12 @@ class PlanePanel extends Panel {
   }
 
   async refresh() {
-    const fields = { kind: this.kind, of: this.of, at: this.at?.value ?? null, size: PlanePanel.SIZE };
+    this.stale = false;
+    const held = this.held(), fields = { kind: this.kind, of: this.of, at: this.at?.value ?? null, size: PlanePanel.SIZE };
     const found = await this.ask("plane", "Computing the plane", fields);
     if (!found) return;
     found.falling = fields.kind === "distance";
-    this.record = { ...found, at: fields.at };
+    this.record = { ...found, at: fields.at, held };
     this.thresholds(found);
     this.words.textContent = found.words;
     this.same.show(found);
@@ -72,7 +97,8 @@ class PlanePanel extends Panel {
 
   entered() {
     this.draw();
-    if (this.record) this.studio.refit();
+    if (this.stale) this.refresh();
+    else if (this.record) this.studio.refit();
   }
 
   left() {

@@ -68,6 +68,7 @@ class ServoPanel extends Panel {
   frame(frame, index) {
     this.studio.draw(frame);
     this.picture.show(frame, index);
+    if (index === this.player.frames.length - 1) this.studio.refit();
     this.now.textContent = `${frame.t.toFixed(2)} s, error ${Number(frame.e).toPrecision(2)}`;
   }
 
