@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import json
 import shlex
-import time
 from base64 import b64decode
 from pathlib import Path
 from typing import Any
@@ -302,20 +301,17 @@ def test_what_was_guessed_of_a_foreign_file_is_told_and_can_be_changed(tmp_path:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("robot", list(shipped()))
-def test_a_drag_is_answered_twenty_times_a_second(robot: str):
+def test_along_every_slider_the_loops_stay_closed(robot: str):
+    """Step by step, as a hand draws it, with the hidden robot; how quickly is measured in ``benchmarks/studio.py``."""
     scene = ask("open", robot)
-    ask("move", robot, hidden=True)
     for number, slider in enumerate(scene["sliders"]):
-        values, here, seconds = [*scene["values"]], None, []
+        values, here = [*scene["values"]], None
         for _ in range(10):
             values[number] += (slider["max"] - slider["home"]) / 30
-            began = time.process_time()
             moved = DESK.answer({"ask": "move", "robot": {"source": f"shipped:{robot}"}, "values": values,
                                  "here": here, "hidden": True})
-            seconds.append(time.process_time() - began)
             here = moved["here"]
             assert moved["residual"] < CLOSED
-        assert np.median(seconds) < 0.05
 
 
 def test_at_a_singularity_no_error_is_told():
