@@ -17,7 +17,8 @@ Z = np.array([0.0, 0.0, 1.0])
 
 def rocker_driven(bars, angle, side, turn=None) -> Mechanism:
     """A four-bar whose platform is the rocker."""
-    robot = four_bar(*bars, angle, turn, side)
+    ground, crank, coupler, rocker = bars
+    robot = four_bar(ground, crank, coupler, rocker, angle, turn, side)
     return Mechanism.of("rocker", robot.links.values(), robot.joints.values(), base="base", platform="rocker")
 
 

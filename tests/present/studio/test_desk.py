@@ -139,6 +139,7 @@ def test_a_mode_is_flown_to_and_has_the_same_directions():
     assert np.array(there["state"]["real"]) == pytest.approx(np.array(found["modes"][1]["places"]), abs=1e-6)
     twin = setting.everything.start.twin
     for each in setting.observed:
+        assert isinstance(each, Direction)
         one, other = (twin.pose(np.array(q), each.link)[:3, :3] @ each.direction
                       for q in (twin.q0, there["here"]["q"]))
         assert one == pytest.approx(other, abs=1e-9)

@@ -22,7 +22,7 @@ FIELDS = {"open": ("watch", "camera", "here", "robot"), "move": ("values", "plat
           "watch": ("watch", "camera", "here"), "play": ("lost", "hidden", "here", "watch"), "answer": ("camera",),
           "modes": ("here", "watch", "camera"), "plane": ("kind", "of", "at", "here", "watch"),
           "servo": ("goal", "here", "watch"), "export": ("kind", "watch"), "gallery": ("robot",)}
-QUICK = {"plane": {"size": 2}, "export": {"kind": "robot"}}
+QUICK: dict[str, dict[str, Any]] = {"plane": {"size": 2}, "export": {"kind": "robot"}}
 LONG = ("plane", "servo", "export", "open")
 OPTIONS = ("base", "platform", "motors", "close", "freeze", "keyframe", "unit", "tolerance", "as_written", "observe")
 
@@ -50,7 +50,7 @@ def test_the_fuzz_knows_every_question():
                                   for what in sorted(FIELDS)])
 def test_no_field_of_any_question_is_trusted(what: str):
     desk = Desk()
-    base = {"ask": what, "robot": {"source": f"shipped:{ROBOT}"}, **QUICK.get(what, {})}
+    base: dict[str, Any] = {"ask": what, "robot": {"source": f"shipped:{ROBOT}"}, **QUICK.get(what, {})}
     for name in FIELDS[what]:
         for junk in JUNK:
             law_plain_or_refused(desk, {**base, name: junk})
