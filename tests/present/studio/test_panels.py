@@ -363,6 +363,26 @@ def test_a_file_that_is_no_robot_is_one_line_and_the_robot_stays(tab: Tab, addre
     tab.complaints.clear()
 
 
+def test_a_file_is_named_as_it_is_called_and_long_words_are_in_sight(tab: Tab, address: str):
+    page = enter(tab, address)
+    drop(page, bad__urdf="<robot name='bad'><link/></robot>")
+    panel = page.locator("#panel-robot")
+    panel.locator("[role=alert]:not(:empty)").wait_for(timeout=SLOW)
+    assert said(panel).startswith("bad.urdf:")
+    name = f"four {'x' * 150}.urdf"
+    drop(page, **{name.replace(".", "__"): next(iter(URDF.values()))})
+    page.locator(f"[data-source='file:{name}'][aria-current=true]").wait_for(timeout=SLOW)
+    assert beyond(page) == []
+    assert panel.evaluate("(panel) => panel.scrollWidth <= panel.clientWidth")
+    show(page, "legs")
+    answered(page)
+    assert page.locator("#panel-legs .same code").first.text_content().startswith(f"hrsynth derive '{name}'")
+    page.evaluate("() => studio.draw({ ...studio.state, beyond: ['a_joint_of_a_long_name', 'another_one'].concat("
+                  "Array(6).fill('and_one_more_joint')) })")
+    told, legend = (page.locator(each).bounding_box() for each in ("#now", "#legend ul"))
+    assert told["y"] + told["height"] <= legend["y"] + 1
+
+
 def test_what_is_shown_can_be_copied_and_saved(tab: Tab, address: str):
     page = opened(tab, address, "3rrr_m1")
     page.context.grant_permissions(["clipboard-read", "clipboard-write"])

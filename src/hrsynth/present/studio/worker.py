@@ -129,9 +129,10 @@ def answer_all(channel: socket.socket, desk: Callable[..., Any]) -> None:
         setup = json.loads(_read(stream) or b"{}")
         folder, uploads = (None if setup[each] is None else Path(setup[each]) for each in ("folder", "uploads"))
         found = desk(folder, uploads, setup["given"])
+        place = b"" if uploads is None else f"{uploads.resolve()}/".encode()  # what was dropped in is named alone
         _write(stream, READY)
         while asked := _read(stream):
-            _write(stream, answered(found, json.loads(asked)))
+            _write(stream, answered(found, json.loads(asked)).replace(place, b""))
 
 
 def answered(desk: Any, asked: dict[str, Any]) -> bytes:

@@ -176,8 +176,8 @@ class Studio {
 
   draw(state) {
     this.stage.state(state);
-    const beyond = state.beyond?.length ? `Beyond its limits: ${state.beyond.join(", ")}.` : "";
-    $("now").textContent = [state.error?.words, beyond].filter(Boolean).join(" ");
+    const beyond = state.beyond?.length ? `beyond its limits: ${state.beyond.join(", ")}` : "";
+    $("now").textContent = [state.error?.words, beyond].filter(Boolean).join("; ");
     $("now").hidden = !$("now").textContent;
     if (this.step !== state.error?.step) this.relegend();
     this.step = state.error?.step;
