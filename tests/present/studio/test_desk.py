@@ -73,6 +73,13 @@ def test_a_platform_is_drawn_to_the_nearest_pose_that_it_can_have():
     assert again["residual"] < CLOSED
 
 
+def test_what_no_leg_stands_for_is_asked_for_by_its_link():
+    """A link named when the robot was opened stays the one that is watched, whatever legs are ticked."""
+    legs = {leg["name"]: leg for leg in ask("open", "quattro", watch=["rod_1b", "2"])["legs"]}
+    assert [(leg["ask"], leg["link"], leg["watched"]) for leg in legs.values()] == [
+        ("rod_1b", "rod_1b", True), ("2", "rod_2a", True), ("3", "rod_3a", False), ("4", "rod_4a", False)]
+
+
 def test_what_is_watched_is_what_check_says():
     found = ask("watch", "prrrp_parallel", watch=["1"])
     known = check("prrrp_parallel", ["1"]).postures[0]

@@ -72,7 +72,7 @@ def sliders(mover: Mover, ends: Sequence[tuple[Posed, Posed]]) -> list[dict[str,
 
 
 def _leg(request: Request, setting: ObservedRobot, leg: Leg) -> dict[str, Any]:
-    """A leg: its chain, whether it can be watched, and why at this link, or why not."""
+    """A leg: its chain, whether it can be watched, and why at this link, or why not; what to ``ask`` for it by."""
     seen = next((each for each in setting.observed if each.leg == leg.label), None)
     default = next((each for each in setting.segments if each.leg == leg.label), None)
     shown, why = seen or default, None
@@ -84,7 +84,8 @@ def _leg(request: Request, setting: ObservedRobot, leg: Leg) -> dict[str, Any]:
     if shown is not None:
         why = reason(setting.anatomy, shown)
     return {"name": leg.label, "words": str(setting.anatomy.word(leg)), "can": shown is not None, "why": why,
-            "watched": seen is not None and not request.blind, "link": None if shown is None else shown.link}
+            "watched": seen is not None and not request.blind, "link": None if shown is None else shown.link,
+            "ask": seen.link if seen and not (default and seen.link == default.link) else leg.label}
 
 
 def guessed(request: Request) -> ImportChoices | None:

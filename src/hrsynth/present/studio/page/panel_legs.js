@@ -36,7 +36,7 @@ class LegsPanel extends Panel {
   cameras({ machines: [{ links }] }) {
     const { studio } = this, [base, ...others] = links;
     return choice("The camera stands on", [["", base], ...others.map((link) => [link, link])], studio.camera ?? "",
-      (link) => studio.open(studio.robot, { watch: studio.watch, camera: link || null }));
+      (link) => studio.open(studio.robot, { watch: studio.seen, camera: link || null }));
   }
 
   boxes() { return [...this.legs.querySelectorAll("input")]; }

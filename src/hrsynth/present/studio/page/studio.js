@@ -52,7 +52,12 @@ class Studio {
 
   /* What each ask carries. */
   asked() {
-    return { robot: this.robot, watch: this.watch, camera: this.camera, here: this.here };
+    return { robot: this.robot, watch: this.seen, camera: this.camera, here: this.here };
+  }
+
+  /* What is watched, as it is asked for: by legs, or by the links that were named when the robot was opened. */
+  get seen() {
+    return this.named ?? this.watch?.map((name) => this.scene.legs.find((leg) => leg.name === name)?.ask ?? name);
   }
 
   /* Another robot; the one that is shown stays until the new one is read. */
@@ -62,7 +67,7 @@ class Studio {
     const scene = await status.during(this.link.ask("open", { robot: given, watch, camera, here: null }), "Reading the robot", () => this.link.cancel("open"));
     this.ready();
     if (!scene || scene.failed) { this.kept(); this.panels.robot?.failed(scene, given); return; }
-    Object.assign(this, { robot: given, camera, scene, here: scene.here ?? null });
+    Object.assign(this, { robot: given, camera, scene, named: watch, here: scene.here ?? null });
     this.watch = scene.legs.filter(({ watched }) => watched).map(({ name }) => name);
     this.values = scene.values ?? scene.sliders.map(({ home }) => home);
     this.settled = String(this.values);
@@ -162,7 +167,7 @@ class Studio {
   }
 
   rewatch(names) {
-    this.watch = names;
+    Object.assign(this, { watch: names, named: null });
     this.stage.watch(names);
     this.judge(null);
     this.each("rewatched", names);
