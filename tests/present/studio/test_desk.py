@@ -152,6 +152,16 @@ def test_a_mode_is_flown_to_and_has_the_same_directions():
         assert one == pytest.approx(other, abs=1e-9)
 
 
+@pytest.mark.parametrize(("robot", "aspect"), [("3rrr_m1", [1, 2]), ("rrrrr_m1", [1, 2])])
+def test_aspects_are_those_of_the_atlas(robot: str, aspect: list[int]):
+    found = ask("aspects", robot)
+    same = hrsynth.atlas(robot)
+    assert found["groups"] == [list(group) for group in same.groups]
+    assert found["aspect"] == aspect
+    assert all(each.certified for each in same.pairs)
+    assert found["pairs"][0].startswith("modes 1 and 2: separated (certified)")
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize(("robot", "of"), [("3upu", "xy"), ("3rps", "turn about xturn about y")])
 def test_a_plane_has_the_errors_that_moving_there_shows(robot: str, of: str):
@@ -223,7 +233,7 @@ def test_what_is_exported_is_the_file_that_its_name_says(kind: str, tmp_path: Pa
 
 @pytest.mark.parametrize(("what", "robot", "fields"), [
     ("open", "rrrrr_m1", {}), ("watch", "prrrp_parallel", {"watch": ["1"]}),
-    ("modes", "rrrrr_m1", {"watch": ["2", "1"]}),
+    ("modes", "rrrrr_m1", {"watch": ["2", "1"]}), ("aspects", "rrrrr_m1", {}),
     ("plane", "3upu", {"of": "xy", "size": 4}),
     pytest.param("plane", "3upu", {"of": "xz", "size": 3, "kind": "distance"}, marks=pytest.mark.slow),
     ("answer", "rrrrr_m1", {}),
@@ -241,6 +251,8 @@ def test_the_command_and_the_line_of_python_give_what_the_panel_shows(what: str,
             assert [each["name"] for each in record["lost"]] == [each["words"] for each in verdict["lost"]]
         elif what == "modes":
             assert len(record["modes"]) == len(found["modes"])
+        elif what == "aspects":
+            assert record["aspects"]["modes"] == found["groups"]
         elif what == "plane":
             told = np.array(record["position_mm"] if "position_mm" in record else record["grid"]["type2"]).T
             assert told == pytest.approx(np.array(found["values"]), rel=1e-6)

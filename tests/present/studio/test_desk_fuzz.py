@@ -20,10 +20,11 @@ JUNK: list[Any] = [
     {"q": {}}, {"q": [0.0] * 50, "hidden": None}, {"q": None, "hidden": 3}, "mode:2", "page", "accuracy", "xy", "phi"]
 FIELDS = {"open": ("watch", "camera", "here", "robot"), "move": ("values", "platform", "hidden", "here", "watch"),
           "watch": ("watch", "camera", "here"), "play": ("lost", "hidden", "here", "watch"), "answer": ("camera",),
-          "modes": ("here", "watch", "camera"), "plane": ("kind", "of", "at", "here", "watch"),
+          "modes": ("here", "watch", "camera"), "aspects": ("here", "watch"),
+          "plane": ("kind", "of", "at", "here", "watch"),
           "servo": ("goal", "here", "watch"), "export": ("kind", "watch"), "gallery": ("robot",)}
 QUICK: dict[str, dict[str, Any]] = {"plane": {"size": 2}, "export": {"kind": "robot"}}
-LONG = ("plane", "servo", "export", "open")
+LONG = ("aspects", "plane", "servo", "export", "open")
 OPTIONS = ("base", "platform", "motors", "close", "freeze", "keyframe", "unit", "tolerance", "as_written", "observe")
 
 

@@ -222,6 +222,11 @@ def test_a_mode_is_flown_to_and_back(tab: Tab, address: str):
     panel.locator(".modes button:enabled").last.click()
     until(page, f"() => studio.values.some((value, i) => Math.abs(value - {before}[i]) > 1e-3)")
     answered(page)
+    panel.get_by_role("button", name="Which of them lie in one aspect?").click()
+    answered(page)
+    assert panel.locator(".modes button").all_inner_texts() == ["mode 1, aspect 1", "mode 2, aspect 2"]
+    assert panel.locator(".modes [aria-current=true] button").inner_text() == "mode 2, aspect 2"
+    assert "separated (certified)" in panel.inner_text()
     panel.get_by_role("button", name="Back to where I was").click()
     answered(page)
     assert page.evaluate("() => studio.values") == pytest.approx(before, abs=1e-6)

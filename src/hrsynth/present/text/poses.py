@@ -260,7 +260,7 @@ def atlas(found: Atlas) -> str:
     told: dict[str, list[str]] = {}
     for pair in found.pairs:
         if pair.answer is not None or pair.verdict == UNDECIDED_PAIR:
-            told.setdefault(_told(pair), []).append("{}, {}".format(*pair.numbers))
+            told.setdefault(pair_words(pair), []).append("{}, {}".format(*pair.numbers))
     rows += [(first, [words, *textwrap.wrap("; ".join(rest), initial_indent="so are modes ")])
              for words, (first, *rest) in told.items()]
     return listing(rows)
@@ -277,7 +277,7 @@ def _cuspidal(found: Atlas) -> list[str]:
             f"Type 2 singularity leads from one to the other; {how} on it"]
 
 
-def _told(pair: ModePair) -> str:
+def pair_words(pair: ModePair) -> str:
     """The verdict on two modes, and what shows it."""
     certified = "" if pair.verdict == UNDECIDED_PAIR else f" ({'certified' if pair.certified else 'not certified'})"
     found = pair.answer

@@ -8,8 +8,10 @@ class ModesPanel extends Panel {
     this.words = element("p");
     this.list = element("ol", { className: "modes" });
     this.back = button("Back to where I was", () => this.return(), { hidden: true });
+    this.join = button("Which of them lie in one aspect?", () => this.group(), { hidden: true });
+    this.aspects = element("div", { "aria-live": "polite" });
     this.body.append(element("p", { textContent: "Poses that look the same to the camera: the controller may end at any of them." }),
-      element("div", { className: "row" }, this.find, this.back), this.words, this.list);
+      element("div", { className: "row" }, this.find, this.back), this.words, this.list, this.join, this.aspects);
     this.outlines = [];
   }
 
@@ -30,26 +32,44 @@ class ModesPanel extends Panel {
 
   forget() {
     this.outlines = [];
-    this.origin = this.flown = null;
+    this.origin = this.flown = this.start = null;
     this.words.textContent = "";
     this.list.replaceChildren();
+    this.aspects.replaceChildren();
+    this.join.hidden = true;
     this.same.show(null);
     this.back.hidden = true;
     this.draw();
   }
 
   async refresh() {
-    const origin = this.studio.values;
+    const { values: origin, here: start } = this.studio;
     const found = await this.ask("modes", "Listing the modes");
     if (!found) return;
     this.forget();
-    this.origin = origin;
-    this.outlines = found.modes;
+    Object.assign(this, { origin, start, outlines: found.modes });
+    this.join.hidden = found.modes.length < 2;
     this.words.textContent = found.words;
     this.list.replaceChildren(...found.modes.map((mode) => this.row(mode)));
     this.same.show(found);
     this.draw();
     this.studio.say(`${found.modes.length} modes. ${found.words}`);
+  }
+
+  /* Modes in one aspect: a path without singularity leads from one to the other. */
+  async group() {
+    const found = await this.ask("aspects", "Looking for paths without singularity", { here: this.start });
+    if (!found) return;
+    const current = this.list.querySelector("[aria-current=true]")?.dataset.label?.replace(/,.*/, "");
+    this.outlines = this.outlines.map((mode, i) => {
+      const label = mode.label.replace(/,.*/, "");
+      return { ...mode, label: found.aspect[i] ? `${label}, aspect ${found.aspect[i]}` : label };
+    });
+    this.list.replaceChildren(...this.outlines.map((mode) => this.row(mode)));
+    this.mark(this.outlines.find(({ label }) => current && label.replace(/,.*/, "") === current)?.label ?? null);
+    this.aspects.replaceChildren(...[found.words, ...found.pairs].map((textContent) => element("p", { textContent })));
+    this.same.show(found);
+    this.draw();
   }
 
   row(mode) {

@@ -1,0 +1,35 @@
+"""Which of the poses at which the watched legs look the same a path without Type 2 singularity joins."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from ....analysis.aspects.atlas import Atlas, atlas
+from ...text.poses import pair_words
+from ..commands import NONE, at_pose, lines, same_at
+from ..request import Request
+
+
+def answer(request: Request) -> dict[str, Any]:
+    """The modes by their numbers, those together that lie in one aspect, and what shows it of which two; ``aspect`` is
+    the number of each mode's where every verdict is certified, else null."""
+    setting = request.seeing()
+    here = request.here(request.mover())
+    found = atlas(setting, at=here.real)
+    pose = at_pose(setting, here.real)
+    same = lines(request, "atlas", "--at", pose, at=pose) if same_at(setting, here.real) else NONE
+    known = len(set(found.count)) == 1 and all(pair.certified for pair in found.pairs)
+    return {"groups": [list(group) for group in found.groups],
+            "aspect": [next((i for i, group in enumerate(found.groups, 1) if known and number in group), None)
+                       for number in range(1, len(found.places) + 1)],
+            "words": words(found),
+            "pairs": [f"modes {one} and {other}: {pair_words(pair)}"
+                      for pair in found.pairs for one, other in [pair.numbers]], **same}
+
+
+def words(found: Atlas) -> str:
+    """How many aspects hold them."""
+    if not found.groups:
+        return "no aspect: there is no mode at which the robot was found assembled"
+    groups = "; ".join(f"mode{'s' * (len(group) > 1)} {', '.join(map(str, group))}" for group in found.groups)
+    return f"aspects of the hidden robot: {found.aspects_met} ({groups})"
