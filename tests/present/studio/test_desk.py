@@ -18,7 +18,7 @@ from hrsynth.cli import main
 from hrsynth.errors import BadRequest, HrsynthError
 from hrsynth.mechanism.observation import Direction
 from hrsynth.present.studio.desk import Desk
-from hrsynth.present.studio.scale import LOST, error
+from hrsynth.present.studio.scale import CONE_TEXT, LOST, error, rounded
 from hrsynth.present.text.tables import NOT_BOUNDED
 
 DESK = Desk()
@@ -339,6 +339,16 @@ def test_at_a_singularity_no_error_is_told():
         told = error(observe("3rrr_m1"), example.configuration)
         assert (told["mm"], told["step"]) == (None, 4)
         assert told["words"] in (LOST, NOT_BOUNDED)
+
+
+@pytest.mark.parametrize("robot", ["delta", "quattro", "3rrr_m1", "uranesx"])
+def test_the_error_of_orientation_is_told_where_the_platform_turns(robot: str):
+    setting = observe(robot)
+    wrong, turns = error(setting, setting.everything.start), setting.motion.rotations.shape[1] > 0
+    assert ("turned by about" in wrong["words"]) == (turns and wrong["words"] != LOST)
+    if turns:
+        found = hrsynth.accuracy(robot, cone=CONE_TEXT).to_dict()["poses"][0]["orientation_deg"]["largest"]
+        assert f"turned by about {rounded(found)}°" in wrong["words"]
 
 
 def test_meshes_of_a_dropped_file_are_those_that_were_dropped_with_it(tmp_path: Path):

@@ -43,17 +43,19 @@ def error(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
     metres, radians = attained(at, setting.samples.question, np.full(len(setting.observed), CONE))
     if np.isfinite([metres, radians]).all() and not (bounded(metres, at.twin.length) and bounded(radians)):
         return nothing(unit, NOT_BOUNDED)
-    return told(finite(1e3 * metres), finite(math.degrees(radians)), unit)
+    return told(finite(1e3 * metres), finite(math.degrees(radians)), unit, bool(setting.motion.rotations.shape[1]))
 
 
-def told(mm: float | None, deg: float | None, unit: str) -> dict[str, Any]:
-    """The record of an error of position and of orientation."""
+def told(mm: float | None, deg: float | None, unit: str, turns: bool) -> dict[str, Any]:
+    """The record of an error of position and of orientation; the step's name is that of ``unit``, the error of
+    orientation is told beside it where the platform ``turns``."""
     value = {"mm": mm, "deg": deg}[unit]
     if mm is None or deg is None:
         return {"mm": mm, "deg": deg, "unit": unit, "step": len(NAMES) - 1, "words": LOST}
-    step = step_of(value, unit)
-    return {"mm": mm, "deg": deg, "unit": unit, "step": step,
-            "words": f"about {rounded(value)}{SIGNS[unit]} wrong per 0.1°: {NAMES[step]}"}
+    step, size = step_of(value, unit), f"{rounded(value)}{SIGNS[unit]}"
+    turned = f"{rounded(deg)}°" if turns and unit == "mm" else ""
+    return {"mm": mm, "deg": deg, "unit": unit, "step": step, "size": f"{size} and {turned}" if turned else size,
+            "words": f"about {size} wrong per 0.1°: {NAMES[step]}{f'; turned by about {turned}' if turned else ''}"}
 
 
 def nothing(unit: str, words: str) -> dict[str, Any]:

@@ -18,7 +18,7 @@ from ....tolerances import SAME_RELATION
 from ...text.poses import all_of
 from ..commands import lines
 from ..request import Request
-from ..scale import LOST, SIGNS, error, rounded
+from ..scale import LOST, error
 from .watch import smallest
 
 
@@ -71,7 +71,7 @@ def rest(setting: ObservedRobot) -> list[str]:
         first = ("At the zero configuration a freedom is lost, so that the error has no bound there."
                  if wrong["words"] == LOST else f"How wrong the platform is then is {wrong['words']}.")
     else:
-        first = f"The platform is then about {rounded(value)}{SIGNS[wrong['unit']]} wrong per 0.1°."
+        first = f"The platform is then about {wrong['size']} wrong per 0.1°."
     return [first, _elsewhere(setting)]
 
 
