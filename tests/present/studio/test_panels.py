@@ -188,6 +188,20 @@ def test_an_answer_for_other_legs_is_not_shown(tab: Tab, address: str):
     assert page.locator("#panel-modes .modes li").count() == 0
 
 
+def test_at_a_singular_pose_nothing_says_that_all_is_well(tab: Tab, address: str):
+    from hrsynth import singular
+
+    there = singular("rrrrr_m1", points=200).examples[0].to_dict()["pose"]
+    page = opened(tab, address, "rrrrr_m1")
+    panel = show(page, "legs")
+    answered(page)
+    assert panel.locator(".verdict.good").count() == 1
+    page.evaluate("(values) => studio.move({ values })", [there["x"], there["y"]])
+    panel.locator(".verdict.elsewhere").wait_for(timeout=SLOW)
+    assert "Here 1 of 2" in panel.locator(".verdict .wrong").inner_text()
+    assert panel.locator(".verdict.good").count() == 0
+
+
 def test_smallest_sets_that_are_not_listed_are_counted(tab: Tab, address: str):
     page = opened(tab, address, "gough_stewart")
     panel = show(page, "legs")

@@ -222,10 +222,10 @@ def _words(kind: str, unit: str, found: PoseField, length: float) -> str:
     here = found.values[np.isfinite(found.values)]
     if not here.size:
         return "No pose of this plane is reached."
-    part = f"{100 * here.size / found.values.size:.0f} % of these poses are reached"
+    part = f"{here.size} of these {found.values.size} poses are reached"
     if kind == DISTANCE:
-        return f"{part}; the smallest singular value of Mᵀ lies between {here.min():.2g} and {here.max():.2g}."
+        return f"{part}; there the smallest singular value of Mᵀ lies between {here.min():.2g} and {here.max():.2g}."
     most = float(here.max())
     near = bounded(most / 1e3, length) if unit == "mm" else bounded(np.radians(most))
     worst = f"{rounded(most)}{SIGNS[unit]}" if near else f"more, {NOT_BOUNDED}"
-    return f"{part}; per 0.1° the platform is wrong by {rounded(float(here.min()))}{SIGNS[unit]} to {worst}."
+    return f"{part}; there the platform is wrong per 0.1° by {rounded(float(here.min()))}{SIGNS[unit]} to {worst}."

@@ -79,10 +79,10 @@ class LegsPanel extends Panel {
   tell({ verdict, rank, dof, here, lost, hidden_words: hidden, condition, sets, more_sets: more, error }) {
     const good = verdict.controllable;
     const line = (words, more = {}) => (words ? element("p", { textContent: words, ...more }) : null);
-    this.verdict.className = `verdict ${good ? "good" : "bad"}`;
+    this.verdict.className = `verdict ${!good ? "bad" : rank < dof ? "elsewhere" : "good"}`;
     this.verdict.replaceChildren(
       element("p", { className: "head" }, element("b", { textContent: verdict.words })), line(verdict.certainty.replace(`${verdict.words}, `, "")) ?? "",
-      line(`Here ${rank} of ${dof} freedoms are seen${here ? `: ${here}` : ""}.`), ...[line(error?.words)].filter(Boolean));
+      line(`Here ${rank} of ${dof} freedoms are seen${here ? `: ${here}` : ""}.`, { className: good && rank < dof ? "wrong" : "" }), ...[line(error?.words)].filter(Boolean));
     const head = lost.length ? [element("h3", { textContent: lost.length > 1 ? "Lost freedoms" : "Lost freedom" })] : [];
     this.lost.replaceChildren(...head, ...lost.map(({ words }, i) =>
       element("div", { className: "row" }, element("span", { textContent: words }), button("Play", () => this.play(i), { "aria-label": `Play: ${words}` }))));
