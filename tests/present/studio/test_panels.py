@@ -228,6 +228,17 @@ def test_sliders_move_the_robot_and_home_brings_it_back(tab: Tab, address: str):
     assert page.evaluate("() => studio.values") == pytest.approx(home, abs=1e-6)
 
 
+def test_a_slider_moves_its_own_freedom_alone(tab: Tab, address: str):
+    page = opened(tab, address, "3rrr_m1")
+    home = page.evaluate("() => studio.values")
+    show(page, "move").get_by_role("slider").last.focus()
+    page.keyboard.press("ArrowRight")
+    answered(page)
+    values = page.evaluate("() => studio.values")
+    assert values[:2] == pytest.approx(home[:2], abs=1e-6)
+    assert values[2] > home[2]
+
+
 def test_a_mode_is_flown_to_and_back(tab: Tab, address: str):
     page = opened(tab, address, "rrrrr_m1")
     before = page.evaluate("() => studio.values")

@@ -40,7 +40,7 @@ def _page(request: Request) -> tuple[str, bytes, dict[str, str]]:
 
 
 def _report(request: Request) -> tuple[str, bytes, dict[str, str]]:
-    name = request.derivation.robot.name
+    name = f"{request.derivation.robot.name}_report"  # the page has the bare name
     report = next(each for each in OUTPUTS["derive"].files if each.option == "report")
     content = report.content(request.derivation, ".html", {"seed": 0})[0]
     return name, _bytes(content), lines(request, "derive", "--report", f"{name}.html")

@@ -64,8 +64,8 @@ class Slider {
     Object.assign(this.input, { min, max, step: unit ? (max - min) / steps || 1e-6 : 1 });
     this.output = element("output", { for: id });
     this.root = element("div", { className: "slider" }, element("label", { for: id, textContent: label }), this.output, this.input);
-    this.input.oninput = () => { this.told(Number(this.input.value)); onmove(Number(this.input.value)); };
-    this.input.onchange = () => onset(Number(this.input.value));
+    this.input.oninput = () => { this.told(Number(this.input.value)); onmove(this.value); };
+    this.input.onchange = () => onset(this.value);
     this.read(value);
   }
 
@@ -74,13 +74,13 @@ class Slider {
     this.told(value);
   }
 
+  /* The value itself: what was read may lie between the steps of the input. */
   told(value) {
+    this.value = value;
     const words = this.unit ? written(value, this.unit) : String(value);
     this.output.textContent = words;
     this.input.setAttribute("aria-valuetext", words);
   }
-
-  get value() { return Number(this.input.value); }
 }
 
 /* The command and the Python line that give the same, each with a button that copies it. */
