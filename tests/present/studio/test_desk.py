@@ -206,6 +206,19 @@ def test_a_servo_run_ends_where_the_camera_sees_the_goal():
     assert ask("move", "rrrrr_m1", here=found["frames"][-1]["here"])["values"] == pytest.approx(goal, abs=1e-4)
 
 
+def test_a_servo_run_aims_at_the_configuration_that_was_set():
+    """Also where it lies in another mode than the start: the picture that is wanted is the one there."""
+    goal = ask("modes", "3rrr_m1")["modes"][1]["here"]
+    found = ask("servo", "3rrr_m1", end=goal)
+    there = ask("servo", "3rrr_m1", here=goal, end=goal)
+    assert found["kind"] == "mode"
+    assert there["kind"] == "goal"
+    assert len(found["frames"]) >= 1
+    open_ = {**goal, "q": [value + 0.1 for value in goal["q"]]}
+    with pytest.raises(HrsynthError, match="end"):
+        ask("servo", "3rrr_m1", end=open_)
+
+
 @pytest.mark.parametrize("robot", ["rrrrr_m1", "prrrp_parallel", "3ppr_m1", "3upu"])
 def test_the_plain_answer_agrees_with_legs_and_modes(robot: str):
     found = ask("answer", robot)

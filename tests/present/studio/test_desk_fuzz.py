@@ -22,7 +22,7 @@ FIELDS = {"open": ("watch", "camera", "here", "robot"), "move": ("values", "plat
           "watch": ("watch", "camera", "here"), "play": ("lost", "hidden", "here", "watch"), "answer": ("camera",),
           "modes": ("here", "watch", "camera"), "aspects": ("here", "watch"),
           "plane": ("kind", "of", "at", "here", "watch"),
-          "servo": ("goal", "here", "watch"), "export": ("kind", "watch"), "gallery": ("robot",)}
+          "servo": ("goal", "end", "here", "watch"), "export": ("kind", "watch"), "gallery": ("robot",)}
 QUICK: dict[str, dict[str, Any]] = {"plane": {"size": 2}, "export": {"kind": "robot"}}
 LONG = ("aspects", "plane", "servo", "export", "open")
 OPTIONS = ("base", "platform", "motors", "close", "freeze", "keyframe", "unit", "tolerance", "as_written", "observe")

@@ -173,20 +173,20 @@ class Request(Value):
 
     # Where it is
 
-    def here(self, mover: Mover) -> Posed:
-        """Where the robot is: the zero configuration where nothing is said. What a hidden robot had for other legs does
-        not count; its loops and those of the real robot are closed, else it is refused."""
-        found = self.fields.get("here")
+    def here(self, mover: Mover, field: str = "here") -> Posed:
+        """Where the robot is, or is wanted: the zero configuration where nothing is said. What a hidden robot had for
+        other legs does not count; its loops and those of the real robot are closed, else it is refused."""
+        found = self.fields.get(field)
         if found is None:
             return mover.home
         if not isinstance(found, dict):
-            raise BadRequest("here", found, "what an answer has there, or null")
+            raise BadRequest(field, found, "what an answer has there, or null")
         twin = mover.home.real.twin
         q = _configuration(twin, found.get("q"))
         try:
             at = ClosedConfiguration.of(twin, q)
         except LoopsNotClosed as error:
-            raise BadRequest("here: the loops are not closed, residual", f"{error.residual:.2g}",
+            raise BadRequest(f"{field}: the loops are not closed, residual", f"{error.residual:.2g}",
                              f"up to {error.tolerance:g}") from None
         other = found.get("hidden")
         if mover.hidden is None:
@@ -195,10 +195,10 @@ class Request(Value):
             q = _configuration(mover.hidden, other.get("q"))
             posed = mover.beside(at, q)
             if posed is None:
-                raise BadRequest("here: the hidden robot is elsewhere", None, f"with the platform, to {FOLLOWED:g}")
+                raise BadRequest(f"{field}: the hidden robot is elsewhere", None, f"with the platform, to {FOLLOWED:g}")
             return posed
         if other is not None and not isinstance(other, dict):
-            raise BadRequest("here: hidden", other, "what an answer has there, or null")
+            raise BadRequest(f"{field}: hidden", other, "what an answer has there, or null")
         return mover.joined(at)
 
     def told(self, posed: Posed) -> dict[str, Any]:

@@ -50,9 +50,11 @@ def which(verdict: Verdict) -> str:
     if verdict == CONTROLLABLE:
         return f"Watch {legs}."
     if not verdict.rank:
-        return "Watching the legs does not help: their directions do not change when the platform moves."
+        return ("Watching the legs does not help: their directions do not change with the platform wherever it was "
+                "tried.")
     return (f"Watching legs is not enough: even with all of them {_listed([each.name for each in verdict.lost])} "
-            f"stay{'s' * (len(verdict.lost) == 1)} unseen ({verdict.dof - verdict.rank} of {verdict.dof} freedoms).")
+            f"stay{'s' * (len(verdict.lost) == 1)} unseen wherever it was tried ({verdict.dof - verdict.rank} of "
+            f"{verdict.dof} freedoms).")
 
 
 def blind(verdict: Verdict) -> list[str]:
@@ -71,7 +73,7 @@ def rest(setting: ObservedRobot) -> list[str]:
         first = ("At the zero configuration a freedom is lost, so that the error has no bound there."
                  if wrong["words"] == LOST else f"How wrong the platform is then is {wrong['words']}.")
     else:
-        first = f"The platform is then about {wrong['size']} wrong per 0.1°."
+        first = f"At home the platform is then about {wrong['size']} wrong per 0.1°."
     return [first, _elsewhere(setting)]
 
 

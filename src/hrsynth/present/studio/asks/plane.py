@@ -86,8 +86,11 @@ def answer(request: Request) -> dict[str, Any]:
             "at": float(values[third[0]]) if third else None,
             "normal": np.eye(3)[across].tolist() if across is not None and across < 3 else None,
             "locus": [[place(*point).tolist() for point in segment] for segment in found.locus],
-            "words": _words(kind, unit, found, here.real.twin.length),
+            "words": _words(kind, unit, found, here.real.twin.length) + ("" if grid is not None and known else SINGLY),
             "of": [mover.coordinates.names[i] for i in pair], **same}
+
+
+SINGLY = " The poses were found one by one: where a freedom is lost between them is not drawn."
 
 
 def _range(request: Request, mover: Mover, index: int) -> Array:

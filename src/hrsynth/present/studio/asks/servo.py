@@ -12,6 +12,7 @@ from ....geometry.vectors import Array
 from ....simulation.camera import Camera, Cylinder, cylinders, placed
 from ....simulation.servo import ServoTask
 from ....tolerances import SLIDER_ARRIVED
+from ...view.states import Mover, Posed
 from ..commands import NONE, at_pose, lines, same_at
 from ..request import Request
 from .move import state
@@ -23,15 +24,10 @@ Poses = Callable[[str], Array]
 
 
 def answer(request: Request) -> dict[str, Any]:
-    """The run from ``here`` to the coordinates ``goal``."""
+    """The run from ``here`` to ``end``, a configuration told as ``here`` is, or to the coordinates ``goal``."""
     setting, mover = request.seeing(), request.mover(request.flag("hidden"))
     start = request.here(mover)
-    goal = request.vector("goal", len(mover.coordinates.places))
-    if goal is None or mover.far(goal):
-        raise BadRequest("goal", None if goal is None else goal.tolist(), "values of the robot's sliders")
-    end, reached = mover.sent(start, goal)
-    if np.max(np.abs(reached - goal), initial=0.0) > SLIDER_ARRIVED:
-        raise BadRequest("the goal is not reached from the start", goal.tolist(), "values that the robot comes to")
+    end = _sent(request, mover, start) if request.fields.get("end") is None else request.here(mover, "end")
     task = ServoTask.between(setting, start.real, end.real)
     found = task.run()
     reference, rods = setting.mechanism.reference, cylinders(setting.mechanism, setting.observed)
@@ -48,6 +44,17 @@ def answer(request: Request) -> dict[str, Any]:
             "size": [eye.width, eye.height], "kind": found.ended,
             "words": f"Ended in: {found.ended} ({found.ending.reason}), after {found.run.times[-1]:.3g} s",
             **(same if same_at(setting, start.real, end.real) else NONE)}
+
+
+def _sent(request: Request, mover: Mover, start: Posed) -> Posed:
+    """The configuration with the coordinates ``goal`` to which small steps lead."""
+    goal = request.vector("goal", len(mover.coordinates.places))
+    if goal is None or mover.far(goal):
+        raise BadRequest("goal", None if goal is None else goal.tolist(), "values of the robot's sliders")
+    end, reached = mover.sent(start, goal)
+    if np.max(np.abs(reached - goal), initial=0.0) > SLIDER_ARRIVED:
+        raise BadRequest("the goal is not reached from the start", goal.tolist(), "values that the robot comes to")
+    return end
 
 
 def image(eye: Camera, reference: str, rods: tuple[Cylinder, ...], poses: Poses) -> list[list[list[float]] | None]:

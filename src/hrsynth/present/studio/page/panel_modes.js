@@ -26,8 +26,9 @@ class ModesPanel extends Panel {
 
   /* Other poses from here are other modes: those that are listed belong to where they were asked. */
   settled() {
-    const away = this.origin?.some((value, i) => Math.abs(value - this.studio.values[i]) > 1e-6);
-    if (away && !this.flown) this.words.textContent = "These belong to an earlier pose. Find them again.";
+    const away = (values) => values?.some((value, i) => Math.abs(value - this.studio.values[i]) > 1e-6);
+    if (this.flown) this.flown.to ??= this.studio.values;
+    if (this.flown ? away(this.flown.to) : away(this.origin)) this.words.textContent = "These belong to an earlier pose. Find them again.";
   }
 
   forget() {
@@ -80,7 +81,7 @@ class ModesPanel extends Panel {
   }
 
   fly(mode) {
-    this.flown ||= { here: this.studio.here };
+    this.flown = { here: this.studio.here, ...this.flown, to: null };
     this.back.hidden = false;
     this.mark(mode.label);
     this.studio.fly(mode.places, mode.here);

@@ -54,7 +54,7 @@ class ServoPanel extends Panel {
 
   async go() {
     this.clear();
-    const found = await this.ask("servo", "Running the loop", { here: this.ends.start?.here ?? null, goal: this.ends.goal.values, hidden: this.studio.sees });
+    const found = await this.ask("servo", "Running the loop", { here: this.ends.start?.here ?? null, goal: this.ends.goal.values, end: this.ends.goal.here, hidden: this.studio.sees });
     if (!found) return;
     this.found = found;
     this.words.textContent = found.words;
