@@ -25,10 +25,12 @@ pytest.importorskip("uvicorn")
 def started(*arguments: str, folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """The program, and the address that it tells."""
     program = [sys.executable, "-m", "hrsynth.cli", "studio", "--no-browser", *arguments]
-    handler = signal.signal(signal.SIGINT, signal.default_int_handler)  # ignored ones are inherited
+    ends = {signal.SIGINT: signal.default_int_handler, signal.SIGHUP: signal.SIG_DFL}  # ignored ones are inherited
+    before = {number: signal.signal(number, handler) for number, handler in ends.items()}
     with subprocess.Popen(program, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
                           env={**os.environ, "TMPDIR": str(folder)}) as running:
-        signal.signal(signal.SIGINT, handler)
+        for number, handler in before.items():
+            signal.signal(number, handler)
         assert running.stdout is not None
         told = re.fullmatch(r"The studio is served at (http://127\.0\.0\.1:\d+/\S+/) \(Ctrl-C ends it\)\.\n",
                             running.stdout.readline())
