@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import os
 import re
 import signal
@@ -10,7 +11,6 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -21,7 +21,7 @@ from present.studio_client import alive, soon
 pytest.importorskip("uvicorn")
 
 
-@contextmanager
+@contextlib.contextmanager
 def started(*arguments: str, folder: Path) -> Iterator[tuple[subprocess.Popen[str], str]]:
     """The program, and the address that it tells."""
     program = [sys.executable, "-m", "hrsynth.cli", "studio", "--no-browser", *arguments]
@@ -43,8 +43,12 @@ def started(*arguments: str, folder: Path) -> Iterator[tuple[subprocess.Popen[st
 
 def children(process: int) -> list[int]:
     """The processes that a process has started."""
-    listed = subprocess.run(["ps", "-eo", "pid=,ppid="], capture_output=True, text=True, check=True).stdout.split()
-    return [int(child) for child, parent in zip(listed[::2], listed[1::2], strict=True) if int(parent) == process]
+    found = []
+    for file in Path("/proc").glob("[0-9]*/stat"):
+        with contextlib.suppress(OSError):  # it has ended
+            if int(file.read_text().rpartition(")")[2].split()[1]) == process:
+                found.append(int(file.parent.name))
+    return found
 
 
 @pytest.mark.slow
