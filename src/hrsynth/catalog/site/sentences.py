@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator
 
+from ...present.text.tables import listed, named
 from ..jsonl import Record
 
 RULES = {
@@ -47,17 +48,14 @@ def cure(record: Record) -> str | None:
     if said.startswith("none of"):
         return "Of the measurements that were tried, up to four at a time, none shows all freedoms."
     parts = [_KINDS[each["kind"]].format(_where(each["name"])) for each in _PART.finditer(said)]
-    listed = ", ".join(parts[:-1]) + " and " * (len(parts) > 1) + parts[-1]
+    measured = listed(parts)
     if said.startswith("not all by"):
-        return f"Measure {listed} as well: that shows more, but not all freedoms."
-    return f"Measure {listed} as well: then all {record['dof']} freedoms are seen."
+        return f"Measure {measured} as well: that shows more, but not all freedoms."
+    return f"Measure {measured} as well: then all {record['dof']} freedoms are seen."
 
 
 def _legs(labels: str | None) -> str:
-    if labels is None:
-        return "all legs"
-    each = labels.split(",")
-    return f"leg {each[0]}" if len(each) == 1 else f"legs {', '.join(each[:-1])} and {each[-1]}"
+    return "all legs" if labels is None else named("leg", labels.split(","))
 
 
 def _where(name: str) -> str:

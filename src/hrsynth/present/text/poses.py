@@ -246,9 +246,8 @@ def atlas(found: Atlas) -> str:
     rows = [*head(listed.setting), ("held", f"{_SINCE[listed.kind]} at {listed.pose}")]
     if listed.found.continuum is not None:
         return listing([*rows, *known("special", listed.found.degenerate)])
-    groups = [f"mode{'s' * (len(group) > 1)} {', '.join(map(str, group))}" for group in found.groups]
     rows += [("modes", f"{listed.count}, {all_of(listed)}"),
-             ("aspects", f"{found.aspects_met} of the hidden robot: {'; '.join(groups)}"),
+             ("aspects", f"{found.aspects_met} of the hidden robot: {aspect_groups(found)}"),
              ("cuspidal", _cuspidal(found)), *GAP]
     numbers = range(1, len(found.places) + 1)
     wide = len(str(len(found.places)))
@@ -264,6 +263,11 @@ def atlas(found: Atlas) -> str:
     rows += [(first, [words, *textwrap.wrap("; ".join(rest), initial_indent="so are modes ")])
              for words, (first, *rest) in told.items()]
     return listing(rows)
+
+
+def aspect_groups(found: Atlas) -> str:
+    """The modes of each aspect."""
+    return "; ".join(f"mode{'s' * (len(group) > 1)} {', '.join(map(str, group))}" for group in found.groups)
 
 
 def _cuspidal(found: Atlas) -> list[str]:

@@ -42,6 +42,16 @@ def listing(rows: Iterable[tuple[str, str | Sequence[str]]]) -> str:
     return "\n".join(f"{name:<{head}}  {value}".rstrip() for name, value in lines)
 
 
+def listed(words: Sequence[str]) -> str:
+    """Words as a sentence lists them: one, two and three."""
+    return ", ".join(words[:-1]) + " and " * (len(words) > 1) + words[-1]
+
+
+def named(noun: str, words: Sequence[str]) -> str:
+    """Things of a kind by their names: leg 1; legs 1, 2 and 4."""
+    return f"{noun}{'s' * (len(words) > 1)} {listed(words)}"
+
+
 def bounded(error: Any, length: float = 1.0) -> Any:
     """Whether a displacement (m, with a characteristic ``length``) or a turn (rad) is one of which the first order
     tells anything."""

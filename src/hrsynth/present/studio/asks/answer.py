@@ -16,6 +16,7 @@ from ....geometry.vectors import Array
 from ....kinematics.platform_motion import PlatformMotion
 from ....tolerances import SAME_RELATION
 from ...text.poses import all_of
+from ...text.tables import listed, named
 from ..commands import lines
 from ..request import Request
 from ..scale import LOST, error
@@ -46,20 +47,20 @@ def _size(wrong: dict[str, Any]) -> float:
 
 def which(verdict: Verdict) -> str:
     """The sentence that says which legs to watch."""
-    legs = named(verdict.legs)
+    legs = named("leg", verdict.legs)
     if verdict == CONTROLLABLE:
         return f"Watch {legs}."
     if not verdict.rank:
         return ("Watching the legs does not help: their directions do not change with the platform wherever it was "
                 "tried.")
-    return (f"Watching legs is not enough: even with all of them {_listed([each.name for each in verdict.lost])} "
+    return (f"Watching legs is not enough: even with all of them {listed([each.name for each in verdict.lost])} "
             f"stay{'s' * (len(verdict.lost) == 1)} unseen wherever it was tried ({verdict.dof - verdict.rank} of "
             f"{verdict.dof} freedoms).")
 
 
 def blind(verdict: Verdict) -> list[str]:
     """What follows where a freedom is not seen."""
-    legs = named(verdict.legs)
+    legs = named("leg", verdict.legs)
     seen = f"{legs[0].upper()}{legs[1:]} see{'s' * (len(verdict.legs) == 1)} as much as all of them together."
     return [seen if verdict.rank else "However well the directions are measured, they say nothing of the platform.",
             "Something else must be measured as well: the command advise lists what would do."]
@@ -120,15 +121,6 @@ def _length(metres: float) -> str:
     if metres >= 1:
         return f"{metres:.2g} m"
     return f"{100 * metres:.2g} cm" if metres >= 0.01 else f"{1e3 * metres:.2g} mm"
-
-
-def named(legs: tuple[str, ...]) -> str:
-    """Legs as one says them: legs 1, 2 and 4."""
-    return f"leg{'s' * (len(legs) > 1)} {_listed(legs)}"
-
-
-def _listed(words: tuple[str, ...] | list[str]) -> str:
-    return words[0] if len(words) == 1 else f"{', '.join(words[:-1])} and {words[-1]}"
 
 
 def _number(count: int) -> str:

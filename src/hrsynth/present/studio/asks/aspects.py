@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ....analysis.aspects.atlas import Atlas, atlas
-from ...text.poses import pair_words
+from ...text.poses import aspect_groups, pair_words
 from ..commands import NONE, at_pose, lines, same_at
 from ..request import Request
 
@@ -31,5 +31,4 @@ def words(found: Atlas) -> str:
     """How many aspects hold them."""
     if not found.groups:
         return "no aspect: there is no mode at which the robot was found assembled"
-    groups = "; ".join(f"mode{'s' * (len(group) > 1)} {', '.join(map(str, group))}" for group in found.groups)
-    return f"aspects of the hidden robot: {found.aspects_met} ({groups})"
+    return f"aspects of the hidden robot: {found.aspects_met} ({aspect_groups(found)})"
