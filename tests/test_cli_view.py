@@ -53,6 +53,7 @@ def test_other_endings_are_refused(capfd: pytest.CaptureFixture[str], tmp_path: 
 
 
 def test_what_cannot_be_done_is_refused_in_one_line(capfd: pytest.CaptureFixture[str], tmp_path: Path):
+    pytest.importorskip("uvicorn")
     assert_refused(ask(capfd, "rrrrr_m1", "--static", str(tmp_path / "none" / "view.html")), 2, "no such folder")
     assert_refused(ask(capfd, "rrrrr_m1", "--observe", "7", "--no-open"), 2, "has no leg or link")
     assert_refused(ask(capfd, "nobody", "--static", str(tmp_path / "view.html")), 2, "nobody")
@@ -61,6 +62,7 @@ def test_what_cannot_be_done_is_refused_in_one_line(capfd: pytest.CaptureFixture
 
 
 def test_a_port_that_is_taken_is_refused(capfd: pytest.CaptureFixture[str]):
+    pytest.importorskip("uvicorn")
     with socket.socket() as taken:
         taken.bind(("127.0.0.1", 0))
         taken.listen()
@@ -71,6 +73,7 @@ def test_a_port_that_is_taken_is_refused(capfd: pytest.CaptureFixture[str]):
 def test_the_page_is_told_what_the_command_line_says(capfd: pytest.CaptureFixture[str], tmp_path: Path,
                                                      monkeypatch: pytest.MonkeyPatch):
     """The processes that answer read the same robot, and what the page copies is what was typed."""
+    pytest.importorskip("uvicorn")
     from hrsynth.present.studio import server
 
     told = []

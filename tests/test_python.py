@@ -27,6 +27,8 @@ def test_help_has_an_example_that_works(name: str):
             hrsynth.examples()
         except MissingExtra:
             pytest.skip("example-robot-data is not installed")
+    if name == "studio":
+        pytest.importorskip("uvicorn")
     (example,) = doctest.DocTestFinder(recurse=False).find(getattr(hrsynth, name), name, globs={"hrsynth": hrsynth})
     assert f"hrsynth.{name}(" in example.docstring
     assert doctest.DocTestRunner(verbose=False).run(example).failed == 0

@@ -156,6 +156,7 @@ def test_a_name_cannot_break_the_page():
 
 
 def test_an_interrupt_ends_the_server_quietly():
+    pytest.importorskip("uvicorn")
     command = [sys.executable, "-m", "hrsynth.cli", "view", "rrrrr_m1", "--no-open"]
     # a test run that was put into the background ignores interrupts, and its children with it
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
