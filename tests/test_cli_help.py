@@ -15,7 +15,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 
 import hrsynth
 from hrsynth.cli import app, execute
@@ -25,7 +24,7 @@ from hrsynth.cli.questions import QUESTIONS
 from hrsynth.description import shipped
 from hrsynth.errors import MissingExtra
 
-ROOT: Any = typer.main.get_command(app)
+ROOT: Any = app
 LEAVES = [(name,) for name, each in ROOT.commands.items() if not hasattr(each, "commands")] + [
     (name, inner) for name, each in ROOT.commands.items() for inner in getattr(each, "commands", {})]
 
@@ -80,10 +79,51 @@ def examples() -> Iterator[tuple[str, ...]]:
 
 @pytest.mark.parametrize("arguments", list(examples()), ids=" ".join)
 def test_examples_are_commands(arguments: tuple[str, ...]):
-    """Typer reads every option of an example with its type."""
+    """Every option of an example is read with its type."""
     path = next(path for path in LEAVES if arguments[: len(path)] == path)
-    read = command(path).make_context("hrsynth", list(arguments[len(path):]))
-    assert set(read.params) == {each.name for each in command(path).options}
+    read = command(path).values(list(arguments[len(path):]))
+    assert set(read) == {each.name for each in command(path).options}
+
+
+@pytest.mark.parametrize("words", [
+    ["quattro", "--observe", "1,4", "-o", "a.urdf", "--seed", "3", "--close", "a:b", "--close", "-c:d", "--json"],
+    ["-oa.urdf", "--close=a:b", "--seed=3", "--observe=1,4", "--json", "--close=-c:d", "quattro"],
+    ["--json", "--output=a.urdf", "--close", "a:b", "--seed", "4", "--close=-c:d", "--seed=3", "--observe", "1,4", "--",
+     "quattro"]], ids=" ".join)
+def test_options_stand_anywhere_and_their_values_in_any_form(words: list[str]):
+    """Of what is given twice the last counts, of what can be repeated all; a value may begin with a dash."""
+    read = command(("derive",)).values(words)
+    given = {"robot": "quattro", "observe": "1,4", "output": "a.urdf", "seed": 3, "close": ["a:b", "-c:d"],
+             "json": True}
+    assert read == {each.name: each.default for each in command(("derive",)).options} | given
+    assert command(("derive",)).values([*words[:-1], "-h"]) is None or "--" in words
+
+
+def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
+    assert [command(("view",)).values(["delta", *more])["open_"] for more in ([], ["--no-open"], ["--open"])] == [
+        True, False, True]
+    assert command(("lint",)).values(["a", "--fix", "b", "--", "-c"])["files"] == ["a", "b", "-c"]
+
+
+@pytest.mark.parametrize(("words", "told"), [
+    ("derive", "derive needs ROBOT"), ("accuracy delta", "accuracy needs --cone ANGLE"),
+    ("catalog site", "catalog site needs -o, --output DIR"),
+    ("derive quattro --observ 1", "no such option, found '--observ', allowed: --observe"),
+    ("derive quattro -x", "derive: no such option, found '-x'"),
+    ("-x", "no such option, found '-x', allowed: -h, --help"),
+    ("derive quattro --seed x", "--seed, found 'x', allowed: an integer, at least 0"),
+    ("derive quattro --seed 1.5", "--seed, found '1.5'"), ("derive quattro --seed=-1", "--seed, found '-1'"),
+    ("servo delta --gain 1e9", "--gain, found '1e9', allowed: a number, at most 1e+06"),
+    ("modes delta --effort nan", "--effort, found 'nan'"),
+    ("derive quattro a b", "derive takes no more words, found 'a b'"),
+    ("derive quattro --at", "--at needs a value"), ("derive quattro --json=3", "--json takes no value, found '3'"),
+    ("nope", "no such command, found 'nope', allowed: derive"), ("catalog nope", "no such command, found 'nope'")])
+def test_what_cannot_be_read_is_refused_in_one_line(capsys, words: str, told: str):
+    assert execute(words.split()) == 2
+    shown = capsys.readouterr()
+    assert told in shown.err
+    assert shown.out == ""
+    assert shown.err.count("\n") == 1
 
 
 @pytest.mark.slow
@@ -137,9 +177,8 @@ def test_completion_knows_robots_and_every_option():
     assert candidates(ROOT, ["derive", ""]) == candidates(ROOT, ["lint", "a.urdf", ""]) == list(shipped())
     for path in LEAVES:
         offered = candidates(ROOT, [*path, "--"])
-        known = {part for each in command(path).params for part in (*each.opts, *each.secondary_opts)}
-        old = {name for each in command(path).options for name in each.old}
-        assert {*offered} - {"--help"} == {name for name in known if name.startswith("--")} - old
+        known = {part for each in command(path).options for name in each.names for part in name.split("/")}
+        assert {*offered} - {"--help"} == {name for name in known if name.startswith("--")}
 
 
 def test_completion_knows_the_examples_once_they_are_begun():

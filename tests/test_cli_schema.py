@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-import typer
 from jsonschema import Draft202012Validator
 
 import hrsynth
@@ -78,7 +77,7 @@ def test_every_answer_is_what_its_schema_says(here: Path, capsys, command: str):
 
 
 def test_every_command_with_json_has_a_record():
-    root: Any = typer.main.get_command(app)
+    root: Any = app
     found = [name for name, each in root.commands.items() if not hasattr(each, "commands")]
     found += [f"{name} {inner}" for name, each in root.commands.items() for inner in getattr(each, "commands", {})]
     leaves = {name: (root.commands[name] if " " not in name else

@@ -7,46 +7,31 @@ import gc
 import io
 import os
 import sys
-from typing import Annotated
-
-import typer
 
 from . import completion, files, importing, lint, schema, studio
 from .catalog import catalog
-from .commands import HELP, WholeGroup
+from .colour import say
+from .commands import Group
 from .questions import QUESTIONS
 
-app = typer.Typer(
-    name="hrsynth", cls=WholeGroup, invoke_without_command=True, add_completion=False, rich_markup_mode=None,
-    pretty_exceptions_enable=False, context_settings=HELP,
-    help="Hidden robots of parallel robots that are controlled by watching the directions of their legs.")
+
+def _version() -> str:
+    from .. import __version__
+
+    return __version__
+
+
+app = Group("hrsynth", "Hidden robots of parallel robots that are controlled by watching the directions of their legs.",
+            _version)
 for question in QUESTIONS:
     question.add(app)
 lint.add(app)
 files.add(app)
 importing.add(app)
 studio.add(app)
-app.add_typer(catalog)
 schema.add(app)
 completion.add(app)
-
-
-def _version(wanted: bool) -> None:
-    if wanted:
-        from .. import __version__
-
-        typer.echo(f"hrsynth {__version__}")
-        raise typer.Exit()
-
-
-@app.callback()
-def _options(
-    context: typer.Context,
-    version: Annotated[bool, typer.Option("--version", callback=_version, is_eager=True, help="Print the version.")]
-    = False,
-) -> None:
-    if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
+app.commands["catalog"] = catalog
 
 
 def main(arguments: list[str] | None = None) -> None:
@@ -64,9 +49,11 @@ def main(arguments: list[str] | None = None) -> None:
 def execute(arguments: list[str] | None = None) -> int:
     """Run a command; the exit status."""
     try:
-        status = app(args=arguments, prog_name="hrsynth", standalone_mode=False)
+        app.main(sys.argv[1:] if arguments is None else arguments)
         sys.stdout.flush()
-        return int(status or 0)
+        return 0
+    except SystemExit as end:
+        return int(end.code or 0)
     except BrokenPipeError:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return 0
@@ -76,7 +63,7 @@ def execute(arguments: list[str] | None = None) -> int:
         if error.filename is not None or error.errno not in (errno.ENOSPC, errno.EIO, errno.EBADF):
             return _report_failure(error)
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        typer.echo(f"hrsynth: cannot write to standard output: {error.strerror}", err=True)
+        say(f"hrsynth: cannot write to standard output: {error.strerror}", err=True)
         return 2
     except Exception as error:
         return _report_failure(error)
@@ -88,16 +75,10 @@ def _report_failure(error: Exception) -> int:
 
     if isinstance(error, HrsynthError):
         for line in error.lines():
-            typer.echo(f"hrsynth: {line}", err=True)
+            say(f"hrsynth: {line}", err=True)
         return error.exit_status
-    usage = getattr(error, "format_message", None)
-    if usage is not None:
-        message = " ".join(str(usage()).split())
-        if message:
-            typer.echo(f"hrsynth: {message}", err=True)
-        return 2
     if os.environ.get("HRSYNTH_DEBUG"):
         raise error
     what = " ".join(f"{type(error).__name__}: {error}".split())
-    typer.echo(f"hrsynth: a defect of hrsynth itself, please report it: {what}", err=True)
+    say(f"hrsynth: a defect of hrsynth itself, please report it: {what}", err=True)
     return 3

@@ -12,14 +12,12 @@ import json as javascript
 from pathlib import Path
 from typing import Any
 
-import typer
-
-from .commands import WholeGroup, add_command
+from .colour import say
+from .commands import Group, add_command
 from .options import JSON, NEEDED, Option, flag, output, warn
 from .progress import Progress
 
-catalog = typer.Typer(name="catalog", cls=WholeGroup, invoke_without_command=True, rich_markup_mode=None,
-                      help="The catalog of architectures: what can be controlled by watching legs.")
+catalog = Group("hrsynth catalog", "The catalog of architectures: what can be controlled by watching legs.")
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
 KEPT = Option("kept", "A folder or SQLite file (default: what is shipped).", "PATH", flags=("--catalog",))
 WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
@@ -38,16 +36,10 @@ FILTER = (
 """Which architectures are asked for."""
 
 
-@catalog.callback()
-def _alone(context: typer.Context) -> None:
-    if context.invoked_subcommand is None:
-        typer.echo(context.get_help())
-
-
 def _say(command: str, fields: dict[str, Any], text: str, json: bool) -> None:
     from ..present.show import record
 
-    typer.echo(record(f"catalog {command}", None, fields) if json else text)
+    say(record(f"catalog {command}", None, fields) if json else text)
 
 
 def build(groups: list[str] | None, output: str | None, workers: int, cluster: str | None, check: bool,

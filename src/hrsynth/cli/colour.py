@@ -1,12 +1,10 @@
-"""Colour on a terminal: names and verdicts stand out. None where the output is no terminal or NO_COLOR is set."""
+"""What is printed, at once; on a terminal in colour, so that names and verdicts stand out, unless NO_COLOR is set."""
 
 from __future__ import annotations
 
 import os
 import re
 import sys
-
-import typer
 
 VERDICTS = {
     "green": ("controllable", "regular", "same aspect", "goal", "passed"),
@@ -15,7 +13,14 @@ VERDICTS = {
             "local minimum", "antipodal"),
 }
 """Words that end a question well, not wholly, badly; they stand first in their row, or as a cell of a table."""
+CODES = {"green": 32, "yellow": 33, "red": 31}
+"""Of a terminal's colours."""
 _TITLE = re.compile(r"^([a-zA-Z][^ ]*(?: [^ ]+){0,3})(  +)(?=\S)", re.MULTILINE)
+
+
+def say(text: str, *, err: bool = False) -> None:
+    """Print a text to standard output, or to standard error."""
+    print(text, file=sys.stderr if err else sys.stdout, flush=True)
 
 
 def wanted() -> bool:
@@ -25,7 +30,7 @@ def wanted() -> bool:
 
 def heading(text: str) -> str:
     """The title of a part of the help."""
-    return typer.style(text, bold=True) if wanted() else text
+    return f"\x1b[1m{text}\x1b[0m" if wanted() else text
 
 
 def painted(text: str) -> str:
@@ -34,5 +39,5 @@ def painted(text: str) -> str:
         return text
     for name, words in VERDICTS.items():
         shown = rf"(?:(?<=  )|(?<=: ))({'|'.join(words)})(?=[ ,]|$)"
-        text = re.sub(shown, typer.style(r"\1", fg=name), text, flags=re.MULTILINE)
-    return _TITLE.sub(typer.style(r"\1", dim=True) + r"\2", text)
+        text = re.sub(shown, f"\x1b[{CODES[name]}m\\1\x1b[0m", text, flags=re.MULTILINE)
+    return _TITLE.sub("\x1b[2m\\1\x1b[0m\\2", text)

@@ -1,74 +1,177 @@
-"""Commands made of their declared options; the help of each is written from them: in groups, with examples, whole."""
+"""Commands made of their declared options: how the words of a command line are read by them, and the help."""
 
 from __future__ import annotations
 
-import inspect
-from collections.abc import Callable, Sequence
+import shutil
+import textwrap
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from typing import Any
 
-import typer
-from typer.core import TyperCommand, TyperGroup
-
-from . import colour
+from ..errors import BadRequest
+from .colour import heading, say
 from .options import NEEDED, OUTPUT, OWN, READING, WATCHING, Option, warn
 
-HELP = {"help_option_names": ["-h", "--help"], "max_content_width": 100}
+HELP = ("-h", "--help")
+HELP_ROW = (", ".join(HELP), "Show this message and exit.")
 
 
-class DeclaredCommand(TyperCommand):
-    """A command whose help comes from its table of options."""
+@dataclass(frozen=True, eq=False)
+class DeclaredCommand:
+    """A command: what it says of itself, its options, what is run with all of them by name, and examples without its
+    name."""
 
-    options: Sequence[Option] = ()
+    path: str
+    help: str
+    options: Sequence[Option]
+    run: Callable[..., None]
     examples: Sequence[str] = ()
 
-    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
-        """Read the command line; what is called by an old name is told."""
-        given = {each.partition("=")[0] for each in args}
-        for option in self.options:
-            for name in given.intersection(option.old):
-                warn(f"{name} is called {option.names[0]} now; the old name goes with 0.4")
-        return super().parse_args(ctx, args)
+    @property
+    def name(self) -> str:
+        """As it is called after ``hrsynth``."""
+        return self.path.partition(" ")[2]
 
-    def format_help(self, ctx: Any, formatter: Any) -> None:
+    def main(self, words: Sequence[str]) -> None:
+        """Run the command on the words after its name, or show its help."""
+        values = self.values(words)
+        if values is None:
+            say(self.shown())
+        else:
+            self.run(**values)
+
+    def values(self, words: Sequence[str]) -> dict[str, Any] | None:
+        """The value of each option by its name, None where help is asked for; what is called by an old name is told.
+        Raises ``BadRequest``.
+
+        Options stand anywhere before ``--``, as ``--name VALUE``, ``--name=VALUE``, ``-n VALUE`` or ``-nVALUE``.
+        """
+        flags = {name: (each, told) for each in self.options for names in (*each.names, *each.old)
+                 for name, told in zip(names.split("/"), (True, False), strict=False)}
+        given: dict[str, list[Any]] = {}
+        plain: list[str] = []
+        rest = iter(words)
+        for word in rest:
+            if word == "--":
+                plain += rest
+            elif word == "-" or not word.startswith("-"):
+                plain.append(word)
+            elif word in HELP:
+                return None
+            else:
+                option, value = self._option(word, flags, rest)
+                given.setdefault(option.name, []).append(value)
+        for option in self.options:
+            if option.argument and plain:
+                count = len(plain) if option.several else 1
+                given[option.name], plain = [option.read(each) for each in plain[:count]], plain[count:]
+        if plain:
+            raise BadRequest(f"{self.name} takes no more words", " ".join(plain))
+        missing = [each.shown for each in self.options if each.default is NEEDED and each.name not in given]
+        if missing:
+            raise BadRequest(f"{self.name} needs {' and '.join(missing)}")
+        return {each.name: each.default if each.name not in given else given[each.name] if each.several
+                else given[each.name][-1] for each in self.options}
+
+    def _option(self, word: str, flags: dict[str, tuple[Option, bool]], rest: Iterator[str]) -> tuple[Option, Any]:
+        """The option that a word names, and its value: in the word, or the next one."""
+        name, given, value = word.partition("=")
+        if not word.startswith("--") and word[:2] in flags:
+            name, given, value = word[:2], word[2:], word[2:]
+        if name not in flags:
+            from difflib import get_close_matches
+
+            raise BadRequest(f"{self.name}: no such option", name, get_close_matches(name, flags) or sorted(flags))
+        option, told = flags[name]
+        if name in option.old:
+            warn(f"{name} is called {option.names[0]} now; the old name goes with 0.4")
+        if option.kind is bool:
+            if given:
+                raise BadRequest(f"{name} takes no value", value)
+            return option, told
+        if not given:
+            following = next(rest, None)
+            if following is None:
+                raise BadRequest(f"{name} needs a value", None, option.value)
+            value = following
+        return option, option.read(value)
+
+    def shown(self) -> str:
         """Usage, what it does, arguments, groups of options, examples."""
         arguments = [each for each in self.options if each.argument]
         needed = [each.shown.split(", ")[-1] for each in self.options if each.default is NEEDED and not each.argument]
-        formatter.write_usage(ctx.command_path, " ".join([*(each.value for each in arguments), *needed, "[OPTIONS]"]))
-        self.format_help_text(ctx, formatter)
-        _section(formatter, "Arguments", [(each.value, each.told) for each in arguments])
+        parts = [*_head(self.path, [*(each.value for each in arguments), *needed, "[OPTIONS]"], self.help),
+                 *_section("Arguments", [(each.value, each.told) for each in arguments])]
         for group in (OWN, WATCHING, OUTPUT, READING):
             rows = [(each.shown, each.told) for each in self.options if each.group == group and not each.argument]
-            _section(formatter, group, rows + [("-h, --help", "Show this message and exit.")] * (group == OUTPUT))
+            parts += _section(group, rows + [HELP_ROW] * (group == OUTPUT))
         if self.examples:
-            with formatter.section(colour.heading("Examples")):
-                for each in self.examples:
-                    formatter.write(f"  {ctx.command_path} {each}\n")
+            parts.append("\n".join([f"{heading('Examples')}:", *(f"  {self.path} {each}" for each in self.examples)]))
+        return "\n\n".join(parts)
 
 
-class WholeGroup(TyperGroup):
-    """A group of commands that says of each all that it does."""
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Commands under one name; ``version`` is what ``--version`` prints."""
 
-    def format_commands(self, ctx: Any, formatter: Any) -> None:
+    path: str
+    help: str
+    version: Callable[[], str] | None = None
+    commands: dict[str, DeclaredCommand | Group] = field(default_factory=dict)
+
+    def main(self, words: Sequence[str]) -> None:
+        """Run the command that the first word names on those after it; without one show the help."""
+        name, *rest = words or HELP
+        if name in HELP:
+            say(self.shown())
+        elif name == "--version" and self.version is not None:
+            say(f"{self.path} {self.version()}")
+        elif name.startswith("-"):
+            raise BadRequest("no such option", name, [*HELP, *["--version"] * (self.version is not None)])
+        elif name not in self.commands:
+            raise BadRequest("no such command", name, tuple(self.commands))
+        else:
+            self.commands[name].main(rest)
+
+    def shown(self) -> str:
         """A row a command."""
-        _section(formatter, "Commands", [(name, each.help or "") for name, each in self.commands.items()])
+        version = [] if self.version is None else [("--version", "Print the version.")]
+        return "\n\n".join([*_head(self.path, ["[OPTIONS]", "COMMAND", "[ARGS]..."], self.help),
+                            *_section("Options", [*version, HELP_ROW]),
+                            *_section("Commands", [(name, each.help) for name, each in self.commands.items()])])
 
 
-def add_command(app: typer.Typer, name: str, help: str, declared: Sequence[Option], run: Callable[..., None],
-                shown: Sequence[str] = ()) -> None:
-    """Add a command: what must be given comes first, ``run`` is called with all by name; the examples that are
-    ``shown`` follow the command's own name in its help."""
-    parameters = sorted((each.parameter() for each in declared), key=lambda each: each.default is not NEEDED)
-
-    def called(**values: Any) -> None:
-        run(**values)
-
-    called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
-    called.__annotations__ = {each.name: each.annotation for each in parameters}
-    kind = type("Command", (DeclaredCommand,), {"options": declared, "examples": shown})
-    app.command(name, help=help, cls=kind)(called)
+def add_command(group: Group, name: str, help: str, options: Sequence[Option], run: Callable[..., None],
+                examples: Sequence[str] = ()) -> None:
+    """Add a command; the examples follow its name in its help."""
+    group.commands[name] = DeclaredCommand(f"{group.path} {name}", help, options, run, examples)
 
 
-def _section(formatter: Any, title: str, rows: Sequence[tuple[str, str]]) -> None:
-    if rows:
-        with formatter.section(colour.heading(title)):
-            formatter.write_dl(rows)
+def _width() -> int:
+    """Columns of a help."""
+    return max(min(shutil.get_terminal_size().columns, 100) - 2, 50)
+
+
+def _filled(text: str, width: int, first: str, more: str) -> str:
+    return textwrap.fill(text, width, initial_indent=first, subsequent_indent=more, break_on_hyphens=False,
+                         break_long_words=False)
+
+
+def _head(path: str, words: Sequence[str], help: str) -> tuple[str, str]:
+    usage = f"Usage: {path} "
+    return _filled(" ".join(words), _width(), usage, " " * len(usage)), _filled(help, _width(), "  ", "  ")
+
+
+def _section(title: str, rows: Sequence[tuple[str, str]]) -> list[str]:
+    """A title and its rows, the second column below each other; none where there are no rows."""
+    if not rows:
+        return []
+    column = min(max(len(name) for name, _ in rows), 30) + 2
+    lines = [f"{heading(title)}:"]
+    for name, told in rows:
+        first, apart = f"  {name:{column}}", " " * (column + 2)
+        if len(name) > column - 2:
+            lines.append(f"  {name}")
+            first = apart
+        lines.append(_filled(told, _width(), first, apart).rstrip())
+    return ["\n".join(lines)]

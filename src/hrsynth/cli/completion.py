@@ -6,9 +6,8 @@ from collections.abc import Iterable, Sequence
 from contextlib import suppress
 from typing import Any
 
-import typer
-
-from .commands import add_command
+from .colour import say
+from .commands import Group, add_command
 from .options import NEEDED, Option, shipped
 
 EXAMPLE = "example:"
@@ -77,17 +76,17 @@ def _words(option: Option, last: str) -> Iterable[str]:
     return words
 
 
-def add(app: typer.Typer) -> None:
+def add(app: Group) -> None:
     """Make it a command."""
     def completion(shell: str, typed: list[str] | None) -> None:
         """Print a shell's script, or (asked by that) the words that can follow."""
         from ..errors import BadRequest
 
         if shell == WORDS:
-            for each in candidates(typer.main.get_command(app), typed or []):
-                typer.echo(each)
+            for each in candidates(app, typed or []):
+                say(each)
         elif shell in SCRIPTS:
-            typer.echo(SCRIPTS[shell])
+            say(SCRIPTS[shell])
         else:
             raise BadRequest("no completion for the shell", shell, tuple(SCRIPTS))
 

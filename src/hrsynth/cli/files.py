@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from typing import Any
 
-import typer
-
 from . import options
-from .commands import add_command
+from .colour import say
+from .commands import Group, add_command
 from .options import JSON, NEEDED, OUTPUT, SOURCE, Option, flag, output, robot_of, warn
 from .progress import Progress
 
@@ -23,19 +22,19 @@ def robots(examples: bool, json: bool) -> None:
 
     if examples:
         if json:
-            typer.echo(record("robots", None, {"robots": [{"name": f"example:{name}", "file": str(file)}
+            say(record("robots", None, {"robots": [{"name": f"example:{name}", "file": str(file)}
                                                           for name, file in found().items()]}))
         else:
-            typer.echo(table([(f"example:{name}", file.suffix[1:], file.parts[-3]) for name, file in found().items()],
+            say(table([(f"example:{name}", file.suffix[1:], file.parts[-3]) for name, file in found().items()],
                              ("name", "format", "from example-robot-data")))
         return
     files = shipped()
     if json:
         rows = [{"name": each.name, "file": str(files.get(each.name, "")), "architecture_ascii": each.architecture,
                  "dof": each.dof, "section": each.section, "dimensions": each.provenance} for each in ROBOTS]
-        typer.echo(record("robots", None, {"robots": rows}))
+        say(record("robots", None, {"robots": rows}))
     else:
-        typer.echo(table([(each.name, str(parse(each.architecture)), str(each.dof), each.section) for each in ROBOTS],
+        say(table([(each.name, str(parse(each.architecture)), str(each.dof), each.section) for each in ROBOTS],
                          ("name", "architecture", "dof", "source")))
 
 
@@ -59,7 +58,7 @@ def convert(target: str | None, output: str | None, to: str | None, meshes: str,
         warn(warning)
     fields = {"file": target, "files": files, "links": len(mechanism.links), "joints": len(mechanism.joints),
               "warnings": lost}
-    typer.echo(record("convert", mechanism.name, fields) if json
+    say(record("convert", mechanism.name, fields) if json
                else f"{mechanism.name} with {fields['links']} links and {fields['joints']} joints is written to "
                     f"{' and '.join(files)}.")
 
@@ -73,11 +72,11 @@ def verify(certificate: str, robot: str | None, json: bool) -> None:
     mechanism = None if robot is None else load(robot)
     proved = checked(certificate, mechanism)
     fields = {"file": certificate, "accepted": True, "proved": proved}
-    typer.echo(record("verify", None if mechanism is None else mechanism.name, fields)
+    say(record("verify", None if mechanism is None else mechanism.name, fields)
                if json else f"accepted: {proved}")
 
 
-def add(app: typer.Typer) -> None:
+def add(app: Group) -> None:
     """Make them commands."""
     add_command(app, "verify", "Check a certificate that modes or derive wrote, with integers and fractions alone.",
                 (Option("certificate", "The certificate's file.", "FILE", default=NEEDED, argument=True),

@@ -8,9 +8,8 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-import typer
-
-from .commands import add_command
+from .colour import say
+from .commands import Group, add_command
 from .options import JSON, NEEDED, SOURCE, WATCHING, Option, flag, output, quiet_robot_of, robot_of, warn
 from .progress import Progress
 
@@ -52,9 +51,9 @@ def importing(target: str, observe: str | None, yes: bool, view: bool, json: boo
                   "base": mechanism.base, "platform": mechanism.platform, "motors": motors,
                   "observed": {leg: seen.link for leg, seen in _segments(mechanism).items()},
                   "notes": [str(note) for note in mechanism.notes], "warnings": lost}
-        typer.echo(record("import", mechanism.name, fields))
+        say(record("import", mechanism.name, fields))
     else:
-        typer.echo(f"{mechanism.name} with {len(mechanism.links)} links and {len(mechanism.joints)} joints is written "
+        say(f"{mechanism.name} with {len(mechanism.links)} links and {len(mechanism.joints)} joints is written "
                    f"to {target}.\nThe same without questions: {again}")
 
 
@@ -106,10 +105,10 @@ def _answered(path: Path, source: dict[str, Any], observe: str | None, target: s
             if wanted is False:
                 break
     except (EOFError, KeyboardInterrupt) as error:
-        typer.echo("")
+        say("")
         status = 2 if isinstance(error, EOFError) else 130
     warn("nothing is written")
-    raise typer.Exit(status)
+    raise SystemExit(status)
 
 
 class _Dialog:
@@ -164,7 +163,7 @@ class _Dialog:
         except HrsynthError as error:
             if not self.asked:
                 raise
-            typer.echo("\n".join(["", *error.lines(), "That cannot be read so; the questions again.", ""]))
+            say("\n".join(["", *error.lines(), "That cannot be read so; the questions again.", ""]))
             return None
 
     def _show_file(self, found: ImportChoices) -> None:
@@ -172,19 +171,19 @@ class _Dialog:
         for joint in found.joints:
             kinds[_word(joint)] = kinds.get(_word(joint), 0) + 1
         counts = ", ".join(f"{count} {kind}" for kind, count in kinds.items())
-        typer.echo(f"{self.path}: {found.dialect}, {len(found.links)} links, {len(found.joints)} joints ({counts})")
+        say(f"{self.path}: {found.dialect}, {len(found.links)} links, {len(found.joints)} joints ({counts})")
         for note in found.notes:
-            typer.echo(f"  {note}")
+            say(f"  {note}")
 
     def _ask_closures(self, found: ImportChoices) -> None:
         """Frames to join, on top of what the file closes."""
         from ..description.overrides import closures
 
         closing, near = found.closing, found.candidates
-        typer.echo(f"\nLoops: {len(closing) or 'none'} closed by the file")
+        say(f"\nLoops: {len(closing) or 'none'} closed by the file")
         _list([f"{joint.name}: {joint.links[0]} to {joint.links[1]}, {_word(joint)}" for joint in closing], "-")
         if near:
-            typer.echo("Frames that lie near to each other, and could be held together:")
+            say("Frames that lie near to each other, and could be held together:")
             _list([str(each) for each in near])
         elif closing:
             return
@@ -206,7 +205,7 @@ class _Dialog:
             "none", lambda text: [] if text == "none" else chosen(text))
 
     def _ask_base(self, found: ImportChoices) -> None:
-        typer.echo(f"\nBase: {found.bases[0]}" + (f", of {len(found.bases)} that no joint carries"
+        say(f"\nBase: {found.bases[0]}" + (f", of {len(found.bases)} that no joint carries"
                                                   if len(found.bases) > 1 else ""))
         if len(found.bases) > 1:
             _list(found.bases)
@@ -216,7 +215,7 @@ class _Dialog:
 
     def _ask_platform(self, found: ImportChoices) -> None:
         why = found.why or "says the file"
-        typer.echo(f"\nPlatform: {found.platforms[0]}, {why}" if found.told else "\nPlatform: several could be")
+        say(f"\nPlatform: {found.platforms[0]}, {why}" if found.told else "\nPlatform: several could be")
         _list(found.platforms)
         name = _answer("Which link is the platform? A number or a name", found.platforms[0] if found.told else None,
                        lambda text: _one(text, found.platforms, found.links), self._view)
@@ -226,7 +225,7 @@ class _Dialog:
     def _ask_motors(self, found: ImportChoices) -> None:
         joints = found.moving
         driven = [joint.name for joint in joints if joint.motor is not None]
-        typer.echo(f"\nMotors: {', '.join(driven) or 'none is told'}")
+        say(f"\nMotors: {', '.join(driven) or 'none is told'}")
         _list([f"{joint.name} ({_word(joint)}){', driven' if joint.motor is not None else ''}" for joint in joints])
 
         def chosen(text: str) -> str:
@@ -241,10 +240,10 @@ class _Dialog:
     def _show_robot(self, mechanism: Mechanism) -> None:
         points = [joint.point for joint in mechanism.joints.values()]
         span = max((float(abs(one - other).max()) for one in points for other in points), default=0.0)
-        typer.echo(f"\nRead: {mechanism.headline()}; base {mechanism.base}, platform {mechanism.platform}; its joints "
+        say(f"\nRead: {mechanism.headline()}; base {mechanism.base}, platform {mechanism.platform}; its joints "
                    f"span {span:.4g} m")
         for note in mechanism.notes:
-            typer.echo(f"  {note}")
+            say(f"  {note}")
 
     def _ask_unit(self, mechanism: Mechanism) -> Mechanism:
         from ..description.overrides import UNITS
@@ -254,14 +253,14 @@ class _Dialog:
                 raise ValueError(", ".join(UNITS))
             return text
 
-        typer.echo(f"\nLengths: the robot's characteristic length would be {mechanism.length:.3g} m")
+        say(f"\nLengths: the robot's characteristic length would be {mechanism.length:.3g} m")
         unit = _answer(f"In which unit is the file? {', '.join(UNITS)}", "m", meant)
         self.source["unit"] = None if unit == "m" else unit
         return mechanism if unit == "m" else self._mechanism() or mechanism
 
     def _ask_segments(self, mechanism: Mechanism) -> str | None:
         segments = _segments(mechanism)
-        typer.echo("\nObserved: " + ("; ".join(f"leg {leg} at {seen.link}" for leg, seen in segments.items())
+        say("\nObserved: " + ("; ".join(f"leg {leg} at {seen.link}" for leg, seen in segments.items())
                                      or "no leg has a segment that could be watched"))
         if not segments:
             return None
@@ -300,9 +299,9 @@ class _Dialog:
                 page = Path(tempfile.mkdtemp(prefix="hrsynth-"), "robot.html")
                 view(_read(self.source, self.observe, tell=False)).save(page)
         except HrsynthError as error:
-            typer.echo(f"No picture yet: {error.lines()[0]}")
+            say(f"No picture yet: {error.lines()[0]}")
             return
-        typer.echo(f"The robot is drawn in {page}")
+        say(f"The robot is drawn in {page}")
         webbrowser.open(page.as_uri())
 
 
@@ -322,9 +321,9 @@ def _answer(question: str, default: str | None, meant: Callable[[str], T], view:
         try:
             return meant(text or str(default))
         except HrsynthError as error:
-            typer.echo(f"  {error.lines()[0]}")
+            say(f"  {error.lines()[0]}")
         except ValueError as error:
-            typer.echo(f"  {text!r:.60} is no answer: {error}")
+            say(f"  {text!r:.60} is no answer: {error}")
 
 
 def _words(text: str) -> list[str]:
@@ -352,16 +351,16 @@ def _one(text: str, listed: Sequence[str], named: Iterable[str]) -> str:
 
 def _list(lines: Sequence[str], mark: str | None = None) -> None:
     for number, line in enumerate(lines[:SHOWN], 1):
-        typer.echo(f"  {mark or number:>2}  {line}")
+        say(f"  {mark or number:>2}  {line}")
     if len(lines) > SHOWN:
-        typer.echo(f"      and {len(lines) - SHOWN} more, which can be named")
+        say(f"      and {len(lines) - SHOWN} more, which can be named")
 
 
 def _word(joint: Any) -> str:
     return str(joint.kind.name).lower()
 
 
-def add(app: typer.Typer) -> None:
+def add(app: Group) -> None:
     """Make it a command."""
     add_command(app, "import", "A guided reader: shows what a robot's file says and what is guessed, asks for "
                 "closures, base, platform, motors and segments, writes the native file, and prints the command that "

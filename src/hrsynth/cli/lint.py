@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from typing import Any
 
-import typer
-
-from .colour import painted
-from .commands import add_command
+from .colour import painted, say
+from .commands import Group, add_command
 from .options import JSON, NEEDED, OUTPUT, SOURCE, Option, flag, output, shipped
 from .progress import Progress
 
@@ -48,16 +46,16 @@ def lint(files: list[str], format: str, fail_on: str, json: bool, reader: list[s
         given["close"] = given["close"] or ()
         found = hrsynth.lint(files, reader=reader or (), ignore=ignore or (), **given)
     if json or format == "json":
-        typer.echo(record("lint", None, found.to_dict()))
+        say(record("lint", None, found.to_dict()))
     elif format == "text":
-        typer.echo(painted(hrsynth.text(found)))
+        say(painted(hrsynth.text(found)))
     else:
-        typer.echo(shown.github(found) if format == "github" else shown.sarif(found))
+        say(shown.github(found) if format == "github" else shown.sarif(found))
     if fail_on != "nothing" and found.reaches(fail_on):
-        raise typer.Exit(1)
+        raise SystemExit(1)
 
 
-def add(app: typer.Typer) -> None:
+def add(app: Group) -> None:
     """Make it a command."""
     add_command(app, "lint", "What is wrong, doubtful or lost in robot files, by rules with names, and what mends it.",
                 (Option("files", "Robot files in any dialect, or names of shipped robots.", "FILES", list[str], NEEDED,

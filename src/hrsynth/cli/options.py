@@ -1,20 +1,19 @@
-"""Options as data: each is declared once, the commands' tables put them together; typer reads them, the help and the
-completion of shells are made of them."""
+"""Options as data: each is declared once, the commands' tables put them together; the command line is read
+by them, the help and the completion of shells are made of them."""
 
 from __future__ import annotations
 
-import inspect
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
+from .colour import say
 
 if TYPE_CHECKING:
     from ..mechanism import Mechanism
 
-NEEDED: Any = inspect.Parameter.empty
+NEEDED: Any = ...
 """The default of what must be given."""
 OWN, WATCHING, OUTPUT, READING = "Options", "What is watched", "Output", "The robot, where its file does not say"
 """Groups of options, in the order of the help."""
@@ -63,17 +62,26 @@ class Option:
         facts += [] if self.high is None else [f"at most {self.high}"]
         return f"{self.help}  [{'; '.join(facts)}]" if facts else self.help
 
-    def parameter(self) -> inspect.Parameter:
-        """As typer reads it from a signature."""
-        kind = self.kind if self.default is not None else self.kind | None
-        told: Any
-        if self.argument:
-            told = typer.Argument(metavar=self.metavar, help=self.help)
-        else:
-            told = typer.Option(*self.names, *self.old, metavar=self.metavar, help=self.help, min=self.low,
-                                max=self.high)
-        return inspect.Parameter(self.name, inspect.Parameter.KEYWORD_ONLY, default=self.default,
-                                 annotation=Annotated[kind, told])
+    @property
+    def several(self) -> bool:
+        """Whether it can be given more than once."""
+        return self.kind == list[str]
+
+    def read(self, text: str) -> Any:
+        """A value as it is written on the command line; raises ``BadRequest``."""
+        from ..errors import BadRequest
+
+        if self.kind not in (int, float):
+            return text
+        ends = [f"at {end} {value:g}" for end, value in (("least", self.low), ("most", self.high)) if value is not None]
+        try:
+            number = self.kind(text)
+            if (self.low is None or number >= self.low) and (self.high is None or number <= self.high):
+                return number
+        except ValueError:
+            pass
+        name = self.names[0] if self.names else self.value
+        raise BadRequest(name, text, ", ".join(["an integer" if self.kind is int else "a number", *ends])) from None
 
 
 def flag(name: str, help: str, group: str = OWN) -> Option:
@@ -140,7 +148,7 @@ def quiet_robot_of(values: dict[str, Any]) -> Mechanism:
 
 def warn(text: str) -> None:
     """Say something beside the answer."""
-    typer.echo(f"hrsynth: {text}", err=True)
+    say(f"hrsynth: {text}", err=True)
 
 
 def told_radians(option: str, text: str | None) -> None:

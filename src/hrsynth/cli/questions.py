@@ -7,13 +7,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-import typer
-
 from ..budgets import BRANCH_CELLS, EFFORT
 from ..present.outputs import OUTPUTS
 from ..progress import following
-from .colour import painted
-from .commands import add_command
+from .colour import painted, say
+from .commands import Group, add_command
 from .options import (
     JSON,
     NEEDED,
@@ -49,7 +47,7 @@ class Question:
     after: Callable[..., None] | None = None
     seeded: bool = True
 
-    def add(self, app: typer.Typer) -> None:
+    def add(self, app: Group) -> None:
         """Make it a command."""
         drawn = FIGURE if any(each.drawn for each in OUTPUTS[self.name].files) else ()
         options = SOURCE[0], *self.options, *[SEED] * self.seeded, *drawn, JSON, *SOURCE[1:]
@@ -91,14 +89,14 @@ class Question:
             write()
         written = {each.field: path for each, path in files.items() if each.field is not None}
         if json:
-            typer.echo(record(self.name, mechanism.name, {**found.to_dict(), **more, **written}))
+            say(record(self.name, mechanism.name, {**found.to_dict(), **more, **written}))
         elif self.shows is not None and not any(written.values()):
             self.shows(found, source=source, **values)
         else:
-            typer.echo(painted(text(found)))
+            say(painted(text(found)))
             for each, path in files.items():
                 if path is not None:
-                    typer.echo(each.told(path))
+                    say(each.told(path))
         if self.after is not None:
             self.after(found, **values)
 

@@ -7,9 +7,8 @@ import sys
 from types import NoneType, UnionType
 from typing import Annotated, Any, Literal, NotRequired, Union, get_args, get_origin, get_type_hints, is_typeddict
 
-import typer
-
-from .commands import add_command
+from .colour import say
+from .commands import Group, add_command
 from .options import NEEDED, Option
 
 DIALECT = "https://json-schema.org/draft/2020-12/schema"
@@ -74,7 +73,7 @@ def page() -> str:
     return "\n\n".join(blocks) + "\n"
 
 
-def add(app: typer.Typer) -> None:
+def add(app: Group) -> None:
     """Make it a command."""
     def told(command: list[str]) -> None:
         """Print a command's schema."""
@@ -84,7 +83,7 @@ def add(app: typer.Typer) -> None:
         name = " ".join(command)
         if name not in RECORDS:
             raise BadRequest("no record of the command", name, tuple(RECORDS))
-        typer.echo(javascript.dumps(schema(name), ensure_ascii=False, indent=2))
+        say(javascript.dumps(schema(name), ensure_ascii=False, indent=2))
 
     add_command(app, "schema", "The JSON schema of what a command prints with --json.",
                 (Option("command", "A command, as derive or catalog list.", "COMMAND", list[str], NEEDED, argument=True,

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import signal
-import sys
 import threading
 from typing import TYPE_CHECKING, Any
 
-import typer
-
-from .commands import add_command
+from .colour import say
+from .commands import Group, add_command
 from .options import CAMERA, WATCHING, Option, listed, shipped
 
 if TYPE_CHECKING:
@@ -37,8 +35,7 @@ def serve(server: StudioServer, what: str) -> None:
             if signal.getsignal(number) is not signal.SIG_IGN:  # as nohup leaves it
                 signal.signal(number, end)
     try:
-        typer.echo(f"{what} is served at {server.address} (Ctrl-C ends it).")
-        sys.stdout.flush()
+        say(f"{what} is served at {server.address} (Ctrl-C ends it).")
         server.wait()
     except KeyboardInterrupt:
         pass
@@ -46,7 +43,7 @@ def serve(server: StudioServer, what: str) -> None:
         server.stop()
 
 
-def add(app: typer.Typer) -> None:
+def add(app: Group) -> None:
     """Make it a command."""
     add_command(app, "studio", "The page to work in, in the browser: a robot, a folder of robots or what is dropped "
                 "in, its hidden robot, its modes, its accuracy and runs, live.",
