@@ -17,7 +17,8 @@ from numpy.typing import NDArray
 
 from hrsynth.geometry.vectors import Array, hat, inverse, perpendicular, pose, rotation_about
 from hrsynth.mechanism.model import Joint, JointType, Mechanism
-from hrsynth.mechanism.observation import Direction, Observation
+from hrsynth.mechanism.observation import Observation
+from hrsynth.mechanism.observations.direction import Direction
 
 CLOSED = 1e-11
 """Largest residual of a closed state (lengths in characteristic lengths, angles in radians)."""

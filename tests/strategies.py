@@ -17,7 +17,8 @@ from hypothesis import strategies as st
 from hrsynth.geometry.vectors import Array, frozen, perpendicular, pose, rotation_about, unit
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Joint, JointType, Link, Mechanism, Motor
-from hrsynth.mechanism.observation import Direction, Observation
+from hrsynth.mechanism.observation import Observation
+from hrsynth.mechanism.observations.direction import Direction
 
 PLANAR_WORDS = ("RRR", "RPR", "PRR", "PPR", "PRP", "RRP")
 POD_WORDS = ("UPS", "RPS", "UPU", "SPS")

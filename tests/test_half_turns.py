@@ -29,7 +29,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.steps import track
 from hrsynth.kinematics.tasks import Target
 from hrsynth.mechanism import Mechanism
-from hrsynth.mechanism.observation import AngleEncoder
+from hrsynth.mechanism.observations.encoder import AngleEncoder
 from hrsynth.mechanism.pose import Grid, Pose
 from hrsynth.selection import select as selections
 from hrsynth.simulation.law import whole

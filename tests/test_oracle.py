@@ -14,7 +14,8 @@ from hypothesis import strategies as st
 from hrsynth.geometry.vectors import Array, pose
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Joint, JointType, Link, Mechanism
-from hrsynth.mechanism.observation import Direction, Observation
+from hrsynth.mechanism.observation import Observation
+from hrsynth.mechanism.observations.direction import Direction
 from oracle import CLOSED, GAP, NotAssembled, Oracle, exponential, logarithm, same_relation, span
 from strategies import (
     chains,

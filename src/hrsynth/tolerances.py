@@ -54,6 +54,9 @@ OUT_OF_REACH = 1e-7
 """Radius (part of the extents) of the balls around a pose within which no leg's closure is refused: a leg that is
 nearer to its reach than that stays undecided."""
 
+LINE_AT_CENTRE = 1e-3
+"""Distance (m) up to which an observed line counts as one through the camera's centre: its chain has other motors."""
+
 # Ranks and relations
 
 RANK_GAP = 1e3

@@ -22,7 +22,7 @@ from hrsynth.errors import BadRequest, NotCertified
 from hrsynth.kinematics.certificate import Certificate
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism.model import JointType
-from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.rewrite.strategy import Rewriting
 from hrsynth.tolerances import ASSEMBLED, FOLLOWED, RANK_GAP, SAME_RELATION
 from kinematics.robots import ROBOTS, derived

@@ -28,7 +28,8 @@ from hrsynth.kinematics.relation import Measurement, relation
 from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Coupling
-from hrsynth.mechanism.observation import Direction, Observation
+from hrsynth.mechanism.observation import Observation
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.relations import DirectionSource, Relations
 from hrsynth.mechanism.sensors import encoders
 from hrsynth.present.text import robots as text

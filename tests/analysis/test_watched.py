@@ -13,7 +13,7 @@ from hrsynth.description import load
 from hrsynth.geometry.so3 import exponential
 from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.pose import Pose
 from hrsynth.mechanism.sensors import defaults_of
 from oracle import Oracle

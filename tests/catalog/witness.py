@@ -19,7 +19,7 @@ from hrsynth.catalog.words import parse
 from hrsynth.geometry.vectors import Array, unit
 from hrsynth.mechanism.legs import decompose
 from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.sensors import default_observation
 from oracle import GAP, RANK, NotAssembled, Oracle, Undecided, exponential, split_rank
 

@@ -10,7 +10,7 @@ import numpy as np
 from hrsynth.geometry.vectors import Array, frozen, perpendicular, pose, rotation_about, unit
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Joint, JointType, Limits, Link, Mechanism, Motor
-from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.observations.direction import Direction
 
 FOUR_BAR = """\
 <robot name="four_bar">

@@ -17,7 +17,8 @@ from hrsynth.description.jointmotion import residual
 from hrsynth.errors import BadRequest
 from hrsynth.geometry.vectors import pose, rotation_from_rpy
 from hrsynth.mechanism.model import Coupling, Joint, JointType, Limits, Link, Mechanism, Motor
-from hrsynth.mechanism.observation import Direction, Observation
+from hrsynth.mechanism.observation import Observation
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.tolerances import ASSEMBLED
 
 IN_TREE = list(JointType)

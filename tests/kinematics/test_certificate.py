@@ -14,7 +14,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.kinematics.relation import relation
 from hrsynth.mechanism.model import JointType, Mechanism, Motor
-from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
 from kinematics.robots import derived
 

@@ -14,7 +14,7 @@ from hrsynth.kinematics.locked import interaction, leg_twists, split
 from hrsynth.kinematics.relation import Measurement, relation
 from hrsynth.kinematics.sampling import WEAKEST, random_walk
 from hrsynth.mechanism.legs import Leg
-from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.tolerances import CLOSED
 from kinematics.robots import ROBOTS, setting_of, state_of
 from oracle import Oracle, Rows, rows_of

@@ -15,8 +15,9 @@ from hrsynth.kinematics.configuration import ClosedConfiguration, measure
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import Direction, Joint, JointType, Observation
 from hrsynth.mechanism.builder import Builder
-from hrsynth.mechanism.observation import AngleEncoder, LinePosition, SlideEncoder
-from hrsynth.mechanism.sensors import encoders, line_position
+from hrsynth.mechanism.observations.encoder import AngleEncoder, SlideEncoder
+from hrsynth.mechanism.observations.line import SpaceLine
+from hrsynth.mechanism.sensors import encoders, observed_line
 from kinematics.robots import ROBOTS, setting_of, walked
 from oracle import exponential
 from strategies import random_direction, random_rotation, split
@@ -28,7 +29,7 @@ def kinds(rng: np.random.Generator) -> list[Observation]:
     """One observation of each class, with random geometry."""
     (u, a, m), p = (random_direction(rng) for _ in range(3)), rng.normal(size=3)
     start = random_rotation(rng) @ perpendicular(a)
-    return [Direction("1", "l", u), LinePosition("1", "l", u, p),
+    return [Direction("1", "l", u), SpaceLine("1", "l", at=p, axis=u),
             AngleEncoder("1", "l", "j", a, m, rng.normal(size=3), seen_from="c"),
             AngleEncoder("1", "l", "j", a, perpendicular(a), start, seen_from="c"),
             SlideEncoder("1", "l", "j", a, p, m, seen_from="c")]
@@ -148,7 +149,7 @@ def test_rates_and_values_of_candidates_have_the_same_units(robot: str) -> None:
             np.testing.assert_allclose(rate @ step, (a - b) / (2 * STEP), rtol=1e-6, atol=1e-6)
         found.append([(o.dimension, value) for o, value in zip(observations, values, strict=True)])
     for (dimension, own), (_, metres) in zip(*found, strict=True):
-        np.testing.assert_allclose(own * mechanism.length**dimension, metres, atol=1e-9)
+        np.testing.assert_allclose(own * mechanism.length ** np.asarray(dimension, dtype=float), metres, atol=1e-9)
 
 
 def test_a_split_universal_joint_has_the_encoders_of_its_halves() -> None:
@@ -178,11 +179,11 @@ def test_a_moment_is_that_of_the_line_not_of_its_point(seed: int) -> None:
     rng = np.random.default_rng(seed)
     X_c, X, V_c, V = random_pose(rng), random_pose(rng), rng.normal(size=(6, 12)), rng.normal(size=(6, 12))
     u, p = random_direction(rng), rng.normal(size=3)
-    line, again = LinePosition("1", "l", u, p), LinePosition("1", "l", u, p + rng.normal() * u)
-    h = line.value(X_c, X)
+    line, again = SpaceLine("1", "l", at=p, axis=u), SpaceLine("1", "l", at=p + rng.normal() * u, axis=u)
+    h = line.value(X_c, X)[3:]
     seen = Direction("1", "l", u)
     assert abs(h @ seen.value(X_c, X)) < 1e-12
-    np.testing.assert_allclose(again.value(X_c, X), h, atol=1e-12)
+    np.testing.assert_allclose(again.value(X_c, X)[3:], h, atol=1e-12)
     np.testing.assert_allclose(again.rate(X_c, X, V_c, V), line.rate(X_c, X, V_c, V), atol=1e-12)
 
 
@@ -195,9 +196,11 @@ def test_with_its_direction_a_moment_tells_the_same_about_any_origin(seed: int) 
     X_o = X_c @ pose(o)
     V_o = np.vstack([V_c[:3] + np.cross(V_c[3:].T, X_c[:3, :3] @ o).T, V_c[3:]])
     u, p = random_direction(rng), rng.normal(size=3)
-    seen, line = Direction("1", "l", u), LinePosition("1", "l", u, p)
-    np.testing.assert_allclose(line.value(X_o, X), line.value(X_c, X) - np.cross(o, seen.value(X_c, X)), atol=1e-12)
-    du, dh, dh_o = seen.rate(X_c, X, V_c, V), line.rate(X_c, X, V_c, V), line.rate(X_o, X, V_o, V)
+    seen, line = Direction("1", "l", u), SpaceLine("1", "l", at=p, axis=u)
+    h, h_o = line.value(X_c, X)[3:], line.value(X_o, X)[3:]
+    np.testing.assert_allclose(h_o, h - np.cross(o, seen.value(X_c, X)), atol=1e-12)
+    du = seen.rate(X_c, X, V_c, V)
+    dh, dh_o = line.rate(X_c, X, V_c, V)[3:], line.rate(X_o, X, V_o, V)[3:]
     rank = np.linalg.matrix_rank
     assert rank(np.vstack([du, dh])) == rank(np.vstack([du, dh, dh_o])) == rank(np.vstack([du, dh_o])) == 4
     assert rank(np.vstack([dh, dh_o])) > rank(dh)
@@ -210,11 +213,11 @@ def test_an_observed_line_is_that_of_the_segment(robot: str) -> None:
     mechanism = setting.mechanism
     for seen in setting.observed:
         assert isinstance(seen, Direction)
-        line = line_position(setting.anatomy, seen)
+        line = observed_line(setting.anatomy, seen)
         assert line.key != seen.key
         X = mechanism.links[seen.link].pose
-        u, p = X[:3, :3] @ line.direction, X[:3, :3] @ line.point + X[:3, 3]
-        np.testing.assert_allclose(line.direction, seen.direction)
+        u, p = X[:3, :3] @ line.axis, X[:3, :3] @ line.at + X[:3, 3]
+        np.testing.assert_allclose(line.axis, seen.direction)
         still = [j for j in mechanism.joints_of(seen.link) if not j.type.slides]
         assert len(still) > 0
         for joint in still:
@@ -234,4 +237,4 @@ def test_a_line_keeps_the_link_it_is_seen_from() -> None:
     setting = setting_of("delta")
     seen = replace(setting.observed[0], seen_from="platform")
     assert isinstance(seen, Direction)
-    assert line_position(setting.anatomy, seen).seen_from == "platform"
+    assert observed_line(setting.anatomy, seen).seen_from == "platform"

@@ -11,7 +11,7 @@ from hrsynth import check, load, modes, view
 from hrsynth.description import shipped
 from hrsynth.geometry.vectors import unit
 from hrsynth.mechanism import JointType
-from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.present.view.view import View
 from present.views import mechanism_of, miss, moved, seen, states, turned
 

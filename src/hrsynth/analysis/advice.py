@@ -16,7 +16,7 @@ from ..geometry.vectors import Array
 from ..kinematics.sampling import Samples
 from ..mechanism import Direction, JointType, Observation
 from ..mechanism.legs import LegDecomposition
-from ..mechanism.sensors import encoders, line_position, observation_of
+from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..progress import tell
 from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
@@ -86,7 +86,7 @@ def _directions(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
 def _lines(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
     for seen in setting.observed:
         if isinstance(seen, Direction):
-            yield FurtherMeasurement("line", seen.link, line_position(setting.anatomy, seen), seen.leg)
+            yield FurtherMeasurement("line", seen.link, observed_line(setting.anatomy, seen), seen.leg)
 
 
 def _encoders(anatomy: LegDecomposition) -> Iterator[FurtherMeasurement]:
@@ -106,6 +106,8 @@ LARGEST_SIZE = 4
 """Measurements of the largest sets that are tried."""
 LARGEST_COUNT = 20000
 """Sets of one size that are tried."""
+LARGEST_VALUE = 6
+"""Rows of the largest measured value."""
 BATCH = 2000
 """Sets that are tried at once."""
 
@@ -236,7 +238,7 @@ class Search:
         kept = [i for i in kept if max(float(np.linalg.norm(blocks[i])) for blocks in unseen) > RANK_CUTOFF]
         kept = _without_twins(kept, everything, rates)
         self.useful = tuple(everything[i] for i in kept)
-        self._rows = [np.array([_padded(blocks[i]) for i in kept]).reshape(len(kept), 3, twist.shape[1])
+        self._rows = [np.array([_padded(blocks[i]) for i in kept]).reshape(len(kept), LARGEST_VALUE, twist.shape[1])
                       for blocks, twist in zip(unseen, self._twists, strict=True)]
 
     def lost(self, sets: Sequence[Sequence[int]]) -> Array:
@@ -290,8 +292,8 @@ def _without_twins(kept: Sequence[int], everything: Sequence[FurtherMeasurement]
 
 
 def _padded(block: Array) -> Array:
-    """The rows of a candidate, zero rows added up to three."""
-    return np.vstack([block, np.zeros((3 - len(block), block.shape[1]))])
+    """The rows of a candidate, zero rows added up to those of the largest."""
+    return np.vstack([block, np.zeros((LARGEST_VALUE - len(block), block.shape[1]))])
 
 
 def _ranks(matrices: Array) -> Array:

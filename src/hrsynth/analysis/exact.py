@@ -32,7 +32,8 @@ from ..kinematics.relation import Measurement, Relation
 from ..mechanism import Mechanism, Observation
 from ..mechanism.carried import Tie, carried_by_joints, ties
 from ..mechanism.model import JointType
-from ..mechanism.observation import Direction, labels_of
+from ..mechanism.observation import labels_of
+from ..mechanism.observations.direction import Direction
 from ..mechanism.relations import Relations, recognise
 from ..results import Compared
 from ..tolerances import CLOSED

@@ -22,7 +22,7 @@ from ..geometry.ranks import rank_of
 from ..geometry.screws import normals
 from ..geometry.vectors import Numbers, cross
 from ..mechanism import Joint, Mechanism, graphs
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from ..mechanism.relations import DirectionSource, Relations
 from ..mechanism.screws import allowed
 from ..tolerances import RANK_CUTOFF, RANK_GAP

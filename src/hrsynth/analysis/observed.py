@@ -24,7 +24,8 @@ from ..kinematics.sampling import Sample, Samples, sample
 from ..mechanism import Mechanism, Observation
 from ..mechanism.legs import LegDecomposition, decompose
 from ..mechanism.normal import NormalForm, normal_form
-from ..mechanism.observation import Direction, labels_of
+from ..mechanism.observation import labels_of
+from ..mechanism.observations.direction import Direction
 from ..mechanism.pose import RADIANS, ModeNumber, Pose, PoseForm
 from ..mechanism.sensors import default_observation, defaults_of, encoders, observation_of, reason
 from ..progress import tell

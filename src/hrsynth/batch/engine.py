@@ -22,7 +22,8 @@ from ..geometry.vectors import Array, frozen
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..mechanism.legs import LegDecomposition
-from ..mechanism.observation import Direction, Observation
+from ..mechanism.observation import Observation
+from ..mechanism.observations.direction import Direction
 from ..results import Value
 from ..tolerances import RANK_CUTOFF
 from .direction_rows import direction_rows

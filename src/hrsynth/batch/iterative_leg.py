@@ -18,7 +18,7 @@ from ..geometry.so3 import exponential, logarithm
 from ..geometry.vectors import Array, hat, inverse, perpendicular
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from ..results import Value
 from ..tolerances import CLOSED, RANK_CUTOFF, SOLVED
 from .platform_coordinates import PlatformCoordinates

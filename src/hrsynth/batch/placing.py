@@ -21,7 +21,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.pinocchio_model import PinocchioModel
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg, LegDecomposition
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from ..results import Value
 from ..tolerances import CLOSED
 from .engine import Batch, Flags

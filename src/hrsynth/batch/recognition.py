@@ -21,7 +21,7 @@ from ..geometry.vectors import Array, inverse
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.normal import centre_pair
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from ..tolerances import SAME_GEOMETRY
 from .platform_coordinates import Frames, PlatformCoordinates
 

@@ -19,7 +19,7 @@ from ..mechanism.builder import Builder
 from ..mechanism.legs import decompose
 from ..mechanism.model import Mechanism
 from ..mechanism.normal import normal_form
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from ..mechanism.sensors import default_observation, observation_of
 from ..tolerances import SQUARE_AXES
 from .words import COMPOSITE, JointSymbol, LegWord, RobotWord

@@ -12,7 +12,7 @@ from ..analysis.branch.proof import BoxLike, branch
 from ..analysis.observed import LegsLike, ObservedRobot, RobotLike, as_robot
 from ..analysis.question import question
 from ..errors import BadRequest, HrsynthError
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from ..progress import tell
 from ..results import Result
 from ..tolerances import GENERATED_CLOSED, GENERATED_LAST_STEP

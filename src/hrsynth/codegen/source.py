@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from ..results import Value
 from .cell_tree import Node, cell_tree
 from .trace import FormulaTracer, TracedFunction

@@ -11,7 +11,7 @@ import numpy as np
 from ..analysis.branch.loops import LoopSystem, mapped
 from ..batch.tape import Symbol, Tape
 from ..geometry.affine import crossed
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from ..results import Value
 from .formulas import cut, cut_coordinate, placed, rows
 

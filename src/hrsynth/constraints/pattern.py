@@ -20,7 +20,7 @@ from ..kinematics.locked import leg_twists, split
 from ..kinematics.relation import Measurement, relation
 from ..mechanism import JointType, Mechanism, Observation
 from ..mechanism.legs import Leg, LegDecomposition
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from ..results import Value
 from ..tolerances import SAME_RELATION
 from .named_vectors import BodyPoint, BodyVector, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at

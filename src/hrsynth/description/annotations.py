@@ -10,7 +10,7 @@ import numpy as np
 
 from ..geometry.vectors import frozen, inverse
 from ..mechanism.model import JointType, Mechanism, Motor
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from ..tolerances import WITHOUT_DIRECTION
 from . import numerals
 from .jointgraph import FrameSpec, JointGraph

@@ -10,7 +10,7 @@ import numpy as np
 from ..geometry.vectors import Array, frozen, inverse
 from ..mechanism import graphs
 from ..mechanism.model import JointType, Limits, Link, Motor, Note
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from .numerals import Digits
 
 ORIGIN = frozen(np.eye(4))

@@ -12,7 +12,7 @@ from dataclasses import replace
 from ..errors import BadRequest
 from ..geometry.vectors import pose
 from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor, Note
-from ..mechanism.observation import Direction
+from ..mechanism.observations.direction import Direction
 from . import chains
 from .chains import CUT, WELD
 from .tree import is_connected, spanning

@@ -74,9 +74,9 @@ def measure(twin: PinocchioModel, q: Array, reference: str, observations: Sequen
     for group in groups:
         kind, view, at = group.kind, group.view, group.at
         found, moving = kind.together(group.observations, X[view], X[at], metric[view], metric[at])
-        unit = twin.length**kind.dimension
-        if unit != 1.0:
-            found, moving = found / unit, moving / unit
+        if np.any(kind.dimension):
+            unit = np.tile(twin.length ** np.broadcast_to(kind.dimension, kind.size), len(group.members))
+            found, moving = found / unit, moving / unit[:, None]
         for number, i in enumerate(group.members):
             rows = slice(number * kind.size, (number + 1) * kind.size)
             values[i], rates[i] = found[rows], moving[rows]

@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike
 
 from ..geometry.vectors import pose
 from .model import Coupling, Joint, JointType, Link, Mechanism, Motor
-from .observation import Direction
+from .observations.direction import Direction
 
 
 class Builder:

@@ -20,6 +20,7 @@ from ..results import Result, Value, content
 from ..tolerances import SAME_GEOMETRY
 from .graphs import Adjacency, adjacency
 from .observation import Observation
+from .sights import NamedCamera
 from .wrist import Wrist
 
 if TYPE_CHECKING:
@@ -190,6 +191,8 @@ class Mechanism(Result, shown_as="robot"):
     file: str | None = field(default=None, compare=False)
     notes: tuple[Note, ...] = field(default=(), compare=False)
     """What reading the file had to settle."""
+    cameras: tuple[NamedCamera, ...] = ()
+    """The cameras that have a name: what observations of their own reference see from."""
 
     def headline(self) -> str:
         """The name, and how much there is of it."""
@@ -344,6 +347,10 @@ class Mechanism(Result, shown_as="robot"):
             near(f"centre of joint {name}", a.point, b.point)
             if len(a.axes) == len(b.axes):
                 near(f"axes of joint {name}", np.ravel(a.axes), np.ravel(b.axes))
+        compare("cameras", [(c.name, c.link, c.focal, c.width, c.height) for c in self.cameras],
+                [(c.name, c.link, c.focal, c.width, c.height) for c in other.cameras])
+        for eye, other_eye in zip(self.cameras, other.cameras, strict=False):
+            near(f"pose of camera {eye.name}", eye.pose, other_eye.pose)
         for mine, theirs in zip(self.observations, other.observations, strict=False):
             found.extend(mine.differences(theirs, tolerance))
         return found

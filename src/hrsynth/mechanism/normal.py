@@ -22,7 +22,6 @@ from ..results import Value
 from ..tolerances import SAME_POINT
 from . import graphs
 from .model import Joint, JointType, Mechanism
-from .observation import Direction
 from .wrist import Interval, Wrist, chained
 
 
@@ -60,7 +59,13 @@ def _moved(old: Joint, new: Joint, length: float) -> float:
 
 
 def _protected(mechanism: Mechanism) -> set[str]:
-    return {mechanism.base, mechanism.platform, mechanism.reference} | {o.link for o in mechanism.observations}
+    return {mechanism.base, mechanism.platform, mechanism.reference, *_watching(mechanism)}
+
+
+def _watching(mechanism: Mechanism) -> list[str]:
+    """The links that are observed, or from which others are."""
+    seen = [o.link for o in mechanism.observations]
+    return seen + [o.seen_from for o in mechanism.observations if o.seen_from is not None]
 
 
 def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
@@ -69,7 +74,7 @@ def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
     fixed = [j for j in mechanism.joints.values() if j.type is JointType.FIXED]
     if not fixed:
         return mechanism
-    first = (mechanism.base, mechanism.platform, mechanism.reference, *(o.link for o in mechanism.observations))
+    first = (mechanism.base, mechanism.platform, mechanism.reference, *_watching(mechanism))
     order = {name: i for i, name in enumerate(dict.fromkeys((*first, *mechanism.links)))}
     bonds = graphs.adjacency((), (j.links for j in fixed))
     gone: set[str] = set()
@@ -83,11 +88,9 @@ def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
         gone.update(members)
         content = mechanism.links[kept].xml + tuple(x for name in members for x in mechanism.links[name].xml)
         kept_links.append(replace(mechanism.links[kept], xml=content))
-    observations = tuple(
-        replace(o, link=into[o.link], direction=mechanism.links[into[o.link]].pose[:3, :3].T
-                @ mechanism.links[o.link].pose[:3, :3] @ o.direction)
-        if isinstance(o, Direction) and o.link in gone else o
-        for o in mechanism.observations)
+    poses = {name: link.pose for name, link in mechanism.links.items()}
+    observations = tuple(o.carried_by(into, poses) for o in mechanism.observations)
+    cameras = tuple(camera.carried_by(into, poses) for camera in mechanism.cameras)
     joints = {}
     for joint in mechanism.joints.values():
         moved = replace(joint, predecessor=into[joint.predecessor], successor=into[joint.successor])
@@ -98,7 +101,7 @@ def _without_fixed(mechanism: Mechanism, into: dict[str, str]) -> Mechanism:
     couplings = tuple(replace(c, predecessor=into[c.predecessor], successor=into[c.successor])
                       for c in mechanism.couplings)
     return replace(mechanism, links=links, joints=joints, observations=observations, couplings=couplings,
-                   camera=None if mechanism.camera is None else into[mechanism.camera])
+                   camera=None if mechanism.camera is None else into[mechanism.camera], cameras=cameras)
 
 
 def _next_merge(mechanism: Mechanism) -> tuple[list[str], list[Joint], Joint] | None:

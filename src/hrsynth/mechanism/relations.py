@@ -24,7 +24,7 @@ from ..geometry.vectors import Array, cross, dot, inverse, transform, triple, un
 from ..tolerances import RANK_GAP, SAME_DIRECTION, SAME_PLANE, SAME_POINT
 from . import graphs
 from .model import Joint, JointType, Mechanism
-from .observation import Direction
+from .observations.direction import Direction
 
 AXIAL = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 """Joints whose centre may slide along their axis without consequence."""

@@ -1,5 +1,4 @@
-"""What can be measured of a mechanism: the direction of a segment of a leg, the position of its line, an encoder on a
-joint."""
+"""What can be measured of a mechanism: the direction of a segment of a leg, its line, an encoder on a joint."""
 
 from __future__ import annotations
 
@@ -17,7 +16,10 @@ from .composites import WordEdge
 from .legs import Leg, LegDecomposition
 from .model import Joint, JointType, Mechanism
 from .normal import centre_pair
-from .observation import AngleEncoder, Direction, Encoder, LinePosition, Observation, SlideEncoder
+from .observation import Observation
+from .observations.direction import Direction
+from .observations.encoder import AngleEncoder, Encoder, SlideEncoder
+from .observations.line import SpaceLine
 
 Place = TypeVar("Place")
 TURNING = (JointType.REVOLUTE, JointType.CYLINDRICAL)
@@ -208,12 +210,12 @@ def _slide(mechanism: Mechanism, joint: Joint, leg: str) -> SlideEncoder:
                  frozen(before[:3, :3].T @ (joint.point - before[:3, 3])), seen_from=joint.predecessor)
 
 
-def line_position(anatomy: LegDecomposition, seen: Direction) -> LinePosition:
-    """The position of the line whose direction is ``seen``: the line through the segment's first centre (that of a
-    joint that does not slide, where there is one; docs/pages/theory.md, section 2)."""
+def observed_line(anatomy: LegDecomposition, seen: Direction) -> SpaceLine:
+    """The line whose direction is ``seen``: the one through the segment's first centre (that of a joint that does not
+    slide, where there is one; docs/pages/theory.md, section 2)."""
     mechanism = anatomy.mechanism
     link = mechanism.links[seen.link]
     joints = sorted(mechanism.joints_of(seen.link), key=lambda joint: joint.type.slides)
     centre = centre_pair(*joints)[0] if len(joints) == 2 else joints[0].point
-    return LinePosition(seen.leg, seen.link, seen.direction, link.pose[:3, :3].T @ (centre - link.pose[:3, 3]),
-                        seen_from=seen.seen_from)
+    return SpaceLine(seen.leg, seen.link, at=link.pose[:3, :3].T @ (centre - link.pose[:3, 3]), axis=seen.direction,
+                     seen_from=seen.seen_from)

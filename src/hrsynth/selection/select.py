@@ -24,7 +24,8 @@ from ..budgets import AXIS_SEEN
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
-from ..mechanism.observation import Direction, labels_of
+from ..mechanism.observation import labels_of
+from ..mechanism.observations.direction import Direction
 from ..mechanism.pose import Pose, PoseLike, asked_pose
 from ..progress import tell
 from ..results import Compared, Result, Value, by_name

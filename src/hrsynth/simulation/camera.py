@@ -15,7 +15,8 @@ import numpy as np
 from ..errors import BadRequest
 from ..geometry.vectors import Array, inverse, perpendicular, pose, transform, unit
 from ..mechanism import Mechanism
-from ..mechanism.observation import Direction, Observation
+from ..mechanism.observation import Observation
+from ..mechanism.observations.direction import Direction
 from ..results import Value
 from ..tolerances import NUDGE
 from .law import Poses

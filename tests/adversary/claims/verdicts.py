@@ -116,11 +116,11 @@ def rows_of(case: Case, measured: object, at: object) -> np.ndarray | None:
     metric = np.where(robot.slides, robot.length, 1.0)
     if kind == "Direction":
         return case.study.rates(things(robot, [(link, measured.direction, False)]), at)  # type: ignore[attr-defined,arg-type]
-    if kind == "LinePosition":
-        x, J = robot.items(things(robot, [(link, measured.point, True),  # type: ignore[attr-defined]
-                                          (link, measured.direction, False)]), frames)  # type: ignore[attr-defined]
+    if kind == "SpaceLine":
+        x, J = robot.items(things(robot, [(link, measured.at, True),  # type: ignore[attr-defined]
+                                          (link, measured.axis, False)]), frames)  # type: ignore[attr-defined]
         rate = np.cross(J[:, 0], x[:, 1, None]) + np.cross(x[:, 0, None], J[:, 1])
-        return np.swapaxes(rate, 1, 2) * metric / robot.length
+        return np.swapaxes(np.concatenate([J[:, 1], rate / robot.length], axis=2), 1, 2) * metric
     axis = np.asarray(measured.axis)  # type: ignore[attr-defined]
     a = frames[0][:, robot.number(seen_from)] @ axis
     masks = robot.carried[robot.number(link)].astype(float) - robot.carried[robot.number(seen_from)]

@@ -16,7 +16,7 @@ from hrsynth.description import load, shipped
 from hrsynth.errors import PoseNotReached
 from hrsynth.geometry.vectors import pose
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.mechanism.pose import Pose
 
 OUTSIDE_BEFORE = "x=-0.058,y=0.031,z=0.301,rpy=0/0/0"

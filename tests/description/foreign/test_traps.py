@@ -15,7 +15,7 @@ from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism import JointType, Mechanism
 from hrsynth.mechanism.normal import normal_form
-from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.observations.direction import Direction
 
 CHAIN = '<link name="{1}"/><joint name="{0}" type="{3}"><parent link="{2}"/><child link="{1}"/>{4}</joint>'
 

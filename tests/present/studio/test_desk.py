@@ -16,7 +16,7 @@ import strategies
 from hrsynth import check, legs, load, modes, observe, save, shipped
 from hrsynth.cli import main
 from hrsynth.errors import BadRequest, HrsynthError
-from hrsynth.mechanism.observation import Direction
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.present.studio.desk import Desk
 from hrsynth.present.studio.scale import CONE_TEXT, LOST, error, rounded
 from hrsynth.present.text.tables import NOT_BOUNDED

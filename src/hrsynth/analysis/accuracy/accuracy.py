@@ -11,7 +11,7 @@ import numpy as np
 from ...errors import BadRequest
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...mechanism.observation import Direction
+from ...mechanism.observations.direction import Direction
 from ...mechanism.pose import Grid, ModeNumber, Pose, PoseLike, as_pose, asked_poses
 from ...progress import tell
 from ...results import Result

@@ -23,7 +23,8 @@ from ...mechanism import Joint, JointType, Observation
 from ...mechanism.composites import WordEdge
 from ...mechanism.legs import Leg, LegDecomposition
 from ...mechanism.notation import Rods
-from ...mechanism.observation import Direction, Encoder
+from ...mechanism.observations.direction import Direction
+from ...mechanism.observations.encoder import Encoder
 from ...tolerances import CHAIN_ROUNDING, RANK_GAP, SAME_DIRECTION, SAME_POINT
 
 

@@ -19,7 +19,7 @@ from ...mechanism import Observation
 from ...mechanism.composites import WordEdge
 from ...mechanism.legs import Leg, LegDecomposition
 from ...mechanism.notation import Rods
-from ...mechanism.observation import Direction
+from ...mechanism.observations.direction import Direction
 from ...tolerances import CHAIN_ROUNDING, SAME_RELATION
 from .chain import Chain, ChainBody, Underived, chain
 from .conditions import (

@@ -12,7 +12,7 @@ from ...errors import Disagreement
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, relation
-from ...mechanism.observation import Direction
+from ...mechanism.observations.direction import Direction
 from ...tolerances import SAME_RELATION
 from ..classes import interaction_matrix
 

@@ -18,7 +18,7 @@ from ...geometry.vectors import Array, hat, transform
 from ...mechanism.legs import decompose
 from ...mechanism.model import Mechanism, Note
 from ...mechanism.normal import normal_form
-from ...mechanism.observation import Direction
+from ...mechanism.observations.direction import Direction
 from ...mechanism.sensors import defaults_of
 from ...tolerances import RANK_GAP, SOLVED
 from ..postures import STAY

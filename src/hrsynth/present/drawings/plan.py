@@ -14,7 +14,7 @@ from itertools import pairwise
 from ...errors import HrsynthError
 from ...mechanism import Mechanism
 from ...mechanism.legs import LegDecomposition, decompose
-from ...mechanism.observation import Direction
+from ...mechanism.observations.direction import Direction
 from .boxes import Box, Ear, boxes_of, ears
 
 Point = tuple[float, int]

@@ -18,7 +18,7 @@ from ...analysis.modes.modes import AssemblyModes, modes
 from ...analysis.observed import ObservedRobot
 from ...analysis.singularity.singular import Singularity, singular
 from ...errors import BadRequest, HrsynthError
-from ...mechanism.observation import Direction
+from ...mechanism.observations.direction import Direction
 from ...mechanism.pose import Pose
 
 POINTS = 500

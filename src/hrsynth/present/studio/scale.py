@@ -10,7 +10,7 @@ import numpy as np
 from ...analysis.accuracy.pose_errors import attained, finite
 from ...analysis.observed import ObservedRobot
 from ...kinematics.configuration import ClosedConfiguration
-from ...mechanism.observation import Direction
+from ...mechanism.observations.direction import Direction
 from ..text.tables import NOT_BOUNDED, bounded
 
 CONE = math.radians(0.1)

@@ -72,7 +72,7 @@ def head(found: ObservedRobot) -> Rows:
 def watched(found: ObservedRobot) -> dict[str, list[str]]:
     """What is watched of each leg: the link, the axis in its frame, and why it is that."""
     from ...analysis.freedoms import point_text
-    from ...mechanism.observation import Direction
+    from ...mechanism.observations.direction import Direction
 
     told: dict[str, list[str]] = {}
     for o, why in found.watched():

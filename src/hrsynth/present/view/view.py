@@ -16,7 +16,8 @@ from ...geometry.vectors import Array, oriented
 from ...kinematics.coordinates import Coordinates
 from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism import Mechanism
-from ...mechanism.observation import Direction, Observation
+from ...mechanism.observation import Observation
+from ...mechanism.observations.direction import Direction
 from ...progress import tell
 from ...results import Result, Value
 from ..outputs import OUTPUTS, function

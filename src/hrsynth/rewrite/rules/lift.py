@@ -14,7 +14,7 @@ import numpy as np
 
 from ...geometry.vectors import Array, pose, unit
 from ...mechanism import Joint, JointType, Link, Motor
-from ...mechanism.observation import Direction
+from ...mechanism.observations.direction import Direction
 from ..evidence import Evidence, ProximalChain, far_from
 from ..rule import Match, Rule, Stage, whole_leg
 from ..state import State, VirtualChain

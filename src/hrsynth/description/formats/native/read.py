@@ -13,7 +13,7 @@ from ....errors import BadRobotFile
 from ....geometry.vectors import Array
 from ....mechanism import graphs
 from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
-from ....mechanism.observation import Direction
+from ....mechanism.observations.direction import Direction
 from ....tolerances import NO_FINER, SAME_DIRECTION, SAME_GEOMETRY
 from ... import chains, xml
 from ...dialect import RobotFile

@@ -12,7 +12,7 @@ from ....budgets import LARGEST_NUMBER
 from ....errors import BadRequest
 from ....geometry.vectors import Array, inverse, pose, unit
 from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
-from ....mechanism.observation import Direction
+from ....mechanism.observations.direction import Direction
 from ....tolerances import AT_ORIGIN, SAME_DIRECTION
 from ... import chains, numerals, xml
 from ...dialect import Written

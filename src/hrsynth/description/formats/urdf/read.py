@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ....mechanism.model import JointType, Limits, Link, Motor
-from ....mechanism.observation import Direction
+from ....mechanism.observations.direction import Direction
 from ... import xml
 from ...dialect import RobotFile
 from ...elements import sound_limits

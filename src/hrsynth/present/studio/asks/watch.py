@@ -19,7 +19,8 @@ from ....budgets import REMEMBERED
 from ....constraints.condition import always
 from ....errors import HrsynthError, RankUndecided
 from ....kinematics.configuration import ClosedConfiguration
-from ....mechanism.observation import Direction, labels_of
+from ....mechanism.observation import labels_of
+from ....mechanism.observations.direction import Direction
 from ....tolerances import NAMED
 from ...text.poses import STATES
 from ...text.robots import certificate, exact_words

@@ -1,0 +1,16 @@
+"""The kinds of observations: one file each. What lies here is found by itself."""
+
+from __future__ import annotations
+
+from functools import cache
+from importlib import import_module
+from pkgutil import iter_modules
+
+from ..observation import Observation
+
+
+@cache
+def kinds() -> dict[str, type[Observation]]:
+    """All kinds by their words, in the order of their files' names."""
+    found = (import_module(f"{__name__}.{module.name}").KIND for module in iter_modules(__path__))
+    return {kind.kind: kind for kind in found}

@@ -1,0 +1,60 @@
+"""A circle in space, as from stereo: its centre and its normal.
+
+    reference –U̲(C)–P̲–U̲(B)–R(d)– ℓ
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...geometry.screws import couple, force, normals
+from ...geometry.vectors import Array, Numbers, frozen
+from ..sights import CameraObservation, Sighting, VirtualJoint, apart, gimbal, normalised
+
+
+def circle_chain(at: Sighting, leg: str) -> tuple[VirtualJoint, ...]:
+    """U̲P̲-U̲-R: five motors, R about the normal."""
+    apart(at, at.B, 0.0, f"circle {leg!r}", "a centre outside of it")
+    return (gimbal(at.C, at.ray, at.far, actuated=True), VirtualJoint("P", at.C, (at.ray,), True),
+            gimbal(at.B, at.d, None, actuated=True), VirtualJoint("R", at.B, (at.d,)))
+
+
+def circle_wrenches(at: Sighting) -> list[Numbers]:
+    """Three forces at the centre, two moments normal to d."""
+    return [force(e, at.B) for e in np.eye(3, dtype=int).astype(at.B.dtype)] + [couple(n) for n in normals(at.d)]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpaceCircle(CameraObservation):
+    """(p, d), p from C to the centre B, d the normal."""
+
+    kind = "circle"
+    words = "a circle: its centre B and its normal d"
+    locked = "three forces at the centre, two moments ⟂ the normal"
+    needs = ("at", "axis")
+    size = 6
+    rank = 5
+    dimension = frozen([1, 1, 1, 0, 0, 0])
+
+    @staticmethod
+    def measured(p: Array, d: Array, r: Array) -> Array:
+        return np.concatenate([p, d], axis=-1)
+
+    @staticmethod
+    def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
+        one = np.broadcast_to(np.eye(3), (*p.shape, 3))
+        return np.concatenate([one, 0 * one], axis=-2), np.concatenate([0 * one, one], axis=-2)
+
+    def wrenches(self, at: Sighting) -> list[Numbers]:
+        return circle_wrenches(at)
+
+    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+        return circle_chain(at, self.leg)
+
+    def pointing(self, values: Array) -> Array | None:
+        return normalised(values[:, :3])[0]
+
+
+KIND = SpaceCircle

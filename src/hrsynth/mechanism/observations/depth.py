@@ -1,0 +1,49 @@
+"""The depth of a point: its coordinate along the camera's z axis.
+
+    reference –P̲(z)–PP–S(B)– ℓ
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...geometry.screws import force
+from ...geometry.vectors import Array, Numbers, perpendicular
+from ..sights import CameraObservation, Sighting, VirtualJoint
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PointDepth(CameraObservation):
+    """z · p, p from C to B."""
+
+    kind = "depth"
+    words = "the z-coordinate of B in the camera's frame"
+    locked = "the force along z at B"
+    needs = ("at",)
+    size = 1
+    rank = 1
+    dimension = 1
+
+    @staticmethod
+    def measured(p: Array, d: Array, r: Array) -> Array:
+        return p[..., 2:]
+
+    @staticmethod
+    def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
+        return np.broadcast_to(np.eye(3)[2:], (*p.shape[:-1], 1, 3)), None
+
+    def wrenches(self, at: Sighting) -> list[Numbers]:
+        return [force(at.z, at.B)]
+
+    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+        x = perpendicular(at.z)
+        return (VirtualJoint("P", at.B, (at.z,), actuated=True), VirtualJoint("P", at.B, (x,)),
+                VirtualJoint("P", at.B, (np.cross(at.z, x),)), VirtualJoint("S", at.B))
+
+    def pointing(self, values: Array) -> Array | None:
+        return None
+
+
+KIND = PointDepth

@@ -1,0 +1,126 @@
+"""The direction of an axis: u, a unit vector.
+
+    reference –P–P–P– T –U̲– W –R(d)– ℓ        (MMT 3.2, Fig. 2(b))
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import lru_cache
+from typing import Any, Self
+
+import numpy as np
+
+from ...errors import BadMechanism
+from ...geometry.screws import couple, normals
+from ...geometry.vectors import Array, Numbers, frozen, hat, unit
+from ..observation import Observation
+from ..sights import Sighting, VirtualJoint, gimbal, moved
+
+
+def axis_chain(at: Sighting) -> tuple[VirtualJoint, ...]:
+    """PPP-U̲-R(d): T only translates relative to the reference link, so the first axis of U̲ keeps its direction
+    there."""
+    turning = gimbal(at.B, at.d, at.far, actuated=True)
+    first, second = turning.axes
+    slides = (VirtualJoint("P", at.B, (axis,)) for axis in (first, second, np.cross(first, second)))
+    return (*slides, turning, VirtualJoint("R", at.B, (at.d,)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SeenAxis(Observation):
+    """The unit vector u = R_cᵀ R_ℓ d of a direction d fixed in link ℓ (docs/pages/theory.md, section 2; MMT 2.3.1).
+
+    ``direction`` is d in the *link's* frame, shape (3,).
+    """
+
+    locked = "two moments ⟂ u"
+    size = 3
+    rank = 2
+    rational = True
+    direction: Array
+
+    def __post_init__(self) -> None:
+        try:
+            object.__setattr__(self, "direction", frozen(unit(self.direction)))
+        except ValueError:
+            raise BadMechanism(f"observation of leg {self.leg!r}: direction", "0 0 0", "a non-zero vector") from None
+
+    def value(self, X_reference: Array, X_link: Array) -> Array:
+        """u, shape (3,), a unit vector in the reference link's frame."""
+        return X_reference[:3, :3].T @ X_link[:3, :3] @ self.direction
+
+    def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
+        """u̇ = R_cᵀ ((ω_ℓ − ω_c) × R_ℓ d), shape (3, n)."""
+        u = X_link[:3, :3] @ self.direction
+        return (X_reference[:3, :3].T @ -hat(u)) @ (V_link[3:] - V_reference[3:])
+
+    @classmethod
+    def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
+                 V_links: Array) -> tuple[Array, Array]:
+        seen = X_reference[:3, :3].T
+        u = np.matmul(X_links[:, :3, :3], _directions(tuple(observations)))[:, :, 0]
+        crosses = np.zeros((3, 3, len(u)))
+        crosses[1, 2], crosses[2, 0], crosses[0, 1] = u.T
+        crosses -= crosses.transpose(1, 0, 2)
+        rates = (seen @ crosses.transpose(2, 0, 1)) @ (V_links[:, 3:] - V_reference[3:])
+        return (u @ seen.T).ravel(), rates.reshape(-1, rates.shape[2])
+
+    @property
+    def view(self) -> Array:
+        """The frame in which the value is told (4, 4), in the reference link's."""
+        return frozen(np.eye(4))
+
+    def sighting(self, X_reference: Array, X_link: Array, far: Array | None = None) -> Sighting:
+        """Where links and axis are, in the base frame."""
+        return Sighting(X_reference[:3, 3], X_reference[:3, 2], X_link[:3, 3], X_link[:3, :3] @ self.direction, far)
+
+    def wrenches(self, at: Sighting) -> list[Numbers]:
+        """Two moments normal to u."""
+        return [couple(n) for n in normals(at.d)]
+
+    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+        """PPP-U̲-R(d)."""
+        return axis_chain(at)
+
+    def pointing(self, values: Array) -> Array | None:
+        """Of values (n, 3), what the chain's first U turns: all."""
+        return values
+
+    def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
+        if into[self.link] == self.link:
+            return super().carried_by(into, poses)
+        turned = moved(self.link, into, poses)[:3, :3] @ self.direction
+        return replace(super().carried_by(into, poses), direction=turned)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {**super().to_dict(), "axis": self.direction.tolist()}
+
+    def differences(self, other: Observation, tolerance: float) -> list[str]:
+        found = super().differences(other, tolerance)
+        if not found and isinstance(other, SeenAxis) and np.max(np.abs(self.direction - other.direction)) > tolerance:
+            found.append(f"direction of leg {self.leg}: {self.direction} / {other.direction}")
+        return found
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Direction(SeenAxis):
+    """The direction of a segment, or of any axis of a link."""
+
+    kind = "direction"
+    words = "the direction of an axis, u"
+    needs = ("axis",)
+
+    @property
+    def by_segment(self) -> bool:
+        return self.seen_from is None
+
+
+@lru_cache(maxsize=512)
+def _directions(observations: tuple[Observation, ...]) -> Array:
+    """The directions (k, 3, 1) of observations, in their links."""
+    return frozen([o.direction[:, None] for o in observations if isinstance(o, SeenAxis)])
+
+
+KIND = Direction

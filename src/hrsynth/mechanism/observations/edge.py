@@ -1,0 +1,67 @@
+"""One edge of a cylinder in the image: the plane through C that touches it.
+
+    reference –U̲(C)–R(n)–P–C(d)– ℓ        as for a line in the image, the axis at the radius from the plane
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...geometry.screws import couple, force
+from ...geometry.vectors import Array, Numbers, cross, unit
+from ..sights import CameraObservation, Sighting, VirtualJoint, across, apart
+
+
+def tangent(p: Array, d: Array, r: Array) -> Array:
+    """n with n · d = 0, n · p = r, ‖n‖ = 1: the plane of normal n through C touches the cylinder; of the two the one
+    with n · (d × p) > 0. A negative r gives (with −n) the other plane."""
+    f = p - np.sum(p * d, axis=-1, keepdims=True) * d
+    D = np.linalg.norm(f, axis=-1, keepdims=True)
+    return np.asarray((r / D) * f / D + np.sqrt(1 - (r / D) ** 2) * cross(d, f / D))
+
+
+def tangent_partials(p: Array, d: Array, r: Array) -> tuple[Array, Array]:
+    """∂n/∂p and ∂n/∂d, (…, 3, 3): ṅ · d = −n · ḋ, ṅ · p = −n · ṗ, ṅ · n = 0."""
+    n = tangent(p, d, r)
+    solved = np.linalg.inv(np.stack(np.broadcast_arrays(d, p, n), axis=-2))
+    return -solved[..., 1:2] * n[..., None, :], -solved[..., 0:1] * n[..., None, :]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CylinderEdge(CameraObservation):
+    """The normal n of a plane through C that touches the cylinder of axis (B, d); the sign of ``radius`` says which of
+    the two (MMT eq. 3-4)."""
+
+    kind = "edge"
+    words = "an edge of a cylinder of known radius: its tangent plane through C"
+    locked = "the force n at the axis, the moment d × n"
+    needs = ("at", "axis", "radius")
+    size = 3
+    rank = 2
+    rational = False
+
+    @staticmethod
+    def measured(p: Array, d: Array, r: Array) -> Array:
+        return tangent(p, d, r)
+
+    @staticmethod
+    def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
+        return tangent_partials(p, d, r)
+
+    def _normal(self, at: Sighting) -> Array:
+        return tangent(at.B - at.C, at.d, np.array([self.radius]))
+
+    def wrenches(self, at: Sighting) -> list[Numbers]:
+        n = self._normal(at)
+        return [force(n, at.B), couple(cross(at.d, n))]
+
+    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+        radius = self.radius or 0.0
+        apart(at, at.foot, abs(radius), f"edge {self.leg!r}", f"more than the radius {abs(radius):g}")
+        n = self._normal(at)
+        return across(at, n, unit(at.foot - at.C - radius * n), 1)
+
+
+KIND = CylinderEdge

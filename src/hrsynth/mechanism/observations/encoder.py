@@ -1,0 +1,103 @@
+"""A joint's coordinate, read by an encoder: the one kind whose chain is the real joint, actuated."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Self
+
+import numpy as np
+
+from ...geometry.screws import point_velocity
+from ...geometry.so3 import wrap_angle
+from ...geometry.vectors import Array, cross, transform
+from ..observation import Observation
+from ..sights import moved
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Encoder(Observation):
+    """One coordinate of a joint: the motion of ``link`` seen from ``seen_from``, the joint's other link.
+
+    ``axis`` is the joint's axis in the frame of ``seen_from``, shape (3,).
+    """
+
+    kind = "encoder"
+    words = "the coordinate of a real joint"
+    locked = "the moment about the axis of an R, the force along that of a P"
+    needs = ("joint",)
+    size = 1
+    rank = 1
+    joint: str
+    axis: Array
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        return (self.joint, type(self).__name__, self.link)
+
+    def to_dict(self) -> dict[str, Any]:
+        return {**super().to_dict(), "joint": self.joint}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AngleEncoder(Encoder):
+    """The angle by which a direction fixed in the link has turned about the axis since the zero configuration.
+
+    ``mark`` is that direction in the link's frame, ``start`` the same at zero in the frame of ``seen_from``, both (3,)
+    and not parallel to the axis: any normal of it for R and C, the other axis for U.
+    """
+
+    mark: Array
+    start: Array
+
+    def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
+        R, R_c = (moved(link, into, poses)[:3, :3] for link in (self.link, str(self.seen_from)))
+        axis, start = R_c @ self.axis, R_c @ self.start
+        return replace(super().carried_by(into, poses), axis=axis, mark=R @ self.mark, start=start)
+
+    def value(self, X_reference: Array, X_link: Array) -> Array:
+        """The angle, shape (1,), in (−π, π]."""
+        mark = X_reference[:3, :3].T @ X_link[:3, :3] @ self.mark
+        normal = self.start - (self.axis @ self.start) * self.axis
+        return np.array([np.arctan2(self.axis @ cross(normal, mark), normal @ mark)])
+
+    def apart(self, value: Array, wanted: Array) -> Array:
+        """The difference without whole turns: at half a turn the angle is π as well as −π."""
+        return np.array([wrap_angle(float(value[0] - wanted[0]))])
+
+    def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
+        """a* · (ω_ℓ − ω_c), shape (1, n); a* = (a − c m) / (1 − c²), c = a · m: dual to the axis a and the mark m."""
+        axis, mark = X_reference[:3, :3] @ self.axis, X_link[:3, :3] @ self.mark
+        cosine = float(axis @ mark)
+        return ((axis - cosine * mark) / (1 - cosine**2))[None] @ (V_link[3:] - V_reference[3:])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SlideEncoder(Encoder):
+    """The length by which the link has slid along the axis since the zero configuration.
+
+    ``point`` is the joint's centre in the link's frame, ``start`` the same at zero in the frame of ``seen_from``, (3,).
+    """
+
+    dimension = 1
+    point: Array
+    start: Array
+
+    def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
+        X, X_c = (moved(link, into, poses) for link in (self.link, str(self.seen_from)))
+        axis, start = X_c[:3, :3] @ self.axis, transform(X_c, self.start)
+        return replace(super().carried_by(into, poses), axis=axis, point=transform(X, self.point), start=start)
+
+    def value(self, X_reference: Array, X_link: Array) -> Array:
+        """The length, shape (1,), in metres."""
+        arm = transform(X_link, self.point) - X_reference[:3, 3]
+        return np.array([self.axis @ (X_reference[:3, :3].T @ arm - self.start)])
+
+    def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
+        """a · (velocity of the centre as one link carries it − as the other does), shape (1, n)."""
+        centre = transform(X_link, self.point)
+        slip = point_velocity(V_link, centre - X_link[:3, 3]) - point_velocity(V_reference, centre - X_reference[:3, 3])
+        return (X_reference[:3, :3] @ self.axis)[None] @ slip
+
+
+KIND = Encoder

@@ -1,0 +1,68 @@
+"""A line in space: its direction and its position.
+
+    reference –U̲(C)–R̲(n)–P̲–C(d)– ℓ        where it meets C: –P̲–P̲–U̲–C(d)–
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...geometry.screws import couple, force, normals
+from ...geometry.vectors import Array, Numbers, cross, frozen, hat, perpendicular, unit
+from ...tolerances import LINE_AT_CENTRE
+from ..sights import CameraObservation, Sighting, VirtualJoint, across, gimbal, normalised
+
+
+def line_chain(at: Sighting) -> tuple[VirtualJoint, ...]:
+    """U̲R̲P̲-C; P̲P̲-U̲-C at the point where the line cuts a fixed plane where it meets C."""
+    away = at.foot - at.C
+    if np.linalg.norm(away) > LINE_AT_CENTRE:
+        return across(at, np.cross(unit(away), at.d), unit(away), 3)
+    x = perpendicular(at.d)
+    return (VirtualJoint("P", at.B, (x,), True), VirtualJoint("P", at.B, (np.cross(at.d, x),), True),
+            gimbal(at.B, at.d, None, actuated=True), VirtualJoint("C", at.B, (at.d,)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SpaceLine(CameraObservation):
+    """(d, h), h = p × d the moment of the line (B, d) about C (its Plücker coordinates; MMT 5.3), p from C to B.
+
+    h is taken, and not the unit normal of the plane of C and the line, as that does not exist where the line meets C.
+    """
+
+    kind = "line"
+    words = "a line in space: its direction and its position (Plücker coordinates)"
+    locked = "two forces ⟂ d at the line, two moments ⟂ d"
+    needs = ("at", "axis")
+    size = 6
+    rank = 4
+    dimension = frozen([0, 0, 0, 1, 1, 1])
+
+    @staticmethod
+    def measured(p: Array, d: Array, r: Array) -> Array:
+        return np.concatenate([d, cross(p, d)], axis=-1)
+
+    @staticmethod
+    def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
+        one = np.broadcast_to(np.eye(3), (*d.shape, 3))
+        return np.concatenate([0 * one, -hat(d)], axis=-2), np.concatenate([one, hat(p)], axis=-2)
+
+    def wrenches(self, at: Sighting) -> list[Numbers]:
+        return line_wrenches(at)
+
+    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+        return line_chain(at)
+
+    def pointing(self, values: Array) -> Array | None:
+        sizes = np.linalg.norm(values[:, 3:], axis=1)
+        return normalised(values[:, 3:])[0] if sizes.min() > LINE_AT_CENTRE else None
+
+
+def line_wrenches(at: Sighting) -> list[Numbers]:
+    """Two forces and two moments normal to d, at the line."""
+    return [wrench for n in normals(at.d) for wrench in (force(n, at.B), couple(n))]
+
+
+KIND = SpaceLine

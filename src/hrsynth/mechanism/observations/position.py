@@ -1,0 +1,49 @@
+"""A point with its depth, as from stereo or of a sphere of known radius: all of B.
+
+    reference –U̲(C)–P̲–S(B)– ℓ
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...geometry.screws import force
+from ...geometry.vectors import Array, Numbers
+from ..sights import CameraObservation, Sighting, VirtualJoint, apart, gimbal, normalised
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PointPosition(CameraObservation):
+    """p, from C to B, in the camera's frame."""
+
+    kind = "position"
+    words = "the point B itself: a point with depth, stereo, a sphere of known radius"
+    locked = "three forces at B"
+    needs = ("at",)
+    size = 3
+    rank = 3
+    dimension = 1
+
+    @staticmethod
+    def measured(p: Array, d: Array, r: Array) -> Array:
+        return p
+
+    @staticmethod
+    def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
+        return np.broadcast_to(np.eye(3), (*p.shape, 3)), None
+
+    def wrenches(self, at: Sighting) -> list[Numbers]:
+        return [force(e, at.B) for e in np.eye(3, dtype=int).astype(at.B.dtype)]
+
+    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+        apart(at, at.B, 0.0, f"position {self.leg!r}", "a point outside of it")
+        return (gimbal(at.C, at.ray, at.far, actuated=True), VirtualJoint("P", at.C, (at.ray,), actuated=True),
+                VirtualJoint("S", at.B))
+
+    def pointing(self, values: Array) -> Array | None:
+        return normalised(values)[0]
+
+
+KIND = PointPosition

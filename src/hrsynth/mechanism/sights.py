@@ -1,0 +1,243 @@
+"""Cameras, and what they see of a link: observations that are functions of a point B and an axis d fixed in the link,
+both in the frame of a camera with its centre C on the reference link (docs/pages/theory.md, section 13).
+
+A kind gives its value and partial derivatives, the wrenches that remain when it is held, and its virtual chain.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import lru_cache
+from typing import Any, ClassVar, Self
+
+import numpy as np
+
+from ..errors import BadMechanism
+from ..geometry.vectors import Array, Numbers, frozen, hat, inverse, perpendicular, transform, unit
+from ..results import Value
+from ..tolerances import SAME_POINT
+from .observation import Observation
+
+AT_CENTRE = frozen(np.eye(4))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class NamedCamera(Value):
+    """A named camera on a link: its frame's ``pose`` (4, 4) in the link's (x right, y down, z ahead, its origin the
+    centre C); the focal length and the size of its pictures, in pixels, where they are known."""
+
+    name: str
+    link: str
+    pose: Array = field(default_factory=lambda: AT_CENTRE)
+    focal: float | None = None
+    width: int | None = None
+    height: int | None = None
+    line: int | None = field(default=None, compare=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "pose", frozen(self.pose))
+
+    def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> NamedCamera:
+        """The same camera where links became parts of others, as for observations."""
+        return replace(self, link=into[self.link], pose=moved(self.link, into, poses) @ self.pose)
+
+
+def moved(link: str, into: Mapping[str, str], poses: Mapping[str, Array]) -> Array:
+    """The pose of a link in the frame of the one that took it in."""
+    return AT_CENTRE if into[link] == link else inverse(poses[into[link]]) @ poses[link]
+
+
+@dataclass(frozen=True, eq=False)
+class VirtualJoint:
+    """A joint of a virtual chain, at the zero configuration in base axes: its type's letter, centre, axes."""
+
+    letter: str
+    at: Array
+    axes: tuple[Array, ...] = ()
+    actuated: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Sighting:
+    """Where camera and link are, in one frame: the centre C, the camera's z axis, the point B, the axis d; to build a
+    chain also ``far``, a unit vector far from all values of what its first U turns."""
+
+    C: Numbers
+    z: Numbers
+    B: Numbers
+    d: Numbers
+    far: Array | None = None
+
+    @property
+    def ray(self) -> Array:
+        """The unit vector from C to B."""
+        return unit(self.B - self.C)
+
+    @property
+    def foot(self) -> Array:
+        """The point of the line (B, d) that is nearest to C."""
+        return np.asarray(self.B - ((self.B - self.C) @ self.d) * self.d)
+
+
+def gimbal(at: Array, turned: Array, far: Array | None, actuated: bool = False) -> VirtualJoint:
+    """A U at a point that turns a direction any way: its first axis e₁ far from it, its second normal to both."""
+    first = perpendicular(turned) if far is None else far
+    return VirtualJoint("U", at, (first, unit(np.cross(first, turned))), actuated)
+
+
+def across(at: Sighting, normal: Array, out: Array, actuated: int) -> tuple[VirtualJoint, ...]:
+    """U-R-P-C to the line (B, d): U at C turns the ``normal`` of a plane through C, R turns in it, P goes along ``out``
+    in it, C lies along the line; the first so many of them actuated."""
+    joints = (gimbal(at.C, normal, at.far), VirtualJoint("R", at.C, (normal,)), VirtualJoint("P", at.C, (out,)),
+              VirtualJoint("C", at.foot, (at.d,)))
+    return tuple(replace(joint, actuated=number < actuated) for number, joint in enumerate(joints))
+
+
+def apart(at: Sighting, from_: Array, least: float, what: str, limit: str) -> float:
+    """The distance of C from a point; raises ``BadMechanism`` where it is not larger than ``least``."""
+    distance = float(np.linalg.norm(from_ - at.C))
+    if not distance > least + SAME_POINT * (1 + least):
+        raise BadMechanism(f"{what}: distance from the camera's centre (m)", distance, limit)
+    return distance
+
+
+
+def _aside(direction: Array) -> Array:
+    """A unit vector normal to a direction."""
+    return unit(np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))]))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CameraObservation(Observation):
+    """A measurement by a camera, of the point ``at`` (3,) and the ``axis`` (3,) in the *link's* frame; C is the origin
+    of the reference link's frame where no ``camera`` is named.
+
+    Values are in the camera's frame. ``radius`` is that of a cylinder or circle (m), its sign says which edge is meant.
+    """
+
+    locked: ClassVar[str]
+    """The wrenches that it transmits when it is held, for the table of all kinds."""
+    rational: ClassVar[bool] = True
+    """Whether its wrenches are polynomials of C, B, d and z."""
+    rank: ClassVar[int]
+    """Independent numbers that are measured."""
+
+    at: Array = field(default_factory=lambda: frozen(np.zeros(3)), kw_only=True)
+    axis: Array | None = field(default=None, kw_only=True)
+    radius: float | None = field(default=None, kw_only=True)
+    camera: NamedCamera | None = field(default=None, kw_only=True)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "at", frozen(self.at))
+        if self.axis is not None:
+            try:
+                object.__setattr__(self, "axis", frozen(unit(self.axis)))
+            except ValueError:
+                raise BadMechanism(f"{self.kind} {self.leg!r}: axis", "0 0 0", "a non-zero vector") from None
+        if self.camera is not None:
+            object.__setattr__(self, "seen_from", self.camera.link)
+
+    @property
+    def key(self) -> tuple[str, ...]:
+        return (self.leg, self.link, self.kind, self.camera.name if self.camera else "")
+
+    @property
+    def view(self) -> Array:
+        """The camera's pose (4, 4) in the reference link's frame."""
+        return AT_CENTRE if self.camera is None else self.camera.pose
+
+    @staticmethod
+    def measured(p: Array, d: Array, r: Array) -> Array:
+        """The value (…, size) for points p (…, 3) and axes d (…, 3) in the camera's frame, radii r (…, 1)."""
+        raise NotImplementedError
+
+    @staticmethod
+    def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
+        """∂value/∂p and ∂value/∂d, (…, size, 3) each, None where it is zero."""
+        raise NotImplementedError
+
+    def wrenches(self, at: Sighting) -> list[Numbers]:
+        """The wrenches transmitted when the value is held, on the link's twist relative to the reference link."""
+        raise NotImplementedError
+
+    def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
+        """The virtual chain from the reference link to the link; raises ``BadMechanism`` where the value has no rate
+        (a point in the camera's centre)."""
+        raise NotImplementedError
+
+    def pointing(self, values: Array) -> Array | None:
+        """Of values (n, size), what the chain's first U turns (n, 3), in the camera's frame; None where that is not
+        among them."""
+        return values[:, :3]
+
+    def sighting(self, X_reference: Array, X_link: Array, far: Array | None = None) -> Sighting:
+        """Where camera and link are, in the base frame."""
+        X = X_reference @ self.view
+        axis = X_link[:3, :3] @ self.axis if self.axis is not None else np.zeros(3)
+        return Sighting(X[:3, 3], X[:3, 2], transform(X_link, self.at), axis, far)
+
+    def value(self, X_reference: Array, X_link: Array) -> Array:
+        """The value, shape (size,), in the camera's frame (m)."""
+        return self.together((self,), X_reference, X_link[None], np.zeros((6, 0)), np.zeros((1, 6, 0)))[0]
+
+    def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
+        """∂p · (velocity of B as the link carries it − as the camera would) + ∂d · ((ω − ω_c) × d), (size, n)."""
+        return self.together((self,), X_reference, X_link[None], V_reference, V_link[None])[1]
+
+    @classmethod
+    def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
+                 V_links: Array) -> tuple[Array, Array]:
+        at, axes, radii, views = _stacked(tuple(observations))
+        X = X_reference @ views
+        seen = X[:, :3, :3].transpose(0, 2, 1)
+        B = (X_links[:, :3, :3] @ at)[:, :, 0] + X_links[:, :3, 3]
+        p, d = ((seen @ each[:, :, None])[:, :, 0] for each in (B - X[:, :3, 3], (X_links[:, :3, :3] @ axes)[:, :, 0]))
+        values, (by_p, by_d) = cls.measured(p, d, radii), cls.partials(p, d, radii)
+        turn = V_links[:, 3:] - V_reference[3:]
+        rates = np.zeros((len(at), cls.size, V_links.shape[2]))
+        if by_p is not None:
+            slip = (V_links[:, :3] - hat(B - X_links[:, :3, 3]) @ V_links[:, 3:]
+                    - V_reference[:3] + hat(B - X_reference[:3, 3]) @ V_reference[3:])
+            rates += (by_p @ seen) @ slip
+        if by_d is not None:
+            rates -= (by_d @ hat(d) @ seen) @ turn
+        return values.ravel(), rates.reshape(len(at) * cls.size, V_links.shape[2])
+
+    def carried_by(self, into: Mapping[str, str], poses: Mapping[str, Array]) -> Self:
+        X = moved(self.link, into, poses)
+        return replace(super().carried_by(into, poses), at=transform(X, self.at),
+                       axis=None if self.axis is None else X[:3, :3] @ self.axis,
+                       camera=self.camera and self.camera.carried_by(into, poses))
+
+    def to_dict(self) -> dict[str, Any]:
+        return {**super().to_dict(), "camera": self.camera and self.camera.name,
+                "at": self.at.tolist() if "at" in self.needs else None,
+                "axis": None if self.axis is None else self.axis.tolist()}
+
+    def differences(self, other: Observation, tolerance: float) -> list[str]:
+        if type(self) is not type(other) or (self.leg, self.link) != (other.leg, other.link):
+            return [f"observation {self.leg}: {self!r} / {other!r}"]
+        assert isinstance(other, CameraObservation)
+        mine, theirs = ((o.camera.name if o.camera else None, o.radius) for o in (self, other))
+        found = [] if mine == theirs else [f"{self.kind} {self.leg}: camera and radius {mine} / {theirs}"]
+        pairs = (("point", self.at, other.at), ("axis", self.axis, other.axis), ("camera", self.view, other.view))
+        return found + [f"{what} of {self.leg}: {a} / {b}" for what, a, b in pairs
+                        if (a is None) != (b is None) or (a is not None and b is not None
+                                                          and np.max(np.abs(a - b)) > tolerance)]
+
+
+@lru_cache(maxsize=512)
+def _stacked(observations: tuple[Observation, ...]) -> tuple[Array, Array, Array, Array]:
+    """Points (k, 3, 1) and axes (k, 3, 1) of observations in their links, radii (k, 1), cameras (k, 4, 4)."""
+    sights = [o for o in observations if isinstance(o, CameraObservation)]
+    axes = [o.axis if o.axis is not None else np.zeros(3) for o in sights]
+    return (frozen([o.at[:, None] for o in sights]), frozen([axis[:, None] for axis in axes]),
+            frozen([[o.radius or 0.0] for o in sights]), frozen([o.view for o in sights]))
+
+
+def normalised(w: Array) -> tuple[Array, Array]:
+    """w/‖w‖ (…, 3) of vectors w, and what its rate makes of ẇ: (I − n nᵀ)/‖w‖, (…, 3, 3)."""
+    size = np.linalg.norm(w, axis=-1, keepdims=True)
+    n = w / size
+    return n, (np.eye(3) - n[..., :, None] * n[..., None, :]) / size[..., None]
