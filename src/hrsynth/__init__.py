@@ -39,11 +39,13 @@ if TYPE_CHECKING:
     from .present.view.view import view
     from .progress import following
     from .selection.select import select
+    from .simulation.endings.endings import endings
     from .simulation.servo import servo
 
 __version__ = "0.2.0"
 __all__ = ["__version__", "accuracy", "advise", "atlas", "branch", "catalog", "certificate", "check", "derive", "draw",
-           "examples", "export", "following", "forget", "html", "legs", "lint", "load", "map", "modes", "observe",
+           "endings", "examples", "export",
+           "following", "forget", "html", "legs", "lint", "load", "map", "modes", "observe",
            "path", "save", "select", "servo", "shipped", "singular", "studio", "text", "verify", "view"]
 
 _HOME = {
@@ -70,6 +72,7 @@ _HOME = {
     "save": ".description",
     "select": ".selection.select",
     "servo": ".simulation.servo",
+    "endings": ".simulation.endings.endings",
     "shipped": ".description",
     "singular": ".analysis.singularity.singular",
     "studio": ".present.studio.server",

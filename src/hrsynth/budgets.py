@@ -230,6 +230,18 @@ RUN_EVALUATIONS = 20_000
 """Configurations that the integrator may ask for in a servo run."""
 LONGEST_RUN = 10_000.0
 """Seconds that a run with noise, on the physics bench or along a way may take: these go on to their end."""
+ENDING_STARTS = 100
+"""Starts of one round in which critical points of a loop's error are sought."""
+ENDING_ROUNDS = 16
+"""Rounds at most."""
+ENDING_LATE = 0.04
+"""Part of the critical points that the later half of the starts may find first, twice, for the search to end."""
+ENDING_WALK = 6
+"""Random steps along the loops from the starts of one round to those of the next."""
+ENDING_STEPS = 80
+"""Steps of one start."""
+FARTHEST_ENDING = 50.0
+"""Coordinate (characteristic lengths, radians) beyond which a start is given up."""
 AXIS_SEEN = 0.5
 """Part of a leg's axis that is to be seen by a camera: its direction is rebuilt from what is seen of its edges."""
 WIDEST_NOISE = 50.0

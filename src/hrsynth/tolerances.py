@@ -275,6 +275,16 @@ STRETCH_END = 1e-2
 """Part of its first error at which a stretch of a servo run ends, so that the tolerance follows the error."""
 RUN_SHORTEST_STEP = 1e-9
 """Longest step (time constants) with which a servo run that cannot go on has been tried."""
+CRITICAL = 1e-11
+"""Gradient of the error along the loops, and loops' residual, at which a critical point is found."""
+SAME_ENDING = 1e-5
+"""Difference (characteristic lengths, components of unit vectors) below which two critical points are one; curvature
+below which one may not be isolated."""
+VANISHED = 1e-8
+"""‖e‖ below which a critical point is one at which the error vanishes; cosine below which two directions are at right
+angles."""
+CRITICAL_FLAT = 1e-7
+"""Curvature of the error below which it counts as none while a critical point is sought."""
 BENCH_SETTLED = 1e-6
 """‖e‖ at which the physics bench has settled."""
 BENCH_STEADY = 1e-3

@@ -123,4 +123,4 @@ def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfigurat
     if at is None:
         raise PoseNotReached(name, f"{asked} ({mode.pose})", 0.0, str(listed.pose), reason="the robot was not found "
                              f"assembled there without leg {', '.join(mode.open)}")
-    return of_links(listed.goal.twin, at)
+    return at if at.twin is listed.goal.twin else of_links(listed.goal.twin, at.pose)

@@ -705,6 +705,46 @@ Servo = TypedDict("Servo", {
 Servo.__doc__ = "A servo run: where it ended, and at each time (s) the pose and the error of each direction."
 
 
+class RestRecord(TypedDict):
+    """A pose at which a loop rests; `curvatures` are the eigenvalues of the Hessian of ½ ‖e‖², `met` how many starts
+    led to it."""
+
+    pose: PoseRecord
+    kind: Literal["goal", "mode", "antipodal", "critical"]
+    stable: bool | None
+    stability: Literal["stable", "saddle", "unstable", "undecided"]
+    error: float
+    curvatures: list[float]
+    proved: bool
+    radius_m: Number
+    radius_rad: Number
+    reversed: list[str]
+    across: list[str]
+    singular: str | None
+    boundary: bool
+    assembly: Literal["yes", "beyond limits"]
+    beyond: list[str]
+    other_legs: list[str] | None
+    met: int
+
+
+class EndingsAnswer(OfRobot):
+    """All poses at which a loop can rest: where all velocities are seen, where fewer are (`singular`), and one of each
+    of those that fill curves or surfaces (`continua`)."""
+
+    at: PoseRecord
+    observed: list[Watched]
+    camera: str
+    complex: int | None
+    complete: bool
+    proof: str
+    starts: int
+    attracting: int
+    endings: list[RestRecord]
+    singular: list[RestRecord]
+    continua: list[RestRecord]
+
+
 class ConeRecord(TypedDict):
     """A watched direction, and the half-angle of the cone about it."""
 
@@ -1023,6 +1063,7 @@ class LintAnswer(Head, WrittenTo):
 RECORDS: dict[str, Any] = {
     "derive": Derive, "legs": LegsAnswer, "check": CheckAnswer, "singular": Singular, "advise": Advise,
     "branch": Branch, "modes": AssemblyModesRecord, "atlas": AtlasAnswer, "path": Path, "servo": Servo,
+    "endings": EndingsAnswer,
     "accuracy": AccuracyAnswer, "select": Select, "export": Exported, "view": ViewAnswer, "verify": Verify,
     "robots": Robots, "convert": Convert, "import": Import, "lint": LintAnswer,
     "catalog build": CatalogBuild, "catalog list": CatalogList, "catalog show": CatalogShow,

@@ -116,14 +116,14 @@ def affine(centre: Array, slopes: Array, radius: Array, bend: int | None = None)
     return AffineForms(np.concatenate([centre[None], np.moveaxis(slopes, -1, 0)]), radius, bend)
 
 
-def stacked(parts: Sequence[Any]) -> Any:
-    """Numbers or forms put together along a new last dimension."""
+def stacked(parts: Sequence[Any], axis: int = -1) -> Any:
+    """Numbers or forms put together along a new dimension, the last or (−2) the last but one."""
     like = next((each for each in parts if isinstance(each, AffineForms)), None)
     if like is None:
-        return np.stack(np.broadcast_arrays(*parts), axis=-1)
+        return np.stack(np.broadcast_arrays(*parts), axis=axis)
     every = [like._like(each) for each in parts]
-    return AffineForms(np.stack(np.broadcast_arrays(*(each.v for each in every)), axis=-1),
-                       np.stack(np.broadcast_arrays(*(each.r for each in every)), axis=-1))
+    return AffineForms(np.stack(np.broadcast_arrays(*(each.v for each in every)), axis=axis),
+                       np.stack(np.broadcast_arrays(*(each.r for each in every)), axis=axis))
 
 
 def crossed(a: Any, b: Any) -> Any:

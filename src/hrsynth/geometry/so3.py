@@ -10,7 +10,7 @@ import math
 
 import numpy as np
 
-from .vectors import Array, cross, hat
+from .vectors import Array, cross, hat, perpendicular
 
 
 def exponential(vectors: Array) -> Array:
@@ -69,6 +69,26 @@ def turn_about(normal: Array, R: Array) -> tuple[float, Array]:
     if both == 0.0:
         return math.nan, np.zeros(3)
     return wrap_angle(2 * math.atan2(along, w)), (w * w * normal + w * cross(v, normal) + along * v) / both
+
+
+def turns_about(axes: Array, R: Array) -> Array:
+    """The angles (k,) about up to three axes (k, 3), at right angles to each other, of which a rotation is made: R =
+    exp θ₁[a₁]ₓ exp θ₂[a₂]ₓ …; the second one within a quarter turn where there are three."""
+    a, b, c = _frame(axes)
+    E = np.array([a, b, c])
+    R = E @ R @ E.T
+    if len(axes) < 3:
+        # R a₂ is turned by the first alone, Rᵀ a₁ by the second alone
+        return np.array([math.atan2(R[2, 1], R[1, 1]), math.atan2(R[0, 2], R[0, 0])])[: len(axes)]
+    return np.array([math.atan2(-R[1, 2], R[2, 2]), math.atan2(R[0, 2], math.hypot(R[1, 2], R[2, 2])),
+                     math.atan2(-R[0, 1], R[0, 0])]) * [1.0, 1.0, np.sign(np.linalg.det(E))]
+
+
+def _frame(axes: Array) -> tuple[Array, Array, Array]:
+    """Three axes at right angles to each other, those of ``axes`` (k, 3) first."""
+    a = axes[0]
+    b = axes[1] if len(axes) > 1 else perpendicular(a)
+    return a, b, axes[2] if len(axes) > 2 else cross(a, b)
 
 
 def wrap_angle(angle: float) -> float:

@@ -6,7 +6,7 @@ leg's closures proves it (:mod:`closures`). Starts from which nothing closes pro
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import product
@@ -165,18 +165,12 @@ class Assembler:
         return q if residual <= CLOSED and turned else None
 
 
-def of_links(twin: PinocchioModel, at: ClosedConfiguration) -> ClosedConfiguration:
-    """The configuration of a twin at which its links are where they are at a configuration of another twin of the same
-    links; raises ``LoopsNotClosed`` where none was found."""
-    if at.twin is twin:
-        return at
-    links = {link: at.pose(link) for link in twin.mechanism.links}
-    target, residual = _Poses(tuple(links.items())), np.inf
-    for start in _starts(twin):
-        q, residual = solve(twin, start, target, tolerance=SOLVED, iterations=LEG_ITERATIONS)
-        if residual <= CLOSED and all(_turned_as(twin.pose(q, link), X) for link, X in links.items()):
-            return ClosedConfiguration.of(twin, q)
-    raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, "in coordinates of the zero configuration")
+def of_links(twin: PinocchioModel, pose: Callable[[str], Array]) -> ClosedConfiguration:
+    """The configuration of a twin at which its links have their poses (4, 4); raises ``LoopsNotClosed``."""
+    q, residual = solve(twin, twin.read(pose), tolerance=SOLVED)
+    if residual > CLOSED or not all(_turned_as(twin.pose(q, link), pose(link)) for link in twin.mechanism.links):
+        raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, "in coordinates of the zero configuration")
+    return ClosedConfiguration.of(twin, q)
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,6 +8,7 @@ welded to the other link.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from functools import cached_property
 
 import numpy as np
@@ -15,7 +16,8 @@ import pinocchio as pin
 
 from ..budgets import LARGEST_MODEL
 from ..errors import BadMechanism, BadRequest
-from ..geometry.vectors import Array, cross
+from ..geometry.so3 import logarithm, turns_about
+from ..geometry.vectors import Array, cross, inverse, transform
 from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..tolerances import SAME_GEOMETRY
 
@@ -127,7 +129,7 @@ class PinocchioModel:
             case JointType.SPHERICAL:
                 return [pin.JointModelSpherical()]
             case JointType.PLANAR:
-                x = np.linalg.svd(turned.axis[None, :])[2][1]
+                x = _across(turned.axis)
                 return [pin.JointModelPrismaticUnaligned(x),
                         pin.JointModelPrismaticUnaligned(cross(turned.axis, x)),
                         pin.JointModelRevoluteUnaligned(turned.axis)]
@@ -283,6 +285,29 @@ class PinocchioModel:
             mask[start : start + self.model.joints[joint].nv] = 1.0
         return mask
 
+    def read(self, pose: Callable[[str], Array]) -> Array:
+        """The configuration at which all links have their poses X_BL (4, 4), m, as far as the tree's joints allow."""
+        D = {link: pose(link) @ inverse(each.pose) for link, each in self.mechanism.links.items()}
+        step = np.zeros(self.nv)
+        for joint, parent, _ in self._parts:
+            own = joint if joint.predecessor == parent else joint.turned()
+            places = sorted(self.coordinates[joint.name])
+            moved = inverse(D[parent]) @ D[joint.other(parent)]
+            R, shift = moved[:3, :3], (transform(moved, own.point) - own.point) / self.length
+            match own.type:
+                case JointType.SPHERICAL:
+                    step[places] = logarithm(R)
+                case JointType.FREE:
+                    step[places] = pin.log6(pin.SE3(R, shift)).vector
+                case JointType.REVOLUTE | JointType.UNIVERSAL:
+                    step[places] = turns_about(np.array(own.axes), R)
+                case JointType.PRISMATIC | JointType.CYLINDRICAL | JointType.PLANAR:
+                    x = _across(own.axis)
+                    slides = [x, cross(own.axis, x)] if own.type is JointType.PLANAR else [own.axis]
+                    turn = turns_about(own.axis[None], R)[: len(places) - len(slides)]
+                    step[places] = [*(axis @ shift for axis in slides), *turn]
+        return self.moved(self.q0, step)
+
     def moved(self, q: Array, step: Array) -> Array:
         """The configuration that ``step`` (nv) leads to from ``q``."""
         return pin.integrate(self.model, q, step)
@@ -298,3 +323,8 @@ class PinocchioModel:
     def actuated(self) -> list[int]:
         """Velocity indices of the actuated joints' coordinates."""
         return [i for joint in self.mechanism.joints.values() if joint.actuated for i in self.coordinates[joint.name]]
+
+
+def _across(axis: Array) -> Array:
+    """The first direction in which a planar joint with this normal slides."""
+    return np.asarray(np.linalg.svd(axis[None, :])[2][1])

@@ -195,6 +195,7 @@ OUTPUTS = {
              "report_file", computed="report.parts:parts", plotted=HTML),
         CERTIFICATE,
         File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None, plotted=()))),
+    "endings": Outputs("text.endings:endings"),
     "export": Outputs("text.robots:exported", (
         CodeFile("cannot write the code", dict.fromkeys((".hpp", ".h", ".py"), "text.robots:code"), "The code",
              "Write the code: robot.hpp (C++), robot.py (NumPy).", plotted=()),)),

@@ -50,7 +50,7 @@ class EndingClassifier(Value):
         if run.stopped == SERVED_AT:
             return self._served(run.last, directions)
         if run.stopped in (REST, POISED):
-            ending = self._rest(run.last, last)
+            ending = rest(self.setting, run.last, last)
             loose = "" if run.stopped == REST else "; that this rest draws the state to itself was not found"
             return replace(ending, reason=ending.reason + loose)
         if run.stopped == LIMIT:
@@ -87,24 +87,6 @@ class EndingClassifier(Value):
         return Ending(MODE, "the directions are the goal's, the pose is none of the assembly modes that were listed",
                       None, listed)
 
-    def _rest(self, at: ClosedConfiguration, last: Command) -> Ending:
-        posture = ConfigurationAnalysis.of(self.setting).classify(at)
-        where = f"‖e‖ = {last.size:.3g} and the command vanishes"
-        weak = float(last.values[-1]) < DAMPED
-        shifted = at.velocity(self.setting.motion.link) @ last.weak
-        if weak and float(np.linalg.norm(shifted)) < DAMPED:
-            return Ending(BOUNDARY, f"{where}: a leg that is not watched is stretched to its limit")
-        far = posture.distances
-        if weak and far.type2 is not None and far.type2 < DAMPED:
-            return Ending(MINIMUM, f"{where} at a Type 2 singularity of the hidden robot")
-        if (far.type1 is not None and far.type1 < DAMPED) or far.type2 is None:
-            return Ending(MINIMUM, f"{where} at a Type 1 singularity of the hidden robot")
-        if weak:
-            return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: a direction is perpendicular "
-                                   "to the desired one")
-        return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: more is watched than the robot "
-                               "has freedoms")
-
     def same_pose(self, at: ClosedConfiguration, X: Array) -> bool:
         """Whether the platform of a configuration is at X (4, 4), to ``SAME_RELATION``."""
         return self._alike(at.pose(self.setting.motion.link), X, self.setting.anatomy.point)
@@ -112,3 +94,23 @@ class EndingClassifier(Value):
     def _alike(self, X: Array, other: Array, point: Array | None) -> bool:
         return pose_difference(X, other, self.goal.twin.length, point) <= SAME_RELATION
 
+
+def rest(setting: ObservedRobot, at: ClosedConfiguration, last: Command) -> Ending:
+    """What a configuration is at which the command vanishes and the error does not: a singularity of the hidden robot,
+    the limit of a leg's reach, or neither."""
+    posture = ConfigurationAnalysis.of(setting).classify(at)
+    where = f"‖e‖ = {last.size:.3g} and the command vanishes"
+    weak = float(last.values[-1]) < DAMPED
+    shifted = at.velocity(setting.motion.link) @ last.weak
+    if weak and float(np.linalg.norm(shifted)) < DAMPED:
+        return Ending(BOUNDARY, f"{where}: a leg that is not watched is stretched to its limit")
+    far = posture.distances
+    if weak and far.type2 is not None and far.type2 < DAMPED:
+        return Ending(MINIMUM, f"{where} at a Type 2 singularity of the hidden robot")
+    if (far.type1 is not None and far.type1 < DAMPED) or far.type2 is None:
+        return Ending(MINIMUM, f"{where} at a Type 1 singularity of the hidden robot")
+    if weak:
+        return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: a direction is perpendicular "
+                               "to the desired one")
+    return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: more is watched than the robot "
+                           "has freedoms")

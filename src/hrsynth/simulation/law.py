@@ -48,6 +48,8 @@ class Command(Value):
     values: Array
     weak: Array
     """The joint velocity (nv,), of unit norm, that the measured errors show least."""
+    pull: float
+    """Norm of the gradient of ½ ‖e‖², e as measured, along the motions of the loops."""
 
     @property
     def size(self) -> float:
@@ -82,7 +84,8 @@ class Law(Value):
         left, values, right = left[:, : self.dof], values[: self.dof], right[: self.dof]
         asked = self.gain * error.ravel() + cross(seen, moving).ravel()
         velocity = -kernel @ (right.T @ (inverted(values) * (left.T @ asked)))
-        return Command(velocity, true, u, seen, values, kernel @ right[-1])
+        pull = float(np.linalg.norm(rows.T @ error.ravel()))
+        return Command(velocity, true, u, seen, values, kernel @ right[-1], pull)
 
 
 def inverted(values: Array) -> Array:

@@ -146,7 +146,7 @@ class ServoTask:
         """The task of a request; raises what :func:`servo` raises."""
         wanted = [asked_pose(each) for each in (start, goal)]
         setting = setting.telling(wanted)
-        _require_seen(setting)
+        require_seen(setting)
         first, last = configurations_at(setting, wanted)
         return cls.between(setting, first, last, conditions, seed)
 
@@ -154,7 +154,7 @@ class ServoTask:
     def between(cls, setting: ObservedRobot, start: ClosedConfiguration, goal: ClosedConfiguration,
                 conditions: Conditions = Conditions(), seed: int = 0) -> ServoTask:
         """The same between two configurations."""
-        _require_seen(setting)
+        require_seen(setting)
         motion, ends = setting.motion, [start, goal]
         law = Law(setting.samples.question, setting.dof, conditions.gain)
         desired: FixedDirections | Trajectory = FixedDirections(directions(ends[1], law.question)[0])
@@ -163,7 +163,7 @@ class ServoTask:
             desired, ends[1] = straight(ends[0], motion, goal_pose, law.question, conditions.duration)
         analysis = ConfigurationAnalysis.of(setting)
         for name, at in zip(("start", "goal"), ends, strict=True):
-            _require_regular(analysis, name, at)
+            require_regular(analysis, name, at)
         return cls(setting, ends[0], ends[1], law, desired, conditions, seed)
 
     @property
@@ -247,7 +247,7 @@ class ServoTask:
                        float(np.sqrt(np.mean(turns**2))), (x, y, z), float(np.linalg.norm(middle)))
 
 
-def _require_seen(setting: ObservedRobot) -> None:
+def require_seen(setting: ObservedRobot) -> None:
     """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms."""
     robot, name = setting.robot.name, ", ".join(setting.labels)
     verdict = verdict_of(setting, setting.labels, setting.samples)
@@ -260,7 +260,7 @@ def _require_seen(setting: ObservedRobot) -> None:
                          "other legs")
 
 
-def _require_regular(analysis: ConfigurationAnalysis, name: str, at: ClosedConfiguration) -> None:
+def require_regular(analysis: ConfigurationAnalysis, name: str, at: ClosedConfiguration) -> None:
     """Raise ``BadRequest`` where a pose is singular."""
     posture = analysis.classify(at)
     robot, pose = analysis.setting.robot.name, str(posture.pose)

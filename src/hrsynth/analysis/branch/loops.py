@@ -10,7 +10,7 @@ its chains share, so that what lies before that body does not matter to it. Leng
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -19,7 +19,8 @@ import numpy as np
 from ...errors import BadMechanism
 from ...geometry import lines
 from ...geometry.affine import crossed, dotted
-from ...geometry.vectors import Array, cross, frozen, hat, perpendicular
+from ...geometry.so3 import turns_about
+from ...geometry.vectors import Array, cross, frozen, hat, inverse, perpendicular, transform
 from ...mechanism import Joint, JointType, Mechanism, graphs
 from ...results import Value
 from ...tolerances import ROUNDED_AXIS, SAME_POINT
@@ -144,6 +145,22 @@ class LoopSystem(Value):
     def displacement(self, chain: Sequence[int], values: Any) -> Swept:
         """What a chain of coordinates does: see :class:`Swept`; ``values`` are those of all, None for those at zero."""
         return Swept.of([self.coordinates[i] for i in chain], [values[i] for i in chain])
+
+    def read(self, pose: Callable[[str], Array]) -> Array:
+        """The coordinates (N,) at which the links have their poses X_BL (4, 4), m; turns within half a one."""
+        found = np.zeros(len(self.coordinates))
+        D = {i: pose(link) @ inverse(self.mechanism.links[link].pose) for link, i in self.body.items()}
+        for end in (i for i in D if i >= 0):
+            own = [i for i in self.way(end) if self.coordinates[i].joint == self.coordinates[end].joint]
+            moved = inverse(D[self.coordinates[own[0]].parent]) @ D[end]
+            centre = self.coordinates[end].point * self.length
+            for i in own:
+                if self.coordinates[i].slides:
+                    found[i] = self.coordinates[i].axis @ (transform(moved, centre) - centre) / self.length
+            turns = [i for i in own if not self.coordinates[i].slides]
+            if turns:
+                found[turns] = turns_about(np.array([self.coordinates[i].axis for i in turns]), moved[:3, :3])
+        return found
 
     def pose(self, link: str, values: Sequence[float]) -> Array:
         """X_BL (4, 4), m, of a link for coordinates (N,)."""

@@ -1,0 +1,50 @@
+"""All endings of a loop in text."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from .tables import GAP, Rows, camera, head, listing, named, table
+
+if TYPE_CHECKING:
+    from ...simulation.endings.endings import Endings, RestPoint
+
+LISTED_SADDLES = 12
+"""Rests that do not attract which are told one by one."""
+
+
+def endings(found: Endings) -> str:
+    """The goal, the rests that attract, some of those that do not, and whether that is all."""
+    drawn = [each for each in found.rests if each.stability in ("stable", "undecided")]
+    others = [each for each in found.rests if each not in drawn]
+    rows: Rows = [*head(found.setting), *camera(found.setting), ("goal", str(found.pose)), *GAP,
+                  ("attract", table([_line(each) for each in drawn], HEADS).splitlines()), *GAP]
+    if others:
+        told = table([_line(each) for each in others[:LISTED_SADDLES]], HEADS).splitlines()
+        left = len(others) - LISTED_SADDLES
+        rows += [("do not", [*told, *([f"and {left} more (--json lists them)"] if left > 0 else [])]), *GAP]
+    rows += [("continua", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.continua])]
+    rows += [("all", found.proof if found.complete else f"not proved to be all: {found.proof}")]
+    return listing(rows)
+
+
+HEADS = ("kind", "‖e‖", "", "pose", "")
+
+
+def _line(each: RestPoint) -> list[str]:
+    notes = [] if each.singular is None else [each.singular.split(": ")[-1] if each.boundary else
+                                              each.singular.split("vanishes ")[-1]]
+    if each.reversed:
+        notes.append(f"{named('leg', each.reversed)} reversed")
+    if each.across:
+        notes.append(f"{named('leg', each.across)} at right angles")
+    if each.other_legs:
+        notes.append(f"{named('leg', each.other_legs)} in another working mode")
+    if each.beyond:
+        notes.append(f"beyond the limits of {', '.join(each.beyond)}")
+    return [each.kind, f"{each.error:.3g}" if each.kind == "critical" else "0", each.stability, str(each.pose),
+            "; ".join(notes)]
+
+
+def _why(each: RestPoint) -> str:
+    return f", {named('leg', each.across)} at right angles to the desired directions" if each.across else ""

@@ -1,0 +1,158 @@
+"""Points and directions that chains of coordinates carry, with first and second derivatives, and sums of their
+products: for many floats or affine forms at once.
+
+Behind the coordinates i ≤ j of a chain, i nearer to the base, ∂ᵢ∂ⱼ v = aᵢ × ∂ⱼ v for every point or direction v that
+they carry, aᵢ the axis of a turn, zero of a slide.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis.branch.loops import LoopSystem, Swept, mapped
+from ...geometry.affine import AffineForms, crossed, dotted, stacked
+from ...geometry.vectors import Array
+
+Places = NDArray[np.intp]
+
+
+@dataclass(frozen=True, eq=False)
+class ChainColumns:
+    """What a chain does to one vector: the places (k,) of its coordinates among all, ∂v (…, k, 3), and the axes
+    (…, k, 3) of its turns; the vector counts ``sign`` times."""
+
+    places: Places
+    columns: Any
+    axes: Any
+    sign: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class CarriedVector:
+    """A vector (…, 3) that is a sum of such that chains carry."""
+
+    value: Any
+    parts: tuple[ChainColumns, ...] = ()
+
+    def __sub__(self, other: CarriedVector) -> CarriedVector:
+        turned = tuple(ChainColumns(each.places, each.columns, each.axes, -each.sign) for each in other.parts)
+        return CarriedVector(self.value - other.value, self.parts + turned)
+
+
+@dataclass(frozen=True, eq=False)
+class Product:
+    """x · y, less ``constant``."""
+
+    x: CarriedVector
+    y: CarriedVector
+    constant: Any = 0.0
+
+    @property
+    def value(self) -> Any:
+        """x · y − constant, (…)."""
+        return dotted(self.x.value, self.y.value) - self.constant
+
+
+class SweptChains:
+    """The vectors that a system's coordinates carry at some values (N,) of (…) each; what has been swept is kept."""
+
+    def __init__(self, system: LoopSystem, values: Sequence[Any]) -> None:
+        self.system, self.values = system, values
+        self._swept: dict[tuple[int, ...], tuple[Swept, Any]] = {}
+
+    def _chain(self, chain: tuple[int, ...]) -> tuple[Swept, Any]:
+        if chain not in self._swept:
+            swept = self.system.displacement(chain, self.values)
+            slides = [self.system.coordinates[i].slides for i in chain]
+            axes = [np.zeros(3) if slide else axis for slide, axis in zip(slides, swept.axes, strict=True)]
+            self._swept[chain] = swept, _rows(axes)
+        return self._swept[chain]
+
+    def point(self, chain: tuple[int, ...], p: Array) -> CarriedVector:
+        """The place of a point (3,), as it lies at zero, behind a chain."""
+        swept, axes = self._chain(chain)
+        at = swept.at(p)
+        return CarriedVector(at, _parts(chain, [swept.rate(k, at) for k in range(len(chain))], axes))
+
+    def direction(self, chain: tuple[int, ...], d: Array) -> CarriedVector:
+        """A direction (3,), as it is at zero, behind a chain."""
+        swept, axes = self._chain(chain)
+        v = mapped(swept.R, d)
+        turned = [swept.turned(k, v) for k in range(len(chain))]
+        return CarriedVector(v, _parts(chain, [np.zeros(3) if each is None else each for each in turned], axes))
+
+
+def _parts(chain: tuple[int, ...], columns: Sequence[Any], axes: Any) -> tuple[ChainColumns, ...]:
+    return (ChainColumns(np.array(chain, dtype=np.intp), _rows(columns), axes),) if chain else ()
+
+
+def _rows(vectors: Sequence[Any]) -> Any:
+    """Vectors (…, 3) below each other, (…, k, 3)."""
+    return stacked(vectors, -2) if vectors else np.zeros((0, 3))
+
+
+class Total:
+    """A sum of arrays or forms, (c, …), to parts of which is added."""
+
+    def __init__(self, like: Any, shape: tuple[int, ...]) -> None:
+        """Zero, for as many values as ``like`` (c,) has."""
+        self.sum: Any = np.zeros((*np.shape(like), *shape))
+        if isinstance(like, AffineForms):
+            self.sum = AffineForms(np.zeros((*like.v.shape, *shape)), np.zeros((*like.r.shape, *shape)))
+
+    @property
+    def shape(self) -> tuple[int, ...]:
+        """The last dimensions."""
+        return tuple((self.sum.r if isinstance(self.sum, AffineForms) else self.sum).shape[1:])
+
+    def add(self, where: tuple[Any, ...], part: Any) -> None:
+        """Add to the places ``where`` of the last dimensions."""
+        place = (..., *where)
+        if isinstance(self.sum, AffineForms):
+            total = self.sum[place] + part
+            self.sum.v[place], self.sum.r[place] = total.v, total.r
+        else:
+            self.sum[place] += part
+
+
+def add_slope(total: Total, product: Product, weight: Any = 1.0) -> None:
+    """Add weight ∇(x · y) to a sum (c, N)."""
+    for vector, other in ((product.x, product.y), (product.y, product.x)):
+        for part in vector.parts:
+            f = other.value * (part.sign * _as_column(weight))
+            total.add((part.places,), (part.columns * f[..., None, :]).sum(-1))
+
+
+def add_bend(total: Total, product: Product, weight: Any = 1.0) -> None:
+    """Add weight ∇²(x · y) to a sum (c, N, N)."""
+    for vector, other in ((product.x, product.y), (product.y, product.x)):
+        for part in vector.parts:
+            f = other.value * (part.sign * _as_column(weight))
+            pushed = crossed(f[..., None, :], part.axes)
+            later, earlier = outer(pushed, part.columns), outer(part.columns, pushed)
+            size = len(part.places)
+            total.add(np.ix_(part.places, part.places),
+                      later * np.triu(np.ones((size, size))) + earlier * np.tril(np.ones((size, size)), -1))
+    for one in product.x.parts:
+        for two in product.y.parts:
+            both = one.sign * two.sign
+            columns = two.columns * _as_column(_as_column(weight)) * both
+            total.add(np.ix_(one.places, two.places), outer(one.columns, columns))
+            total.add(np.ix_(two.places, one.places), outer(columns, one.columns))
+
+
+def outer(a: Any, b: Any) -> Any:
+    """The products a_i · b_j (…, k, l) of vectors (…, k, 3) and (…, l, 3)."""
+    if isinstance(a, AffineForms) or isinstance(b, AffineForms):
+        return (a[..., :, None, :] * b[..., None, :, :]).sum(-1)
+    return a @ np.swapaxes(b, -1, -2)
+
+
+def _as_column(weight: Any) -> Any:
+    """A weight (c,) for vectors (c, 3); numbers as they are."""
+    return weight if isinstance(weight, int | float) else weight[..., None]

@@ -1,0 +1,276 @@
+"""The error that a loop decreases, E = ½ ‖e‖², and the closed loops on which it does, in joint coordinates: values,
+gradients and Hessians, for many floats or affine forms at once.
+
+The law commands q̇ = −λ B (L U B)⁺ e with B a basis of the motions of the closed loops: it rests exactly where
+Bᵀ ∇E = 0, at the critical points of E on the configurations G(q) = 0. With multipliers these are the zeros of
+∇E + DGᵀ μ beside G (docs/pages/theory.md, section 11). Of a direction e = u × u_d, so that its part of E is
+½ (1 − (u · u_d)²).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ...analysis.branch.loops import GearEquation, JointLoop, LoopRow, LoopSystem, loop_system
+from ...analysis.branch.part import whole
+from ...errors import BadRequest
+from ...geometry.affine import AffineForms
+from ...geometry.so3 import exponential
+from ...geometry.vectors import Array, cross, transform
+from ...kinematics.configuration import ClosedConfiguration, measure
+from ...kinematics.relation import Measurement
+from ...mechanism.observation import AngleEncoder, Direction, Observation, SlideEncoder
+from ...results import Value
+from ...tolerances import AFFINE_ROUNDING, RANK_CUTOFF
+from .carried import CarriedVector, Product, SweptChains, Total, add_bend, add_slope, outer
+
+Row = tuple[JointLoop, LoopRow]
+
+
+class ErrorTerm(Protocol):
+    """A part of E of one observation."""
+
+    def add(self, carrier: SweptChains, sums: ErrorSums) -> None:
+        """Add its value, gradient and Hessian."""
+
+
+@dataclass(eq=False)
+class ErrorSums:
+    """E (c,), ∇E (c, N) and, where it is asked for, ∇²E (c, N, N)."""
+
+    value: Any
+    slope: Total
+    bend: Total | None
+
+    def add_square(self, e: Any, slope: Any, bends: Sequence[tuple[Product, Any]] = ()) -> None:
+        """Add ½ e², for e with the gradient ``slope`` (c, N) and the Hessian that is the sum of those of products, each
+        with its weight (c,)."""
+        self.value = self.value + e * e * 0.5
+        self.slope.add((slice(None),), slope * e[..., None])
+        if self.bend is not None:
+            column = slope[..., :, None]
+            self.bend.add((slice(None), slice(None)), outer(column, column))
+            for product, weight in bends:
+                add_bend(self.bend, product, weight * e)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DirectionTerm(Value):
+    """½ ‖u × u_d‖² = ½ (1 − c²), c = u · u_d, of a direction (3,) behind a chain and the desired one (3,) behind that
+    of the reference link, both as they are at zero."""
+
+    chains: tuple[tuple[int, ...], tuple[int, ...]]
+    direction: Array
+    wanted: Array
+
+    def cosine(self, carrier: SweptChains) -> Product:
+        """c."""
+        return Product(carrier.direction(self.chains[0], self.direction),
+                       carrier.direction(self.chains[1], self.wanted))
+
+    def add(self, carrier: SweptChains, sums: ErrorSums) -> None:
+        """As of :class:`ErrorTerm`."""
+        product = self.cosine(carrier)
+        c = product.value
+        slope = gradient(product, sums)
+        sums.value = sums.value + (1.0 - c * c) * 0.5
+        sums.slope.add((slice(None),), slope * -c[..., None])
+        if sums.bend is not None:
+            column = slope[..., :, None]
+            sums.bend.add((slice(None), slice(None)), -outer(column, column))
+            add_bend(sums.bend, product, -c)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SlideTerm(Value):
+    """½ (a · (p − o) − wanted)², of a point p (3,) behind a chain, the point o and the axis a of its slide (3,) behind
+    that of the joint's other link, all as they are at zero; characteristic lengths."""
+
+    chains: tuple[tuple[int, ...], tuple[int, ...]]
+    point: Array
+    start: Array
+    axis: Array
+    wanted: float
+
+    def add(self, carrier: SweptChains, sums: ErrorSums) -> None:
+        """As of :class:`ErrorTerm`."""
+        way = carrier.point(self.chains[0], self.point) - carrier.point(self.chains[1], self.start)
+        product = Product(carrier.direction(self.chains[1], self.axis), way, self.wanted)
+        sums.add_square(product.value, gradient(product, sums), [(product, 1.0)])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class AngleTerm(Value):
+    """½ θ², θ = atan2(s, c) the angle by which a mark (3,) behind a chain is turned beyond where it is wanted: s and c
+    are its products with ``across`` and ``along`` (3,) behind the chain of the joint's other link, as they are at zero.
+    """
+
+    chains: tuple[tuple[int, ...], tuple[int, ...]]
+    mark: Array
+    across: Array
+    along: Array
+
+    def add(self, carrier: SweptChains, sums: ErrorSums) -> None:
+        """As of :class:`ErrorTerm`: ∇θ = (c ∇s − s ∇c) / r², r² = s² + c², which is constant, as is the angle between
+        mark and axis; ∇²θ = (c ∇²s − s ∇²c) / r²."""
+        mark = carrier.direction(self.chains[0], self.mark)
+        s, c = (Product(mark, carrier.direction(self.chains[1], each)) for each in (self.across, self.along))
+        size = float(self.mark @ self.across) ** 2 + float(self.mark @ self.along) ** 2
+        one, other = c.value * (1 / size), s.value * (-1 / size)
+        slope = gradient(s, sums) * one[..., None] + gradient(c, sums) * other[..., None]
+        sums.add_square(angle(s.value, c.value), slope, [(s, one), (c, other)])
+
+
+def gradient(product: Product, sums: ErrorSums) -> Any:
+    """∇(x · y), (c, N)."""
+    total = Total(sums.value, sums.slope.shape)
+    add_slope(total, product)
+    return total.sum
+
+
+def angle(s: Any, c: Any) -> Any:
+    """atan2(s, c); of forms an enclosure, not a number where both may vanish."""
+    if not isinstance(s, AffineForms):
+        return np.arctan2(s, c)
+    far, near = np.hypot(s.spread, c.spread), np.hypot(s.v[0], c.v[0])
+    with np.errstate(invalid="ignore", divide="ignore"):
+        # asin x ≤ π x / 2
+        doubt = np.where(far < near, np.pi / 2 * far / near, np.nan) + 4 * AFFINE_ROUNDING
+    middle = np.zeros_like(s.v)
+    middle[0] = np.arctan2(s.v[0], c.v[0])
+    return AffineForms(middle, doubt)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RestSystem(Value):
+    """The loops of a robot and the error that its controller decreases: ``rows`` are as many equations of the loops as
+    are independent, ``terms`` one for each observation."""
+
+    system: LoopSystem
+    rows: tuple[Row, ...]
+    gears: tuple[GearEquation, ...]
+    terms: tuple[ErrorTerm, ...]
+
+    @classmethod
+    def of(cls, goal: ClosedConfiguration, question: Measurement, generic: Sequence[ClosedConfiguration]) -> RestSystem:
+        """That of the values measured at a goal; which equations are independent is seen at ``generic`` configurations.
+
+        Raises ``BadRequest`` for observations of a kind whose error has no formula here.
+        """
+        mechanism = goal.twin.mechanism
+        system = loop_system(mechanism, ())
+        values = measure(goal.twin, goal.q, question.reference, question.observations)[2]
+        terms = tuple(term(system, question.reference, each, value)
+                      for each, value in zip(question.observations, values, strict=True))
+        every = [(loop, row) for loop in system.loops for row in loop.rows]
+        q = np.array([system.read(each.pose) for each in generic])
+        _, rates = whole(system, system.loops, system.gears, list(q.T), (len(q),))
+        chosen = independent(rates)
+        count = len(every)
+        return cls(system, tuple(every[k] for k in chosen if k < count),
+                   tuple(system.gears[k - count] for k in chosen if k >= count), terms)
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Coordinates N and equations m."""
+        return len(self.system.coordinates), len(self.rows) + len(self.gears)
+
+    def at(self, values: Sequence[Any]) -> RestEquations:
+        """All of it at values (N,) of (c,) each."""
+        return RestEquations(self, values)
+
+
+class RestEquations:
+    """The loops and the error at values (N,) of (c,) each: G (c, m), DG (c, m, N), E (c,), ∇E (c, N)."""
+
+    def __init__(self, system: RestSystem, values: Sequence[Any]) -> None:
+        size, count = system.size
+        self.like = values[0] * 0.0
+        self.carrier = SweptChains(system.system, values)
+        self.system = system
+        self.products = [row_product(self.carrier, *each) for each in system.rows]
+        closing, rates = Total(self.like, (count,)), Total(self.like, (count, size))
+        for k, product in enumerate(self.products):
+            closing.add((k,), product.value)
+            own = Total(self.like, (size,))
+            add_slope(own, product)
+            rates.add((k, slice(None)), own.sum)
+        for k, gear in enumerate(system.gears, len(system.rows)):
+            closing.add((k,), values[gear.second] - values[gear.first] * gear.ratio)
+            for i, rate in ((gear.second, 1.0), (gear.first, -gear.ratio)):
+                rates.add((k, i), rate)
+        self.G, self.DG = closing.sum, rates.sum
+        sums = self._error(False)
+        self.E, self.slope = sums.value, sums.slope.sum
+
+    def _error(self, bend: bool) -> ErrorSums:
+        size = self.system.size[0]
+        sums = ErrorSums(self.like, Total(self.like, (size,)), Total(self.like, (size, size)) if bend else None)
+        for each in self.system.terms:
+            each.add(self.carrier, sums)
+        return sums
+
+    def bend(self, multipliers: Any) -> Any:
+        """The Hessian (c, N, N) of E + μ · G for multipliers μ (c, m)."""
+        total = self._error(True).bend
+        assert total is not None
+        for k, product in enumerate(self.products):
+            add_bend(total, product, multipliers[..., k])
+        return total.sum
+
+    def pull(self, multipliers: Any) -> Any:
+        """∇E + DGᵀ μ, (c, N)."""
+        return self.slope + (self.DG * multipliers[..., :, None]).sum(-2)
+
+
+def independent(rates: Array) -> list[int]:
+    """Rows of a matrix (…, m, N) that are as many as are independent at most of the places, and are independent at all
+    of them if any are: those of a pivoted QR decomposition of all places beside each other."""
+    if not rates.shape[-2]:
+        return []
+    from scipy.linalg import qr
+
+    values = np.linalg.svd(rates, compute_uv=False)
+    rank = int(np.median((values > RANK_CUTOFF).sum(axis=-1)))
+    _, _, order = qr(np.concatenate(list(rates), axis=-1).T, mode="economic", pivoting=True)
+    return sorted(order[:rank].tolist())
+
+
+def row_product(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> Product:
+    """An equation of a loop as a product that vanishes."""
+    if row.kind == "direction":
+        assert row.one is not None
+        assert row.other is not None
+        return Product(carrier.direction(loop.chains[0], row.one), carrier.direction(loop.chains[1], row.other),
+                       float(row.one @ row.other))
+    assert row.one is not None
+    k = carrier.direction(loop.chains[0], row.one) if row.carried else CarriedVector(row.one)
+    return Product(k, carrier.point(loop.chains[1], loop.point) - carrier.point(loop.chains[0], loop.point))
+
+
+def term(system: LoopSystem, reference: str, seen: Observation, value: Array) -> ErrorTerm:
+    """The part of E of an observation whose desired value is given (characteristic lengths, radians); raises
+    ``BadRequest`` for kinds without a formula."""
+    links, length = system.mechanism.links, system.length
+    view = seen.seen_from or reference
+    chains = system.way(system.body[seen.link]), system.way(system.body[view])
+    shared = sum(1 for i, k in zip(*chains, strict=False) if i == k)
+    chains = chains[0][shared:], chains[1][shared:]
+    X, Y = links[seen.link].pose, links[view].pose
+    R, S = X[:3, :3], Y[:3, :3]
+    match seen:
+        case Direction():
+            return DirectionTerm(chains, R @ seen.direction, S @ value)
+        case SlideEncoder():
+            return SlideTerm(chains, transform(X, seen.point) / length, transform(Y, seen.start) / length,
+                             S @ seen.axis, float(value[0]))
+        case AngleEncoder():
+            normal = seen.start - (seen.axis @ seen.start) * seen.axis
+            along = exponential(float(value[0]) * seen.axis) @ normal
+            return AngleTerm(chains, R @ seen.mark, S @ cross(seen.axis, along), S @ along)
+    raise BadRequest(f"endings of a loop on the {type(seen).__name__} of leg {seen.leg}", seen.link,
+                     "directions and encoders")

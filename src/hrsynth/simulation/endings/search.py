@@ -1,0 +1,254 @@
+"""Critical points of the error on closed loops, from many starts at once: to minima, saddles of each index and maxima.
+
+About a configuration the columns of Z span the motions of the closed loops; the step Z s + p closes them (p, normal to
+Z) and solves ZᵀHZ s = −Zᵀ(∇E + H p), H the Hessian of E + μ · G: Newton's method on ∇E + DGᵀ μ = 0 beside G = 0. Along
+the eigenvectors of ZᵀHZ with the k lowest eigenvalues it goes up instead, along all others down, which leads to
+critical points of index k (C. J. Cerjan, W. H. Miller, J. Chem. Phys. 75, 1981). Nothing here proves anything.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis.observed import ObservedRobot
+from ...budgets import ENDING_LATE, ENDING_ROUNDS, ENDING_STARTS, ENDING_STEPS, ENDING_WALK, FARTHEST_ENDING
+from ...constraints.pattern import attached
+from ...geometry.vectors import Array
+from ...kinematics.configuration import ClosedConfiguration
+from ...mechanism.observation import Direction
+from ...progress import tell
+from ...results import Value
+from ...tolerances import CRITICAL, CRITICAL_FLAT, SAME_ENDING
+from .carried import SweptChains
+from .error import RestEquations, RestSystem
+
+LONGEST_STEP = 0.25
+"""Longest change of a coordinate in a step (characteristic lengths, radians)."""
+WALK_STEP = 0.3
+"""The same of a random step between starts."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CriticalPoint(Value):
+    """A critical point of E: coordinates (N,) and multipliers (m,), ∇E on the loops and G as they are left
+    (``residual``), and the eigenvalues of the Hessian along the motions of the loops, ascending, without idle ones;
+    ``value`` is E."""
+
+    q: Array
+    multipliers: Array
+    residual: float
+    curvatures: Array
+    value: float
+
+
+@dataclass(frozen=True, eq=False)
+class Tangents:
+    """The motions of the loops at configurations (c,): Z (c, N, d), Y (c, N, m) normal to them, R (c, m, m) with DGᵀ =
+    Y R."""
+
+    Z: Array
+    Y: Array
+    R: Array
+
+    @classmethod
+    def of(cls, DG: Array) -> Tangents:
+        """Those of DG (c, m, N)."""
+        m = DG.shape[-2]
+        Q, R = np.linalg.qr(np.swapaxes(DG, -1, -2), mode="complete")
+        R = R[..., :m, :]
+        # a row that is lost counts as a faint one
+        faint = np.abs(np.diagonal(R, axis1=-2, axis2=-1)) < 1e-12
+        R = R + np.where(faint, 1e-12, 0.0)[..., None] * np.eye(m)
+        return cls(Q[..., m:], Q[..., :m], R)
+
+    def closing(self, G: Array) -> Array:
+        """p (c, N), normal to Z, with DG p = −G."""
+        return -1.0 * _times(self.Y, np.linalg.solve(np.swapaxes(self.R, -1, -2), G[..., None])[..., 0])
+
+    def multipliers(self, slope: Array) -> Array:
+        """μ (c, m) with ∇E + DGᵀ μ in the span of Z."""
+        return np.asarray(-np.linalg.solve(self.R, _times(np.swapaxes(self.Y, -1, -2), slope)[..., None])[..., 0])
+
+
+@dataclass(frozen=True, eq=False)
+class Expansion:
+    """E on the loops to second order at configurations (c,): the closing step p (c, N), multipliers μ (c, m), gradient
+    (c, d) and Hessian along Z: its eigenvalues (c, d) and directions (c, N, d), the idle ones last."""
+
+    E: Array
+    closing: Array
+    multipliers: Array
+    slope: Array
+    curvatures: Array
+    directions: Array
+    residual: Array
+
+    @classmethod
+    def of(cls, system: RestSystem, q: Array, idle: int) -> Expansion:
+        """That at q (c, N)."""
+        at = RestEquations(system, list(q.T))
+        tangents = Tangents.of(at.DG)
+        p, mu = tangents.closing(at.G), tangents.multipliers(at.slope)
+        H = at.bend(mu)
+        Z = tangents.Z
+        back = np.swapaxes(Z, -1, -2)
+        flat = _times(back, at.slope)
+        slope = flat + _times(back, _times(H, p))
+        values, vectors = np.linalg.eigh(back @ H @ Z)
+        along = _times(np.swapaxes(vectors, -1, -2), slope)
+        still = np.argsort(np.argsort(np.abs(values) + np.abs(along), axis=-1), axis=-1) < idle
+        order = np.argsort(np.where(still, np.inf, values), axis=-1, kind="stable")
+        values, along = (np.take_along_axis(each, order, -1) for each in (values, along))
+        vectors = np.take_along_axis(vectors, order[..., None, :], -1)
+        kept = values.shape[-1] - idle
+        return cls(at.E, p, mu, along[..., :kept], values[..., :kept], (Z @ vectors)[..., :kept],
+                   np.maximum(np.linalg.norm(at.G, axis=-1), np.linalg.norm(flat, axis=-1)))
+
+
+def _times(M: Any, v: Any) -> Array:
+    """M v for matrices (c, k, l) and vectors (c, l)."""
+    return np.asarray((M @ v[..., None])[..., 0])
+
+
+def _shortened(step: Array, longest: float) -> Array:
+    """Steps (c, N), none of whose changes is longer."""
+    size = np.abs(step).max(axis=-1, keepdims=True)
+    return np.asarray(step * np.minimum(1.0, longest / np.maximum(size, longest)))
+
+
+def closed(system: RestSystem, q: Array, steps: int = 12) -> Array:
+    """Configurations (c, N) moved to the nearest closed ones, as far as Newton's method does it."""
+    for _ in range(steps):
+        at = RestEquations(system, list(q.T))
+        if np.linalg.norm(at.G, axis=-1).max(initial=0.0) < CRITICAL:
+            break
+        q = q + _shortened(Tangents.of(at.DG).closing(at.G), LONGEST_STEP)
+    return q
+
+
+def walked(system: RestSystem, q: Array, rng: np.random.Generator, steps: int, longest: float = WALK_STEP) -> Array:
+    """Closed configurations (c, N), each led so many random steps along the loops; those that do not close stay."""
+    for _ in range(steps):
+        tangents = Tangents.of(RestEquations(system, list(q.T)).DG)
+        way = _times(tangents.Z, rng.normal(size=(len(q), tangents.Z.shape[-1])))
+        there = closed(system, q + longest * rng.uniform(0.2, 1.0, (len(q), 1)) * way / np.abs(way).max(
+            axis=-1, keepdims=True))
+        good = np.linalg.norm(RestEquations(system, list(there.T)).G, axis=-1) < CRITICAL
+        good &= np.abs(there - q).max(axis=-1) < 2 * longest
+        q = np.where(good[:, None], there, q)
+    return q
+
+
+def descend(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) -> list[CriticalPoint]:
+    """The critical points to which starts (c, N) lead, each sought as one of an index (c,)."""
+    found: list[CriticalPoint] = []
+    for _ in range(ENDING_STEPS):
+        if not len(q):
+            break
+        at = Expansion.of(system, q, idle)
+        done = at.residual < CRITICAL
+        found += [CriticalPoint(*each) for each in zip(q[done], at.multipliers[done], at.residual[done],
+                                                      at.curvatures[done], at.E[done], strict=True)]
+        up = np.arange(at.curvatures.shape[-1]) < index[:, None]
+        size = np.maximum(np.abs(at.curvatures), CRITICAL_FLAT)
+        # near a critical point: Newton's method, whatever it is
+        near = (at.residual < 1e-3) & (np.abs(at.slope / size).max(axis=-1) < 0.05)
+        sign = np.where(near[:, None], -np.sign(at.curvatures), np.where(up, 1.0, -1.0))
+        step = _shortened(_times(at.directions, sign * at.slope / size), LONGEST_STEP)
+        q = q + step + _shortened(at.closing, LONGEST_STEP)
+        going = ~done & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < FARTHEST_ENDING)
+        q, index = q[going], index[going]
+    return found
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Critical(Value):
+    """A critical point, and how often it was met."""
+
+    point: CriticalPoint
+    met: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CriticalPoints(Value):
+    """What a search found: isolated critical points, and of those that fill curves or surfaces one for each value of E
+    and signs of the curvatures; how many ``starts`` there were, and how many of the isolated ones the last half of them
+    found first (``late``)."""
+
+    isolated: tuple[Critical, ...]
+    continua: tuple[Critical, ...]
+    starts: int
+    late: int
+
+    @property
+    def words(self) -> str:
+        """What was done, and how well it covers."""
+        return f"found from {self.starts:,} random starts, {self.late} of them first in the second half of these"
+
+
+def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConfiguration, seed: int = 0
+                    ) -> CriticalPoints:
+    """The critical points to which random walks from the samples lead, in rounds, until the later half of the starts
+    finds few new ones."""
+    relation = setting.samples.members[0].relation
+    idle, freedoms = relation.mobility - relation.dimension, relation.dimension
+    homes = np.array([system.system.read(at.pose) for at in (goal, *setting.configurations)])
+    rng = np.random.default_rng(seed)
+    q = homes[np.arange(ENDING_STARTS) % len(homes)]
+    bodies = attached(setting.anatomy)
+    known: dict[tuple[int, ...], list[tuple[Array, CriticalPoint, int, int]]] = {}
+    families: dict[tuple[int, ...], Critical] = {}
+    fresh: list[int] = []
+    points = descend(system, homes[:1], np.zeros(1, dtype=np.intp), idle)
+    for number in range(ENDING_ROUNDS):
+        tell("starts")
+        q = walked(system, q, rng, ENDING_WALK)
+        points += descend(system, q, rng.integers(freedoms + 1, size=len(q)), idle)
+        new = 0
+        for point, mark in zip(points, marks(system, setting, bodies, points), strict=True):
+            flat = np.abs(point.curvatures) < SAME_ENDING
+            key = (*(int(np.sum(each)) for each in (point.curvatures < -SAME_ENDING, flat)),)
+            if flat.any():
+                key = (*key, round(point.value / SAME_ENDING))
+                old = families.get(key)
+                families[key] = Critical(point, 1) if old is None else Critical(old.point, old.met + 1)
+                continue
+            own = known.setdefault(key, [])
+            near = next((k for k, each in enumerate(own) if np.abs(mark - each[0]).max() < SAME_ENDING), None)
+            if near is None:
+                own.append((mark, point, 1, number))
+                new += 1
+            else:
+                own[near] = (*own[near][:2], own[near][2] + 1, own[near][3])
+        points = []
+        fresh.append(new)
+        count = sum(map(len, known.values()))
+        if number and 2 * sum(fresh[len(fresh) // 2 :]) <= ENDING_LATE * count:
+            break
+    late = sum(fresh[len(fresh) // 2 :])
+    isolated = tuple(Critical(point, met) for own in known.values() for _, point, met, _ in own)
+    return CriticalPoints(isolated, tuple(families.values()), ENDING_STARTS * len(fresh), late)
+
+
+def marks(system: RestSystem, setting: ObservedRobot, bodies: Sequence[str], points: Sequence[CriticalPoint]) -> Array:
+    """What tells configurations (n, k) apart: the poses of the platform's bodies and the directions of all segments."""
+    if not points:
+        return np.zeros((0, 0))
+    loops, links = system.system, system.system.mechanism.links
+    carrier = SweptChains(loops, list(np.array([each.q for each in points]).T))
+    parts = []
+    for body in bodies:
+        chain, X = loops.way(loops.body[body]), links[body].pose
+        parts.append(carrier.point(chain, X[:3, 3] / loops.length).value)
+        if setting.motion.body:
+            parts += [carrier.direction(chain, axis).value for axis in X[:3, :2].T]
+    for seen in setting.everything.question.observations:
+        if isinstance(seen, Direction):
+            parts.append(carrier.direction(loops.way(loops.body[seen.link]),
+                                           links[seen.link].pose[:3, :3] @ seen.direction).value)
+    return np.concatenate([np.broadcast_to(each, (len(points), 3)) for each in parts], axis=-1)
