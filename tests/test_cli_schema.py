@@ -29,6 +29,7 @@ QUICK = {
               "3rrr_m1 --real --at x=0.02,phi=5deg"],
     "atlas": ["3rrr_m1 --observe 2,1,3"],
     "path": ["quattro --observe 1,4 --start x=0.05 --goal x=-0.05,phi=20deg", "3rps --start z=0.5 --goal z=0.51"],
+    "endings": ["rrrrr_m1 --at x=0,y=0.2"],
     "servo": ["rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22",
               "rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22 --noise 0.1deg --time 3"],
     "accuracy": ["delta --cone 0.1deg --at x=0.1", "rrrrr_m1 --cone 0.1deg --at x=0,y=0.3332050807568877",
