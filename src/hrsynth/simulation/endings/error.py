@@ -23,7 +23,9 @@ from ...geometry.so3 import exponential
 from ...geometry.vectors import Array, cross, transform
 from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.relation import Measurement
-from ...mechanism.observation import AngleEncoder, Direction, Observation, SlideEncoder
+from ...mechanism.observation import Observation
+from ...mechanism.observations.direction import SeenAxis
+from ...mechanism.observations.encoder import AngleEncoder, SlideEncoder
 from ...results import Value
 from ...tolerances import AFFINE_ROUNDING, RANK_CUTOFF
 from .carried import CarriedVector, Product, SweptChains, Total, add_bend, add_slope, outer
@@ -263,7 +265,7 @@ def term(system: LoopSystem, reference: str, seen: Observation, value: Array) ->
     X, Y = links[seen.link].pose, links[view].pose
     R, S = X[:3, :3], Y[:3, :3]
     match seen:
-        case Direction():
+        case SeenAxis():
             return DirectionTerm(chains, R @ seen.direction, S @ value)
         case SlideEncoder():
             return SlideTerm(chains, transform(X, seen.point) / length, transform(Y, seen.start) / length,

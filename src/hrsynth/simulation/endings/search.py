@@ -20,7 +20,7 @@ from ...budgets import ENDING_LATE, ENDING_ROUNDS, ENDING_STARTS, ENDING_STEPS, 
 from ...constraints.pattern import attached
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...mechanism.observation import Direction
+from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
 from ...tolerances import CRITICAL, CRITICAL_FLAT, SAME_ENDING
@@ -248,7 +248,7 @@ def marks(system: RestSystem, setting: ObservedRobot, bodies: Sequence[str], poi
         if setting.motion.body:
             parts += [carrier.direction(chain, axis).value for axis in X[:3, :2].T]
     for seen in setting.everything.question.observations:
-        if isinstance(seen, Direction):
+        if isinstance(seen, SeenAxis):
             parts.append(carrier.direction(loops.way(loops.body[seen.link]),
                                            links[seen.link].pose[:3, :3] @ seen.direction).value)
     return np.concatenate([np.broadcast_to(each, (len(points), 3)) for each in parts], axis=-1)
