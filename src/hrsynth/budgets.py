@@ -316,3 +316,11 @@ NEWTON_STEPS_AT_RUN = 8
 """Steps of Newton's method that a generated program takes at most in each part of the loops."""
 INVERSE_STEPS_AT_RUN = 20
 """Steps from motors to motors that it takes at most towards a pose."""
+CONE_BOXES = 60_000
+"""Slices of cones about a goal that are tried at most, where the error is proved to rise along every ray."""
+CONES_AT_ONCE = 2048
+"""Cones whose next slice is tried together: those of the lowest levels."""
+RAYS = 3000
+"""Rays from a goal along which it is seen, not proved, how high the error rises."""
+RADIUS_BOXES = 60_000
+"""Boxes with which a certified radius is tried, at most."""

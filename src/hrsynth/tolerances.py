@@ -331,3 +331,11 @@ ON_LOCUS = 0.2
 is where it vanishes, not where it is infinite."""
 SLIDER_ARRIVED = 1e-6
 """Difference (metres, radians) within which the platform has come to where a slider sent it."""
+NARROWEST_RISING_CONE = 2.0 ** -7
+"""Half the width of a cone about a goal, in faces of the cube [-1, 1] to the n, below which it is cut no more."""
+SHORTEST_SLICE = 2.0 ** -9
+"""Length of a slice of such a cone, in square roots of twice the error, below which it is cut no more."""
+CERTIFIED_LEVEL = 0.95
+"""Part of the error at which a ray is seen to stop rising up to which it is tried to prove that all rays rise."""
+RADIUS_SHARES = (0.97, 0.9, 0.8, 0.65, 0.5, 0.3)
+"""Parts of the radius that rays show that are tried, one after the other, as the certified one."""

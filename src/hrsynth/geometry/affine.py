@@ -78,6 +78,52 @@ class AffineForms:
 
     __rmul__ = __mul__
 
+    @property
+    def low(self) -> Array:
+        """A lower bound of the values (…)."""
+        return self.v[0] - self.spread - AFFINE_ROUNDING * np.abs(self.v[0])
+
+    @property
+    def high(self) -> Array:
+        """An upper bound of the values (…)."""
+        return self.v[0] + self.spread + AFFINE_ROUNDING * np.abs(self.v[0])
+
+    def scaled(self, factor: float, doubt: float) -> AffineForms:
+        """The values times a number that is known to ``doubt``."""
+        size = np.abs(self.v).sum(axis=0)
+        return _rounded(self.v * factor, self.r * abs(factor) + doubt * (size + self.r), size * abs(factor))
+
+    def shifted(self, term: float, doubt: float) -> AffineForms:
+        """The values and a number that is known to ``doubt``."""
+        v = self.v.copy()
+        v[0] += term
+        return _rounded(v, self.r + doubt, np.abs(v[0]))
+
+    def inverse(self) -> AffineForms:
+        """1 / value: on [a, b], a > 0, it lies between its secant and the tangent of the same slope −1 / (a b). Not
+        finite where the values may vanish."""
+        sign = np.sign(self.v[0])
+        a, b = np.abs(self.v[0]) - self.spread, np.abs(self.v[0]) + self.spread
+        with np.errstate(all="ignore"):
+            a = np.where(a > AFFINE_ROUNDING * b, a, np.nan)
+            top, least = 1 / a + 1 / b, 2 / np.sqrt(a * b)
+            return self._along(-1 / (a * b), sign * (top + least) / 2, np.abs(top - least) / 2, top)
+
+    def sqrt(self) -> AffineForms:
+        """√value for those values that are not negative: on [a, b] it lies between its secant and the tangent of the
+        same slope 1 / (√a + √b). No number where all are negative."""
+        with np.errstate(all="ignore"):
+            a, b = np.sqrt(np.maximum(self.low, 0.0)), np.sqrt(self.high)
+            both = a + b
+            least, top = a * b / both, both / 4
+            return self._along(1 / both, (top + least) / 2, (top - least) / 2, both)
+
+    def _along(self, slope: Array, shift: Array, off: Array, size: Array) -> AffineForms:
+        """slope · values + shift ± off, for results of a ``size``."""
+        v = self.v * slope
+        v[0] += shift
+        return _rounded(v, self.r * np.abs(slope) + off, 4 * (size + np.abs(v).sum(axis=0)))
+
     def sum(self, axis: int = -1) -> AffineForms:
         """The sum along one of the last dimensions."""
         return _rounded(self.v.sum(axis=axis), self.r.sum(axis=axis), np.abs(self.v).sum(axis=0).sum(axis=axis))

@@ -1,0 +1,147 @@
+"""Formulas of a tape over boxes: traced once, evaluated on affine forms of thousands of boxes at once.
+
+What depends on the robot's numbers alone is computed once, in balls; each number holds all that it was rounded from.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..geometry.affine import AffineForms
+from ..results import Value
+from ..tolerances import CHAIN_ROUNDING, FOLLOWED
+from .tape import Symbol, Tape
+
+Term = tuple[float, float]
+"""A number, and how far it may be off."""
+
+
+def traced(formula: Callable[..., Sequence[Any]], inputs: int) -> BoxFormula:
+    """A formula from ``inputs`` numbers and from what makes components of the robot's numbers, as code for boxes."""
+    tape = Tape([])
+
+    def number(value: Any) -> Any:
+        if np.ndim(value):
+            return [number(each) for each in value]
+        return tape.number(0.0 if abs(value) < CHAIN_ROUNDING else float(value))
+
+    return BoxFormula.of(tape, formula([tape.load(i) for i in range(inputs)], number))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BoxFormula(Value):
+    """Straight-line code on affine forms: steps (result, operation, arguments), an argument being the number of an
+    earlier result or a number; which results are needed no more after each; and what is given out."""
+
+    steps: Sequence[tuple[int, str, Sequence[int | Term]]]
+    done: Sequence[Sequence[int]]
+    outputs: Sequence[int | Term]
+
+    @classmethod
+    def of(cls, tape: Tape, outputs: Sequence[Any]) -> BoxFormula:
+        """The code of some of a tape's symbols."""
+        from flint import arb
+
+        used = tape.needed(list(enumerate(outputs)))
+        known: dict[int, Any] = {}
+        fixed = tape.fixed()
+        steps: list[tuple[int, str, Sequence[int | Term]]] = []
+
+        def term(each: Any) -> int | Term:
+            if isinstance(each, int):
+                return _term(known[each]) if fixed[each] else each
+            return _term(arb(each))
+
+        for i in sorted(used):
+            name, *arguments = tape.code[i]
+            if name == "number":
+                known[i] = arb(tape.numbers[arguments[0]], FOLLOWED)
+            elif fixed[i]:
+                known[i] = _ball(name, [known[a] if isinstance(a, int) else arb(a) for a in arguments])
+            else:
+                steps.append((i, name, arguments if name == "load" else [term(a) for a in arguments]))
+        given = [term(each.number if isinstance(each, Symbol) else float(each)) for each in outputs]
+        kept = {each for each in given if isinstance(each, int)}
+        last = {a: k for k, (_, name, arguments) in enumerate(steps) if name != "load"
+                for a in arguments if isinstance(a, int)}
+        done: list[list[int]] = [[] for _ in steps]
+        for a, k in last.items():
+            if a not in kept:
+                done[k].append(a)
+        return cls(steps, done, given)
+
+    def at(self, inputs: Sequence[AffineForms]) -> list[AffineForms]:
+        """What is given out, for inputs of shape (boxes,); no number where a formula has a pole in a box."""
+        found: dict[int, AffineForms] = {}
+        with np.errstate(all="ignore"):
+            for (i, name, arguments), done in zip(self.steps, self.done, strict=True):
+                if name == "load":
+                    found[i] = inputs[arguments[0]]  # type: ignore[index]
+                else:
+                    found[i] = _forms(name, [found[a] if isinstance(a, int) else a for a in arguments])
+                for each in done:
+                    del found[each]
+        nothing = inputs[0].scaled(0.0, 0.0)
+        return [found[each] if isinstance(each, int) else nothing.shifted(*each) for each in self.outputs]
+
+
+def _term(ball: Any) -> Term:
+    """A ball as a float and how far it may be off."""
+    if not ball.is_finite():
+        return np.nan, np.inf
+    middle = float(ball.mid())
+    return middle, float(np.nextafter(float((ball - middle).abs_upper()), np.inf)) if not ball.is_exact() else 0.0
+
+
+def _ball(name: str, a: Sequence[Any]) -> Any:
+    """An operation on balls."""
+    match name:
+        case "+":
+            return a[0] + a[1]
+        case "-":
+            return a[0] - a[1]
+        case "*":
+            return a[0] * a[1]
+        case "/":
+            return a[0] / a[1]
+        case "sqrt":
+            return a[0].sqrt()
+    raise ValueError(name)
+
+
+def _forms(name: str, a: Sequence[AffineForms | Term]) -> AffineForms:
+    """An operation on forms, or on a form and a number."""
+    one, other = a[0], a[-1]
+    if isinstance(one, AffineForms) and isinstance(other, AffineForms):
+        match name:
+            case "+":
+                return one + other
+            case "-":
+                return one - other
+            case "*":
+                return one * other
+            case "sqrt":
+                return one.sqrt()
+    elif isinstance(one, AffineForms) and not isinstance(other, AffineForms):
+        match name:
+            case "+":
+                return one.shifted(*other)
+            case "-":
+                return one.shifted(-other[0], other[1])
+            case "*":
+                return one.scaled(*other)
+    elif isinstance(other, AffineForms) and not isinstance(one, AffineForms):
+        match name:
+            case "+":
+                return other.shifted(*one)
+            case "-":
+                return (-other).shifted(*one)
+            case "*":
+                return other.scaled(*one)
+            case "/":
+                return other.inverse().scaled(*one)
+    raise ValueError(name)

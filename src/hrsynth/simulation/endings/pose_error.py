@@ -1,0 +1,282 @@
+"""The error of the directions as a function of the platform's pose, in the working mode of a goal: one formula for
+numbers and for enclosures.
+
+E = ½ Σ sin² ∠(u, u*) = ½ Σ (1 − (u · u*)²), u* the direction at the goal. With y the velocity of a rod's tip, t that of
+its other end and s = t · u, u̇ = g (y − t (u · y) / s), so that E's rate is Σ −c g (u* · y) + c g (u* · t) (u · y) / s,
+c = u · u*: s vanishes where the rod's leg is at its limit (Type 1), ± √reach margin / rod. Poses about the goal's have
+coordinates x: the point's shift along a basis (characteristic lengths), then γ = tan(θ/2) · axis of the turn (Cayley).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...analysis.aspects.leg_forms import LegPattern, pattern
+from ...analysis.aspects.path_segments import path_coordinates
+from ...analysis.aspects.vector_expressions import NoLegForm
+from ...analysis.observed import ObservedRobot
+from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRod, SlidingRod
+from ...closed_forms.platform_points import PlatformPoint, platform_point
+from ...constraints.named_vectors import BodyVector, poses_at
+from ...geometry.components import Components, cross, dot, minus, plus, scaled, sqrt, transformed
+from ...geometry.vectors import Array
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.platform_motion import PlatformMotion
+from ...mechanism.observation import Observation
+from ...mechanism.observations.direction import Direction
+from ...results import Value
+from ...tolerances import FOLLOWED
+
+Number = Callable[[Any], Any]
+Place = tuple[Components, Components]
+"""A pose: the point (3) and the platform's rotation (9, by rows)."""
+
+
+def _plain(value: Any) -> Any:
+    """A number of the robot, as it is."""
+    return value
+
+
+class NotEnclosed(Exception):
+    """Why the error has no enclosure over poses: the reason, for the answer."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SeenDirection(Value):
+    """An observed direction: ``sense`` times that of a limb's rod, or (``limb`` None) one that the pose turns."""
+
+    leg: str
+    sense: float
+    limb: int | None
+    rule: PlatformPoint | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Turning:
+    """An observed direction u, the one that is wanted, and u̇ along some directions of the coordinates: ``plain``[j] +
+    ``steep``[j] / ``along``, which vanishes at the leg's limit."""
+
+    u: Components
+    wanted: Components
+    plain: Sequence[Components]
+    steep: Sequence[Components]
+    along: Any
+
+    @property
+    def error(self) -> Components:
+        """e = u × u*."""
+        return cross(self.u, self.wanted)
+
+    @property
+    def rates(self) -> list[Components]:
+        """ė along each direction."""
+        return [cross([a + b / self.along for a, b in zip(plain, steep, strict=True)], self.wanted)
+                for plain, steep in zip(self.plain, self.steep, strict=True)]
+
+    @property
+    def slopes(self) -> list[tuple[Any, Any]]:
+        """e · ė = −(u · u*) (u̇ · u*) along each direction: its two parts, the second to be divided by ``along``."""
+        c = dot(self.u, self.wanted)
+        return [(-(c * dot(plain, self.wanted)), -(c * dot(steep, self.wanted)))
+                for plain, steep in zip(self.plain, self.steep, strict=True)]
+
+
+@dataclass(frozen=True, eq=False)
+class ErrorRates:
+    """At poses: the legs' reach margins, and what the observed directions do."""
+
+    margins: Sequence[Any]
+    seen: Sequence[Turning]
+
+    @property
+    def E(self) -> Any:
+        """½ Σ |e|²."""
+        return 0.5 * sum(dot(e, e) for e in (each.error for each in self.seen))
+
+    @property
+    def slopes(self) -> list[Any]:
+        """E's rates along the directions, where no leg is at its limit."""
+        parts = [[plain + steep / each.along for plain, steep in each.slopes] for each in self.seen]
+        return [sum(column) for column in zip(*parts, strict=True)]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PoseError(Value):
+    """The error about a goal, in its working mode: the goal's pose (``p``, ``R``), the basis of shifts (3, k) and of
+    turns (3, m), all limbs, what is observed. Lengths in characteristic lengths."""
+
+    length: float
+    motion: PlatformMotion
+    p: Array
+    R: Array
+    shifts: Array
+    turns: Array
+    limbs: tuple[ClosedFormLeg, ...]
+    seen: tuple[SeenDirection, ...]
+    fitted: tuple[str, ...] = ()
+    """What was fitted to samples and not read from the joints."""
+    limits: tuple[str, ...] = ()
+    """Joints whose limits are not looked at."""
+
+    @classmethod
+    def of(cls, setting: ObservedRobot, goal: ClosedConfiguration) -> PoseError:
+        """That of what is observed, about a configuration; raises ``NotEnclosed``."""
+        mechanism = setting.mechanism
+        others = [each for each in setting.observed if not isinstance(each, Direction)]
+        if others:
+            raise NotEnclosed(f"of leg {others[0].leg} something else than a direction is measured")
+        if mechanism.reference != mechanism.base or any(each.seen_from is not None for each in setting.observed):
+            raise NotEnclosed("directions are not seen from the base")
+        if mechanism.couplings:
+            raise NotEnclosed("joints are coupled")
+        configurations = [setting.everything.start, *setting.configurations]
+        reason = "the parts of the platform's pose that change depend on each other"
+        for each in path_coordinates(setting.anatomy, setting.samples.question, setting.dof, configurations):
+            try:
+                known = pattern(setting.anatomy, [], each, configurations)
+                limbs = known.forms(goal).limbs
+            except NoLegForm as why:
+                reason = str(why)
+                continue
+            seen = tuple(_seen(o, known, limbs, [goal, *configurations]) for o in setting.observed)
+            p, R = each.of([goal])
+            rules = tuple(f"direction of leg {o.leg}" for o in seen if o.rule is not None)
+            return cls(each.length, each.motion, p[0], R[0], each.motion.translations,
+                       each.motion.rotations if each.turning else np.zeros((3, 0)), limbs, seen,
+                       (*known.fitted, *rules), (*mechanism.limited, *mechanism.wrists))
+        raise NotEnclosed(reason)
+
+    @property
+    def size(self) -> int:
+        """The number of coordinates."""
+        return int(self.shifts.shape[1] + self.turns.shape[1])
+
+    def pose(self, x: Components, number: Number) -> tuple[Components, Components]:
+        """p (3) and R (9, by rows) at coordinates x."""
+        k = self.shifts.shape[1]
+        p: Components = number(self.p)
+        for each, axis in zip(x[:k], self.shifts.T, strict=True):
+            p = plus(p, scaled(each, number(axis)))
+        R = number(self.R.ravel())
+        if not self.turns.shape[1]:
+            return p, R
+        # Q = 1 + 2 ([γ]ₓ + [γ]ₓ²) / (1 + γ·γ), column by column
+        gamma = self._gamma(x[k:], number)
+        share = 2.0 / (dot(gamma, gamma) + 1.0)
+        columns = []
+        for j in range(3):
+            v = [R[3 * i + j] for i in range(3)]
+            w = cross(gamma, v)
+            columns.append(plus(v, scaled(share, plus(w, cross(gamma, w)))))
+        return p, [columns[j][i] for i in range(3) for j in range(3)]
+
+    def _gamma(self, y: Components, number: Number) -> Components:
+        first, *others = [scaled(each, number(axis)) for each, axis in zip(y, self.turns.T, strict=True)]
+        for each in others:
+            first = plus(first, each)
+        return first
+
+    def at(self, x: Components, directions: Sequence[Components], number: Number) -> ErrorRates:
+        """What the error does at coordinates x, and along directions of the coordinates."""
+        p, R = self.pose(x, number)
+        goal = number(self.p), number(self.R.ravel())
+        k = self.shifts.shape[1]
+        twists = [self._twist(x[k:], each, number) for each in directions]
+        margins = [limb.at(self._tip(limb, p, R, number)[0], number, limb.mode)[0] for limb in self.limbs]
+        return ErrorRates(margins, [self._turning(each, (p, R), goal, twists, number) for each in self.seen])
+
+    def levels(self, x: Array) -> tuple[NDArray[np.bool_], Array]:
+        """Whether all legs reach, and E, (n,), at coordinates (n, size)."""
+        with np.errstate(all="ignore"):
+            found = self.at(list(x.T), [], _plain)
+            reached = np.ones(len(x), dtype=bool)
+            for margin in found.margins:
+                reached &= margin > 0
+            return reached, np.broadcast_to(found.E, reached.shape)
+
+    def numbers(self, x: Array, directions: Array) -> tuple[Array, Array]:
+        """e (n, 3 legs) and its rates (n, 3 legs, directions) at coordinates (n, size)."""
+        with np.errstate(all="ignore"):
+            found = self.at(list(x.T), list(directions), _plain).seen
+            e = [np.broadcast_to(each, len(x)) for one in found for each in one.error]
+            rates = [[np.broadcast_to(each, len(x)) for one in found for each in one.rates[j]]
+                     for j in range(len(directions))]
+        return np.array(e).T, np.array(rates).transpose(2, 1, 0)
+
+    def _twist(self, y: Components, rates: Components, number: Number) -> tuple[Components, Components]:
+        """Velocity of the point and angular velocity 2 (γ̇ + γ × γ̇) / (1 + γ·γ) along rates of the coordinates."""
+        k = self.shifts.shape[1]
+        v: Components = [0.0, 0.0, 0.0]
+        for each, axis in zip(rates[:k], self.shifts.T, strict=True):
+            v = plus(scaled(each, number(axis)), v)
+        if not self.turns.shape[1]:
+            return v, [0.0, 0.0, 0.0]
+        gamma, rate = self._gamma(y, number), self._gamma(rates[k:], number)
+        turned = rate if self.turns.shape[1] == 1 else plus(rate, cross(gamma, rate))
+        return v, scaled(2.0 / (dot(gamma, gamma) + 1.0), turned)
+
+    def _tip(self, limb: ClosedFormLeg, p: Components, R: Components, number: Number) -> tuple[Components, Components]:
+        """A limb's tip, and the tip from the point."""
+        arm: Components = transformed(R, number(limb.tip.turned)) if np.any(limb.tip.turned) else [0.0, 0.0, 0.0]
+        return plus(plus(p, number(limb.tip.constant)), arm), arm
+
+    def _turning(self, seen: SeenDirection, here: Place, goal: Place, twists: Sequence[tuple[Components, Components]],
+                 number: Number) -> Turning:
+        """An observed direction, and how it changes with twists of the platform's point."""
+        u, wanted = self._direction(seen, *here, number), self._direction(seen, *goal, number)
+        if seen.limb is None:
+            return Turning(u, wanted, [cross(w, u) for _, w in twists], [[0.0, 0.0, 0.0]] * len(twists), 1.0)
+        limb = self.limbs[seen.limb]
+        tip, arm = self._tip(limb, *here, number)
+        margin, carried = limb.at(tip, number, limb.mode)
+        tips = [plus(v, cross(w, arm)) if self.turns.shape[1] else v for v, w in twists]
+        if isinstance(limb, OnRod):
+            gain, axis = seen.sense / number(limb.rod), number(limb.axis)
+            slip = cross(axis, minus(carried, number(limb.centre))) if isinstance(limb, OnCrank) else axis
+            # t · u, which is ∓ √margin / rod
+            along = (-limb.mode) * (gain * sqrt(margin))
+        else:
+            gain, slip, along = (seen.sense * limb.mode) / sqrt(margin), u, 1.0
+        return Turning(u, wanted, [scaled(gain, y) for y in tips],
+                       [scaled(-(gain * dot(u, y)), slip) for y in tips], along)
+
+    def _direction(self, seen: SeenDirection, p: Components, R: Components, number: Number) -> Components:
+        """An observed direction at a pose."""
+        if seen.rule is not None:
+            return plus(transformed(R, number(seen.rule.turned)), number(seen.rule.constant))
+        assert seen.limb is not None
+        limb = self.limbs[seen.limb]
+        tip = self._tip(limb, p, R, number)[0]
+        carried = limb.at(tip, number, limb.mode)[1]
+        return scaled(seen.sense / number(limb.rod), minus(tip, carried)) if isinstance(limb, OnRod) else scaled(
+            seen.sense, carried)
+
+
+def _seen(observation: Observation, known: LegPattern, limbs: Sequence[ClosedFormLeg],
+          configurations: Sequence[ClosedConfiguration]) -> SeenDirection:
+    """Which limb's rod an observed direction is, at all configurations; raises ``NotEnclosed``."""
+    assert isinstance(observation, Direction)
+    feature = BodyVector("u", "observed", observation.link, observation.direction)
+    u = feature.value(poses_at(configurations, feature.links))
+    p, R = known.coordinates.of(configurations)
+    for i, (limb, carried) in enumerate(zip(limbs, known.carried, strict=True)):
+        if not isinstance(limb, OnRod | SlidingRod):
+            continue
+        held = carried.value(poses_at(configurations, carried.links))
+        rods = (limb.tip.value(p, R) - held) / limb.rod if isinstance(limb, OnRod) else held
+        for sense in (1.0, -1.0):
+            if np.max(np.abs(u - sense * rods)) < FOLLOWED:
+                return SeenDirection(observation.leg, sense, i)
+    rule = platform_point(u, p, R)
+    if rule is not None and not rule.follows:
+        # what does not turn with the platform is the same everywhere
+        if known.coordinates.turning and np.any(rule.turned) and np.any(rule.constant):
+            raise NotEnclosed(f"the direction of link {observation.link} turns in part with the platform")
+        return SeenDirection(observation.leg, 1.0, None, rule)
+    raise NotEnclosed(f"the direction of link {observation.link} of leg {observation.leg} is not that of a rod whose "
+                      "form is known")

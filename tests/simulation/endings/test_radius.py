@@ -1,0 +1,138 @@
+"""The certified radius: the enclosures hold what they enclose, and runs from all over it end at the goal, integrated
+with directions and rates of the batch engine, which reads the legs in another way."""
+
+import numpy as np
+import pytest
+
+from hrsynth import load
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.batch.enclosures import traced
+from hrsynth.geometry.affine import affine
+from hrsynth.geometry.so3 import exponential, logarithm
+from hrsynth.simulation.endings.cones import ConeProver, RisingCones
+from hrsynth.simulation.endings.pose_error import PoseError
+from hrsynth.simulation.endings.radius import CERTIFIED, UNDECIDED, certified_radius
+from hrsynth.simulation.law import inverted
+from strategies import random_rotation, transformed
+
+
+def starts(found, rng, count):
+    """Platform poses (count, 4, 4) of a region, half of them on its boundary."""
+    motion, X = found.motion, found.goal.pose(found.motion.link)
+    p = X[:3, :3] @ motion.point + X[:3, 3]
+
+    def ball(basis, radius):
+        v = rng.normal(size=(count, basis.shape[1]))
+        size = np.where(rng.uniform(size=(count, 1)) < 0.5, 1.0, rng.uniform(size=(count, 1)) ** (1 / v.shape[1]))
+        return (v / np.linalg.norm(v, axis=1, keepdims=True) * size * radius) @ basis.T
+
+    poses = np.tile(np.eye(4), (count, 1, 1))
+    poses[:, :3, :3] = X[:3, :3]
+    if found.angle is not None:
+        poses[:, :3, :3] = exponential(ball(motion.rotations, found.angle)) @ X[:3, :3]
+    poses[:, :3, 3] = p + ball(motion.translations, found.length) - poses[:, :3, :3] @ motion.point
+    return poses
+
+
+def ends(setting, found, poses, steps=400, step=0.25):
+    """How far from the goal's pose runs of the damped law end (metres and radians together), by the midpoint rule."""
+    batch, motion, goal = setting.batch, found.motion, found.goal.pose(found.motion.link)
+    legs = list(setting.labels)
+    wanted = batch.evaluate(goal[None], legs).directions
+
+    def rate(X):
+        at = batch.evaluate(X, legs, compiled=False)
+        u, M = at.directions, at.interaction_matrix.reshape(len(X), len(legs), 3, -1)
+        rows = np.cross(M, wanted[..., None], axis=2).reshape(len(X), 3 * len(legs), -1)
+        left, values, right = np.linalg.svd(np.nan_to_num(rows), full_matrices=False)
+        e = np.nan_to_num(np.cross(u, wanted)).reshape(len(X), -1)
+        shares = np.einsum("nij,ni->nj", left, e) * np.array([inverted(v) for v in values])
+        return -np.einsum("ij,nkj,nk->ni", at.twists, right, shares)
+
+    def moved(X, v, h):
+        new = X.copy()
+        p = X[:, :3, :3] @ motion.point + X[:, :3, 3]
+        new[:, :3, :3] = exponential(h * v[:, 3:]) @ X[:, :3, :3]
+        new[:, :3, 3] = p + h * v[:, :3] - new[:, :3, :3] @ motion.point
+        return new
+
+    X = poses
+    for _ in range(steps):
+        X = moved(X, rate(moved(X, rate(X), step / 2)), step)
+    turn = np.linalg.norm(logarithm(X[:, :3, :3] @ goal[:3, :3].T), axis=1)
+    return np.linalg.norm(X[:, :3, 3] - goal[:3, 3], axis=1) + turn
+
+
+def certified(setting, at=None):
+    found = certified_radius(setting, setting.everything.start if at is None else at)
+    assert found.verdict == CERTIFIED, found.words
+    return found
+
+
+@pytest.mark.parametrize(("name", "legs"), [("quattro", "1,4"), ("3rpr_m1", None), ("delta", None)])
+def test_enclosures_hold_the_error_and_its_rates(name, legs):
+    setting = ObservedRobot.of(name, legs)
+    error = PoseError.of(setting, setting.configurations[0])
+    n, rng = error.size, np.random.default_rng(0)
+    W = rng.normal(size=(n, n)) / 4
+    prover = ConeProver.of(error, W)
+    middle, half = rng.uniform(-0.8, 0.8, (40, n)), rng.uniform(0, 0.2, (40, n))
+    face = rng.integers(n, size=40)
+    middle[range(40), face], half[range(40), face] = 1.0, 0.0
+    low = rng.uniform(0.05, 0.2, 40)
+    high = low * rng.uniform(1.0, 1.3, 40)
+    bounds = prover.slices(RisingCones(middle, half, low, low, low, low), low, high)
+    assert bounds.reached.sum() > 20
+    for _ in range(20):
+        w, t = middle + half * rng.uniform(-1, 1, (40, n)), rng.uniform(low, high)
+        x = t[:, None] * (w @ W.T)
+        e, rates = error.numbers(x, np.eye(n))
+        E, slope = np.sum(e * e, axis=1) / 2, np.einsum("nr,nrj,nj->n", e, rates, w @ W.T)
+        kept = bounds.reached
+        assert np.all(bounds.low[kept] <= E[kept] * (1 + 1e-9))
+        assert np.all(E[kept] <= bounds.high[kept] * (1 + 1e-9))
+        assert np.all(bounds.rise[kept] <= slope[kept] / t[kept] + 1e-9)
+
+
+def test_roots_and_inverses_of_forms_hold_those_of_numbers():
+    rng = np.random.default_rng(1)
+    formula = traced(lambda x, number: [1.0 / (x[0] * number(0.3) - x[1]), (x[0] * x[1]).sqrt()], 2)
+    middle, half = rng.uniform(0.3, 2, (500, 2)), rng.uniform(0, 0.3, (500, 2))
+    found = formula.at([affine(middle[:, i], half[:, i, None] * np.eye(2)[i], np.zeros(500)) for i in range(2)])
+    for _ in range(50):
+        x = middle + half * rng.uniform(-1, 1, (500, 2))
+        for form, value in zip(found, (1 / (0.3 * x[:, 0] - x[:, 1]), np.sqrt(x[:, 0] * x[:, 1])), strict=True):
+            known = np.isfinite(form.r)
+            assert known.sum() > 300
+            assert np.all((form.low <= value + 1e-12)[known] & (value <= form.high + 1e-12)[known])
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "led"), [("rrrrr_m1", False), ("3rrr_m1", True)])
+def test_all_starts_within_it_end_at_the_goal(name, led):
+    """Also where the base is tilted; of the five-bar, whose pose has parts that depend on each other, it is proved."""
+    rng = np.random.default_rng(2)
+    setting = ObservedRobot.of(transformed(load(name), random_rotation(rng), rng.normal(size=3)))
+    found = certified(setting)
+    assert found.length > 0.01 * setting.mechanism.length
+    if led:
+        assert np.all(ends(setting, found, starts(found, rng, 200), 200) < 1e-6)
+
+
+def test_a_goal_that_the_directions_do_not_see_is_undecided():
+    setting = ObservedRobot.of("quattro", "1")
+    found = certified_radius(setting, setting.everything.start)
+    assert found.verdict == UNDECIDED
+    assert "do not see" in found.words
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(("name", "legs", "least"), [
+    ("quattro", "1,4", 4.5e-3), ("quattro", "2,3", 4.5e-3), ("quattro", None, 7.9e-3), ("quattro_rigid", None, 15e-3),
+    ("3rpr_m1", None, 31e-3), ("delta", None, 38e-3), ("3upu", None, 98e-3)])
+def test_ten_thousand_starts_end_at_the_goal(name, legs, least):
+    setting = ObservedRobot.of(name, legs)
+    found = certified(setting)
+    assert found.length > least
+    poses = starts(found, np.random.default_rng(3), 10_000)
+    assert np.max(ends(setting, found, poses)) < 1e-6
