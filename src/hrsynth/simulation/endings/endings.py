@@ -3,7 +3,7 @@ them attract (docs/pages/theory.md, section 11)."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -182,10 +182,10 @@ class RestSearch:
         system = RestSystem.of(goal, question, setting.configurations)
         return cls(setting, goal, system, Law(question, setting.dof, 1.0), directions(goal, question)[0])
 
-    def answer(self, seed: int = 0) -> Endings:
-        """The rests that were found."""
+    def answer(self, seed: int = 0, *, minima: bool = False, rounds: Iterable[Array] | None = None) -> Endings:
+        """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`."""
         setting = self.setting
-        found = critical_points(self.system, setting, self.goal, seed)
+        found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds)
         rests = [each for one in found.isolated if (each := self.read(one)) is not None]
         continua = [each for one in found.continua if (each := self.read(one)) is not None]
         order = {GOAL: 0, MODE: 1, ANTIPODAL: 2, CRITICAL: 3}

@@ -8,8 +8,9 @@ critical points of index k (C. J. Cerjan, W. H. Miller, J. Chem. Phys. 75, 1981)
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 from typing import Any
 
 import numpy as np
@@ -191,24 +192,32 @@ class CriticalPoints(Value):
         return f"found from {self.starts:,} random starts, {self.late} of them first in the second half of these"
 
 
-def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConfiguration, seed: int = 0
-                    ) -> CriticalPoints:
+def starts(system: RestSystem, homes: Array, seed: int = 0) -> Iterator[Array]:
+    """Rounds of closed configurations (c, N), where random walks from some (n, N) have come to."""
+    rng = np.random.default_rng(seed)
+    q = homes[np.arange(ENDING_STARTS) % len(homes)]
+    while True:
+        q = walked(system, q, rng, ENDING_WALK)
+        yield q
+
+
+def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConfiguration, seed: int = 0, *,
+                    minima: bool = False, rounds: Iterable[Array] | None = None) -> CriticalPoints:
     """The critical points to which random walks from the samples lead, in rounds, until the later half of the starts
-    finds few new ones."""
+    finds few new ones; ``minima``: only descent, which finds what attracts; ``rounds``: of :func:`starts`, where they
+    are known."""
     relation = setting.samples.members[0].relation
     idle, freedoms = relation.mobility - relation.dimension, relation.dimension
     homes = np.array([system.system.read(at.pose) for at in (goal, *setting.configurations)])
-    rng = np.random.default_rng(seed)
-    q = homes[np.arange(ENDING_STARTS) % len(homes)]
+    rng = np.random.default_rng([seed, 1])
     bodies = attached(setting.anatomy)
     known: dict[tuple[int, ...], list[tuple[Array, CriticalPoint, int, int]]] = {}
     families: dict[tuple[int, ...], Critical] = {}
     fresh: list[int] = []
     points = descend(system, homes[:1], np.zeros(1, dtype=np.intp), idle)
-    for number in range(ENDING_ROUNDS):
+    for number, q in enumerate(islice(rounds or starts(system, homes, seed), ENDING_ROUNDS)):
         tell("starts")
-        q = walked(system, q, rng, ENDING_WALK)
-        points += descend(system, q, rng.integers(freedoms + 1, size=len(q)), idle)
+        points += descend(system, q, rng.integers(1 if minima else freedoms + 1, size=len(q)), idle)
         new = 0
         for point, mark in zip(points, marks(system, setting, bodies, points), strict=True):
             flat = np.abs(point.curvatures) < SAME_ENDING
