@@ -13,10 +13,12 @@ from hrsynth.analysis.modes.branches import solve_all
 from hrsynth.analysis.modes.conditions import (
     AtAngle,
     Coplanar,
+    OnCylinder,
     OnMovingPlane,
     OnMovingRevolution,
     OnPlane,
     OnRevolution,
+    OnTwoCircles,
 )
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.modes.pose_bound import bound
@@ -48,8 +50,10 @@ KINDS = [
     ("(Cr-Pz*-S)+(Rt*-Pl-S)+(S-Pl*-Rt)+2(Utn-Pl*-S)", "34", 16),  # a cone, a line, an angle
     ("(Ph*-Rz-Rz)+(Rz*!-Rz-Ph)+(Rz*!-Rz-Rz)", "123", 6),  # in a plane: a line of the platform, a line, a circle
     ("3(Ra-Ph*-Ra!-Ra)", "123", 8),  # three quadrics of revolution, no turns
+    ("3(Ra*-Ra!-Ra-Ph)", "123", 8),  # three oblique cylinders
 ]
 SLOW = [
+    ("3(Ra*-Ra-Rb!-Rb-Rb)", "123", 64),  # sums of two circles
     ("3(Cr-Pz*-S)+2(Utn-Pl*-Unt)", "45", 8),  # lines and angles
     ("(Cr-Pz*-S)+(Pr*-Pz-S)+(S-Pl*-S)+2(Utn-Pl*-Unt)", "13", 24),  # axes in planes with their legs
     ("(Cr*-Pz-S)+(Pr*-Pz-S)+2(S-Pl*-Rt)+2(Utn-Pl*-S)", "13", 24),  # cones of the platform
@@ -131,13 +135,22 @@ def random_conditions(rng, kinds):
             found.append(OnMovingRevolution("1", b, c, o, f))
         elif kind is OnMovingPlane:
             found.append(OnMovingPlane("1", b, c, o, float(-y @ c)))
+        elif kind is OnCylinder:
+            across = y - c * float(a @ y) / float(a @ c)
+            found.append(OnCylinder("1", b, c, o, a, np.array(np.linalg.norm(across)), c))
+        elif kind is OnTwoCircles:
+            first = rng.normal(size=3)
+            first, second = (np.cross(n, v) for n, v in ((a, first), (c, first + rng.normal(size=3))))
+            radii = [np.array(np.linalg.norm(spoke)) for spoke in (first, second)]
+            found.append(OnTwoCircles("1", b, c, b - first - second, a, radii[0], c, radii[1]))
         else:
             t = np.cross(y, c)  # any vector in the plane of y and c
             found.append(Coplanar("1", b, c, o, y + 0.5 * c + 0.0 * t))
     return found
 
 
-@pytest.mark.parametrize("kind", [OnPlane, AtAngle, OnRevolution, OnMovingRevolution, OnMovingPlane, Coplanar])
+@pytest.mark.parametrize("kind", [OnPlane, AtAngle, OnRevolution, OnMovingRevolution, OnMovingPlane, Coplanar,
+                                  OnCylinder, OnTwoCircles])
 def test_slopes_are_the_derivatives(kind):
     rng = np.random.default_rng(3)
     (condition,) = random_conditions(rng, [kind])

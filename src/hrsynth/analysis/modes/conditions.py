@@ -98,6 +98,68 @@ class OnRevolution(PoseCondition):
 
 
 @dataclass(frozen=True, eq=False)
+class OnCylinder(PoseCondition):
+    """x − o is a spoke of a circle about n with the radius r, and a multiple of d: |v y − z d|² = v² r² with
+    y = x − o, z = n · y, v = n · d."""
+
+    o: Array
+    n: Array
+    r: Array
+    d: Array
+
+    def value(self, x: Any, d: Any, of: Convert) -> Any:
+        v, _, u = self._across(x, of)
+        return np.sum(u * u, axis=-1) - (v * of(self.r)) ** 2
+
+    def slopes(self, x: Any, d: Any, of: Convert) -> tuple[Any, Any]:
+        v, along, u = self._across(x, of)
+        return 2 * (v * u - np.multiply.outer(u @ along, of(self.n))), d * 0
+
+    def _across(self, x: Any, of: Convert) -> tuple[Any, Any, Any]:
+        """v, d and v y − z d."""
+        y, n, along = x - of(self.o), of(self.n), of(self.d)
+        v = n @ along
+        return v, along, v * y - np.multiply.outer(y @ n, along)
+
+
+@dataclass(frozen=True, eq=False)
+class OnTwoCircles(PoseCondition):
+    """x − o is the sum of spokes of circles about n and m with the radii r and s.
+
+    With e = n × m, f = n × e, w = |e|² the first spoke is r/√w (C e + S f); m · y = z gives r √w S = −z, and
+    |y − spoke|² = s² then 2 r √w C e·y = w (|y|² + r² − s²) + 2 z f·y = Q: Q² = 4 (e·y)² (r² w − z²).
+    """
+
+    o: Array
+    n: Array
+    r: Array
+    m: Array
+    s: Array
+
+    degree = 4
+
+    def value(self, x: Any, d: Any, of: Convert) -> Any:
+        left, _, along, _, square, *_ = self._parts(x, of)
+        return square * square - 4 * along * along * left
+
+    def slopes(self, x: Any, d: Any, of: Convert) -> tuple[Any, Any]:
+        left, z, along, across, square, y, e, f = self._parts(x, of)
+        outer, m = np.multiply.outer, of(self.m)
+        by_square = 2 * (e @ e) * y + 2 * (outer(across, m) + outer(z, f))
+        bent = outer(8 * along * left, e) - outer(8 * along * along * z, m)
+        return np.asarray(2 * square)[..., None] * by_square - bent, d * 0
+
+    def _parts(self, x: Any, of: Convert) -> tuple[Any, ...]:
+        """r² w − z², z, e · y, f · y, Q, y, e, f."""
+        y, n, m = x - of(self.o), of(self.n), of(self.m)
+        e = np.array([n[j] * m[k] - n[k] * m[j] for _, j, k in CYCLES])
+        f = np.array([n[j] * e[k] - n[k] * e[j] for _, j, k in CYCLES])
+        w, z, r, s = e @ e, y @ m, of(self.r), of(self.s)
+        square = w * (np.sum(y * y, axis=-1) + r * r - s * s) + 2 * z * (y @ f)
+        return r * r * w - z * z, z, y @ e, y @ f, square, y, e, f
+
+
+@dataclass(frozen=True, eq=False)
 class OnMovingRevolution(PoseCondition):
     """A point o of the base on a surface about an axis d through x of the platform: as above with y = o − x."""
 

@@ -27,7 +27,7 @@ class _Checked(Value):
         for name, value in list(vars(self).items()):
             if name == "radius":
                 object.__setattr__(self, name, _radius(type(self).__name__.lower(), value))
-            elif name not in ("start", "profile"):
+            elif name not in ("start", "profile", "other"):
                 object.__setattr__(self, name, _vector(value) if name == "centre" else _unit(value))
 
 
@@ -149,10 +149,30 @@ class Revolution(_Checked):
         return cls(centre, axis, (float(across @ across) - mixed * w + f2 * w * w, mixed - 2.0 * f2 * w, f2))
 
 
+@dataclass(frozen=True, eq=False)
+class Swept(_Checked):
+    """The tip is ``centre`` + a spoke of a circle about ``axis`` + s ``direction``, oblique to it: a cylinder; with
+    ``other`` not zero the last is a spoke of a circle of that radius about the direction."""
+
+    centre: Array
+    axis: Array
+    radius: float
+    direction: Array
+    other: float = 0.0
+    freedoms = 2
+
+    def off(self, centre: Array) -> Array:
+        """How far the centre is from that of another; on a cylinder that slides."""
+        v = self.centre - centre
+        return v if self.other else v - self.direction * float(self.axis @ v) / float(self.axis @ self.direction)
+
+
 Curve = Point | Line | Circle
 Surface = Sphere | Plane
 Reach = Curve | Surface
 """What a tip can reach."""
+Quadrics = Revolution | Swept
+"""Surfaces that only conditions on the pose know."""
 
 
 def curves_of(reaches: Iterable[Reach]) -> list[int]:

@@ -25,13 +25,15 @@ from .chain import Chain, ChainBody, Underived, chain
 from .conditions import (
     AtAngle,
     Coplanar,
+    OnCylinder,
     OnMovingPlane,
     OnMovingRevolution,
     OnPlane,
     OnRevolution,
+    OnTwoCircles,
     PoseCondition,
 )
-from .curves import Circle, Line, Plane, Point, Reach, Revolution, Sphere
+from .curves import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, Swept
 from .reaches import apart, place
 from .turns import Known, groups, orientations, two_axes
 
@@ -135,7 +137,7 @@ class _Rods:
 def _of_tip(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plane: Array | None,
             rods: _Rods | None = None) -> _Read:
     """A tip that is confined, and angles that are kept."""
-    seen: list[tuple[Reach | Revolution, list[tuple[Array, Array, float]]]] = []
+    seen: list[tuple[Reach | Quadrics, list[tuple[Array, Array, float]]]] = []
     moved = 0.0
     for known, _ in orientations(found):
         reach, radii = place(found, known)
@@ -155,16 +157,11 @@ def _of_tip(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plan
             for reach, turns in seen], moved
 
 
-def _alike(one: Reach | Revolution, other: Reach | Revolution, length: float) -> bool:
-    if isinstance(one, Revolution) or isinstance(other, Revolution):
-        return bool(isinstance(one, Revolution) and isinstance(other, Revolution)
-                and np.linalg.norm(one.centre - other.centre) <= SAME_RELATION * length
-                and lines.parallel(one.axis, other.axis)
-                and np.abs(np.subtract(one.profile, other.profile)).max() <= SAME_RELATION)
+def _alike(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> bool:
     return apart(one, other, length) <= SAME_RELATION
 
 
-def _angle(reach: Reach | Revolution, a: Array, c: Array, own: Array) -> tuple[Array, Array, float]:
+def _angle(reach: Reach | Quadrics, a: Array, c: Array, own: Array) -> tuple[Array, Array, float]:
     """a · R c = h, h that of the leg's own axes; a is exactly the direction of the tip's line where along that."""
     if isinstance(reach, Line) and lines.parallel(a, reach.direction):
         a = reach.direction * np.sign(a @ reach.direction)
@@ -177,7 +174,7 @@ def _same_turns(one: list[tuple[Array, Array, float]], other: list[tuple[Array, 
                for (a, c, h), (b, d, k) in zip(one, other, strict=True))
 
 
-def _reached(leg: str, reach: Reach | Revolution, tip: Array, middle: Middle, plane: Array | None
+def _reached(leg: str, reach: Reach | Quadrics, tip: Array, middle: Middle, plane: Array | None
              ) -> list[PoseCondition]:
     """The conditions that a tip is within its reach."""
     b, none, o = middle.point(tip), np.zeros(3), middle.point(reach.centre)
@@ -198,6 +195,10 @@ def _reached(leg: str, reach: Reach | Revolution, tip: Array, middle: Middle, pl
                                   np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])))
     if isinstance(reach, Revolution):
         found.append(OnRevolution(leg, b, none, o, reach.axis, _profile(reach, middle)))
+    if isinstance(reach, Swept):
+        r, s = (np.array(radius / middle.size) for radius in (reach.radius, reach.other))
+        found.append(OnTwoCircles(leg, b, none, o, reach.axis, r, reach.direction, s) if reach.other else
+                     OnCylinder(leg, b, none, o, reach.axis, r, reach.direction))
     return found
 
 
@@ -207,7 +208,7 @@ def _across(d: Array) -> list[Array]:
     return [np.cross(d, e) for k, e in enumerate(np.eye(3)) if k != skip]
 
 
-def _in_motion(leg: str, reach: Reach | Revolution, b: Array, o: Array, n: Array, middle: Middle
+def _in_motion(leg: str, reach: Reach | Quadrics, b: Array, o: Array, n: Array, middle: Middle
                ) -> list[PoseCondition]:
     """The same in a plane with the normal n, whatever the heights above it."""
     none = np.zeros(3)
@@ -227,7 +228,7 @@ def _profile(reach: Revolution, middle: Middle) -> Array:
 
 def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: Middle, plane: Array | None) -> _Read:
     """A point of the base that is confined in the platform's frame, by what follows the last body at rest."""
-    seen: list[tuple[Reach | Revolution, Array]] = []
+    seen: list[tuple[Reach | Quadrics, Array]] = []
     moved = 0.0
     for known, _ in orientations(found):
         foot, rest = turned_round(found, known)
@@ -242,7 +243,7 @@ def _of_foot(leg: str, found: Chain, count: int, tip: Array, middle: Middle, pla
     return [_holds(leg, reach, foot, middle, plane) for reach, foot in seen], moved
 
 
-def _holds(leg: str, reach: Reach | Revolution, foot: Array, middle: Middle, plane: Array | None
+def _holds(leg: str, reach: Reach | Quadrics, foot: Array, middle: Middle, plane: Array | None
            ) -> list[PoseCondition]:
     o, b = middle.point(foot), middle.point(reach.centre)
     if isinstance(reach, Revolution):

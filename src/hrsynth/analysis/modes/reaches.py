@@ -16,7 +16,7 @@ from ...geometry import lines
 from ...geometry.vectors import Array
 from ...tolerances import CHAIN_ROUNDING, MOVED, RANK_GAP, SAME_POINT
 from .chain import Chain, ChainBody, Underived
-from .curves import Circle, Line, Plane, Point, Reach, Revolution, Sphere
+from .curves import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, Swept
 from .turns import Known, groups, orientations, ways
 
 
@@ -31,8 +31,8 @@ def reaches(chain: Chain) -> tuple[list[tuple[Reach, float]], float]:
     moved = 0.0
     for known, gain in orientations(chain):
         reach, radii = place(chain, known)
-        if isinstance(reach, Revolution):
-            raise Underived("a slide that turns about an axis oblique to it")
+        if isinstance(reach, Quadrics):
+            raise Underived("two parts that move on a surface which is no plane and no sphere")
         moved = max(moved, radii)
         gap = min((apart(reach, other, chain.length) for other, _ in found), default=np.inf)
         if gap > SAME_POINT:
@@ -81,7 +81,7 @@ class _Sum:
             self.centre = self.centre + vector
             self.moved += radius
 
-    def reach(self) -> Reach | Revolution:
+    def reach(self) -> Reach | Quadrics:
         """Its name. Raises :class:`Underived` where it has none."""
         if self.sweeps:
             if len(self.sweeps) > 1 or self.spheres or self.circles or self.lines:
@@ -104,6 +104,11 @@ class _Sum:
                 and all(lines.perpendicular(d, normal) for d in self.lines)):
             self.tilt += sum(abs(float(d @ normal)) for d in self.lines)
             return Plane(self.centre, normal)
+        if len(self.circles) == 1 and all(lines.parallel(d, self.lines[0]) for d in self.lines):
+            return Swept(self.centre, normal, float(np.linalg.norm(self.circles[0][1])), self.lines[0])
+        if len(self.circles) == 2 and not self.lines:
+            one, other = (float(np.linalg.norm(spoke)) for _, spoke in self.circles)
+            return Swept(self.centre, normal, one, first[1], other)
         raise Underived("circles and lines that lie in no common plane")
 
 
@@ -112,7 +117,7 @@ def _normal(directions: Sequence[Array]) -> Array:
     return np.asarray(crossed / np.linalg.norm(crossed))
 
 
-def place(chain: Chain, known: Known) -> tuple[Reach | Revolution, float]:
+def place(chain: Chain, known: Known) -> tuple[Reach | Quadrics, float]:
     """The reach in one branch of orientations, and how far radii were moved (m)."""
     total = _Sum(SAME_POINT * chain.length, chain.bodies[0].point)
     for k, body in enumerate(chain.bodies):
@@ -190,15 +195,17 @@ def _spins(total: _Sum, body: ChainBody) -> None:
     total.lines += [d] * len(body.slides)
 
 
-def apart(one: Reach, other: Reach, length: float) -> float:
+def apart(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> float:
     """How far two reaches are apart (characteristic lengths, radians); infinite where they are of different kinds."""
     if type(one) is not type(other):
         return np.inf
-    between = one.miss(other.centre) if isinstance(one, Line | Plane) else one.centre - other.centre
+    between = (one.miss(other.centre) if isinstance(one, Line | Plane) else
+               one.off(other.centre) if isinstance(one, Swept) else one.centre - other.centre)
     found = [float(np.linalg.norm(between)) / length]
     for name in ("direction", "normal", "axis"):
         if hasattr(one, name):
             found.append(float(np.linalg.norm(np.cross(getattr(one, name), getattr(other, name)))))
-    if isinstance(one, Circle | Sphere) and isinstance(other, Circle | Sphere):
-        found.append(abs(one.radius - other.radius) / length)
+    for name, unit in (("radius", length), ("other", length), ("profile", 1.0)):
+        if hasattr(one, name):
+            found.append(float(np.abs(np.subtract(getattr(one, name), getattr(other, name))).max()) / unit)
     return max(found)
