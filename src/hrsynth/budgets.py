@@ -182,6 +182,8 @@ ELIMINATION_SECONDS, HOMOTOPY_SECONDS, MSOLVE_SECONDS = 0.02, 0.4, 2.0
 """What one system of equations needs, about: by an exact resultant, by forty paths, by an external program."""
 LARGEST_FORMS = 700
 """Forms of a degree above which all poses of conditions are not looked for by linear algebra."""
+CAP_OF_MULTIPLES, LARGEST_MULTIPLES = 4, 250
+"""Largest degree in a group of unknowns, and most monomials, of a bound by multiples of quadrics."""
 MOST_INFINITE = 4
 """Powers of q · q that are tried to leave out what are no poses."""
 FINEST_BOX = 2.0 ** -100

@@ -216,7 +216,7 @@ def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[comple
                   "hub": _strings(_rounded(frame.point(system.hub))),
                   "chart": [[str(round(x)) for x in row] for row in part.chart.study[:4, :4]]}
         return record, list(zip(values, real, strict=True)), [_placed(mode.pose, frame, 3) for mode in solved.modes]
-    if not isinstance(system, Articulated):
+    if not isinstance(system, Articulated) or not isinstance(system.slide, Circle):
         raise NotAccepted("tips on surfaces of another platform than the checker knows")
     turn = TURNS[0]
     record = {"kind": "shifting", "reaches": [_reach(system.paths[k], frame, turn) for k in part.legs],

@@ -304,7 +304,7 @@ def poses(equations, halves, system):
     return 8 if "point" in kinds or kinds <= {"line", "plane"} else 16 if kinds == {"sphere"} and together > 2 else 40
 
 def modes(record):
-    seen, real, complex_ = [], 0, 0
+    seen, real, complex_, whole = [], 0, 0, 0
     for system in record["systems"]:
         tips = rational(system["tips"])
         fair(system, tips, 2 if system["kind"] == "planar" else 3)
@@ -326,6 +326,9 @@ def modes(record):
                 need(all(size(value(p, m)) + change(p, m, r) < FIT for leg in legs for p in leg), "a leg that misses")
                 need(finite and all(v == 0 for _, v in m), "a real pose with a complex box")
                 told(system, each, points, tips, m, r)
+                if "links" in each:
+                    closes(record["assembly"], each["links"])
+                    whole += 1
             elif "misses" in each:
                 need(any(least(p, m, r) > 0 for p in legs[each["misses"]]), "a leg that may not miss")
             else:
@@ -337,30 +340,65 @@ def modes(record):
             need(any(max(abs(a - c), abs(b - d)) > r + s for (a, b), (c, d) in zip(m, k)), "two boxes touch")
     need(seen and record["real"] == real and record["complex"] == complex_, f"{real} real of {complex_} are proved")
     more = " (more legs than needed fit)" * any(legs for _, legs in seen) + f" ({len(seen)} systems)" * (len(seen) > 1)
+    more += f"; the robot closes at {whole} of the real ones, to 1e-9" * ("assembly" in record)
     return f"{real} real of {complex_} complex poses, and no other{more}"
 
 def fair(system, tips, d):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
-    need(system.keys() <= {*f"kind reaches tips boxes bound {OWN[system['kind']]}".split()}, "what is not of its kind")
+    need(system.keys() <= {*f"kind reaches tips boxes bound frame places {OWN[system['kind']]}".split()}, "what is not of its kind")
     need(len(tips) < 50 and all(len(b) == d for b in tips), "tips of another dimension, or too many")
     reaches = [reach_of(each, d) for each in system["reaches"]]
     spans = [v[1] for kind, v in reaches if kind in ("circle", "sphere")] or [[int(system["kind"] == "shifting")]]
     spans += [sub(b, places[0]) for places in (tips, [v[0] for _, v in reaches]) for b in places]
     need(max(abs(x) for span in spans for x in span) > Fraction(1, 1000), "lengths in other units than its size")
 
-def told(system, each, points, tips, m, r):  # whether the pose puts the tips where the box does
-    P, within, d = rational(each["pose"]), rational(each["within"]), len(points[0][0])
+def turn_of(P, d):  # the rotation of a pose in space or in a plane
+    need(len(P) == d and all(len(row) == d + 1 for row in P), "a pose of another form")
     turn = [row[:d] for row in P]
-    need(len(P) == d and all(len(row) == d + 1 for row in P) and within <= WITHIN, "a pose of another form, or vague")
     need(all(abs(dot(turn[i], turn[j]) - int(i == j)) < FIT for i in range(d) for j in range(d))
          and (dot(cross(*turn[:2]), turn[2]) if d == 3 else cross(*([*row, 0] for row in turn))[2]) > 0, "no turn")
+    return turn
+
+def moved(D, x):  # a point (x, y, z, 1) or direction (x, y, z, 0) of a link that is displaced by D since zero
+    return [dot(row, x) for row in D]
+
+def closes(robot, links):  # all joints fit to 1e-9 with their links displaced, and what is held is as at the goal
+    D, home = ({name: rational(rows) for name, rows in each.items()} for each in (links, robot["goal"]))
+    turns, off = {name: turn_of(rows, 3) for name, rows in D.items()}, []
+    need(D.keys() == home.keys() and {name for _, *ends, _, _ in robot["joints"] for name in ends} <= D.keys()
+         and robot["held"], "a link without its place, or nothing held")
+    for kind, one, other, point, axes in robot["joints"]:
+        gap = sub(*(moved(D[link], rational(point)) for link in (other, one)))
+        axes = rational(axes)
+        u, v = ([moved(D[link], axis) for axis in axes] for link in (one, other))
+        need((kind, len(axes)) in (("R", 1), ("P", 1), ("C", 1), ("E", 1), ("U", 2), ("S", 0), ("F", 0))
+             and all(max(map(abs, axis)) > Fraction(1, 2) for axis in axes), "a joint of another kind")
+        off += gap if kind in "RUSF" else [dot(gap, u[0])] if kind == "E" else cross(gap, u[0])
+        off += (sub(u[0], v[0]) if kind in "RCE" else [dot(u[0], v[1]) - dot(*axes)] if kind == "U" else
+                [x for rows in zip(turns[one], turns[other]) for x in sub(*rows)] if kind in "PF" else [])
+    for one, other, x in robot["held"]:
+        seen, goal = ([dot(column, sub(moved(at[one], rational(x)), moved(at[other], [0, 0, 0, rational(x)[3]])))
+                       for column in zip(*(row[:3] for row in at[other]))] for at in (D, home))
+        off += sub(seen, goal)
+    need(all(abs(x) < FIT for x in off), "a joint that is open, or a measurement that is another one")
+
+def told(system, each, points, tips, m, r):  # whether the pose puts the tips where the box does
+    P, within, d = rational(each["pose"]), rational(each["within"]), len(points[0][0])
+    turn = turn_of(P, d)
+    need(within <= WITHIN, "a vague pose")
     need(system["kind"] != "shifting" or all(turn[i][i] == 1 for i in range(d)), "a platform that only translates")
     arrows, bodies = system.get("arrows", 0), system.get("bodies", [0] * len(tips))
     for k, (b, (N, _, w), body) in enumerate(zip(tips, points, bodies)):
         start = rational(system["hub"]) if k >= len(tips) - arrows else [row[d] for row in P]
-        for i in range(0 if body else d):
-            at = value(N[i], m)[0] / value(w, m)[0]
-            wide = change(minus(N[i], times(at, w)), m, r) / least(w, m, r)
-            need(abs(at - start[i] - dot(turn[i], b)) + wide <= within, "a tip that is not where its box is")
+        at = [value(p, m)[0] / value(w, m)[0] for p in N]
+        off = max(change(minus(p, times(x, w)), m, r) / least(w, m, r) for p, x in zip(N, at))
+        need(body or all(abs(x - start[i] - dot(turn[i], b)) + off <= within for i, x in enumerate(at)),
+             "a tip that is not where its box is")
+        if "links" in each:
+            (link, x), (origin, *rows, (unit,)) = system["places"][k], rational(system["frame"])
+            x = rational(x)
+            there = sub(moved(rational(each["links"][link]), x), [x[3] * c for c in origin])
+            need(x[3] in (0, 1) and unit > 0 and all(abs(v - dot(row, there) / unit - (1 - x[3]) * start[i]) + off <=
+                 WITHIN for i, (v, row) in enumerate(zip(at, rows, strict=True))), "a tip that is not on its link")
 
 def ranks(record):
     need(record["stacks"] and record["matrices"].keys() <= {"A", "X", "Y"}, "no stack, or a matrix of another name")

@@ -213,8 +213,10 @@ def _two_bodies(anatomy: LegDecomposition, legs: tuple[LockedLeg, ...], motions:
     if any(each.shape[1] != 1 for each in relative):
         return None
     directions = np.array([each[:, 0] for each in relative])
-    inner = [j.name for j in anatomy.mechanism.joints.values() if set(j.links) <= set(anatomy.platform)]
-    slide = next((f for f in _tangents(anatomy, inner, "e") if _along(f, directions, samples)), None)
+    inner = [j for j in anatomy.mechanism.joints.values() if set(j.links) <= set(anatomy.platform)]
+    named = [*(axis_of(anatomy.mechanism, j, "e") for j in inner if j.type is JointType.PRISMATIC),
+             *_tangents(anatomy, [j.name for j in inner], "e")]
+    slide = next((f for f in named if _along(f, directions, samples)), None)
     if slide is None:
         return None
     return ConstraintPattern("bodies", anatomy.mechanism.base, attached(anatomy), legs, slide=slide)

@@ -190,7 +190,7 @@ def _spatial(found: AssemblyModes, confined: TipLoci) -> _Plot:
 def _bodies(found: AssemblyModes, confined: TipLoci) -> _Plot:
     """The surface of translation of one body's curve and the slide, and the other body's curve (MMT Fig. 15)."""
     legs = _deciding(found, confined, 2)
-    if not legs or confined.slide is None or len({confined.tips[k].body for k in legs}) < 2:
+    if not legs or not isinstance(confined.slide, Circle) or len({confined.tips[k].body for k in legs}) < 2:
         return _platform(found)
     first, last = (confined.tips[k] for k in legs)
     sign = 1.0 if first.body == confined.bodies[0] else -1.0

@@ -82,10 +82,11 @@ def articulated(rng: Rng, kinds: str, parallel: tuple[int, ...] = ()) -> Draw:
     return Draw(Articulated(tuple(curves), tips, (0, 1), slide), pose(p))
 
 
-def on_two_bodies(rng: Rng, kinds: tuple[str, str]) -> Draw:
-    """The legs of each body; the bodies translate, the second on a circle about the first."""
+def on_two_bodies(rng: Rng, kinds: tuple[str, str], straight: bool = False) -> Draw:
+    """The legs of each body; the bodies translate, the second on a circle about the first, or straight."""
     p = rng.normal(size=3)
-    slide = Circle(rng.normal(scale=0.1, size=3), unit(rng.normal(size=3)), rng.uniform(0.3, 1.5))
+    centre, axis = rng.normal(scale=0.1, size=3), unit(rng.normal(size=3))
+    slide = Line(centre, axis) if straight else Circle(centre, axis, rng.uniform(0.3, 1.5))
     bodies = tuple(body for body in (0, 1) for _ in kinds[body])
     origins = np.array([p, p + slide.at(rng.uniform(-3, 3))])[list(bodies)]
     tips = rng.normal(scale=0.4, size=(len(bodies), 3))
@@ -146,6 +147,8 @@ SURFACES = {
     "two bodies, four spheres": Family(lambda rng: on_two_bodies(rng, ("SS", "SS")), 8),
     "two bodies, three spheres on one": Family(lambda rng: on_two_bodies(rng, ("SSS", "S")), 4),
     "two bodies, planes and spheres": Family(lambda rng: on_two_bodies(rng, ("ES", "SE")), 8),
+    "two bodies on a slide, four spheres": Family(lambda rng: on_two_bodies(rng, ("SS", "SS"), True), 4),
+    "two bodies on a slide, three spheres on one": Family(lambda rng: on_two_bodies(rng, ("SSS", "S"), True), 4),
     "two bodies, a circle and two spheres": Family(lambda rng: on_two_bodies(rng, ("C", "SS")), 8),
 }
 """Tips on surfaces that only msolve solves."""

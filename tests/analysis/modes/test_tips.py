@@ -84,10 +84,18 @@ def test_tips_that_two_slides_carry_stay_in_a_plane(name: str):
     assert missed(found) < 1e-9
 
 
-@pytest.mark.parametrize(("name", "real"), [("3ppr_m1", False), ("i4l", False), ("3prp", True)])
+@pytest.mark.parametrize(("name", "real"), [("3ppr_m1", False), ("3prp", True)])
 def test_tips_without_a_place_are_refused(name: str, real: bool):
     with pytest.raises(NotConfined, match="cannot be listed"):
         confined(name, real=real)
+
+
+def test_bodies_on_a_slide_have_lines_and_spheres():
+    for real, kind in ((False, Line), (True, Sphere)):
+        found = confined("i4l", real=real)
+        assert {type(tip.curve) for tip in found.tips} == {kind}
+        assert isinstance(found.slide, Line)
+        assert missed(found) < 1e-9
 
 
 @pytest.mark.parametrize(("name", "complex_count"), [("delta", 2), ("orthoglide", 2), ("3upu", 2), ("3rps", 16)])

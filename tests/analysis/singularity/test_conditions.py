@@ -72,7 +72,7 @@ WHOLE = {
     "6pus": gram("spatial", SIX.format("p"), "123456"), "hexa": gram("spatial", SIX.format("τ"), "123456"),
     "gough_stewart": gram("spatial", SIX.format("u"), "123456"),
     "hexaglide": always("spatial", "translation along x", lines("p", "123456")),
-    "i4l": always("other", "translation along x", lines("p", "1234")),
+    "i4l": always("bodies", "translation along x", lines("p", "1234")),
     "uranesx": always("translations", "translation along z", lines("p", "123")),
     "prrrp_parallel": always("translations", "translation along y", lines("p", "12")),
     "prrrp_parallel_point": always("translations", "translation along y", lines("p", "12")),

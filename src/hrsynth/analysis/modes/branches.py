@@ -15,7 +15,7 @@ from ...errors import TooLarge
 from ...geometry.vectors import Array, inverse, perpendicular, pose, pose_difference, transform
 from ...results import Value
 from ...tolerances import RANK_GAP, SAME_POINT
-from .curves import Circle, Plane, Reach
+from .curves import Circle, Line, Plane, Reach
 from .rigid import Planar, Spatial
 from .solve import SystemMode, SystemModes, solve
 from .systems import System
@@ -91,7 +91,7 @@ def _carried(system: Spatial | Planar, at: dict[str, Array], q: Array) -> dict[s
     return {body: system.pose(q) @ X for body, X in at.items()}
 
 
-def _on_circle(X_one: Array, X_other: Array, one: str, other: str, slide: Circle, q: Array) -> dict[str, Array]:
+def _on_circle(X_one: Array, X_other: Array, one: str, other: str, slide: Circle | Line, q: Array) -> dict[str, Array]:
     """Two bodies, the second at a place of its curve about the first."""
     first = q[:3] - X_one[:3, 3]
     second = q[:3] + slide.at(float(q[3])) - X_other[:3, 3]

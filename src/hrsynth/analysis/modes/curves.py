@@ -150,7 +150,7 @@ class Revolution(_Checked):
 
 
 @dataclass(frozen=True, eq=False)
-class Swept(_Checked):
+class SweptCircle(_Checked):
     """The tip is ``centre`` + a spoke of a circle about ``axis`` + s ``direction``, oblique to it: a cylinder; with
     ``other`` not zero the last is a spoke of a circle of that radius about the direction."""
 
@@ -171,7 +171,7 @@ Curve = Point | Line | Circle
 Surface = Sphere | Plane
 Reach = Curve | Surface
 """What a tip can reach."""
-Quadrics = Revolution | Swept
+Quadrics = Revolution | SweptCircle
 """Surfaces that only conditions on the pose know."""
 
 

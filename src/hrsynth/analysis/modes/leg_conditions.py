@@ -33,7 +33,7 @@ from .conditions import (
     OnTwoCircles,
     PoseCondition,
 )
-from .curves import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, Swept
+from .curves import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, SweptCircle
 from .reaches import apart, place
 from .turns import Known, groups, orientations, two_axes
 
@@ -195,7 +195,7 @@ def _reached(leg: str, reach: Reach | Quadrics, tip: Array, middle: Middle, plan
                                   np.array([(reach.radius / middle.size) ** 2, 0.0, -1.0])))
     if isinstance(reach, Revolution):
         found.append(OnRevolution(leg, b, none, o, reach.axis, _profile(reach, middle)))
-    if isinstance(reach, Swept):
+    if isinstance(reach, SweptCircle):
         r, s = (np.array(radius / middle.size) for radius in (reach.radius, reach.other))
         found.append(OnTwoCircles(leg, b, none, o, reach.axis, r, reach.direction, s) if reach.other else
                      OnCylinder(leg, b, none, o, reach.axis, r, reach.direction))

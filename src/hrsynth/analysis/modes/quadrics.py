@@ -317,13 +317,15 @@ def linear(count: int, slopes: Sequence[tuple[int, Any]], offset: Any) -> Any:
 
 def shifting(count: int, offset: Any, turns: Sequence[tuple[int, Any]] = ()) -> Moving:
     """The tip UNIT p + offset + Σ x_k v_k, with p the first coordinates and (k, v_k) the turns; where there are two of
-    them, x_k² + x_l² = 1 and they are spokes, normal to each other and of one length."""
+    them, x_k² + x_l² = 1 and they are spokes, normal to each other and of one length; one is a slide."""
     d = len(offset)
     axes = np.eye(d, dtype=int).astype(object) * UNIT
     moves = [*((k + 1, axis) for k, axis in enumerate(axes)), *turns]
     N = linear(count, moves, offset)
-    square = offset @ offset + (turns[0][1] @ turns[0][1] if turns else 0)
+    square = offset @ offset + (turns[0][1] @ turns[0][1] if len(turns) == 2 else 0)
     Q = linear(count, [(k, 2 * (v @ offset)) for k, v in moves], square)
+    if len(turns) == 1:
+        Q[turns[0][0], turns[0][0]] = turns[0][1] @ turns[0][1]
     for k in range(1, d + 1):
         Q[k, k] = UNIT * UNIT
         for other, v in turns:

@@ -16,7 +16,7 @@ from ...geometry import lines
 from ...geometry.vectors import Array
 from ...tolerances import CHAIN_ROUNDING, MOVED, RANK_GAP, SAME_POINT
 from .chain import Chain, ChainBody, Underived
-from .curves import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, Swept
+from .curves import Circle, Line, Plane, Point, Quadrics, Reach, Revolution, Sphere, SweptCircle
 from .turns import Known, groups, orientations, ways
 
 
@@ -105,10 +105,10 @@ class _Sum:
             self.tilt += sum(abs(float(d @ normal)) for d in self.lines)
             return Plane(self.centre, normal)
         if len(self.circles) == 1 and all(lines.parallel(d, self.lines[0]) for d in self.lines):
-            return Swept(self.centre, normal, float(np.linalg.norm(self.circles[0][1])), self.lines[0])
+            return SweptCircle(self.centre, normal, float(np.linalg.norm(self.circles[0][1])), self.lines[0])
         if len(self.circles) == 2 and not self.lines:
             one, other = (float(np.linalg.norm(spoke)) for _, spoke in self.circles)
-            return Swept(self.centre, normal, one, first[1], other)
+            return SweptCircle(self.centre, normal, one, first[1], other)
         raise Underived("circles and lines that lie in no common plane")
 
 
@@ -200,7 +200,7 @@ def apart(one: Reach | Quadrics, other: Reach | Quadrics, length: float) -> floa
     if type(one) is not type(other):
         return np.inf
     between = (one.miss(other.centre) if isinstance(one, Line | Plane) else
-               one.off(other.centre) if isinstance(one, Swept) else one.centre - other.centre)
+               one.off(other.centre) if isinstance(one, SweptCircle) else one.centre - other.centre)
     found = [float(np.linalg.norm(between)) / length]
     for name in ("direction", "normal", "axis"):
         if hasattr(one, name):

@@ -15,6 +15,7 @@ from ...tolerances import FARTHEST, NEARLY_DOUBLE, SAME_RELATION, TIP_ROUNDING, 
 from .bounds import Bound
 from .curves import Point
 from .fits import Meant, as_meant, dimension, excluded, meets, residual, stationary, torn, words
+from .multiples import most_zeros
 from .quadrics import PoseSystem
 from .roots import Root, Roots, nearly_double, solve_square
 from .squares import SquareSystem
@@ -88,10 +89,10 @@ class SystemModes(Value):
 
     Where more is observed than needed, ``complex`` counts only the modes. ``complete`` holds only if every complex
     solution is isolated and every real one enclosed. ``near`` are poses that match almost (none unless more is observed
-    than needed); ``bound`` says by what there are no more: ``resultant``, ``class`` (the degrees of such systems) or
-    ``none``, where a solver's count is trusted; ``enclosed`` that each solution that was counted has its enclosure;
-    ``degenerate`` says what is special about the input: a continuum, of dimension ``continuum``, a
-    singular pose, tips on one line.
+    than needed); ``bound`` says by what there are no more: ``resultant``, ``class`` (the degrees of such systems),
+    ``rank`` (of multiples of the equations) or ``none``, where a solver's count is trusted; ``enclosed`` that each
+    solution that was counted has its enclosure; ``degenerate`` says what is special about the input: a continuum, of
+    dimension ``continuum``, a singular pose, tips on one line.
     """
 
     complex: int | None
@@ -216,7 +217,7 @@ def _judged(system: System, square: Part, roots: Roots, others: Iterable[tuple[P
     found = [_mode(system, square, root) for root in roots.real]
     enclosed = roots.complete and all(mode.proved for mode in found)
     bound, proof = (("resultant", _proof(system, roots)) if isinstance(square, SquareSystem)
-                    else _bounded(system, most, roots))
+                    else _bounded(system, square, most, roots))
     if square.whole:
         return SystemModes(roots.complex, tuple(found), enclosed and bound != "none", proof, (), _special(roots), None,
                            bound, enclosed, solved=(Solved(system, square, roots, tuple(found), (True,) * len(found)),))
@@ -262,13 +263,18 @@ def _same(system: System, q: Array, goal: Array) -> bool:
     return float(np.abs(system.reached(q) - system.reached(goal)).max()) <= SAME_RELATION * system.size
 
 
-def _bounded(system: System, most: Bound | None, roots: Roots) -> tuple[str, str]:
+def _bounded(system: System, part: PoseSystem, most: Bound | None, roots: Roots) -> tuple[str, str]:
     """By what there are no more solutions than a solver proposes, and the proof in words (theory.md 8)."""
     proof = _proof(system, roots)
     known = f", {roots.beyond} enclosed at infinity" if roots.beyond else ""
-    if most is not None and roots.apart and roots.complex + roots.beyond == most.most:
+    known += f", the {roots.far} far ones for the rounded geometry" if roots.far else ""
+    count = roots.complex + roots.beyond + roots.far
+    if most is not None and roots.apart and count == most.most:
         return "class", (f"{proof}; the complex ones are enclosed too, apart from each other{known}, and there are at "
                          f"most {most.most}: {most.why}")
+    if roots.apart and part.chart.study is None and most_zeros(part.equations(), count) == count:
+        return "rank", (f"{proof}; the complex ones are enclosed too, apart from each other{known}, and there are no "
+                        "more: ranks of multiples of the equations modulo a prime of 62 bits")
     limit = "" if most is None else f"{known}, of at most {most.most}: {most.why}"
     return "none", f"{proof}; that is what the solver found{limit}"
 

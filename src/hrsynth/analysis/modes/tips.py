@@ -89,7 +89,7 @@ class TipLoci(Value):
     tips: tuple[Tip, ...]
     bodies: tuple[str, ...]
     plane: Array | None = None
-    slide: Circle | None = None
+    slide: Circle | Line | None = None
     angles: tuple[KeptAngle, ...] = ()
     error: float = 0.0
     """How far a point of the robot can be from where it is at the exact goal (m)."""
@@ -223,12 +223,15 @@ def _opposite(circle: Circle, tip: Array) -> Circle:
 
 
 def _slide(anatomy: LegDecomposition, pattern: ConstraintPattern, goal: ClosedConfiguration
-           ) -> tuple[Circle, str | None]:
-    """The circle of the second body's origin relative to the first's, and why it may not be all.
+           ) -> tuple[Circle | Line, str | None]:
+    """The curve of the second body's origin relative to the first's, and why it may not be all.
 
-    Where a parallelogram joins the bodies it is that of a crank; else of the two with the tangent that the pattern
-    names (whichever of the bodies its link turns about) the one that nearby configurations keep to."""
+    Where a P joins the bodies, a line. Where a parallelogram joins them it is that of a crank; else of the two circles
+    with the tangent that the pattern names (whichever of the bodies its link turns about) the one that nearby
+    configurations keep to."""
     at, moving = _apart(pattern, goal, goal.q)
+    if pattern.slide is not None and not isinstance(pattern.slide, Tangent):
+        return Line(at, _value(pattern.slide, goal)), None
     one, other = pattern.bodies
     graph = WordGraph(anatomy.mechanism, pattern.bodies, anatomy.platform).recognise()
     for _, edge in graph.between(one, other):

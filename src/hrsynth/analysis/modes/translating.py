@@ -135,7 +135,8 @@ def coplanar(one: Curve, other: Curve, size: float) -> bool:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Articulated(Shifting):
-    """Two bodies that translate: q = (p, θ), p (3,) the first body's origin, θ where the second is on ``slide``.
+    """Two bodies that translate: q = (p, θ), p (3,) the first body's origin, θ where the second is on ``slide``, a
+    circle about it or (s for θ, in metres) a line.
 
     tip_i = p + b_i on the first body, p + slide(θ) + b_i on the second; ``bodies`` says which, 0 or 1, for each
     leg. The square systems take one leg of each body: with the tip of one as p, the sum (or difference) of two circles
@@ -143,7 +144,7 @@ class Articulated(Shifting):
     """
 
     bodies: tuple[int, ...]
-    slide: Circle
+    slide: Circle | Line
     freedoms = 4
 
     def __post_init__(self) -> None:
@@ -154,7 +155,11 @@ class Articulated(Shifting):
     @cached_property
     def size(self) -> float:
         """What residuals are divided by (m)."""
-        return max(extent(self.curves, self.tips), self.slide.radius)
+        return max(extent(self.curves, self.tips), self._radius)
+
+    @property
+    def _radius(self) -> float:
+        return self.slide.radius if isinstance(self.slide, Circle) else 0.0
 
     def left(self, legs: Sequence[int]) -> int:
         """Freedoms that some legs leave: of each body's three, and one at least where a body has no leg."""
@@ -180,30 +185,36 @@ class Articulated(Shifting):
     def bound(self, legs: Sequence[int]) -> Bound | None:
         """Bézout for p in space and the slide's circle (degree 2): of a body's spheres all but one are planes by their
         differences, and those of the other body are linear in p then: 2 · 2 m, m the other body's conditions; without
-        spheres 2 m."""
+        spheres 2 m. With a line for the slide one sphere of each body is left: 2 each."""
         sides = [[k for k in legs if self.bodies[k] == body] for body in (0, 1)]
         counts = [sum(self.forbids[k] for k in side) for side in sides]
         round_ = [any(isinstance(self.curves[k], Circle | Sphere) for k in side) for side in sides]
         if sum(counts) != self.freedoms or not all(counts):
             return None
+        if isinstance(self.slide, Line):
+            return Bound(2 ** sum(round_), "a sphere of each body, planes besides (Bézout)", "product")
         found = [(4 if round_[body] else 2) * counts[1 - body] for body in (0, 1) if round_[body] or not any(round_)]
         return Bound(min(found), "the product of degrees in space and on the circle (Bézout)", "product")
 
     def chart(self, number: int) -> PoseParametrization:
-        """p, cos θ and sin θ."""
+        """p, cos θ and sin θ, or s."""
         middle = spatial_frame(self.paths, self.size).origin
         frame = replace(spatial_frame((*self.paths, self.slide), self.size), origin=middle)
 
+        count = 5 if isinstance(self.slide, Circle) else 4
+
         def tips(numbers: Numbers) -> list[Moving]:
             centre = numbers.vector(frame.vector(self.slide.centre))
-            a, b = spokes(self.slide, frame, 0.0, numbers)
-            both = shifting(5, centre * 0), shifting(5, centre, ((4, a), (5, b)))
+            along = (spokes(self.slide, frame, 0.0, numbers) if isinstance(self.slide, Circle) else
+                     [direction(self.slide.direction, frame, numbers)])
+            both = shifting(count, centre * 0), shifting(count, centre, tuple(enumerate(along, 4)))
             return [both[body] for body in self.bodies]
 
         def place(x: Sequence[float]) -> Array:
-            return np.array([*(frame.origin + frame.size * (np.array(x[:3]) @ frame.R)), math.atan2(x[4], x[3])])
+            along = math.atan2(x[4], x[3]) if count == 5 else frame.size * x[3]
+            return np.array([*(frame.origin + frame.size * (np.array(x[:3]) @ frame.R)), along])
 
-        return PoseParametrization(frame, 5, self.paths, tips, (on_circle(5, 4, 5),), place)
+        return PoseParametrization(frame, count, self.paths, tips, (on_circle(5, 4, 5),) if count == 5 else (), place)
 
     def squares(self) -> Iterator[SquareSystem]:
         """The pairs of legs, one on each body, each in both roles; first those where no plane is the slide's own."""
@@ -216,12 +227,13 @@ class Articulated(Shifting):
 
     def _along_slide(self, curve: Curve) -> bool:
         """Whether a circle lies in a plane parallel to the slide's."""
-        return isinstance(curve, Circle) and length(cross(curve.axis, self.slide.axis)) < PARALLEL
+        return (isinstance(curve, Circle) and isinstance(self.slide, Circle)
+                and length(cross(curve.axis, self.slide.axis)) < PARALLEL)
 
     def _square(self, legs: tuple[int, int], first: Curve, onto: Line | Circle) -> SquareSystem:
         """The first leg's tip carries the slide to the second leg's curve."""
         sign = 1 if self.bodies[legs[0]] == 0 else -1
-        size = max(extent((first, onto), np.zeros((1, 3))), self.slide.radius, length(self.slide.centre))
+        size = max(extent((first, onto), np.zeros((1, 3))), self._radius, length(self.slide.centre))
         middle = (first.centre + onto.centre) / 2
         start, end = shifted(first, -middle), shifted(onto, -middle)
         frame = replace(spatial_frame((start, end, self.slide), size), origin=np.zeros(3))

@@ -22,6 +22,7 @@ from .curves import Point
 from .homotopy import ends
 from .infinity import beyond
 from .msolve import Parametrisation, parametrised
+from .multiples import combined
 from .polynomials import Quadric, krawczyk
 from .quadrics import UNIT, Balls, Moving, PoseParametrization, PoseSystem, Rounded, Within
 from .roots import PRECISION, PRECISIONS, Enclosing, Roots, Solution, all_solutions, is_real, sharp
@@ -111,9 +112,14 @@ def enclosed(part: PoseSystem, proposed: Proposed, most: Bound | None = None, ba
     found = _Tips(balls, part.equations(), thick, part.chart).all_of(
         proposed.solutions, len(proposed.solutions) + proposed.lost, farthest)
     with ctx.workprec(PRECISION):
-        apart = not found.far and all(root.real and root.thick for root in found.real) and _apart(
+        apart = all(root.real and root.thick for root in found.real) and _apart(
             part.chart, thick, [root.parameters for root in found.real],
             [values for values in found.values if not is_real(values)])
+    if found.far and apart:
+        near = {id(values) for values in found.values}
+        apart = part.chart.study is None and _far_apart(part, [each for each, _ in proposed.solutions
+                                                              if id(each) not in near])
+    with ctx.workprec(PRECISION):
         wanted = most.most - found.complex if most is not None and most.law == "degree" and apart else 0
         away = 0
         if wanted > 0 and proposed.far is not None and np.isfinite(farthest):
@@ -152,6 +158,25 @@ class _Tips(Enclosing):
             radii = [float(((x @ tip.N[:, :, k] @ x) / w).rad()) for k in range(tip.N.shape[2])]
             found.append(2.0 * self.chart.frame.size * math.hypot(*radii))
         return tuple(found)
+
+
+def _far_apart(part: PoseSystem, far: Sequence[Sequence[Any]]) -> bool:
+    """Whether solutions of the rounded equations beyond ``FARTHEST`` are enclosed, each unknown in its own size, no two
+    in one box."""
+    from flint import ctx
+
+    boxes, quadrics = list[list[Any]](), combined(part.equations())
+    with ctx.workprec(PRECISION << PRECISIONS):
+        for values in far:
+            sizes = [2 ** max(0, math.frexp(float(abs(v).upper()))[1]) for v in values]
+            D = np.diag(np.array([1, *sizes], dtype=object))
+            box = krawczyk([Quadric(D @ each.A @ D) for each in quadrics],
+                           [v / size for v, size in zip(values, sizes, strict=True)])
+            if box is None:
+                return False
+            boxes.append([v * size for v, size in zip(box, sizes, strict=True)])
+        return all(any(not (v - w).contains(0) for v, w in zip(one, other, strict=True))
+                   for one, other in combinations(boxes, 2))
 
 
 def _apart(chart: PoseParametrization, thick: Sequence[Any], real: Sequence[Sequence[Any]],
