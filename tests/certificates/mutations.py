@@ -128,9 +128,70 @@ def other(direction: list[str]) -> list[str]:
         Fraction(x) == 0 for x in direction) else ["1", *["0"] * (len(direction) - 1)]
 
 
+def closed(record: Record) -> list[Record]:
+    """The boxes at which the robot is told to close."""
+    return [box for system in record["systems"] for box in system["boxes"] if "links" in box]
+
+
+def open_joint(record: Record, rng: random.Random) -> None:
+    """A link elsewhere."""
+    if not closed(record):
+        return wrong_count(record, rng)
+    row = rng.choice(rng.choice(list(rng.choice(closed(record))["links"].values())))
+    k = rng.randrange(4)
+    row[k] = moved(row[k], rng.choice((-1, 1)) * Fraction(1, 10 ** rng.randint(0, 5)))
+    return None
+
+
+def lost_link(record: Record, rng: random.Random) -> None:
+    if not closed(record):
+        return wrong_count(record, rng)
+    links = rng.choice(closed(record))["links"]
+    del links[rng.choice(list(links))]
+    return None
+
+
+def other_measurement(record: Record, rng: random.Random) -> None:
+    """A direction or place that is held, told otherwise."""
+    if not closed(record):
+        return wrong_count(record, rng)
+    seen = rng.choice(record["assembly"]["held"])[3]
+    k = rng.randrange(3)
+    seen[k] = moved(seen[k], rng.choice((-1, 1)) * Fraction(1, 10 ** rng.randint(0, 8)))
+    return None
+
+
+def other_place(record: Record, rng: random.Random) -> None:
+    """A tip at another point of its link, or in another frame."""
+    places = [system["places"] for system in record["systems"] if "places" in system]
+    if not places:
+        return wrong_count(record, rng)
+    told = rng.choice(places)
+    if rng.random() < 0.5:
+        vector = rng.choice(told["frame"][1:])
+        vector[0] = moved(vector[0], rng.choice((-1, 1)) * Fraction(1, 10 ** rng.randint(0, 4)))
+    else:
+        rng.choice(told["tips"])[1][3] = rng.choice(("2", "-1", "1/2"))
+    return None
+
+
+def other_joint(record: Record, rng: random.Random) -> None:
+    """A joint of no kind, with other axes, or at an axis of no length."""
+    if "assembly" not in record:
+        return wrong_count(record, rng)
+    joint = rng.choice(record["assembly"]["joints"])
+    if rng.random() < 0.5:
+        joint[0] = rng.choice(("X", "", None, "RU"))
+    else:
+        joint.append(["1", "0", "0", "0"])
+        if joint[0] == "R":
+            joint[-2:] = [["0", "0", "1/1000", "0"]]
+    return None
+
+
 def missing_key(record: Record, rng: random.Random) -> None:
     holder = rng.choice([record["systems"][0], record["systems"][0]["boxes"][0]])
-    del holder[rng.choice([key for key in holder if key not in ("pose", "within")])]
+    del holder[rng.choice([key for key in holder if key not in ("pose", "within", "links")])]
 
 
 def wrong_type(record: Record, rng: random.Random) -> None:
@@ -141,7 +202,8 @@ def wrong_type(record: Record, rng: random.Random) -> None:
 
 FALSE: tuple[Callable[[Record, random.Random], None], ...] = (
     drop_box, double_box, repeat_box, move_box, turn_complex, wrong_radius, wrong_inverse, wrong_count, wrong_pose,
-    forget_pose, wrong_caps, other_geometry, missing_key, wrong_type)
+    forget_pose, wrong_caps, other_geometry, open_joint, lost_link, other_measurement, other_place, other_joint,
+    missing_key, wrong_type)
 
 
 def false(record: Record, rng: random.Random) -> tuple[str, Record]:

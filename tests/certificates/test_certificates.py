@@ -29,6 +29,7 @@ from hrsynth.certificates.modes import of_systems
 from hrsynth.cli import execute
 from hrsynth.errors import BadRequest, CertificateRefused, NoCertificate
 from hrsynth.mechanism import Mechanism
+from oracle import Oracle
 
 FILE = Path(checker.__file__)
 ROBOTS = {"quattro": ("1", "4"), "gough_stewart": ("1", "3", "5"), "3rrr_m1": ("1", "2", "3"), "delta": ("1", "2"),
@@ -95,6 +96,48 @@ def test_random_platforms(name):
         return
     record = of_systems(found, {})
     assert (record["real"], record["complex"]) == (len(found.modes), found.complex)
+
+
+def displaced(record, mechanism, box) -> np.ndarray:
+    """The poses (links, 4, 4) of a box's links."""
+    found = []
+    for link in mechanism.links:
+        D = np.array([[float(Fraction(x)) for x in row] for row in box["links"][link]])
+        D[:, 3] *= mechanism.length
+        found.append(np.vstack([D, [0, 0, 0, 1]]) @ mechanism.links[link].pose)
+    return np.array(found)
+
+
+@pytest.mark.parametrize("name", ["quattro", "gough_stewart", "3rrr_m1", "delta"])
+def test_links_are_told_where_the_robot_closes(name):
+    """Joints by screws, and the watched directions, at as many modes as are told to be assembled; nowhere else."""
+    found = hrsynth.modes(hrsynth.load(name), list(ROBOTS[name]))
+    record, mechanism = json.loads(of(name)), found.setting.mechanism
+    boxes = [box for system in record["systems"] for box in system["boxes"] if "links" in box]
+    assert len(boxes) == sum(mode.assembly in ("yes", "beyond limits") for mode in found.modes) > 0
+    assert checker.verify(record).endswith(f"; the robot closes at {len(boxes)} of the real ones, to 1e-9")
+    oracle, watched = Oracle(mechanism), found.setting.samples.question.observations
+    states = [displaced(record, mechanism, box) for box in boxes]
+    assert max(oracle.error(state) for state in states) < 1e-8
+    seen = [oracle.directions(state, watched) for state in states]
+    assert max(np.abs(each - seen[0]).max() for each in seen) < 1e-8
+    if len(boxes) > 1:
+        boxes[0]["links"], boxes[1]["links"] = boxes[1]["links"], boxes[0]["links"]
+        record["sha256"] = checker.digest(record)
+        with pytest.raises(checker.NotAccepted, match="not on its link"):
+            checker.verify(record)
+
+
+def test_driven_joints_are_the_same_at_all_modes():
+    record = hrsynth.certificate(hrsynth.modes(hrsynth.load("3rps"), real=True))
+    assert checker.verify(record).endswith("; the robot closes at 8 of the real ones, to 1e-9")
+    for row in record["assembly"]["held"]:
+        assert len(row[3]) == 3
+    held = record["assembly"]["held"][-1]
+    held[3][2] = str(Fraction(held[3][2]) + Fraction(1, 10 ** 6))
+    record["sha256"] = checker.digest(record)
+    with pytest.raises(checker.NotAccepted, match="another measurement"):
+        checker.verify(record)
 
 
 def test_another_robot_is_told():
@@ -212,7 +255,8 @@ def test_command_line(tmp_path, capsys):
     assert execute(["modes", "3rpr_m1", "--certificate", str(path)]) == 0
     assert f"The certificate is written to {path}." in capsys.readouterr().out
     assert execute(["verify", str(path)]) == 0
-    assert capsys.readouterr().out == "accepted: 2 real of 2 complex poses, and no other\n"
+    assert capsys.readouterr().out == (
+        "accepted: 2 real of 2 complex poses, and no other; the robot closes at 2 of the real ones, to 1e-9\n")
     assert execute(["verify", str(path), "--robot", "3rpr_m1", "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["accepted"] is True
     assert execute(["verify", str(path), "--robot", "3rrr_m1"]) == 3

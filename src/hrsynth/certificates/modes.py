@@ -31,6 +31,7 @@ from ..geometry.vectors import Array, cross, unit
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
 from ..tolerances import NO_POSE_START
+from .closures import ClosedRobot, written
 from .verify_certificate import (
     KINDS,
     PRIME,
@@ -72,27 +73,25 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
     complete or no bound of the checker proves the count."""
     about = {"robot": found.setting.robot.name, "kind": found.kind, "at": found.pose.to_dict(),
              "observed": [[o.leg, o.link] for o in found.setting.observed]}
-    listed = found.found
-    if listed.complete and not listed.solved and found.confined is not None:  # a copy: solved again
-        listed = modes(found.setting, at=found.goal, real=found.kind == "real",
-                       as_written=found.confined.as_written).found
+    if found.found.complete and not found.found.solved and found.confined is not None:  # a copy: solved again
+        found = modes(found.setting, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
     try:
-        return of_systems(listed, about)
+        return of_systems(found.found, about, ClosedRobot.of(found))
     except NotAccepted as reason:
         raise NoCertificate(found.setting.robot.name, str(reason)) from None
 
 
-def of_systems(found: SystemModes, about: Mapping[str, Any]) -> dict[str, Any]:
+def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot | None = None) -> dict[str, Any]:
     """The certificate of the modes of systems, with what they are ``about``; raises ``NotAccepted``."""
     if not found.complete:
         raise NotAccepted("the list is not proved complete")
     if not found.solved:
         raise NotAccepted("the list is complete by conditions of kinds that the checker does not know")
-    systems = [_system(each) for each in found.solved]
+    systems = [_system(each, robot) for each in found.solved]
     record = {"format": "hrsynth-certificate-1", "claim": "modes", **about,
               "real": sum("pose" in box for each in systems for box in each["boxes"]),
               "complex": sum(each.roots.complex if each.part.whole else sum(each.kept) for each in found.solved),
-              "systems": systems}
+              "systems": systems, **({} if robot is None else {"assembly": robot.record})}
     record["sha256"] = digest(record)
     verify(record)
     return record
@@ -110,19 +109,28 @@ def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     return certificate(modes(setting, at=None if start == at else at))
 
 
-def _system(solved: Solved) -> dict[str, Any]:
+def _system(solved: Solved, robot: ClosedRobot | None) -> dict[str, Any]:
     """A system with its boxes and its bound."""
     record, starts, placed = _written(solved)
-    equations, halves, points, legs = KINDS[record["kind"]](record, rational(record["tips"]))
+    equations, halves, points, legs = KINDS[record["kind"]][0](record, rational(record["tips"]))
     equations = [integral(p) for p in equations]
-    real = iter(zip(placed, solved.kept, strict=True))
+    real = iter(zip(placed, solved.kept, solved.modes, strict=True))
     record["boxes"] = []
     for start, is_real_ in [*starts, *((each, None) for each in _no_poses(equations, halves))]:
         middle, inverse = _refined(equations, start, bool(is_real_))
-        box = {"middle": _strings(middle), "radius": str(RADIUS), "inverse": _strings(inverse)}
-        pose, kept = next(real) if is_real_ else (np.empty(0), False)
+        box = {"middle": written(middle), "radius": str(RADIUS), "inverse": written(inverse)}
+        pose, kept, mode = next(real) if is_real_ else (np.empty(0), False, None)
         if kept:
             box |= _pose(record, box, points, pose)
+            at = None if robot is None or mode is None else robot.at(mode)
+            if robot is not None and at is not None:
+                box["links"] = robot.links(at)
+                if "places" not in record:
+                    frame = solved.part.chart.frame if isinstance(solved.part, PoseSystem) else solved.part.frame
+                    assert frame is not None
+                    tips = [[value(p, middle)[0] / value(w, middle)[0] for p in N] for N, _, w in points]
+                    record["places"] = robot.places(record.get("bodies", [0] * len(tips)), frame, at, tips,
+                                                    record.get("arrows", 0), rational(record.get("hub", ["0"] * 3)))
         elif is_real_ or (legs and is_real_ is not None):
             box["misses"] = _missed(legs, middle)
         record["boxes"].append(box)
@@ -142,7 +150,7 @@ def _pose(record: dict[str, Any], box: dict[str, Any], points: Any, placed: Arra
     """A real pose, and how far it puts tips from where the box does at most (sizes)."""
     m, r, tips = rational(box["middle"]), rational(box["radius"]), rational(record["tips"])
     for within in WITHIN:
-        given = {"pose": _strings([[Fraction(float(x)) for x in row] for row in placed]), "within": str(within)}
+        given = {"pose": written([[Fraction(float(x)) for x in row] for row in placed]), "within": str(within)}
         try:
             told(record, given, points, tips, m, r)
         except NotAccepted:
@@ -169,7 +177,7 @@ def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], 
         record = {"kind": "planar" if d == 2 else "spatial",
                   "reaches": [_reach(each, frame, 0.0 if isinstance(each, Point | Surface) else
                                                          next(origins, 0.0)) for each in curves],
-                  "tips": _strings(_rounded(system.tips[legs] / frame.size)), "square": len(part.legs)}
+                  "tips": written(_rounded(system.tips[legs] / frame.size)), "square": len(part.legs)}
         return record, list(zip(values, real, strict=True)), [_placed(mode.pose, frame, d) for mode in solved.modes]
     assert isinstance(system, Translating | Articulated)
     if isinstance(system, Translating):
@@ -211,12 +219,12 @@ def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[comple
     frame, (values, real) = part.chart.frame, _starts(solved.roots)
     if isinstance(system, Spatial) and part.chart.study is not None:
         record = {"kind": "pose", "reaches": [_reach(system.curves[k], frame, 0.0) for k in part.legs],
-                  "tips": _strings(_rounded(system.tips[list(part.legs)] / frame.size)),
+                  "tips": written(_rounded(system.tips[list(part.legs)] / frame.size)),
                   "arrows": sum(k >= len(system.points) for k in part.legs),
-                  "hub": _strings(_rounded(frame.point(system.hub))),
+                  "hub": written(_rounded(frame.point(system.hub))),
                   "chart": [[str(round(x)) for x in row] for row in part.chart.study[:4, :4]]}
         return record, list(zip(values, real, strict=True)), [_placed(mode.pose, frame, 3) for mode in solved.modes]
-    if not isinstance(system, Articulated) or not isinstance(system.slide, Circle):
+    if not isinstance(system, Articulated):
         raise NotAccepted("tips on surfaces of another platform than the checker knows")
     turn = TURNS[0]
     record = {"kind": "shifting", "reaches": [_reach(system.paths[k], frame, turn) for k in part.legs],
@@ -224,7 +232,8 @@ def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[comple
               "slide": _reach(system.slide, replace(frame, origin=np.zeros(3)), turn),
               "tips": [["0"] * 3] * len(part.legs)}
     c, s = math.cos(turn), math.sin(turn)
-    starts = [[*x[:3], (x[4] * c - x[3] * s) / (1.0 + x[3] * c + x[4] * s)] for x in values]
+    starts = values if isinstance(system.slide, Line) else [
+        [*x[:3], (x[4] * c - x[3] * s) / (1.0 + x[3] * c + x[4] * s)] for x in values]
     return (record, list(zip(starts, real, strict=True)),
             [_shifted(mode.pose, frame, frame.origin) for mode in solved.modes])
 
@@ -278,12 +287,12 @@ def _reach(reach: Reach, frame: WorkingFrame, turn: float) -> dict[str, Any]:
     centre = _rounded(frame.point(reach.centre))
     if isinstance(reach, Sphere):
         radius = _rounded(reach.radius / frame.size)
-        return {"sphere": _strings([centre, [radius * radius]])}
+        return {"sphere": written([centre, [radius * radius]])}
     if isinstance(reach, Circle):
-        return {"circle": _strings([centre, *_spokes(reach, frame, turn)])}
+        return {"circle": written([centre, *_spokes(reach, frame, turn)])}
     rest = [] if isinstance(reach, Point) else [reach.direction if isinstance(reach, Line) else reach.normal]
     exact = [[Fraction(int(x), UNIT) for x in direction(each, frame, Rounded)] for each in rest]
-    return {type(reach).__name__.lower(): _strings([centre, *exact])}
+    return {type(reach).__name__.lower(): written([centre, *exact])}
 
 
 def _spokes(circle: Circle, frame: WorkingFrame, turn: float) -> list[list[Fraction]]:
@@ -411,8 +420,3 @@ def _rounded(x: Any) -> Any:
     if np.ndim(x) == 0:
         return Fraction(round(float(x) * UNIT), UNIT)
     return [_rounded(each) for each in x]
-
-
-def _strings(values: Any) -> Any:
-    """Fractions as the checker reads them."""
-    return str(values) if isinstance(values, Fraction) else [_strings(each) for each in values]

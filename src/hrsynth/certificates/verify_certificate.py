@@ -6,15 +6,16 @@
   H what they change by in the box, |Y F(m)| + (|1 - Y J| + |Y| H) r < r makes x - Y F(x) a contraction of the box: it
   holds one solution and no other. Where m is real the box is its own conjugate, and so is the solution.
 * At most, *rank*: columns are the monomials up to the caps, B those below, S the others; rows all multiples of the
-  equations within the caps. If the columns S have full rank, each monomial is a sum of those in B modulo the equations:
-  at most |B| + |S| - rank zeros. Modulo a prime ranks are no larger. The tangent of half an angle has its own cap: a
-  zero at infinity, which is a pose, would be a vector on S that all rows annul.
+  equations within the caps. If the columns S have full rank, B spans all modulo the equations: |B| + |S| - rank zeros,
+  and modulo a prime ranks are no larger. The tangent of half an angle has its own cap: a zero at infinity, which is a
+  pose, would be a vector on S that all rows annul.
 * At most, *poses*: conditions *on a sphere*, *on a plane* on points of a rigid body are linear in 17 coordinates in
   which poses have dimension 6 and degree 40 (Gallet, Nawratil, Schicho, J. Geom. 106, 2015): of six at most 40 zeros,
   and no curve besides 40. With a tip at rest, or on six planes, three quadrics of the quaternion remain: 8; three rods
   in one ball put it in two places: 16.
-* A real pose puts each tip where its box does, to the distance told. With more legs than needed, the other solutions
-  miss one, and poses fit to 1e-9. Systems (branches of legs) are counted one by one.
+* A real pose puts each tip where its box does, to the distance told. With more legs than needed, the others miss one,
+  poses fit to 1e-9. Systems (branches of legs) are counted one by one. The robot *closes* where places of its links are
+  told: its joints fit, tips are in place, and what is measured is as told once for all poses.
 
 *ranks*: of stacks of integer matrices, by a minor that is not zero modulo a prime and vectors that the stack annuls.
 """
@@ -26,12 +27,10 @@ import sys
 from fractions import Fraction
 from itertools import combinations, product
 
-PRIME = 2147483647
-FIT, WITHIN = Fraction(1, 10 ** 9), Fraction(1, 10 ** 6)
+PRIME, FIT, WITHIN = 2147483647, Fraction(1, 10 ** 9), Fraction(1, 10 ** 6)
 
 class NotAccepted(Exception):
     """Why a certificate is not accepted."""
-
 def need(true, why):
     if not true:
         raise NotAccepted(why)
@@ -43,38 +42,22 @@ def add(*terms):  # a sum of polynomials {exponents: coefficient}
             total[e] = total.get(e, 0) + c
     return {e: c for e, c in total.items() if c}
 
-def mul(p, q):
-    return add(*({tuple(map(sum, zip(e, f))): c * d for f, d in q.items()} for e, c in p.items()))
-
-def times(c, p):
-    return {e: c * d for e, d in p.items() if c * d}
-
-def minus(p, q):
-    return add(p, times(-1, q))
-
-def term(c, n, k=None):  # c, or c x_k
-    return {tuple(int(i == k) for i in range(n)): Fraction(c)} if c else {}
-
-def inner(u, v):
-    return add(*(mul(a, b) for a, b in zip(u, v)))
-
-def slope(p, k):
-    return {(*e[:k], e[k] - 1, *e[k + 1:]): c * e[k] for e, c in p.items() if e[k]}
-
-def formal(p, w):  # an equation times w, with all monomials of w: those set its degree in half-angle tangents
-    return dict.fromkeys(w, Fraction(0)) | p
+def mul(p, q): return add(*({tuple(map(sum, zip(e, f))): c * d for f, d in q.items()} for e, c in p.items()))
+def times(c, p): return {e: c * d for e, d in p.items() if c * d}
+def minus(p, q): return add(p, times(-1, q))
+def term(c, n, k=None): return {tuple(int(i == k) for i in range(n)): Fraction(c)} if c else {}  # c, or c x_k
+def inner(u, v): return add(*(mul(a, b) for a, b in zip(u, v)))
+def dot(u, v): return sum((a * b for a, b in zip(u, v, strict=True)), Fraction(0))
+def sub(u, v): return [a - b for a, b in zip(u, v, strict=True)]
+def size(z): return abs(z[0]) + abs(z[1])  # at least |z|, at most twice that
+def formal(p, w): return dict.fromkeys(w, Fraction(0)) | p  # p times w: w has its degree in half-angle tangents
+def slope(p, k): return {(*e[:k], e[k] - 1, *e[k + 1:]): c * e[k] for e, c in p.items() if e[k]}
 
 def integral(p):  # with integer coefficients that have no common divisor
     need(any(p.values()), "an equation vanishes")
     below = math.lcm(*(c.denominator for c in p.values()))
     common = math.gcd(*(int(c * below) for c in p.values()))
     return {e: int(c * below) // common for e, c in p.items()}
-
-def dot(u, v):
-    return sum((a * b for a, b in zip(u, v, strict=True)), Fraction(0))
-
-def sub(u, v):
-    return [a - b for a, b in zip(u, v, strict=True)]
 
 def cross(u, v, mul=lambda a, b: a * b, minus=lambda a, b: a - b):
     return [minus(mul(u[i], v[j]), mul(u[j], v[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
@@ -112,7 +95,6 @@ def apart(one, other, squared):  # |P1 - P2|^2 = squared
 def on_plane(point, normal, centre):
     N, _, w = point
     return add(*(times(c, p) for c, p in zip(normal, N)), times(-dot(normal, centre), w))
-
 def on_sphere(point, centre, squared):
     N, Q, w = point
     return add(Q, *(times(-2 * c, p) for c, p in zip(centre, N)), times(dot(centre, centre) - squared, w))
@@ -182,11 +164,11 @@ def planar(system, tips):
     return [formal(p, mul(w, v)) for p in found], halves, points, legs[system["square"] - 2:]
 
 def shifting(system, tips):
-    """Bodies that translate: x, y, z of the first, the second on the circle ``slide`` about it. Of spheres, and of
+    """Bodies that translate: x, y, z of the first, the second on ``slide`` about it. Of spheres, and of
     parallel planes, all but the first are replaced by their difference from it."""
     slide = reach_of(system["slide"]) if "slide" in system else None
     bodies, n = system["bodies"], 4 if slide else 3
-    need(set(bodies) <= ({0, 1} if slide and slide[0] == "circle" else {0}), "the bodies of the tips")
+    need(set(bodies) <= ({0, 1} if slide and slide[0] in ("circle", "line") else {0}), "the bodies of the tips")
     S, SS, v = running(slide, 3, n) if slide else ([], {}, {})
     one, points, found, kept, all_ = term(1, n), [], [], [], []
     for b, body, reach in zip(tips, bodies, map(reach_of, system["reaches"]), strict=True):
@@ -195,13 +177,13 @@ def shifting(system, tips):
         points.append((N, add(mul(inner(p, p), w), *((times(2, inner(p, S)), SS) if body else ())), w))
         all_.append(misfits(conditions(points[-1], reach)))
         for equation, normal in conditions(points[-1], reach) if len(points) <= system["square"] else ():
-            first, n1, w1 = next((each for each in kept if len(normal) == len(each[1]) and (
-                len(normal) == 1 or not any(cross(normal, each[1])))), ({}, normal, one))
-            kept += [] if first else [(equation, normal, w)]
-            mine, other = (one, one) if w == w1 else (w1, w)
+            first, n1, w1, other = next((each for each in kept if len(normal) == len(each[1]) and (
+                len(normal) == 1 or not any(cross(normal, each[1])))), ({}, normal, one, 2))
+            kept = [(equation, normal, w, body)] * (other != body) + kept  # the last body first
+            mine, its = (one, one) if w == w1 else (w1, w)
             ratio = dot(normal, n1) / dot(n1, n1) if len(n1) > 1 else 1
-            found.append(formal(minus(mul(equation, mine), times(ratio, mul(first, other))), mul(w, mine)))
-    return found, [False] * 3 + [True] * (n - 3), points, all_[system["square"]:]
+            found.append(formal(minus(mul(equation, mine), times(ratio, mul(first, its))), mul(w, mine)))
+    return found, [False] * 3 + [slide[0] == "circle" for _ in range(3, n)], points, all_[system["square"]:]
 
 def pose(system, tips):
     """Study's coordinates: a quaternion e, linear in (1, x1, x2, x3), and g = (x4 .. x7), e.g = 0; |e|^2 tip =
@@ -230,8 +212,8 @@ def pose(system, tips):
         found += [equation for equation, _ in conditions(points[-1], reach)]
     return found, [False] * n, points, []
 
-KINDS = {"spatial": spatial, "planar": planar, "shifting": shifting, "pose": pose}
-OWN = {"spatial": "square", "planar": "square", "shifting": "square bodies slide", "pose": "chart arrows hub"}
+KINDS = {"spatial": (spatial, "square"), "planar": (planar, "square"), "shifting": (shifting, "square bodies slide"),
+         "pose": (pose, "chart arrows hub")}
 
 def value(p, x):  # at complex numbers, pairs of fractions
     total = [Fraction(0), Fraction(0)]
@@ -242,18 +224,11 @@ def value(p, x):  # at complex numbers, pairs of fractions
         total = [total[0] + a, total[1] + b]
     return total
 
-def size(z):
-    return abs(z[0]) + abs(z[1])
-
-def most(p, far):  # of |p| where |x_k| <= far_k
-    return sum(abs(c) * math.prod(a ** k for a, k in zip(far, e)) for e, c in p.items())
-
-def change(p, m, r):  # of p in a box at most
-    far = [size(z) + r for z in m]
-    return r * sum(most(slope(p, k), far) for k in range(len(m)))
-
-def least(p, m, r):  # of |p| in a box
-    return size(value(p, m)) / 2 - change(p, m, r)
+def most(p, far): return sum(abs(c) * math.prod(map(pow, far, e)) for e, c in p.items())  # of |p| where |x_k| <= far_k
+def change(p, m, r): return r * sum(most(slope(p, k), [size(z) + r for z in m]) for k in range(len(m)))  # in a box
+def least(p, m, r): return size(value(p, m)) / 2 - change(p, m, r)  # of |p| in a box
+def along(y, z):
+    return [sum(a * c - b * d for (a, b), (c, d) in zip(y, z)), sum(a * d + b * c for (a, b), (c, d) in zip(y, z))]
 
 def enclosed(equations, m, r, Y):  # Krawczyk's condition; see above
     n = len(m)
@@ -265,9 +240,6 @@ def enclosed(equations, m, r, Y):  # Krawczyk's condition; see above
         wide = sum(size(sub(along(y, [J[k][j] for k in range(n)]), [int(i == j), 0])) for j in range(n))
         wide += sum(size(z) * h for z, h in zip(y, H))
         need(size(along(y, F)) + wide * r < r, "a box in which no solution is proved")
-
-def along(y, z):
-    return [sum(a * c - b * d for (a, b), (c, d) in zip(y, z)), sum(a * d + b * c for (a, b), (c, d) in zip(y, z))]
 
 def rank(equations, halves, system, ranks_of=None):
     n, groups = len(halves), system["bound"]["groups"]
@@ -292,8 +264,7 @@ def modular(rows, first):  # the ranks modulo the prime of the first columns and
                 over = pow(row[k], -1, PRIME)
                 echelon[k] = [c * over % PRIME for c in row]
                 break
-            if c := row[k]:
-                row = [(a - c * b) % PRIME for a, b in zip(row, echelon[k])]
+            row = [(a - row[k] * b) % PRIME for a, b in zip(row, echelon[k])] if row[k] else row
     return sum(k < first for k in echelon), len(echelon)
 
 def poses(equations, halves, system):
@@ -308,12 +279,12 @@ def modes(record):
     for system in record["systems"]:
         tips = rational(system["tips"])
         fair(system, tips, 2 if system["kind"] == "planar" else 3)
-        equations, halves, points, legs = KINDS[system["kind"]](system, tips)
+        equations, halves, points, legs = KINDS[system["kind"]][0](system, tips)
         equations = [integral(p) for p in equations]
         need((equations, legs) not in seen, "a system that is told twice")
         seen.append((equations, legs))
-        flat = [times(Fraction(1, 2 ** max(map(abs, p.values())).bit_length()), p) for p in equations]
         need(len(equations) == len(halves), f"{len(equations)} equations in {len(halves)} unknowns")
+        flat = [times(Fraction(1, 2 ** max(map(abs, p.values())).bit_length()), p) for p in equations]
         bound, boxes = {"rank": rank, "poses": poses}[system["bound"]["kind"]](equations, halves, system), []
         need(len(system["boxes"]) == bound, f"{len(system['boxes'])} boxes, but there may be {bound} solutions")
         for each in system["boxes"]:
@@ -326,9 +297,7 @@ def modes(record):
                 need(all(size(value(p, m)) + change(p, m, r) < FIT for leg in legs for p in leg), "a leg that misses")
                 need(finite and all(v == 0 for _, v in m), "a real pose with a complex box")
                 told(system, each, points, tips, m, r)
-                if "links" in each:
-                    closes(record["assembly"], each["links"])
-                    whole += 1
+                whole += "links" in each and closes(record["assembly"], each["links"])
             elif "misses" in each:
                 need(any(least(p, m, r) > 0 for p in legs[each["misses"]]), "a leg that may not miss")
             else:
@@ -344,13 +313,14 @@ def modes(record):
     return f"{real} real of {complex_} complex poses, and no other{more}"
 
 def fair(system, tips, d):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
-    need(system.keys() <= {*f"kind reaches tips boxes bound frame places {OWN[system['kind']]}".split()}, "what is not of its kind")
+    need(system.keys() <= {*f"kind reaches tips boxes bound places {KINDS[system['kind']][1]}".split()}, "another key")
     need(len(tips) < 50 and all(len(b) == d for b in tips), "tips of another dimension, or too many")
     reaches = [reach_of(each, d) for each in system["reaches"]]
     spans = [v[1] for kind, v in reaches if kind in ("circle", "sphere")] or [[int(system["kind"] == "shifting")]]
     spans += [sub(b, places[0]) for places in (tips, [v[0] for _, v in reaches]) for b in places]
     need(max(abs(x) for span in spans for x in span) > Fraction(1, 1000), "lengths in other units than its size")
 
+def moved(D, x): return [dot(row, x) for row in D]  # a point (x, y, z, 1) or direction (x, y, z, 0) of a link
 def turn_of(P, d):  # the rotation of a pose in space or in a plane
     need(len(P) == d and all(len(row) == d + 1 for row in P), "a pose of another form")
     turn = [row[:d] for row in P]
@@ -358,34 +328,27 @@ def turn_of(P, d):  # the rotation of a pose in space or in a plane
          and (dot(cross(*turn[:2]), turn[2]) if d == 3 else cross(*([*row, 0] for row in turn))[2]) > 0, "no turn")
     return turn
 
-def moved(D, x):  # a point (x, y, z, 1) or direction (x, y, z, 0) of a link that is displaced by D since zero
-    return [dot(row, x) for row in D]
-
-def closes(robot, links):  # all joints fit to 1e-9 with their links displaced, and what is held is as at the goal
-    D, home = ({name: rational(rows) for name, rows in each.items()} for each in (links, robot["goal"]))
-    turns, off = {name: turn_of(rows, 3) for name, rows in D.items()}, []
-    need(D.keys() == home.keys() and {name for _, *ends, _, _ in robot["joints"] for name in ends} <= D.keys()
-         and robot["held"], "a link without its place, or nothing held")
-    for kind, one, other, point, axes in robot["joints"]:
-        gap = sub(*(moved(D[link], rational(point)) for link in (other, one)))
-        axes = rational(axes)
-        u, v = ([moved(D[link], axis) for axis in axes] for link in (one, other))
-        need((kind, len(axes)) in (("R", 1), ("P", 1), ("C", 1), ("E", 1), ("U", 2), ("S", 0), ("F", 0))
-             and all(max(map(abs, axis)) > Fraction(1, 2) for axis in axes), "a joint of another kind")
-        off += gap if kind in "RUSF" else [dot(gap, u[0])] if kind == "E" else cross(gap, u[0])
-        off += (sub(u[0], v[0]) if kind in "RCE" else [dot(u[0], v[1]) - dot(*axes)] if kind == "U" else
-                [x for rows in zip(turns[one], turns[other]) for x in sub(*rows)] if kind in "PF" else [])
-    for one, other, x in robot["held"]:
-        seen, goal = ([dot(column, sub(moved(at[one], rational(x)), moved(at[other], [0, 0, 0, rational(x)[3]])))
-                       for column in zip(*(row[:3] for row in at[other]))] for at in (D, home))
-        off += sub(seen, goal)
-    need(all(abs(x) < FIT for x in off), "a joint that is open, or a measurement that is another one")
+def closes(robot, links):  # its joints fit to 1e-9 with links displaced since zero, and what is held is as told
+    D, off = {name: rational(rows) for name, rows in links.items()}, []
+    turns = {name: turn_of(rows, 3) for name, rows in D.items()}
+    for kind, one, other, *vectors in robot["joints"]:  # the point, then axes
+        x = rational(vectors)
+        (p, *u), (q, *v) = ([moved(D[link], y) for y in x] for link in (one, other))
+        need(len(u) == {"R": 1, "P": 1, "C": 1, "E": 1, "U": 2, "S": 0, "F": 0}[kind] and x[0][3] == 1
+             and all(y[3] == 0 and dot(y, y) > Fraction(1, 2) for y in x[1:]), "a joint of another kind")
+        off += sub(p, q) if kind in "RUSF" else [dot(sub(p, q), u[0])] if kind == "E" else cross(sub(p, q), u[0])
+        off += (sub(u[0], v[0]) if kind in "RCE" else [dot(u[0], v[1]) - dot(*x[1:])] if kind == "U" else
+                [z for rows in zip(turns[one], turns[other]) for z in sub(*rows)] if kind in "PF" else [])
+    for one, other, vector, seen in robot["held"]:  # a direction or point of a link, seen from another
+        at = sub(moved(D[one], rational(vector)), [row[3] * rational(vector)[3] for row in D[other]])
+        off += sub([dot(column, at) for column in zip(*turns[other])], rational(seen))
+    need(robot["held"] and robot["joints"] and all(abs(x) < FIT for x in off), "an open joint, or another measurement")
+    return True
 
 def told(system, each, points, tips, m, r):  # whether the pose puts the tips where the box does
     P, within, d = rational(each["pose"]), rational(each["within"]), len(points[0][0])
     turn = turn_of(P, d)
-    need(within <= WITHIN, "a vague pose")
-    need(system["kind"] != "shifting" or all(turn[i][i] == 1 for i in range(d)), "a platform that only translates")
+    need(within <= WITHIN and (system["kind"] != "shifting" or all(turn[i][i] == 1 for i in range(d))), "another pose")
     arrows, bodies = system.get("arrows", 0), system.get("bodies", [0] * len(tips))
     for k, (b, (N, _, w), body) in enumerate(zip(tips, points, bodies)):
         start = rational(system["hub"]) if k >= len(tips) - arrows else [row[d] for row in P]
@@ -394,11 +357,11 @@ def told(system, each, points, tips, m, r):  # whether the pose puts the tips wh
         need(body or all(abs(x - start[i] - dot(turn[i], b)) + off <= within for i, x in enumerate(at)),
              "a tip that is not where its box is")
         if "links" in each:
-            (link, x), (origin, *rows, (unit,)) = system["places"][k], rational(system["frame"])
-            x = rational(x)
-            there = sub(moved(rational(each["links"][link]), x), [x[3] * c for c in origin])
-            need(x[3] in (0, 1) and unit > 0 and all(abs(v - dot(row, there) / unit - (1 - x[3]) * start[i]) + off <=
-                 WITHIN for i, (v, row) in enumerate(zip(at, rows, strict=True))), "a tip that is not on its link")
+            (origin, *rows, (unit,)), (link, x) = rational(system["places"]["frame"]), system["places"]["tips"][k]
+            there = sub(moved(rational(each["links"][link]), rational(x)), [int(x[3]) * c for c in origin])
+            need(x[3] in ("0", "1") and all(abs(dot(u, v) - (u is v)) < FIT for u in rows for v in rows) and all(
+                abs(v - dot(row, there) / unit - (x[3] == "0") * c) + off <= WITHIN
+                for v, row, c in zip(at, rows, start, strict=True)), "a tip that is not on its link")
 
 def ranks(record):
     need(record["stacks"] and record["matrices"].keys() <= {"A", "X", "Y"}, "no stack, or a matrix of another name")
@@ -416,7 +379,6 @@ def ranks(record):
 def digest(record):
     rest = {key: each for key, each in record.items() if key != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
-
 def once(pairs):  # an object of JSON; of two keys a reader may see one, Python the other
     need(len(dict(pairs)) == len(pairs), "a key that is told twice")
     return dict(pairs)

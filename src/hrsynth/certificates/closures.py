@@ -1,0 +1,116 @@
+"""The whole robot at its modes, for certificates: joints, what is held, and where the links are at each mode.
+
+Links are displaced by D (3, 4) since the zero configuration, all lengths in characteristic lengths, base axes: a joint
+has one point and one set of axes for both of its links, and closes at D₁, D₂ where these put them alike.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from ..analysis.measured import MeasuredRobot
+from ..analysis.modes.modes import AssemblyModes
+from ..analysis.modes.quadrics import WorkingFrame
+from ..analysis.modes.solve import SystemMode
+from ..geometry.vectors import Array, inverse
+from ..kinematics.configuration import ClosedConfiguration
+from ..mechanism import Joint, JointType, Mechanism
+from ..mechanism.observations.direction import Direction
+from ..mechanism.observations.encoder import Encoder
+from ..tolerances import SOLVED
+
+
+def written(values: Any) -> Any:
+    """Floats and fractions as the checker reads them."""
+    if isinstance(values, Fraction | float | np.floating):
+        return str(Fraction(values) if isinstance(values, Fraction) else Fraction(float(values)))
+    return [written(each) for each in values]
+
+
+@dataclass(frozen=True, eq=False)
+class ClosedRobot:
+    """A robot with the closed configurations of its modes; ``record``: its joints and what is held."""
+
+    found: AssemblyModes
+    record: dict[str, Any]
+
+    @classmethod
+    def of(cls, found: AssemblyModes) -> ClosedRobot | None:
+        """None where a joint or a measurement is of a kind that the checker does not know."""
+        mechanism = found.setting.mechanism
+        held = list(_held(found))
+        kinds = {joint.type for joint in mechanism.joints.values()}
+        if mechanism.couplings or not held or None in held or JointType.FREE in kinds or found.confined is None:
+            return None
+        length = found.goal.twin.length
+        joints = [[joint.type.value, joint.predecessor, joint.successor,
+                   *written([[*joint.point / length, 1.0], *([*axis, 0.0] for axis in joint.axes)])]
+                  for joint in mechanism.joints.values()]
+        return cls(found, {"joints": joints, "held": held})
+
+    def at(self, mode: SystemMode) -> ClosedConfiguration | None:
+        """The configuration at a mode of a system; None where the robot was not found closed."""
+        assert self.found.model is not None
+        bodies = self.found.model.bodies(mode.q)
+        return next((each.configuration for each in self.found.modes if each.bodies is not None and all(
+            np.abs(X - each.bodies[body]).max() <= SOLVED for body, X in bodies.items())), None)
+
+    def links(self, at: ClosedConfiguration) -> dict[str, Any]:
+        """The displacements of all links."""
+        mechanism = self.found.setting.mechanism
+        return {link: written(displaced(mechanism, at, link)) for link in mechanism.links}
+
+    def places(self, bodies: Sequence[int], frame: WorkingFrame, at: ClosedConfiguration, tips: Sequence[Any],
+               arrows: int, hub: Sequence[Any]) -> dict[str, Any]:
+        """A system's frame, and its tips as points or, the last, arrows of the robot's links, by where they are at a
+        configuration in working coordinates."""
+        assert self.found.confined is not None
+        length, found = at.twin.length, []
+        for k, (body, tip) in enumerate(zip(bodies, tips, strict=True)):
+            link, point = self.found.confined.bodies[body], float(k < len(tips) - arrows)
+            there = np.array(tip, dtype=float) - (1.0 - point) * np.array(hub, dtype=float)[:len(tip)]
+            D = displaced(self.found.setting.mechanism, at, link)
+            v = (point * frame.origin + frame.size * there @ frame.R) / length - point * D[:, 3]
+            found.append([link, [*written(D[:, :3].T @ v), str(int(point))]])
+        return {"frame": written([frame.origin / length, *frame.R, [frame.size / length]]), "tips": found}
+
+
+def displaced(mechanism: Mechanism, at: ClosedConfiguration, link: str) -> Array:
+    """D of a link since the zero configuration of a mechanism, shape (3, 4)."""
+    X = at.pose(link) @ inverse(mechanism.links[link].pose)
+    return np.column_stack([X[:3, :3], X[:3, 3] / at.twin.length])
+
+
+def _held(found: AssemblyModes) -> Iterator[list[Any] | None]:
+    """What is measured: a link's directions and points, the link from which they are seen, and how they are seen at the
+    goal; None of another kind."""
+    setting, at = found.setting, found.goal
+    measured = MeasuredRobot.driven(setting) if found.kind == "real" else MeasuredRobot.watched(setting)
+    observations, mechanism = measured.question.observations, setting.mechanism
+    for each in observations:
+        if isinstance(each, Direction):
+            d = mechanism.links[each.link].pose[:3, :3] @ each.direction
+            yield _seen(mechanism, at, each.link, each.seen_from or measured.question.reference, [*d, 0.0])
+        elif isinstance(each, Encoder):
+            joint = mechanism.joints[each.joint]
+            if sum(isinstance(o, Encoder) and o.joint == each.joint for o in observations) < joint.type.freedoms:
+                yield None
+            else:
+                yield from _locked(mechanism, at, joint)
+        else:
+            yield None
+
+
+def _locked(mechanism: Mechanism, at: ClosedConfiguration, joint: Joint) -> Iterator[list[Any]]:
+    for x in ([1.0, 0.0, 0.0, 0.0], [0.0, 1.0, 0.0, 0.0], [*joint.point / at.twin.length, 1.0]):
+        yield _seen(mechanism, at, joint.successor, joint.predecessor, x)
+
+
+def _seen(mechanism: Mechanism, at: ClosedConfiguration, link: str, other: str, x: Sequence[float]) -> list[Any]:
+    D, E = displaced(mechanism, at, link), displaced(mechanism, at, other)
+    return [link, other, written(x), written(E[:, :3].T @ (D @ x - x[3] * E[:, 3]))]
