@@ -75,8 +75,9 @@ jupyter: setup-all  ## open the notebooks in Jupyter, which is fetched the first
 docs: setup-all  ## run the notebooks that changed and build the site in build/site
 	@NO_MKDOCS_2_WARNING=1 OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 $(BIN)/mkdocs build --quiet --strict
 
-endings: setup-dev  ## how 100 far servo runs of every robot end, checked, as the table in docs/pages (half an hour)
-	@cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m simulation.far 100 -o ../docs/pages/endings.md
+endings: setup-dev  ## how 100 far servo runs of every robot end, checked, against the lists, as tables in docs/pages (an hour; a broken-off run goes on)
+	@mkdir -p build && cd tests && OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 ../$(BIN)/python -m simulation.far 100 --random 42 \
+		--log ../build/far.jsonl -o ../docs/pages/endings.md
 
 bench: setup-all  ## run the benchmarks and write their table in docs/pages (some minutes)
 	@OMP_NUM_THREADS=1 OPENBLAS_NUM_THREADS=1 NUMBA_NUM_THREADS=1 $(BIN)/python benchmarks/table.py docs/pages/batches.md

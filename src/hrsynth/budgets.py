@@ -236,6 +236,8 @@ ENDING_STARTS = 100
 """Starts of one round in which critical points of a loop's error are sought."""
 ENDING_ROUNDS = 16
 """Rounds at most."""
+ENDING_DESCENTS = 3
+"""Rounds before the last one at least where only what attracts is sought."""
 ENDING_LATE = 0.04
 """Part of the critical points that the later half of the starts may find first, twice, for the search to end."""
 ENDING_WALK = 6

@@ -1,24 +1,27 @@
-"""Far pairs: how runs between random poses end, and which endings are not what their names say.
+"""Far pairs: how runs between random poses end, which endings are not what their names say, and which are none of the
+rests that are listed for the goal.
 
-``python -m simulation.far 100 3rpr_m1 delta`` (from ``tests/``) runs so many pairs of each robot and prints a
-table, without names of all controllable robots; ``-o FILE`` writes it between the marks of a page. Two robots at a
-time.
+``python -m simulation.far 100 3rpr_m1 delta --random 40`` (from ``tests/``) runs so many pairs of each robot with all
+legs watched, and so many with random sets of legs; without names those of all controllable robots. A line of the log a
+run: what is broken off goes on. The tables of what is in the log are printed; ``-o FILE`` writes them between the marks
+of a page.
 """
 
 from __future__ import annotations
 
 import argparse
+import json
 import sys
 from collections import Counter
-from collections.abc import Iterator
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator, Sequence
+from itertools import chain
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hrsynth.analysis.aspects.path import SEPARATED, Aspects
 from hrsynth.budgets import RUN_AWAY
-from hrsynth.description import load
 from hrsynth.geometry.vectors import hat, rotation_from_rpy
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction
@@ -30,17 +33,23 @@ from hrsynth.simulation.result import Servo
 from hrsynth.simulation.servo import Conditions, ServoTask
 from kinematics.robots import state_of
 from oracle import Oracle
-from simulation.scenes import CONTROLLABLE, far_pairs, setting
+from simulation.listed import MEMBER, Listed, random_sets
+from simulation.scenes import CONTROLLABLE, Legs, far_pairs, setting
 
-START = "<!-- generated: endings -->"
+START, MEMBERS = "<!-- generated: endings -->", "<!-- generated: members -->"
+OF_ONE_SET = 3
+"""Runs with one random set of legs."""
+KEY = ("robot", "watched", "seed", "pair")
+Key = tuple[Any, ...]
 VANISHED, THERE, CLOSED = 1e-9, 1e-6, 1e-9
 """‖e‖ that counts as zero; how far (m, rotation matrices) the pose may be from the mode it is said to be; residual of
 closed loops, by the oracle."""
 
 
-def run_between(name: str, start: ClosedConfiguration, goal: ClosedConfiguration, gain: float = 0.8) -> Servo:
-    """A run between two configurations of a shipped robot, all legs watched."""
-    found = setting(name)
+def run_between(name: str, start: ClosedConfiguration, goal: ClosedConfiguration, gain: float = 0.8,
+                watched: Legs | None = None) -> Servo:
+    """A run between two configurations of a shipped robot, all legs watched or some."""
+    found = setting(name, watched)
     law = Law(found.samples.question, found.dof, gain)
     desired = FixedDirections(directions(goal, law.question)[0])
     return ServoTask(found, start, goal, law, desired, Conditions(gain)).run()
@@ -115,17 +124,37 @@ def untold(found: Servo, aspects: Aspects) -> Iterator[str]:
         yield f"{len(crossed)} crossings, the condition goes from {values[0]:.3g} to {values[1]:.3g}"
 
 
-def line(name: str, count: int, seed: int = 4) -> tuple[str, list[str]]:
-    """A robot's line of the table, and what is untrue in it."""
-    aspects, endings, wrong, pairs = Aspects.of(load(name)), Counter[str](), [], 0
-    for pairs, (start, goal) in enumerate(far_pairs(name, seed, count), 1):
-        found = run_between(name, start, goal)
-        endings[found.ended] += 1
-        wrong += [f"{name}, pair {pairs}, {found.start} to {found.goal}: {each}"
-                  for each in [*untrue(found), *untold(found, aspects)]]
-        if pairs % 10 == 0:
-            print(f"{name}: {pairs} of {count}, {dict(endings)}, untrue {len(wrong)}", file=sys.stderr, flush=True)
-    return row(f"`{name}`", pairs, *(endings[ended] or "–" for ended in ENDINGS), len(wrong)), wrong
+def runs(name: str, watched: Legs | None, seed: int, count: int, known: set[Key]) -> Iterator[dict[str, Any]]:
+    """Records of so many runs of a robot, without those that are known."""
+    aspects = Aspects.of(setting(name, watched))
+    keys = [(name, None if watched is None else ",".join(watched), seed, pair) for pair in range(1, count + 1)]
+    if known.issuperset(keys):
+        return
+    for key, (start, goal) in zip(keys, far_pairs(name, seed, count, watched), strict=False):
+        if key in known:
+            continue
+        found = run_between(name, start, goal, watched=watched)
+        member = Listed.of(found)
+        wrong = [*untrue(found), *untold(found, aspects), *member.untrue(found)]
+        yield {**dict(zip(KEY, key, strict=True)), "start": str(found.start), "goal": str(found.goal),
+               "ended": found.ended, "untrue": wrong, **member.to_dict()}
+
+
+def tables(records: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str, str]:
+    """The tables of a log, by the marks that they stand between."""
+    ways = {START: ("ended", ENDINGS), MEMBERS: ("member", MEMBER)}
+    found = {}
+    for mark, (field, kinds) in ways.items():
+        heads = ("robot", "pairs", *kinds, *(("untrue",) if mark == START else ()))
+        found[mark] = row(*heads) + row("---", *["---:"] * (len(heads) - 1))
+        for name in names:
+            for watched, what in ((False, f"`{name}`"), (True, f"`{name}`, random sets")):
+                own = [each for each in records if each["robot"] == name and (each["watched"] is not None) == watched]
+                if own and not (watched and mark == START):
+                    counted = Counter(each[field] for each in own)
+                    wrong = (sum(map(len, (each["untrue"] for each in own))),) if mark == START else ()
+                    found[mark] += row(what, len(own), *(counted[kind] or "–" for kind in kinds), *wrong)
+    return found
 
 
 def row(*cells: object) -> str:
@@ -133,24 +162,42 @@ def row(*cells: object) -> str:
 
 
 def main() -> None:
-    """Print or write the table; the exit status is 1 where something is untrue."""
+    """Make the runs that are not in the log; the exit status is 1 where something is untrue."""
     parser = argparse.ArgumentParser(prog="python -m simulation.far", description=__doc__)
     parser.add_argument("count", type=int, help="pairs of each robot")
     parser.add_argument("names", nargs="*", help="robots (default: all that are controllable)")
-    parser.add_argument("-o", dest="page", type=Path, help="the page whose table is written")
+    parser.add_argument("--random", type=int, default=0, help="pairs of each robot with random sets of legs")
+    parser.add_argument("--log", type=Path, required=True, help="the file to which each run is written")
+    parser.add_argument("-o", dest="page", type=Path, help="the page whose tables are written")
     asked = parser.parse_args()
     names = asked.names or CONTROLLABLE
-    text = None if asked.page is None else asked.page.read_text(encoding="utf-8")
-    with ProcessPoolExecutor(2) as pool:
-        found = list(pool.map(line, names, [asked.count] * len(names)))
-    heads = ("robot", "pairs", *ENDINGS, "untrue")
-    table = row(*heads) + row("---", *["---:"] * (len(heads) - 1)) + "".join(told for told, _ in found)
-    if text is None:
-        print(table)
+    records = [json.loads(each) for each in asked.log.read_text().splitlines()] if asked.log.exists() else []
+    known = {tuple(each[part] for part in KEY) for each in records}
+    ways = [way for name in names for way in (
+        runs(name, None, 4, asked.count, known),
+        chain.from_iterable(runs(name, legs, 5 + i, OF_ONE_SET, known)
+                            for i, legs in enumerate(random_sets(name, -(-asked.random // OF_ONE_SET)))))]
+    with asked.log.open("a", encoding="utf-8") as log:
+        while ways:
+            # one of each robot in turn: what is broken off has some of all
+            for way in ways[:]:
+                record = next(way, None)
+                if record is None:
+                    ways.remove(way)
+                    continue
+                records.append(record)
+                log.write(json.dumps(record) + "\n")
+                log.flush()
+    found = tables(records, [each for each in CONTROLLABLE if any(record["robot"] == each for record in records)])
+    if asked.page is None:
+        print("\n".join(found.values()))
     else:
-        asked.page.write_text(replaced(text, table, START), encoding="utf-8", newline="\n")
-    wrong = [each for _, some in found for each in some]
-    sys.exit("\n".join(wrong) or None)
+        text = asked.page.read_text(encoding="utf-8")
+        for mark, table in found.items():
+            text = replaced(text, table, mark)
+        asked.page.write_text(text, encoding="utf-8", newline="\n")
+    sys.exit("\n".join(f"{record['robot']}, {record['watched'] or 'all legs'}, {record['start']} to {record['goal']}: "
+                       f"{each}" for record in records for each in record["untrue"]) or None)
 
 
 if __name__ == "__main__":

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import cache
 from itertools import islice
 
@@ -34,9 +35,14 @@ def few_first(names: list[str]) -> list[ParameterSet]:
     return [pytest.param(name, marks=[] if name in FEW else pytest.mark.slow) for name in names]
 
 
+Legs = tuple[str, ...]
+
+
 @cache
-def setting(name: str) -> ObservedRobot:
-    return ObservedRobot.of(load(name))
+def setting(name: str, watched: Legs | None = None) -> ObservedRobot:
+    """A shipped robot, all or some of its legs watched."""
+    found = ObservedRobot.of(load(name)) if watched is None else setting(name)
+    return found if watched is None else replace(found, observed=tuple(o for o in found.observed if o.leg in watched))
 
 
 @cache
@@ -48,11 +54,11 @@ def home(name: str) -> ServoTask:
 
 
 def regular(name: str, seed: int, distance: float, steps: int = 12, apart: int = 1,
-            tried: int = 600) -> Iterator[ClosedConfiguration]:
+            tried: int = 600, watched: Legs | None = None) -> Iterator[ClosedConfiguration]:
     """Random configurations, in the working mode of the zero configuration, whose hidden robot is at least ``distance``
     from Type 2 singularities (part of the usual distance), ``apart`` steps of a random walk from each other; at most
     ``tried`` steps are made."""
-    found = setting(name)
+    found = setting(name, watched)
     examiner = ConfigurationAnalysis(found)
     question, start = found.everything.question, found.everything.start
     usual = np.median([examiner.classify(at).distances.type2 or 0.0 for at in found.configurations])
@@ -67,8 +73,9 @@ def regular(name: str, seed: int, distance: float, steps: int = 12, apart: int =
         yield there
 
 
-def far_pairs(name: str, seed: int, count: int) -> Iterator[tuple[ClosedConfiguration, ClosedConfiguration]]:
+def far_pairs(name: str, seed: int, count: int, watched: Legs | None = None
+              ) -> Iterator[tuple[ClosedConfiguration, ClosedConfiguration]]:
     """Pairs of random configurations that are regular, ever so slightly."""
-    found = list(islice(regular(name, seed, 0.05, steps=40, apart=15, tried=300 * count + 300),
-                        2 * count))
+    found = list(islice(regular(name, seed, 0.05, steps=40, apart=15, tried=300 * count + 300,
+                                watched=watched), 2 * count))
     return zip(found[::2], found[1::2], strict=False)

@@ -20,6 +20,7 @@ from hrsynth.mechanism.model import Limits
 from hrsynth.simulation.ending import BOUNDARY, GOAL, MODE
 from hrsynth.simulation.servo import servo
 from simulation.far import run_between, untold, untrue
+from simulation.listed import APART, OUTSIDE, Listed
 from simulation.scenes import BLIND, CONTROLLABLE, far_pairs, regular, setting
 
 FEW = ["3rpr_m1", "delta", "quattro"]
@@ -61,7 +62,10 @@ def check_far(name: str, seed: int, count: int) -> None:
     aspects = Aspects.of(load(name))
     for start, goal in far_pairs(name, seed, count):
         found = run_between(name, start, goal)
-        assert [*untrue(found), *untold(found, aspects)] == []
+        listed = Listed.of(found)
+        assert [*untrue(found), *untold(found, aspects), *listed.untrue(found)] == []
+        assert listed.member != OUTSIDE
+        assert replace(listed, nearest=None, continuum=False).member in (OUTSIDE, APART)
 
 
 def test_far_runs_end_as_they_are_named():

@@ -17,7 +17,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.observed import ObservedRobot
-from ...budgets import ENDING_LATE, ENDING_ROUNDS, ENDING_STARTS, ENDING_STEPS, ENDING_WALK, FARTHEST_ENDING
+from ...budgets import (
+    ENDING_DESCENTS,
+    ENDING_LATE,
+    ENDING_ROUNDS,
+    ENDING_STARTS,
+    ENDING_STEPS,
+    ENDING_WALK,
+    FARTHEST_ENDING,
+)
 from ...constraints.pattern import attached
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
@@ -237,7 +245,7 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
         points = []
         fresh.append(new)
         count = sum(map(len, known.values()))
-        if number and 2 * sum(fresh[len(fresh) // 2 :]) <= ENDING_LATE * count:
+        if number >= (ENDING_DESCENTS if minima else 1) and 2 * sum(fresh[len(fresh) // 2 :]) <= ENDING_LATE * count:
             break
     late = sum(fresh[len(fresh) // 2 :])
     isolated = tuple(Critical(point, met) for own in known.values() for _, point, met, _ in own)
