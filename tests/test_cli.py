@@ -116,7 +116,7 @@ def test_derive_json_is_the_contract_whatever_the_verdict(run, name: str, observ
     assert all(step.keys() >= {"rule", "leg", "accepted", "reason", "largest_angle"} for step in data["steps"])
     assert bool(data["lost"]) is (verdict != "controllable")
     assert all(len(lost["twist"]) == 6 and lost["name"] for lost in data["lost"])
-    assert all(one.keys() == {"leg", "link"} for one in data["observed"])
+    assert all(one.keys() == {"leg", "link", "kind", "camera", "at", "axis"} for one in data["observed"])
     blind = verdict == "uncontrollable"
     assert (data["notation"]["hidden"] is None) is blind
     assert (data["notation"]["hidden_ascii"] is None) is blind

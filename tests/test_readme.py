@@ -14,7 +14,7 @@ from hrsynth.catalog import readme as catalog
 from hrsynth.cli import execute
 from hrsynth.description import shipped
 from hrsynth.families.replays import REPLAYS, SIMULATED
-from hrsynth.present import readme, replays
+from hrsynth.present import observation_kinds, readme, replays
 
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = ROOT / "docs" / "pages"
@@ -61,6 +61,11 @@ def test_the_table_has_every_replay():
 def test_the_replays_are_fresh():
     pytest.importorskip("mujoco")
     assert readme.block(PAPERS, replays.START) == replays.table(), "the page is stale: make readme"
+
+
+def test_the_table_of_kinds_is_fresh():
+    page = (PAGES / "observations.md").read_text(encoding="utf-8")
+    assert readme.block(page, observation_kinds.START) == observation_kinds.table(), "the page is stale: make readme"
 
 
 def test_the_table_of_the_catalog_is_fresh():

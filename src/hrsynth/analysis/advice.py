@@ -20,7 +20,7 @@ from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..progress import tell
 from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
-from .observed import LegsLike, ObservedRobot, RobotLike, restricted
+from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, restricted
 from .question import question
 from .verdict import CONTROLLABLE, Verdict, verdict_of
 
@@ -174,7 +174,7 @@ class Advice(Result, shown_as="advise"):
 
 
 @question()
-def advise(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+def advise(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
            most: int | None = None, seed: int = 0) -> Advice:
     """The smallest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3).
 
@@ -187,7 +187,7 @@ def advise(robot: RobotLike, observe: LegsLike = None, camera: str | None = None
     >>> hrsynth.advise("3rrr_m1", "1,2")
     <Advice: 3rrr_m1, watching 1, 2: partially controllable, 15 sets of 1 more>
     """
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     now = verdict_of(setting, setting.labels, setting.samples)
     if now.verdict == CONTROLLABLE:
         return Advice(setting, now, (), 0, True)

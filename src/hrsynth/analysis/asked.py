@@ -14,19 +14,22 @@ from ..kinematics.locked import rezero
 from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
 from ..results import spelled
 from ..tolerances import AS_PRINTED
-from .observed import SAMPLES, LegsLike, ObservedRobot, RobotLike, as_robot
+from .observed import SAMPLES, CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot
 
 if TYPE_CHECKING:
     from .modes.modes import AssemblyModes
 
 
 @spelled
-def observe(robot: RobotLike, legs: LegsLike = None, camera: str | None = None, *,
+def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
             at: PoseLike | None = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
     """A robot with what is watched of it, its normal form and samples of its motion: what every question takes.
 
     ``legs`` holds leg labels or link names (a string sets them apart by commas); None or ``["all"]`` means all legs at
-    their default segments. ``camera`` names the link that carries the camera. ``at`` is a pose that takes the place of
+    their default segments. ``camera`` names the link that carries the camera; ``NAME=LINK@x,y,z/r,p,y`` is a further
+    one, by a name, in the link's frame (x right, y down, z ahead; metres, radians or ``deg``). ``see`` holds other
+    observations, ``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius`` (:mod:`hrsynth.mechanism.observations`), in the place of
+    all legs where ``legs`` is None. ``at`` is a pose that takes the place of
     the zero configuration: on the branch of that where it reaches the pose, else in another operation mode that was
     met; or a mode of the zero configuration with what is watched, ``mode:2``, at which ``modes`` found the robot
     assembled.
@@ -41,7 +44,7 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: str | None = None, 
     """
     robot = as_robot(robot)
     if at is None:
-        return ObservedRobot.of(robot, legs, camera, samples=samples, seed=seed)
+        return ObservedRobot.of(robot, legs, camera, see=see, samples=samples, seed=seed)
     if isinstance(robot, ObservedRobot):
         raise BadRequest(f"{robot.headline()}: what is watched is asked twice", str(at),
                          "nothing besides an observed robot")
@@ -49,8 +52,8 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: str | None = None, 
     if isinstance(asked, Pose):
         start = _started(ObservedRobot.of(robot, seed=seed), asked)
     else:
-        (start,) = configurations_at(ObservedRobot.of(robot, legs, camera, seed=seed), [asked])
-    return ObservedRobot.of(replace(rezero(start), file=robot.file), legs, camera, samples=samples, seed=seed)
+        (start,) = configurations_at(ObservedRobot.of(robot, legs, camera, see=see, seed=seed), [asked])
+    return ObservedRobot.of(replace(rezero(start), file=robot.file), legs, camera, see=see, samples=samples, seed=seed)
 
 
 def _started(setting: ObservedRobot, wanted: Pose) -> ClosedConfiguration:

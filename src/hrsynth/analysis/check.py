@@ -15,7 +15,7 @@ from ..progress import tell
 from ..results import Result, Value
 from .asked import configurations_at
 from .classes import Redundancy, listed
-from .observed import LegsLike, Mobility, ObservedRobot, RobotLike
+from .observed import CameraLike, LegsLike, Mobility, ObservedRobot, RobotLike, SeeLike
 from .posture import ConfigurationAnalysis, Posture
 from .question import question
 
@@ -92,7 +92,7 @@ class Check(Result, shown_as="check"):
 
 
 @question()
-def check(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
           at: PoseLike | Iterable[PoseLike] = (), grid: Grid | str | None = None, seed: int = 0) -> Check:
     """Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six, constraint singularities and redundant constraints
     (docs/pages/theory.md, section 7) at the poses ``at`` (default: the zero configuration) and over ``grid``.
@@ -109,7 +109,7 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
     """
     poses = asked_poses(at)
     cells = Grid.parse(grid) if isinstance(grid, str) else grid
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed).telling(poses)
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(poses)
     examiner = ConfigurationAnalysis.of(setting)
     start, question, motion = setting.everything.start, setting.everything.question, setting.motion
     configurations = configurations_at(setting, poses) or [start]

@@ -12,7 +12,7 @@ from ..progress import tell
 from ..results import Result
 from .asked import observe as observed
 from .exact import ExactVerdict, architecture
-from .observed import LegsLike, ObservedRobot, RobotLike, restricted
+from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, restricted
 from .question import question
 from .verdict import Verdict, verdict_of
 
@@ -59,18 +59,19 @@ class Legs(Result, shown_as="legs"):
 
 
 @question()
-def legs(robot: RobotLike, camera: str | None = None, *, observe: LegsLike = None, at: PoseLike | None = None,
-         seed: int = 0) -> Legs:
+def legs(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = None, see: SeeLike = None,
+         at: PoseLike | None = None, seed: int = 0) -> Legs:
     """The verdict of every set of legs (theory.md 6), on the branch of the zero configuration, or of the pose ``at``
     (``mode:2``: a mode with all legs watched): all legs at their default segments, or those of ``observe``, labels or
-    links.
+    links, and what is seen with ``see``: observations count one by one.
 
     >>> hrsynth.legs("3rrr_m1").minimal
     (('1', '2', '3'),)
     """
-    setting = observed(robot, observe, camera, at=at, seed=seed)
+    setting = observed(robot, observe, camera, see=see, at=at, seed=seed)
     anatomy = setting.anatomy
-    segments = setting.segments if observe is None else setting.observed
+    whole = observe is None and all(each.by_segment for each in setting.observed)
+    segments = setting.segments if whole else setting.observed
     labels = labels_of(segments)
     sets, exact = list[Verdict](), list[ExactVerdict]()
     generic = architecture(setting)

@@ -26,7 +26,7 @@ from .asked import observe as observed_robot
 from .exact import ExactVerdict
 from .exact import architecture as exact_architecture
 from .freedoms import Freedom, name_freedoms
-from .observed import LegsLike, Mobility, ObservedRobot, RobotLike
+from .observed import CameraLike, LegsLike, Mobility, ObservedRobot, RobotLike, SeeLike
 from .question import question
 from .verdict import Verdict, verdict_of
 
@@ -124,16 +124,16 @@ class Derivation(Result, shown_as="derive"):
 
 
 @question()
-def derive(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
            at: PoseLike | None = None, form: str = "simplified", paper: bool = True, seed: int = 0) -> Derivation:
     """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3
     to 5).
 
     ``observe`` holds leg labels or link names (default: all legs); ``camera`` names the link that carries the camera
-    (default: the base); ``at`` is a pose that takes the place of the zero configuration, in another operation mode if
-    need be, or one of its modes (``mode:2``); an observed robot says all of that itself. ``form`` is ``simplified`` or
-    ``general``; ``paper``: with the paper's own form beside it. Raises ``BadRequest`` for unknown names,
-    ``NotCertified`` if even the exact lift fails.
+    (default: the base), or further cameras, and ``see`` what these see (:func:`hrsynth.observe`); ``at`` is a pose that
+    takes the place of the zero configuration, in another operation mode if need be, or one of its modes (``mode:2``);
+    an observed robot says all of that itself. ``form`` is ``simplified`` or ``general``; ``paper``: with the paper's
+    own form beside it. Raises ``BadRequest`` for unknown names, ``NotCertified`` if even the exact lift fails.
 
     >>> found = hrsynth.derive("3rrr_m1", [1, 2, 3])
     >>> found
@@ -143,7 +143,7 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: str | None = None
     """
     if form not in FORMS:
         raise BadRequest("unknown form", form, tuple(FORMS))
-    setting = observed_robot(robot, observe, camera, at=at, seed=seed)
+    setting = observed_robot(robot, observe, camera, see=see, at=at, seed=seed)
     anatomy, samples = setting.anatomy, setting.samples
     verdict = verdict_of(setting, setting.labels, samples)
     exact = exact_architecture(setting).verdict(setting.observed)

@@ -14,6 +14,7 @@ import numpy as np
 
 from ..budgets import REMEMBERED
 from ..description import load
+from ..description.sights import CAMERA, SEE, parse_camera, parse_see, with_sights
 from ..errors import BadMechanism, BadRequest, NoSegment, NotSampled
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
@@ -67,19 +68,20 @@ class ObservedRobot(Value):
     """How poses are told."""
 
     @classmethod
-    def of(cls, robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *, samples: int = SAMPLES,
-           seed: int = 0) -> ObservedRobot:
+    def of(cls, robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
+           samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
         """What a question is asked of: an observed robot itself, or a robot with what is watched of it, as
         :func:`.asked.observe`."""
         robot, names = as_robot(robot), as_names(observe)
         if isinstance(robot, ObservedRobot):
-            if (observe, camera) != (None, None):
-                raise BadRequest(f"{robot.headline()}: what is watched is asked twice", observe or camera,
+            if (observe, camera, see) != (None, None, None):
+                raise BadRequest(f"{robot.headline()}: what is watched is asked twice", observe or camera or see,
                                  "nothing besides an observed robot")
             return robot
         tell("sampling")
         try:
-            return _observed_robot(robot, (robot.file, robot.notes), names, camera, samples, seed)
+            return _observed_robot(robot, (robot.file, robot.notes), names, as_texts(camera), as_texts(see), samples,
+                                   seed)
         except (BadMechanism, NotSampled) as error:
             error.file = robot.file
             raise
@@ -103,6 +105,15 @@ class ObservedRobot(Value):
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.headline()}>"
+
+    def by_segments(self, what: str) -> ObservedRobot:
+        """The same; raises ``BadRequest`` where something else is observed than directions of segments, seen from the
+        mechanism's reference link, which is all that ``what`` knows."""
+        for each in self.observed:
+            if not each.by_segment:
+                raise BadRequest(f"{self.robot.name}: {what} knows directions of segments only",
+                                 f"{each.kind} {each.leg}", "legs to watch (derive, legs, check, advise know all)")
+        return self
 
     @property
     def mechanism(self) -> Mechanism:
@@ -173,9 +184,16 @@ class ObservedRobot(Value):
     @cached_property
     def mobility(self) -> Mobility:
         """Mobility of the normal form, with its idle motions."""
-        first = self.everything.members[0].relation
-        rows = first.basis[: first.twist_rows + sum(first.sizes[: self.defaults])]
-        return Mobility(first.mobility, first.mobility - range_basis(rows, 1.0)[1].value)
+        first, every = self.everything.members[0].relation, self.everything.question.observations
+        places = [every.index(each) for each in self.telling_idle]
+        return Mobility(first.mobility, first.mobility - selected(first, places).dimension)
+
+    @property
+    def telling_idle(self) -> tuple[Observation, ...]:
+        """What an idle motion does not change: the default segments of all legs, and whatever else is observed that is
+        no segment."""
+        more = self.everything.question.observations[self.defaults :]
+        return *self.segments, *(each for each in more if not each.by_segment)
 
     @cached_property
     def mobility_as_written(self) -> Mobility:
@@ -197,7 +215,7 @@ class ObservedRobot(Value):
 
     def to_dict(self) -> dict[str, Any]:
         """What is observed, and from which link, as the records of the command line begin."""
-        return {"observed": [{"leg": o.leg, "link": o.link} for o in self.observed],
+        return {"observed": [o.to_dict() for o in self.observed],
                 "camera": self.mechanism.reference}
 
     def watched(self) -> tuple[tuple[Observation, str], ...]:
@@ -206,8 +224,7 @@ class ObservedRobot(Value):
 
     def watched_dict(self) -> list[dict[str, Any]]:
         """The same as the records of the command line have it; axes in the frames of their links."""
-        return [{"leg": o.leg, "link": o.link, "axis": o.direction.tolist() if isinstance(o, Direction) else None,
-                 "why": why} for o, why in self.watched()]
+        return [{**o.to_dict(), "why": why} for o, why in self.watched()]
 
     def modes_dict(self) -> dict[str, Any]:
         """The samples' operation mode and the others that were met, as the records of the command line have them."""
@@ -220,6 +237,10 @@ class ObservedRobot(Value):
                      "pose": Pose.of(mode.at.pose(drawn.question.platform)).to_dict()} for mode in drawn.met]}
 
 
+CameraLike = str | Iterable[str] | None
+"""The link that carries the camera, or ``NAME=LINK@x,y,z/r,p,y``, or several of them."""
+SeeLike = str | Iterable[str] | None
+"""``[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius``, or several of them."""
 RobotLike = Mechanism | ObservedRobot | str | Path
 """A robot as a user gives it: as it was read or observed, the path of its file, the name of a shipped one."""
 
@@ -247,24 +268,33 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
     return None if names == ("all",) else names
 
 
+def as_texts(given: str | Iterable[str] | None) -> tuple[str, ...]:
+    """One text or several; raises ``BadRequest`` for what is none."""
+    every = () if given is None else (given,) if isinstance(given, str) else tuple(given)
+    if not all(isinstance(each, str) for each in every):
+        raise BadRequest("cameras and what they see", given, f"texts such as {SEE}, or {CAMERA}")
+    return every
+
+
 def forget_robots() -> None:
     """Forget the samples that are remembered."""
     _observed_robot.cache_clear()
 
 
 @lru_cache(maxsize=REMEMBERED)
-def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...] | None, camera: str | None,
-                    samples: int, seed: int) -> ObservedRobot:
+def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...] | None, cameras: tuple[str, ...],
+                    see: tuple[str, ...], samples: int, seed: int) -> ObservedRobot:
     """The answer to the same words for the same value of a robot, of one ``source``, is the same value: it is drawn
     once."""
-    if camera is not None:
-        if camera not in robot.links:
-            raise BadRequest(f"{robot.name} has no link for the camera", camera, sorted(robot.links))
-        robot = replace(robot, camera=camera)
+    robot, asked = _seeing(robot, cameras, see)
     normal = normal_form(robot)
     anatomy = decompose(normal.mechanism)
     defaults = defaults_of(anatomy)
-    observed = _observed(anatomy, normal, defaults, observe)
+    given = tuple(o for o in anatomy.mechanism.observations if not (o.by_segment or o.leg in asked))
+    chosen = () if observe is None and asked else (
+        tuple(anatomy.mechanism.observations) if observe is None and given else
+        _observed(anatomy, normal, defaults, observe, given))
+    observed = (*chosen, *(o for o in anatomy.mechanism.observations if o.leg in asked))
     known = {o.key for o in defaults.values()}
     extra = tuple(o for o in observed if o.key not in known)
     question = Measurement(normal.mechanism.platform, anatomy.point, normal.mechanism.reference,
@@ -273,8 +303,21 @@ def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...]
     return ObservedRobot(robot, normal, anatomy, observed, drawn, len(defaults))
 
 
+def _seeing(robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...]) -> tuple[Mechanism, set[str]]:
+    """The robot with cameras and observations that are asked for, and the labels of these."""
+    named = [parse_camera(text) for text in cameras if "=" in text]
+    for link in [text for text in cameras if "=" not in text]:
+        if link not in robot.links:
+            raise BadRequest(f"{robot.name} has no link for the camera", link, sorted(robot.links))
+        robot = replace(robot, camera=link)
+    before = {o.leg for o in robot.observations}
+    eyes = [each.name for each in named or robot.cameras]
+    robot = with_sights(robot, [parse_see(text, eyes) for text in see], named)
+    return robot, {o.leg for o in robot.observations} - before
+
+
 def _observed(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str, Observation],
-              observe: Sequence[str] | None) -> tuple[Observation, ...]:
+              observe: Sequence[str] | None, given_too: Sequence[Observation]) -> tuple[Observation, ...]:
     if observe is not None and not observe:
         raise BadRequest("nothing is observed", "no leg", "leg labels, links, or all")
     if observe is None or list(observe) == ["all"]:
@@ -288,17 +331,21 @@ def _observed(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str,
         return tuple(defaults.values())
     chosen: dict[tuple[str, ...], Observation] = {}
     for name in observe:
+        others = [o for o in given_too if o.leg == name]
+        chosen |= {o.key: o for o in others}
+        if others and name not in anatomy.labels:
+            continue
         if name in anatomy.labels:
             observation = defaults.get(name) or default_observation(anatomy, anatomy.leg(name))
         elif name in normal.into:
             link = normal.into[name]
             if link not in anatomy.mechanism.links:
                 raise BadRequest(f"link {name!r} acts inside a joint and has no direction of its own")
-            given = next((o for o in anatomy.mechanism.observations if o.link == link), None)
+            given = next((o for o in anatomy.mechanism.observations if o.link == link and o.by_segment), None)
             observation = given or observation_of(anatomy, link)
         else:
             raise BadRequest(f"{anatomy.mechanism.name} has no leg or link", name,
-                             "legs " + ", ".join(anatomy.labels) + "; links "
+                             "legs " + ", ".join([*anatomy.labels, *labels_of(given_too)]) + "; links "
                              + ", ".join(n for leg in anatomy.legs for n in leg.links))
         chosen[observation.key] = observation
     return tuple(chosen.values())

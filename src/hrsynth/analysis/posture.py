@@ -168,9 +168,9 @@ class ConfigurationAnalysis(Value):
         """What can be said without names: no freedoms, no redundant constraints."""
         setting = self.setting
         found = relation(at, setting.samples.question)
-        defaults = relation(at, replace(setting.everything.question, observations=setting.segments))
+        told = relation(at, replace(setting.everything.question, observations=setting.telling_idle))
         real = self._kinds(self._real(at), self.usual_real) if at.twin.actuated() else None
-        mobility = Mobility(found.mobility, found.mobility - defaults.dimension)
+        mobility = Mobility(found.mobility, found.mobility - told.dimension)
         return Posture(at, setting.motion.pose(at.pose(setting.motion.link)), mobility, found.dof.value,
                        self._kinds(found, self.usual), real, self._distances(at, found))
 

@@ -59,7 +59,7 @@ def _watched(word: RobotWord) -> dict[int, int]:
     cannot be made."""
     try:
         anatomy = decompose(normal_form(mechanism(word)).mechanism)
-        given = {seen.leg: seen.link for seen in anatomy.mechanism.observations}
+        given = {seen.leg: seen.link for seen in anatomy.mechanism.observations if seen.by_segment}
         links = [given.get(leg.label) or default_observation(anatomy, leg).link for leg in anatomy.legs]
     except HrsynthError:
         return {}

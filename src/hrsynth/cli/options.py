@@ -102,9 +102,15 @@ def shipped() -> Iterable[str]:
 
 
 JSON = flag("json", "Print the result as one JSON object; its schema: hrsynth schema COMMAND.", OUTPUT)
-OBSERVE = Option("observe", "Legs to watch (1,4), links, or all.", "LEGS", default="all", group=WATCHING)
-CAMERA = Option("camera", "The link that carries the camera.", "LINK", group=WATCHING)
+OBSERVE = Option("observe", "Legs to watch (1,4), links, or all (default: all, beside --see none).", "LEGS",
+                 group=WATCHING)
+CAMERA = Option("camera", "The link that carries the camera; or a further camera by a name, its place on a link "
+                "(metres; radians or deg): again for more.", "LINK|NAME=LINK@x,y,z/r,p,y", list[str], group=WATCHING)
 WATCHED = (OBSERVE, CAMERA)
+SEE = Option("see", "What else is observed: circle, depth, direction, distance, edge, edges, encoder, image_circle, "
+             "image_line, inclination, line, point or position, with a point, an axis and a radius where the kind "
+             "needs them (world: the base; of an encoder the joint); again for more.",
+             "[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius", list[str], group=WATCHING)
 SEED = Option("seed", "Seed of the random configurations.", "NUMBER", int, 0, low=0)
 SOURCE = (
     Option("robot", "A robot file in any dialect, a shipped robot's name, or example:NAME.", "ROBOT", default=NEEDED,

@@ -16,6 +16,7 @@ from .options import (
     JSON,
     NEEDED,
     OUTPUT,
+    SEE,
     SEED,
     SOURCE,
     WATCHED,
@@ -106,6 +107,8 @@ class Question:
         given = {name: value for name, value in values.items() if name in known and value is not None}
         if "observe" in given:
             given["observe"] = listed(given["observe"])
+        if len(given.get("camera", ())) == 1:
+            (given["camera"],) = given["camera"]
         return function(mechanism, **given)
 
 
@@ -164,7 +167,7 @@ BOX = Option("box", "Intervals of motors (m, rad), as hip=-1:1,slide=0:0.2 (defa
 QUESTIONS = (
     Question("derive", "The hidden robot of a robot, how it is derived, its certificate, and what the controller can "
              "see.",
-             (*WATCHED, BEGIN,
+             (*WATCHED, SEE, BEGIN,
               Option("form", "simplified (as in the paper) or general (sliders, all legs kept).", default="simplified",
                      words=("simplified", "general")),
               _file("derive"), _file("derive", "report"), _file("derive", "certificate")),
@@ -172,9 +175,9 @@ QUESTIONS = (
               "robot.urdf --platform plate --motors hip_1,hip_2,hip_3")),
     Question("legs", "Every set of observed legs: its verdict, the freedoms it loses, and the smallest sets that see "
              "most.",
-             (*WATCHED, BEGIN), ("quattro", "quattro --observe arm_1,arm_2,rod_3a", "quattro --camera platform")),
+             (*WATCHED, SEE, BEGIN), ("quattro", "quattro --observe arm_1,arm_2,rod_3a", "quattro --camera platform")),
     Question("check", "Mobility, ranks, singularities and redundant constraints at poses, and over a grid of poses.",
-             (*WATCHED, Option("at", f"A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; {POSES}", "POSE", list[str]),
+             (*WATCHED, SEE, Option("at", f"A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; {POSES}", "POSE", list[str]),
               Option("grid", "A line, plane or box of poses, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 "
                      "(from:to:count).", "GRID"),
               _file("check")),
@@ -189,7 +192,7 @@ QUESTIONS = (
               Option("steps", "Poses along each side of the plane.", None, int, 51, low=5, high=300)),
              ("quattro --observe 1,4", "quattro --observe 1,4 --plane z=-0.7,phi=0 -o locus.png")),
     Question("advise", "What is missing: the smallest sets of further measurements that make a robot controllable.",
-             WATCHED, ("uranesx", "quattro --observe 1")),
+             (*WATCHED, SEE), ("uranesx", "quattro --observe 1")),
     Question("branch", "Where the joints are proved to be one function of the motors, on the branch of the zero "
              "configuration, and what ends that.",
              (BOX,

@@ -47,16 +47,21 @@ class PoseRecord(TypedDict):
 
 
 class Watched(TypedDict):
-    """A watched segment."""
+    """An observation: its label (a leg's, where it is a segment), the link, what kind; the camera that has a name and
+    sees it, point (m) and axis in the link's frame (null where there are none); the joint of an encoder."""
 
     leg: str
     link: str
+    kind: str
+    camera: str | None
+    at: list[float] | None
+    axis: list[float] | None
+    joint: NotRequired[str]
 
 
 class WatchedAxis(Watched):
-    """A watched segment, its direction in the link's frame (null where no direction is watched), and why it is it."""
+    """An observation, and why it is it."""
 
-    axis: list[float] | None
     why: str
 
 

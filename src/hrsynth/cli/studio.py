@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from .colour import say
 from .commands import Group, add_command
-from .options import CAMERA, WATCHING, Option, listed, shipped
+from .options import WATCHING, Option, listed, shipped
 
 if TYPE_CHECKING:
     from ..present.studio.server import StudioServer
@@ -50,6 +50,7 @@ def add(app: Group) -> None:
                 (Option("robot", "A robot file in any dialect, a shipped robot's name, example:NAME, or a folder.",
                         "[ROBOT|FOLDER]", argument=True, words=shipped),
                  Option("observe", "Legs to watch (1,4), links, or all (default: what the file says).", "LEGS",
-                        group=WATCHING), CAMERA, PORT,
+                        group=WATCHING),
+                 Option("camera", "The link that carries the camera.", "LINK", group=WATCHING), PORT,
                  Option("browser", "Open the page in the browser.", None, bool, True, ("--browser/--no-browser",))),
                 studio, ("quattro --observe 1,4", "robots/ --port 8000 --no-browser"))

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..analysis.branch.answer import BranchProof
 from ..analysis.branch.proof import BoxLike, branch
-from ..analysis.observed import LegsLike, ObservedRobot, RobotLike, as_robot
+from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, as_robot
 from ..analysis.question import question
 from ..errors import BadRequest, HrsynthError
 from ..mechanism.observations.direction import Direction
@@ -60,7 +60,7 @@ class ExportedCode(Result, shown_as="export"):
 
 @question()
 def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, observe: LegsLike = None,
-           camera: str | None = None) -> ExportedCode:
+           camera: CameraLike = None) -> ExportedCode:
     """A program for a controller, in C++ (one header, C++17, Eigen) or NumPy (one module): from the motors' coordinates
     the passive joints and the platform's pose on the branch of the zero configuration, their Jacobians, the motors of a
     pose, and the interaction matrix of the watched directions (``observe``, ``camera`` as for ``derive``).
@@ -84,10 +84,10 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
     return ExportedCode(proof, lang, tuple(each.leg for each in watched), code)
 
 
-def _watched(robot: Any, observe: LegsLike, camera: str | None) -> tuple[Direction, ...]:
+def _watched(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:
     """The watched directions that are seen from the base; by default none where a robot has no legs to watch."""
     try:
-        observed = ObservedRobot.of(robot, observe, camera)
+        observed = ObservedRobot.of(robot, observe, camera).by_segments("export")
     except HrsynthError:
         if observe is not None or camera is not None:
             raise

@@ -8,15 +8,20 @@ from urllib.parse import quote, unquote
 
 import numpy as np
 
+from ..errors import BadRequest
 from ..geometry.vectors import frozen, inverse
 from ..mechanism.model import JointType, Mechanism, Motor
 from ..mechanism.observations.direction import Direction
+from ..mechanism.sights import NamedCamera
 from ..tolerances import WITHOUT_DIRECTION
 from . import numerals
 from .jointgraph import FrameSpec, JointGraph
+from .sights import attributes_of, spec_of
 
 NAMESPACE = "urn:hrsynth"
 PREFIX = "hrsynth"
+IMAGE = ("focal", "width", "height")
+"""What is said of a camera's pictures."""
 
 
 def drop_world(graph: JointGraph) -> JointGraph:
@@ -60,9 +65,25 @@ def read_annotation(graph: JointGraph, key: str, text: str) -> str | None:
         if not np.linalg.norm(direction) > WITHOUT_DIRECTION:
             return "observe: a zero direction"
         graph.observations.append(Direction(words[0], words[1], direction))
+    elif key in ("see", "eye"):
+        said = {name: value for name, _, value in (word.partition("=") for word in words)}
+        try:
+            if key == "see":
+                graph.sights.append(spec_of(said))
+            else:
+                graph.cameras.append(_camera(said))
+        except (BadRequest, KeyError, ValueError) as error:
+            return str(error)
     else:
         return "unknown saying"
     return None
+
+
+def _camera(said: dict[str, str]) -> NamedCamera:
+    place, turn = (numerals.parse(said.get(key, "0 0 0"), 3) for key in ("xyz", "rpy"))
+    size = [float(numerals.parse(said[key], 1)[0]) if key in said else None for key in IMAGE]
+    width, height = (None if each is None else int(each) for each in size[1:])
+    return NamedCamera(said["name"], said["link"], numerals.from_origin(place, turn), size[0], width, height)
 
 
 def annotations_of(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[str, str]]:
@@ -73,6 +94,20 @@ def annotations_of(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[
     for joint in robot.joints.values():
         if motors and joint.motor is not None:
             yield "motor", f"{quote(joint.motor.name)} {quote(joint.name)}"
+    for camera in robot.cameras:
+        yield "eye", _said(camera_attributes(camera, numerals.ANGLE_DECIMALS))
     for each in robot.observations:
-        if isinstance(each, Direction):
+        if isinstance(each, Direction) and each.by_segment:
             yield "observe", f"{quote(each.leg)} {quote(each.link)} {numerals.axis(each.direction)}"
+        else:
+            yield "see", _said(attributes_of(each, robot, numerals.ANGLE_DECIMALS))
+
+
+def camera_attributes(camera: NamedCamera, decimals: int) -> dict[str, str]:
+    """All that is said of a camera, by name."""
+    image = {key: numerals.exact(value) for key in IMAGE if (value := getattr(camera, key)) is not None}
+    return {"name": camera.name, "link": camera.link, **numerals.origin(camera.pose, decimals)[1], **image}
+
+
+def _said(attributes: dict[str, str]) -> str:
+    return " ".join(f"{key}={quote(value)}" for key, value in attributes.items())

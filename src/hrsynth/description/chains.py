@@ -70,7 +70,8 @@ def merge(mechanism: Mechanism) -> Mechanism:
     """The mechanism with every chain and every tip merged into one joint; what only looks like one stays as it is."""
     links, joints = dict(mechanism.links), dict(mechanism.joints)
     busy = {mechanism.base, mechanism.platform, mechanism.reference}
-    busy |= {observation.link for observation in mechanism.observations}
+    busy |= {link for o in mechanism.observations for link in (o.link, o.seen_from) if link is not None}
+    busy |= {camera.link for camera in mechanism.cameras}
     busy |= {link for coupling in mechanism.couplings for link in (coupling.predecessor, coupling.successor)}
     degree: dict[str, int] = {}
     for joint in joints.values():

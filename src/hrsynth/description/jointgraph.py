@@ -11,7 +11,9 @@ from ..geometry.vectors import Array, frozen, inverse
 from ..mechanism import graphs
 from ..mechanism.model import JointType, Limits, Link, Motor, Note
 from ..mechanism.observations.direction import Direction
+from ..mechanism.sights import NamedCamera
 from .numerals import Digits
+from .sights import SightSpec
 
 ORIGIN = frozen(np.eye(4))
 Z = frozen([0.0, 0.0, 1.0])
@@ -98,6 +100,9 @@ class JointGraph:
     platform: str | None = None
     camera: str | None = None
     observations: list[Direction] = field(default_factory=list)
+    sights: list[SightSpec] = field(default_factory=list)
+    """Observations of other kinds, or by cameras that have a name."""
+    cameras: list[NamedCamera] = field(default_factory=list)
     rest: list[str] = field(default_factory=list)
     notes: list[Note] = field(default_factory=list)
     digits: Digits = field(default_factory=Digits)
@@ -146,6 +151,9 @@ class JointGraph:
                                           for value in (limits.lower, limits.upper, limits.velocity))
                 limits = replace(limits, lower=lower, upper=upper, velocity=velocity)
             self.joints[name] = replace(joint, ends=(one, two), limits=limits)
+        self.sights = [replace(each, at=each.at and (factor * each.at[0], factor * each.at[1], factor * each.at[2]),
+                               radius=each.radius and factor * each.radius) for each in self.sights]
+        self.cameras = [replace(each, pose=scaled(each.pose, factor)) for each in self.cameras]
         units = {name: factor if name in slides else 1.0 for name in self.joints}
         self.gears = [replace(gear, ratio=gear.ratio * units[gear.driven] / units[gear.driver],
                               offset=gear.offset * units[gear.driven]) for gear in self.gears]

@@ -12,7 +12,6 @@ from dataclasses import replace
 from ..errors import BadRequest
 from ..geometry.vectors import pose
 from ..mechanism.model import Joint, JointType, Link, Mechanism, Motor, Note
-from ..mechanism.observations.direction import Direction
 from . import chains
 from .chains import CUT, WELD
 from .tree import is_connected, spanning
@@ -60,7 +59,7 @@ def reduce(mechanism: Mechanism, tree: Collection[JointType], loops: Collection[
         put(replace(joint, successor=name, in_tree=True))
         weld = Joint(joint.name + WELD, JointType.FIXED, name, joint.successor, joint.point, in_tree=False)
         joints[weld.name] = weld
-    return replace(given, links=links, joints=joints), tuple(_lost(given))
+    return replace(given, links=links, joints=joints), ()
 
 
 def _without_idle_joints(mechanism: Mechanism) -> Mechanism:
@@ -69,14 +68,6 @@ def _without_idle_joints(mechanism: Mechanism) -> Mechanism:
         rest = mechanism.changed(remove_joints=[joint.name])
         mechanism = rest if is_connected(rest) else mechanism
     return mechanism
-
-
-def _lost(mechanism: Mechanism) -> list[Note]:
-    found = []
-    other = [o.leg for o in mechanism.observations if type(o) is not Direction]
-    if other:
-        found.append(Note("warning", "observations that are not directions are not written: legs " + ", ".join(other)))
-    return found
 
 
 def require_free_world(robot: Mechanism, world: str, dialect: str) -> None:

@@ -243,7 +243,7 @@ def _labelled(anatomy: LegDecomposition) -> LegDecomposition:
     mechanism = anatomy.mechanism
     links = ", ".join(n for leg in anatomy.legs for n in leg.links) or "none"
     file = mechanism.file or mechanism.name
-    for observation in mechanism.observations:
+    for observation in (o for o in mechanism.observations if o.by_segment):
         line = getattr(observation, "line", None)
         index = next((i for i, leg in enumerate(anatomy.legs) if anatomy.leg_of(observation.link) == leg), None)
         if index is None:

@@ -29,10 +29,13 @@ def between(mechanism: Mechanism, base: str, platform: str) -> Mechanism:
     inside = next(part for part in parts if {base, platform} <= part)
     gone = [link for link in mechanism.links if link not in inside]
     camera = mechanism.camera if mechanism.camera in inside else None
-    observations = tuple(o for o in mechanism.observations if o.link in inside)
+    observations = tuple(o for o in mechanism.observations
+                         if o.link in inside and (o.seen_from is None or o.seen_from in inside))
+    cameras = tuple(each for each in mechanism.cameras if each.link in inside)
     notes = mechanism.notes
     if gone:
         notes = (*notes, Note("ignored", f"{len(gone)} links that are not between {base!r} and {platform!r}: "
                                          + ", ".join(gone[:5]) + (" …" if gone[5:] else "")))
-    kept = replace(mechanism, base=base, platform=platform, camera=camera, observations=observations, notes=notes)
+    kept = replace(mechanism, base=base, platform=platform, camera=camera, observations=observations, notes=notes,
+                   cameras=cameras)
     return kept.changed(remove_links=gone)

@@ -68,7 +68,7 @@ def _first(segment: Callable[[Place], Direction], places: Sequence[Place]) -> Di
 def reason(anatomy: LegDecomposition, seen: Observation) -> str:
     """Why a segment is watched, in words."""
     if any(each.key == seen.key for each in anatomy.mechanism.observations):
-        return "named in the file"
+        return "named in the file" if seen.by_segment or seen.line is not None else "asked for"
     try:
         default, why = _default(anatomy, anatomy.leg(seen.leg))
     except HrsynthError:
@@ -79,7 +79,7 @@ def reason(anatomy: LegDecomposition, seen: Observation) -> str:
 def defaults_of(anatomy: LegDecomposition) -> dict[str, Observation]:
     """The segment of each leg that has one: the file's choice, else the default one."""
     table: dict[str, Observation] = {}
-    given = {o.leg: o for o in reversed(anatomy.mechanism.observations)}
+    given = {o.leg: o for o in reversed(anatomy.mechanism.observations) if o.by_segment}
     for leg in anatomy.legs:
         if leg.label in given:
             table[leg.label] = given[leg.label]

@@ -11,7 +11,7 @@ from ..analysis.controllability import legs
 from ..analysis.derive import derive
 from ..analysis.singularity.singular import singular
 from ..description import load, shipped
-from . import lint_rules, printed, replays
+from . import lint_rules, observation_kinds, printed, replays
 
 START, END = "<!-- generated: robots -->", "<!-- end -->"
 HEADS = ("robot", "architecture", "dof", "hidden robot, all legs watched", "verdict", "exact", "lost",
@@ -83,6 +83,6 @@ if __name__ == "__main__":
         file = Path(argument)
         text = file.read_text(encoding="utf-8")
         for start, make in ((START, table), (printed.START, printed.table), (replays.START, replays.table),
-                            (lint_rules.START, lint_rules.table)):
+                            (lint_rules.START, lint_rules.table), (observation_kinds.START, observation_kinds.table)):
             text = replaced(text, make(), start) if start in text else text
         file.write_text(text, encoding="utf-8", newline="\n")

@@ -16,7 +16,7 @@ from ..analysis.accuracy.pose_errors import PoseErrors
 from ..analysis.asked import configurations_at
 from ..analysis.aspects.path import SEPARATED, Aspects
 from ..analysis.modes.modes import AssemblyModes, modes
-from ..analysis.observed import LegsLike, ObservedRobot, RobotLike
+from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike
 from ..analysis.posture import ConfigurationAnalysis, Posture
 from ..analysis.question import question
 from ..analysis.verdict import CONTROLLABLE, verdict_of
@@ -187,7 +187,7 @@ class Selection(Result, shown_as="select"):
 
 @question(cones="cone")
 @by_name(Criteria, "criteria")
-def select(robot: RobotLike, camera: str | None = None, *, observe: LegsLike = None, start: PoseLike, goal: PoseLike,
+def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = None, start: PoseLike, goal: PoseLike,
            cone: Cones = "0.1deg", criteria: Criteria, seed: int = 0) -> Selection:
     """All sets of legs for the displacement from ``start`` to ``goal``, ranked by the largest position error at the
     goal for cones about the directions (``cone``: the half-angle of all, or one a leg; MMT A.2).
@@ -205,7 +205,7 @@ def select(robot: RobotLike, camera: str | None = None, *, observe: LegsLike = N
     <Selection: 3rrr_m1: 7 sets, 1 kept, best 1, 2, 3>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed).telling(wanted)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("select").telling(wanted)
     segments = setting.segments if observe is None else setting.observed
     directions = tuple(o for o in segments if isinstance(o, Direction))
     setting = replace(setting, observed=directions)

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..analysis.asked import configurations_at
-from ..analysis.observed import LegsLike, ObservedRobot, RobotLike
+from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike
 from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
 from ..analysis.question import question
 from ..analysis.verdict import verdict_of
@@ -109,7 +109,7 @@ class Conditions:
 
 @question()
 @by_name(Conditions, "conditions")
-def servo(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+def servo(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
           start: PoseLike, goal: PoseLike, conditions: Conditions, seed: int = 0) -> Servo:
     """The servo loop of MMT 2.3 from the pose ``start`` towards the directions at ``goal``.
 
@@ -122,7 +122,7 @@ def servo(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
     >>> hrsynth.servo("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=0", gain=0.8)
     <Servo: 3rrr_m1, watching 1, 2, 3: ended at x=0.02,y=0,z=0,phi=0, goal>
     """
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("servo")
     task = ServoTask.of(setting, start=start, goal=goal, conditions=conditions, seed=seed)
     tell("run")
     return task.run()

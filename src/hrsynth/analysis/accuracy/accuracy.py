@@ -17,7 +17,7 @@ from ...progress import tell
 from ...results import Result
 from ...tolerances import LARGEST_FIRST_ORDER
 from ..asked import configurations_at
-from ..observed import LegsLike, ObservedRobot, RobotLike
+from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike
 from ..question import question
 from ..verdict import verdict_of
 from .cones import Cones, half_angles
@@ -63,7 +63,7 @@ class Accuracy(Result, shown_as="accuracy"):
 
 
 @question(cones="cone", samples="nonlinear")
-def accuracy(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
              cone: Cones, at: PoseLike | Iterable[PoseLike] = (), plane: PoseLike | None = None,
              grid: Grid | str | None = None, steps: int | None = None, nonlinear: int = 0, seed: int = 0) -> Accuracy:
     """The largest position and orientation error of the platform over all errors of the directions inside the cones
@@ -89,7 +89,7 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: str | None = No
         raise BadRequest("number of samples", nonlinear, "none or more")
     held = None if plane is None else as_pose(plane)
     cells = Grid.parse(grid, LARGEST_FIELD) if isinstance(grid, str) else grid
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed).telling(wanted)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("accuracy").telling(wanted)
     if not all(isinstance(o, Direction) for o in setting.observed):
         raise BadRequest("cones apply to directions only", ", ".join(setting.labels), "directions of legs")
     half = half_angles(cone, setting.observed)

@@ -22,7 +22,7 @@ from ...results import Result, Value
 from ...tolerances import FOLLOWED
 from ..asked import at_mode
 from ..modes.modes import AssemblyModes, modes
-from ..observed import LegsLike, RobotLike
+from ..observed import CameraLike, LegsLike, RobotLike
 from ..question import question
 from .held_leg import HeldLegSection, section
 from .path import BUDGET, SAME, SEPARATED, UNDECIDED, Aspects, PathAnswer
@@ -140,7 +140,7 @@ class Atlas(Result, shown_as="atlas"):
 
 
 @question()
-def atlas(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+def atlas(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
           at: PoseLike | ClosedConfiguration | None = None, seed: int = 0, budget: int = BUDGET) -> Atlas:
     """Of all modes with the directions at ``at`` (as for ``modes``), which two lie in one aspect (as for ``path``), and
     whether that shows the hidden robot to be cuspidal: that it can go from one mode to another, with the same

@@ -21,7 +21,7 @@ from ...results import Result, Value
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
 from ..asked import configurations_at
 from ..measured import MeasuredRobot
-from ..observed import LegsLike, ObservedRobot, RobotLike
+from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike
 from ..question import question
 from ..singularity.agreement import smallest_of
 from .condition_enclosure import ConditionEnclosure, PathSegment, enclosed, sign_of
@@ -96,7 +96,7 @@ class PathAnswer(Result, shown_as="path"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         point = None if self.coordinates is None else self.coordinates.motion.point.tolist()
-        return {"observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
+        return {"observed": [o.to_dict() for o in self.setting.observed],
                 "verdict": self.verdict, "certified": self.certified, "path": [pose.to_dict() for pose in self.poses],
                 "crossings": [{"leg": leg, "at": place} for leg, place in self.crossings], "point": point,
                 "margin": self.margin, "boxes": self.boxes,
@@ -152,10 +152,10 @@ class Aspects(Value):
     """Freedoms that are never seen: then every pose is singular."""
 
     @classmethod
-    def of(cls, robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
+    def of(cls, robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
            *, seed: int = 0) -> Aspects:
         """The condition of a robot from random samples of its motion."""
-        setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+        setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("an atlas")
         seen = MeasuredRobot.watched(setting)
         return cls(setting, setting.motion, seen.pattern, seen.condition,
                    tuple(freedom.name for freedom in seen.verdict.lost))
@@ -253,7 +253,7 @@ class Aspects(Value):
 
 
 @question()
-def path(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
          start: PoseLike, goal: PoseLike, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
     """Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
 

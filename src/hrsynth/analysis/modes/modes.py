@@ -27,7 +27,7 @@ from ...progress import tell
 from ...results import Result
 from ...tolerances import CHAIN_ROUNDING, MOVED, SAME_RELATION
 from ..measured import MeasuredRobot
-from ..observed import LegsLike, ObservedRobot, RobotLike
+from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike
 from ..question import question
 from ..singularity.agreement import weakest
 from .branches import Model, solve_all
@@ -161,7 +161,7 @@ class AssemblyModes(Result, shown_as="modes"):
         """The record of the command line, without the command's own fields."""
         found = self.found
         return {"kind": self.kind, "at": self.pose.to_dict(), "within": self.within,
-                "observed": [{"leg": o.leg, "link": o.link} for o in self.setting.observed],
+                "observed": [o.to_dict() for o in self.setting.observed],
                 "complex": None if found.continuum else found.complex, "complete": found.complete,
                 "bound": found.bound, "proof": found.proof,
                 "modes": [each.to_dict() for each in self.modes], "near": [each.to_dict() for each in self.near],
@@ -171,7 +171,7 @@ class AssemblyModes(Result, shown_as="modes"):
 
 
 @question()
-def modes(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
           at: PoseLike | ClosedConfiguration | None = None, real: bool = False, as_written: bool = False,
           effort: float = EFFORT, seed: int = 0) -> AssemblyModes:
     """All poses with the directions that are observed at ``at`` (default: the zero configuration), or with ``real`` the
@@ -196,7 +196,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: str | None = None,
     """
     if real and observe not in (None, "all", ["all"]):
         raise BadRequest("the motors are held instead of directions", f"real with observe {observe}", "one of the two")
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("modes")
     asked = None if at is None or isinstance(at, ClosedConfiguration) else as_pose(at)
     setting = setting if asked is None else setting.telling([asked])
     motion, wanted = setting.motion, None

@@ -17,7 +17,7 @@ from ...results import Result, Value
 from ...tolerances import SOLVED
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
-from ..observed import LegsLike, ObservedRobot, RobotLike
+from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike
 from ..question import question
 from ..verdict import Verdict
 from .agreement import Agreement, agreement, weakest
@@ -89,7 +89,7 @@ class Singularity(Result, shown_as="singular"):
 
 
 @question()
-def singular(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
              real: bool = False, points: int = POINTS, seed: int = 0) -> Singularity:
     """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory.md 7; MMT 3.3.
 
@@ -99,7 +99,7 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: str | None = No
     >>> hrsynth.singular("rrrrr_m1", points=200)
     <Singularity: rrrrr_m1, watching 1, 2: the tangents τ1, τ2 are parallel>
     """
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("singular")
     measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)
     question, verdict = measured.question, measured.verdict
     tell("pattern of the legs' wrenches")

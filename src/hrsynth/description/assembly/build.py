@@ -15,6 +15,7 @@ from ..jointmotion import cure
 from ..numerals import Digits
 from ..overrides import Overrides
 from ..postures import posture
+from ..sights import as_written
 from ..tree import spanning
 from . import closures, guess
 from .candidates import without_loop
@@ -112,7 +113,7 @@ def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssemb
     mechanism = Mechanism(graph.name, links, with_limits(joints, assembly, values), base, platform,
                           tuple(graph.observations), (), graph.camera, tuple(graph.rest), graph.file,
                           tuple(graph.notes))
-    mechanism = spanning(mechanism)
+    mechanism = as_written(spanning(mechanism), graph.sights, graph.cameras, graph.file)
     return replace(mechanism, couplings=tuple(_couplings(graph, mechanism)))
 
 

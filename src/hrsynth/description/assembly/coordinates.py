@@ -71,7 +71,8 @@ def _chains(mechanism: Mechanism) -> list[list[Joint]]:
     bonds = graphs.adjacency(mechanism.links,
                              (j.links for j in mechanism.joints.values() if j.type is JointType.FIXED))
     base, platform = (graphs.component(bonds, link) for link in (mechanism.base, mechanism.platform))
-    busy = {o.link for o in mechanism.observations} | {mechanism.reference}
+    busy = {mechanism.reference, *(o.link for o in mechanism.observations)}
+    busy |= {o.seen_from for o in mechanism.observations if o.seen_from is not None}
     busy |= {link for c in mechanism.couplings for link in (c.predecessor, c.successor)}
     found = []
     for start in base:

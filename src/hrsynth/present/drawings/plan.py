@@ -14,7 +14,6 @@ from itertools import pairwise
 from ...errors import HrsynthError
 from ...mechanism import Mechanism
 from ...mechanism.legs import LegDecomposition, decompose
-from ...mechanism.observations.direction import Direction
 from .boxes import Box, Ear, boxes_of, ears
 
 Point = tuple[float, int]
@@ -92,7 +91,7 @@ def plan(mechanism: Mechanism | LegDecomposition, *, observed: Collection[str] |
     """
     anatomy = mechanism if isinstance(mechanism, LegDecomposition) else _anatomy(mechanism)
     whole = mechanism.mechanism if isinstance(mechanism, LegDecomposition) else mechanism
-    seen = (o.link for o in whole.observations if isinstance(o, Direction)) if observed is None else observed
+    seen = (o.link for o in whole.observations if o.by_segment) if observed is None else observed
     links = frozenset(seen)
     boxes = sorted(boxes_of(whole, links, virtual), key=lambda box: links.isdisjoint((box.tail, box.head)))
     groups, platform = _groups(whole, anatomy, boxes)

@@ -143,7 +143,7 @@ class Request(Value):
     @cached_property
     def setting(self) -> ObservedRobot:
         """The robot with what is watched of it; with all legs where none is."""
-        return observe(self.mechanism, self.watched or None, self.camera)
+        return observe(self.mechanism, self.watched or None, self.camera).by_segments("the studio")
 
     @property
     def blind(self) -> bool:

@@ -9,6 +9,7 @@ from ...tolerances import LARGEST_FIRST_ORDER
 
 if TYPE_CHECKING:
     from ...analysis.observed import ObservedRobot
+    from ...mechanism import Observation
 
 Rows = list[tuple[str, str | Sequence[str]]]
 """Names with their values: several stand under each other, none is no row."""
@@ -66,18 +67,30 @@ def known(name: str, value: str | None) -> Rows:
 def head(found: ObservedRobot) -> Rows:
     """The robot and what is observed of it."""
     return [("robot", f"{found.robot.name}   {found.anatomy.architecture()}"),
-            ("observed", ", ".join(f"{o.leg} ({o.link})" for o in found.observed))]
+            ("observed", ", ".join(f"{o.leg} ({o.link if o.by_segment else seen(o)})" for o in found.observed))]
+
+
+def seen(observation: Observation) -> str:
+    """What is observed, and by what: ``point of plate by hand``."""
+    told = observation.to_dict()
+    if "joint" in told:
+        return f"encoder of {told['joint']}"
+    of, by = observation.link, told["camera"] or observation.seen_from
+    return f"inclination of {by}" if told["kind"] == "inclination" else f"{observation.kind} of {of}" + (
+        f" by {by}" if by else "")
 
 
 def watched(found: ObservedRobot) -> dict[str, list[str]]:
     """What is watched of each leg: the link, the axis in its frame, and why it is that."""
     from ...analysis.freedoms import point_text
-    from ...mechanism.observations.direction import Direction
 
     told: dict[str, list[str]] = {}
     for o, why in found.watched():
-        axis = f" along {point_text(o.direction)} of its frame" if isinstance(o, Direction) else ""
-        told.setdefault(o.leg, []).append(f"{o.link}{axis}, {why}")
+        said = o.to_dict()
+        where = "".join(f" {word} {point_text(said[key])}" for word, key in (("at", "at"), ("along", "axis"))
+                        if said[key] is not None)
+        what = o.link if o.by_segment else seen(o)
+        told.setdefault(o.leg, []).append(f"{what}{where}{' of its frame' * bool(where)}, {why}")
     return told
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis.derive import Derivation, derive
-from ...analysis.observed import LegsLike, ObservedRobot, RobotLike
+from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike
 from ...analysis.question import question
 from ...geometry.vectors import Array, oriented
 from ...kinematics.coordinates import Coordinates
@@ -123,7 +123,7 @@ class View(Result, shown_as="view"):
 
 
 @question()
-def view(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *,
+def view(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
          hidden: bool = False, seed: int = 0) -> View:
     """What there is to see of a robot, and with ``hidden`` of its hidden robot too: every position of a slider is a
     closed configuration, in which one of the platform's coordinates alone differs from the zero configuration's.
@@ -134,7 +134,7 @@ def view(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, 
     >>> hrsynth.view("3rrr_m1")
     <View: 3rrr_m1, 3 sliders, 1 other assembly modes>
     """
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("view")
     derivation = derive(setting, seed=seed) if hidden else None
     other = None if derivation is None else derivation.hidden
     mover = Mover.of(setting, other)

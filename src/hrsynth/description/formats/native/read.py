@@ -14,13 +14,15 @@ from ....geometry.vectors import Array
 from ....mechanism import graphs
 from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
 from ....mechanism.observations.direction import Direction
+from ....mechanism.sights import NamedCamera
 from ....tolerances import NO_FINER, SAME_DIRECTION, SAME_GEOMETRY
 from ... import chains, xml
 from ...dialect import RobotFile
 from ...elements import LIMITS
 from ...jointgraph import JointSpec, TreeJoint, zero_poses
 from ...jointmotion import require_closed, residual
-from ..urdf.elements import INTERFACE, UrdfReader, simple_transmission
+from ...sights import SightSpec, as_written
+from ..urdf.elements import INTERFACE, UrdfReader, is_sight, simple_transmission
 
 OWN_TAGS = ("platform", "camera", "observe")
 """What an ``<hrsynth>`` element is read for; other children are kept, unless they look like one of these."""
@@ -51,6 +53,8 @@ def parse(text: bytes | str, file: str = "<text>") -> Mechanism:
 class _NativeReader(UrdfReader):
     observations: list[Direction] = field(default_factory=list)
     platform: str | None = None
+    seen: list[SightSpec] = field(default_factory=list)
+    cameras: list[NamedCamera] = field(default_factory=list)
     camera: str | None = None
     serial: bool = False
     rest: list[str] = field(default_factory=list)
@@ -128,9 +132,13 @@ class _NativeReader(UrdfReader):
             return
         element = elements[0]
         self.serial = element.get("serial") == "true"
+        self.seen, self.cameras = self.sights(element)
         for role in ("platform", "camera"):
-            child = self.only(element, role)
-            if child is not None:
+            found = [each for each in element.findall(role) if role == "platform" or each.get("name") is None]
+            for extra in found[1:]:
+                self.defect(xml.line(extra), f"second <{role}> in <hrsynth>" + " without a name" * (role == "camera"))
+            if found:
+                child = found[0]
                 link = self.attribute(child, "link")
                 if self.known(link, xml.line(child), f"{role}: unknown link"):
                     setattr(self, role, link)
@@ -151,6 +159,8 @@ class _NativeReader(UrdfReader):
 
     def observe(self, element: xml.Element) -> None:
         """An ``<observe>``: a direction."""
+        if is_sight(element):
+            return
         leg, link = self.attribute(element, "leg"), self.attribute(element, "link")
         self.known(link, xml.line(element), "observe: unknown link")
         if leg is not None and (leg == "all" or "," in leg):
@@ -169,7 +179,8 @@ class _NativeReader(UrdfReader):
             self.defect(root_line, "no links")
             return None
         self.check_ends()
-        if not self.loops and not self.root.findall("loop") and not self.serial:
+        watched = self.cameras or self.root.findall("hrsynth/observe[@kind]")
+        if not (self.loops or self.root.findall("loop") or self.serial or watched):
             self.defect(root_line, "no loop: not a parallel robot")
         carriers: dict[str, JointSpec] = {}
         for joint in self.tree.values():
@@ -232,7 +243,11 @@ class _NativeReader(UrdfReader):
                                 f"{cosine:.3g}", "0")
         self.require_sound()
         require_closed(self.file, loops, mechanism.length)
-        return chains.merge(mechanism)
+        return self.watched(chains.merge(mechanism))
+
+    def watched(self, mechanism: Mechanism) -> Mechanism:
+        """With its cameras and observations of all kinds."""
+        return as_written(mechanism, self.seen, self.cameras, self.file)
 
     def rounded(self, mechanism: Mechanism, loops: Sequence[tuple[JointSpec, Array, Array]], poses: Mapping[str, Array]
                 ) -> Mechanism | None:
@@ -248,4 +263,4 @@ class _NativeReader(UrdfReader):
             return None
         self.require_sound()
         between = [replace(joint_at(joint, poses, False), motor=self.motors.get(joint.name)) for joint, _, _ in loops]
-        return as_meant(chains.merge(mechanism.changed(joints=between)), opening, tolerance)
+        return as_meant(self.watched(chains.merge(mechanism.changed(joints=between))), opening, tolerance)

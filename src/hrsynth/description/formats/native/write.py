@@ -12,11 +12,12 @@ from ....budgets import LARGEST_NUMBER
 from ....errors import BadRequest
 from ....geometry.vectors import Array, inverse, pose, unit
 from ....mechanism.model import Joint, JointType, Limits, Mechanism, Motor
-from ....mechanism.observations.direction import Direction
 from ....tolerances import AT_ORIGIN, SAME_DIRECTION
 from ... import chains, numerals, xml
+from ...annotations import IMAGE, camera_attributes
 from ...dialect import Written
 from ...jointgraph import LOOP_TYPES, ORIGIN
+from ...sights import attributes_of
 from ...tree import outward, spanning
 from ..urdf.elements import simple_transmission
 
@@ -36,8 +37,8 @@ def text(mechanism: Mechanism) -> str:
     Raises
     ------
     BadRequest
-        For what the dialect cannot say: an observation that is no direction, a universal joint whose axes are not
-        perpendicular, a link that has the name of a link in between, numbers that are not finite.
+        For what the dialect cannot say: an observation seen from a link without a named camera, a universal joint whose
+        axes are not perpendicular, a link that has the name of a link in between, numbers that are not finite.
     """
     return _NativeWriter(spanning(mechanism)).text()
 
@@ -163,11 +164,15 @@ class _NativeWriter:
         etree.SubElement(element, "platform", link=robot.platform)
         if robot.camera is not None:
             etree.SubElement(element, "camera", link=robot.camera)
-        for observation in robot.observations:
-            if type(observation) is not Direction:
-                raise BadRequest(f"observation of leg {observation.leg!r}", type(observation).__name__, "a direction")
-            etree.SubElement(element, "observe", leg=observation.leg, link=observation.link,
-                             axis=numerals.axis(observation.direction))
+        for camera in robot.cameras:
+            said = camera_attributes(camera, self.decimals)
+            eye = etree.SubElement(element, "camera", name=camera.name, link=camera.link)
+            for tag, keys in (("origin", ("xyz", "rpy")), ("image", IMAGE)):
+                if inside := {key: said[key] for key in keys if key in said}:
+                    etree.SubElement(eye, tag, inside)
+        for seen in dict.fromkeys(tuple(attributes_of(o, robot, self.decimals).items())
+                                  for o in robot.observations):
+            etree.SubElement(element, "observe", dict(seen))
         for fragment in inner:
             whole = xml.parse_fragment(fragment)
             for name, value in whole.attrib.items():

@@ -8,11 +8,14 @@ from dataclasses import dataclass, field
 
 from lxml import etree
 
+from ....errors import BadRequest
 from ....geometry.vectors import Array
 from ....mechanism.model import Coupling, JointType, Limits, Link, Motor
+from ....mechanism.sights import NamedCamera
 from ... import chains, xml
 from ...elements import XmlReader
 from ...jointgraph import LOOP_TYPES, ORIGIN, FrameSpec, JointSpec
+from ...sights import SightSpec, spec_of
 
 TREE_TYPES = {
     "revolute": JointType.REVOLUTE, "continuous": JointType.REVOLUTE, "prismatic": JointType.PRISMATIC,
@@ -169,6 +172,35 @@ class UrdfReader(XmlReader):
             if name and one.link and two.link:
                 self.couplings.append(Coupling(name, one.link, two.link, value, xml.line(element)))
 
+    def sights(self, own: xml.Element) -> tuple[list[SightSpec], list[NamedCamera]]:
+        """The observations in ``<hrsynth>`` that are no directions seen from its own camera, and the cameras that have
+        a name."""
+        specs, cameras = list[SightSpec](), list[NamedCamera]()
+        for element in own.findall("camera"):
+            if element.get("name") is not None:
+                name, link = self.attribute(element, "name"), self.attribute(element, "link")
+                X, image = self.origin(element), self.only(element, "image")
+                size: list[float | None] = [None, None, None]
+                for number, key in enumerate(("focal", "width", "height")):
+                    if image is not None and image.get(key) is not None:
+                        size[number] = float(self.numbers(image, key, (1,))[0])
+                        if not size[number] > 0:  # type: ignore[operator]
+                            self.defect(xml.line(image), f"{key} of <image>", image.get(key), "more than 0")
+                if name is not None and link is not None:
+                    width, height = (None if each is None else int(each) for each in size[1:])
+                    cameras.append(NamedCamera(name, link, X, size[0], width, height, xml.line(element)))
+        for element in own.findall("observe"):
+            if is_sight(element):
+                try:
+                    said = {str(key): str(value) for key, value in element.attrib.items()}
+                    specs.append(spec_of(said, xml.line(element)))
+                    for key in ("at", "axis", "radius"):
+                        self.digits.read(element.get(key, ""))
+                except BadRequest as error:
+                    value = None if error.value is None else str(error.value)
+                    self.defect(xml.line(element), error.what, value, error.allowed)
+        return specs, cameras
+
     def check_ends(self, loop: str = "loop") -> None:
         """A defect for every end on no link and every joint from a link to itself; loops are called ``loop``."""
         for name, joint in self.joints.items():
@@ -193,6 +225,11 @@ class UrdfReader(XmlReader):
             if link in way:
                 yield [carrier[each] for each in reversed(way[way.index(link):])]
             clear.update(way)
+
+
+def is_sight(element: xml.Element) -> bool:
+    """Whether an ``<observe>`` is no direction of a segment seen from the reference link."""
+    return element.get("kind") is not None or element.get("camera") is not None
 
 
 def simple_transmission(title: str, joint: str, interface: str | None = INTERFACE) -> xml.Element:

@@ -15,7 +15,7 @@ from ...elements import sound_limits
 from ...jointgraph import GearSpec, JointGraph, JointSpec, comma_list
 from ..extensions import DRAKE, is_drake, local
 from .conventions import CONVENTIONS
-from .elements import TREE_TYPES, UrdfReader
+from .elements import TREE_TYPES, UrdfReader, is_sight
 
 WORLD = "world"
 TYPES = {**TREE_TYPES, "spherical": JointType.SPHERICAL, "ball": JointType.SPHERICAL}
@@ -124,10 +124,13 @@ class _TolerantReader(UrdfReader):
         """Platform, camera and observations where the file has an ``<hrsynth>`` element all the same."""
         for own in self.root.findall("hrsynth")[:1]:
             for tag in ("platform", "camera"):
-                element = own.find(tag)
+                element = next((each for each in own.findall(tag) if each.get("name") is None), None)
                 if element is not None and self.known(element.get("link"), xml.line(element), f"{tag}: unknown link"):
                     setattr(graph, tag, element.get("link"))
+            graph.sights, graph.cameras = self.sights(own)
             for element in own.findall("observe"):
+                if is_sight(element):
+                    continue
                 link, leg = element.get("link"), element.get("leg")
                 if self.known(link, xml.line(element), "observe: unknown link") and leg and link:
                     axis = self.direction(element, "axis", (0, 0, 1))

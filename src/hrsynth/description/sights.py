@@ -1,0 +1,245 @@
+"""Observations of all kinds, and cameras, as texts: attributes of ``<observe>``, words of the command line.
+
+They are resolved where links and joints are known: a description names them, an observation has their geometry.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import count
+
+import numpy as np
+
+from ..errors import BadRequest, BadRobotFile, Defect
+from ..geometry.vectors import frozen, pose, rotation_from_rpy
+from ..mechanism import Mechanism
+from ..mechanism.observation import Observation
+from ..mechanism.observations import kinds
+from ..mechanism.observations.direction import Direction
+from ..mechanism.observations.encoder import Encoder
+from ..mechanism.observations.inclination import Inclination
+from ..mechanism.sensors import encoders
+from ..mechanism.sights import CameraObservation, NamedCamera
+from . import numerals
+
+SEE = "[CAMERA=]KIND:LINK[@x,y,z][/dx,dy,dz][/radius]"
+CAMERA = "NAME=LINK[@x,y,z[/roll,pitch,yaw]]"
+WORLD = "world"
+"""What the base is called besides its own name."""
+
+
+@dataclass(frozen=True)
+class SightSpec:
+    """An observation as it is written: ``link`` is the joint of an encoder; ``at`` (m) and ``axis`` are in the link's
+    frame; ``camera`` names one, None the mechanism's reference link."""
+
+    kind: str
+    link: str
+    leg: str | None = None
+    camera: str | None = None
+    at: tuple[float, ...] | None = None
+    axis: tuple[float, ...] | None = None
+    radius: float | None = None
+    line: int | None = None
+
+    def __str__(self) -> str:
+        return f"{self.kind} of {self.link!r}"
+
+
+def spec_of(attributes: Mapping[str, str], line: int | None = None) -> SightSpec:
+    """What the attributes of an ``<observe>`` say; raises ``BadRequest``."""
+    kind = attributes.get("kind", "direction")
+    needs = _needs(kind)
+    own = "joint" if "joint" in needs else "link"
+    numbers: dict[str, tuple[float, ...]] = {}
+    for name, size in (("at", 3), ("axis", 3), ("radius", 1)):
+        if name in attributes:
+            try:
+                numbers[name] = tuple(numerals.parse(attributes[name], size).tolist())
+            except ValueError as error:
+                raise BadRequest(f"observe {kind}: {name}", attributes[name], str(error)) from None
+    for name in (own, *needs):
+        if not name.endswith("?") and name not in attributes:
+            raise BadRequest(f"observe {kind} without the attribute", name)
+    radius = numbers["radius"][0] if "radius" in numbers else None
+    return SightSpec(kind, attributes[own], attributes.get("leg"), attributes.get("camera"), numbers.get("at"),
+                     numbers.get("axis"), radius, line)
+
+
+def attributes_of(seen: Observation, mechanism: Mechanism, decimals: int) -> dict[str, str]:
+    """The attributes of an ``<observe>`` that say an observation, points with so many decimals; raises ``BadRequest``
+    where no camera that has a name is on the link from which it is seen."""
+    link = str(seen.seen_from) if isinstance(seen, Inclination) else seen.link
+    own = {"joint": seen.joint} if isinstance(seen, Encoder) else {"link": link}
+    found = {**({} if seen.by_segment else {"kind": seen.kind}), "leg": seen.leg, **own}
+    if isinstance(seen, CameraObservation):
+        camera = _eye(mechanism, seen) if seen.camera is None else seen.camera.name
+        found |= {"camera": camera} if camera else {}
+        found |= {"at": numerals.vector(seen.at, decimals)} if "at" in seen.needs else {}
+        found |= {} if seen.axis is None else {"axis": numerals.axis(seen.axis)}
+        return found | ({} if seen.radius is None else {"radius": numerals.exact(seen.radius)})
+    if isinstance(seen, Direction) and (camera := _eye(mechanism, seen)):
+        found["camera"] = camera
+    return found | ({"axis": numerals.axis(seen.direction)} if isinstance(seen, Direction | Inclination) else {})
+
+
+def _eye(mechanism: Mechanism, seen: Observation) -> str | None:
+    """The name of a camera on the link from which something is seen; None where that is the reference link."""
+    if seen.seen_from in (None, mechanism.reference):
+        return None
+    for camera in mechanism.cameras:
+        if camera.link == seen.seen_from:
+            return camera.name
+    raise BadRequest(f"{seen.kind} {seen.leg!r} is seen from a link without a camera that has a name", seen.seen_from)
+
+
+def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
+    """What a word of ``--see`` says; without a name, of the one camera in ``cameras`` where there is one."""
+    camera, _, rest = text.rpartition("=")
+    kind, given, place = rest.partition(":")
+    if not given:
+        raise BadRequest("--see", text, SEE)
+    needs = _needs(kind)
+    place, *more = place.split("/")
+    link, _, at = place.rpartition("@") if "at" in needs else (place, "", "")
+    attributes = {"kind": kind, "joint" if "joint" in needs else "link": link or at}
+    if "at" in needs:
+        if not link:
+            raise BadRequest(f"--see {text}: where on the link", at, SEE)
+        attributes["at"] = at.replace(",", " ")
+    for name in ("axis", "radius"):
+        if more and (name in needs or f"{name}?" in needs):
+            attributes[name] = more.pop(0).replace(",", " ")
+    if more:
+        raise BadRequest(f"--see {text}: more than the kind needs", "/".join(more), ", ".join(needs) or "nothing more")
+    by_camera = issubclass(kinds()[kind], CameraObservation)
+    if by_camera and not camera and len(cameras) > 1:
+        raise BadRequest(f"--see {text}: by which camera", None, ", ".join(f"{name}={rest}" for name in cameras))
+    camera = camera or (cameras[0] if by_camera and cameras else "")
+    try:
+        found = spec_of(attributes | ({"camera": camera} if camera else {}))
+    except BadRequest as error:
+        raise BadRequest(f"--see {text}: {error.what}", error.value, error.allowed or SEE) from None
+    return found
+
+
+def parse_camera(text: str) -> NamedCamera:
+    """The camera that ``NAME=LINK@x,y,z/r,p,y`` says; angles in radians, or with ``deg``."""
+    name, _, place = text.partition("=")
+    link, *where = place.split("@")
+    parts = where[0].split("/") if len(where) == 1 else []
+    if not name or not link or len(where) > 1 or len(parts) > 2:
+        raise BadRequest("--camera", text, f"LINK or {CAMERA}")
+    numbers = [np.zeros(3), np.zeros(3)]
+    for number, part in enumerate(parts):
+        words = [re.fullmatch(r"(.*?)(deg)?", word) for word in part.split(",")]
+        try:
+            values = numerals.parse(" ".join(word[1] for word in words if word), 3)
+        except ValueError as error:
+            raise BadRequest(f"--camera {text}", part, f"{error} with commas between them") from None
+        if any(word and word[2] for word in words) and number == 0:
+            raise BadRequest(f"--camera {text}", part, "metres")
+        numbers[number] = values * [math.radians(1) if word and word[2] else 1.0 for word in words]
+    return NamedCamera(name, link, pose(numbers[0], rotation_from_rpy(*numbers[1])))
+
+
+def with_sights(mechanism: Mechanism, specs: Sequence[SightSpec], cameras: Iterable[NamedCamera] = ()) -> Mechanism:
+    """The mechanism with these cameras and observations besides its own; raises ``BadRequest``."""
+    for camera in cameras:
+        mechanism = _with_camera(mechanism, camera)
+    for spec in specs:
+        mechanism = _with_sight(mechanism, spec)
+    return mechanism
+
+
+def as_written(mechanism: Mechanism, specs: Sequence[SightSpec], cameras: Sequence[NamedCamera], file: str
+               ) -> Mechanism:
+    """The same for those of a file; raises ``BadRobotFile`` with all that is wrong with them."""
+    defects: list[Defect] = []
+    every: list[NamedCamera | SightSpec] = [*cameras, *specs]
+    for each in every:
+        try:
+            mechanism = (_with_camera(mechanism, each) if isinstance(each, NamedCamera) else
+                         _with_sight(mechanism, each))
+        except BadRequest as error:
+            defects.append(Defect(file, each.line, error.what, None if error.value is None else str(error.value),
+                                  error.allowed))
+    if defects:
+        raise BadRobotFile(defects)
+    return mechanism
+
+
+def _with_camera(mechanism: Mechanism, camera: NamedCamera) -> Mechanism:
+    link = _link(mechanism, camera.link, f"camera {camera.name!r}: unknown link")
+    if any(camera.name == each.name for each in mechanism.cameras):
+        raise BadRequest("a second camera of this name", camera.name, "another name")
+    return replace(mechanism, cameras=(*mechanism.cameras, replace(camera, link=link)))
+
+
+def _with_sight(mechanism: Mechanism, spec: SightSpec) -> Mechanism:
+    """With the observation, whose label is by default its kind and a number that is free."""
+    taken = {o.leg for o in mechanism.observations}
+    label = spec.leg or next(f"{spec.kind}_{n}" for n in count(1) if f"{spec.kind}_{n}" not in taken)
+    found = resolved(mechanism, replace(spec, leg=label))
+    if {each.key for each in found} & {each.key for each in mechanism.observations}:
+        raise BadRequest(f"observe {spec}: a second one of this label", label, "a label of its own")
+    return replace(mechanism, observations=(*mechanism.observations, *found))
+
+
+def resolved(mechanism: Mechanism, spec: SightSpec) -> tuple[Observation, ...]:
+    """The observations (of a joint with two coordinates, two) that a description says; raises ``BadRequest``."""
+    label, kind = str(spec.leg), kinds()[spec.kind]
+    if label == "all" or "," in label:
+        raise BadRequest(f"observe {spec}: a label that no list could name", label, "one without commas, not all")
+    if kind is Encoder:
+        if spec.link not in mechanism.joints:
+            raise BadRequest("observe encoder: unknown joint", spec.link, sorted(mechanism.joints))
+        read = encoders(mechanism, mechanism.joints[spec.link], label)
+        if not read:
+            raise BadRequest(f"observe encoder: the joint {spec.link!r}", mechanism.joints[spec.link].type.name.lower(),
+                             "one with one axis or two")
+        return tuple(replace(each, line=spec.line) for each in read)
+    link = _link(mechanism, spec.link, f"observe {spec.kind}: unknown link")
+    if issubclass(kind, Inclination):
+        if link == mechanism.base:
+            raise BadRequest("observe inclination: of the base itself", link, "a link that moves")
+        vertical = frozen((0, 0, 1) if spec.axis is None else spec.axis)
+        return (Inclination(label, mechanism.base, vertical, seen_from=link, line=spec.line),)
+    camera = _camera(mechanism, spec)
+    seen_from = mechanism.reference if camera is None else camera.link
+    if seen_from == link:
+        raise BadRequest(f"observe {spec}: seen from the same link", link, "another link, or a camera on another")
+    if issubclass(kind, Direction):
+        return (Direction(label, link, frozen(spec.axis or ()), line=spec.line, seen_from=seen_from),)
+    assert issubclass(kind, CameraObservation)
+    if spec.radius is not None and not abs(spec.radius) > 0:
+        raise BadRequest(f"observe {spec}: radius (m)", spec.radius, "another number than 0")
+    axis = None if spec.axis is None else frozen(spec.axis)
+    return (kind(label, link, at=frozen(spec.at or (0, 0, 0)), axis=axis, radius=spec.radius, camera=camera,
+                 line=spec.line),)
+
+
+def _camera(mechanism: Mechanism, spec: SightSpec) -> NamedCamera | None:
+    if spec.camera is None:
+        return None
+    for camera in mechanism.cameras:
+        if camera.name == spec.camera:
+            return camera
+    raise BadRequest(f"observe {spec}: unknown camera", spec.camera,
+                     [camera.name for camera in mechanism.cameras] or "none is named")
+
+
+def _link(mechanism: Mechanism, link: str, what: str) -> str:
+    found = mechanism.base if link == WORLD and link not in mechanism.links else link
+    if found not in mechanism.links:
+        raise BadRequest(what, link, sorted(mechanism.links))
+    return found
+
+
+def _needs(kind: str) -> tuple[str, ...]:
+    if kind not in kinds():
+        raise BadRequest("unknown kind of observation", kind, sorted(kinds()))
+    return kinds()[kind].needs

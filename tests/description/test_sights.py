@@ -1,0 +1,204 @@
+"""Cameras and observations of all kinds in files and on the command line: read, written and read again, or refused."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.cli import execute
+from hrsynth.description import load, native, save, spanning
+from hrsynth.description.sights import parse_camera, parse_see, with_sights
+from hrsynth.errors import BadRequest, BadRobotFile
+from hrsynth.geometry.vectors import pose
+from hrsynth.mechanism.model import Mechanism
+from hrsynth.mechanism.normal import normal_form
+from hrsynth.mechanism.observations import kinds
+from hrsynth.mechanism.observations.encoder import Encoder
+from hrsynth.mechanism.sights import CameraObservation, NamedCamera
+from strategies import random_direction, random_rotation
+
+PAGE = Path(__file__).resolve().parents[2] / "docs" / "pages" / "files.md"
+BODY = """<robot name="body">
+  <link name="base"/> <link name="object"/>
+  <joint name="free" type="floating"> <parent link="base"/> <child link="object"/> <origin xyz="0.1 0.2 1"/> </joint>
+  <hrsynth> <platform link="object"/>
+    <camera name="eye" link="base"> <origin xyz="0.1 0 0" rpy="0.1 0 0"/> <image focal="800" width="640"/> </camera>
+    OBSERVE
+  </hrsynth>
+</robot>"""
+SEEDS = st.integers(0, 2**32 - 1).map(np.random.default_rng)
+
+
+def seeing_all(robot: str, rng: np.random.Generator) -> Mechanism:
+    """A shipped robot with two cameras, and an observation of every kind by one or the other."""
+    mechanism = load(robot)
+    links = [link for link in mechanism.links if link != mechanism.base]
+    cameras = [NamedCamera("eye", mechanism.base, pose(rng.normal(size=3), random_rotation(rng)), 812.5, 640),
+               NamedCamera("the hand", mechanism.platform, pose(rng.normal(size=3), random_rotation(rng)))]
+    joint = next(joint.name for joint in mechanism.joints.values() if joint.type in ("R", "P"))
+    specs = []
+    for word, kind in kinds().items():
+        if kind is Encoder:
+            specs.append(parse_see(f"encoder:{joint}", ["eye"]))
+            continue
+        text = f"eye={word}:{rng.choice(links)}" if word != "inclination" else f"{word}:{mechanism.platform}"
+        for name, vector in (("at", rng.normal(size=3)), ("axis", random_direction(rng))):
+            if name in kind.needs:
+                text += ("@" if name == "at" else "/") + ",".join(map(repr, vector.tolist()))
+        specs.append(parse_see(text + "/-0.02" * ("radius" in kind.needs), []))
+    seen = replace(specs[0], camera="the hand", link=mechanism.base, leg="seen by the hand")
+    return with_sights(mechanism, [*specs, seen], cameras)
+
+
+@pytest.mark.parametrize("robot", ["gough_stewart", "delta", "3rrr_m1"])
+@settings(max_examples=5, deadline=None)
+@given(rng=SEEDS)
+def test_every_kind_is_written_and_read_again(robot: str, rng: np.random.Generator) -> None:
+    mechanism = seeing_all(robot, rng)
+    text = native.write(mechanism)
+    read = native.parse(text)
+    assert read.differences(spanning(mechanism)) == []
+    assert len(read.observations) == len(load(robot).observations) + 14
+    assert native.write(read) == text
+
+
+@pytest.mark.parametrize("ending", ["xml", "sdf", "yaml"])
+@pytest.mark.parametrize("robot", ["gough_stewart", "3rrr_m1"])
+def test_every_kind_survives_in_other_dialects(robot: str, ending: str, tmp_path: Path) -> None:
+    """The values at zero are the same; links are where they were."""
+    mechanism = seeing_all(robot, np.random.default_rng(2))
+    save(mechanism, tmp_path / f"robot.{ending}")
+    read = load(tmp_path / f"robot.{ending}")
+    assert [(o.kind, o.leg) for o in read.observations] == [(o.kind, o.leg) for o in mechanism.observations]
+    assert [camera.name for camera in read.cameras] == ["eye", "the hand"]
+    for mine, theirs in zip(mechanism.observations, read.observations, strict=True):
+        values = [o.value(robot.links[o.seen_from or robot.reference].pose, robot.links[o.link].pose)
+                  for o, robot in ((mine, mechanism), (theirs, read))]
+        np.testing.assert_allclose(values[1], values[0], atol=1e-9)
+
+
+def test_the_normal_form_sees_the_same() -> None:
+    mechanism = seeing_all("delta", np.random.default_rng(3))
+    normal = normal_form(mechanism).mechanism
+    for mine, theirs in zip(mechanism.observations, normal.observations, strict=True):
+        values = [o.value(robot.links[o.seen_from or robot.reference].pose, robot.links[o.link].pose)
+                  for o, robot in ((mine, mechanism), (theirs, normal))]
+        np.testing.assert_allclose(values[1], values[0], atol=1e-12)
+
+
+WRONG = [
+    ('<observe kind="pint" link="object" at="0 0 0"/>', "unknown kind of observation, found pint, allowed: circle"),
+    ('<observe kind="point" link="object"/>', "observe point without the attribute, found at"),
+    ('<observe kind="point" link="thing" at="0 0 0"/>', "observe point: unknown link, found thing, allowed: base, ob"),
+    ('<observe kind="point" link="object" at="0 0"/>', "observe point: at, found 0 0, allowed: 3 numbers"),
+    ('<observe kind="point" link="object" at="0 0 nan"/>', "observe point: at, found 0 0 nan, allowed: finite"),
+    ('<observe kind="point" camera="ear" link="object" at="0 0 0"/>', "unknown camera, found ear, allowed: eye"),
+    ('<observe kind="point" camera="eye" link="base" at="0 0 0"/>', "seen from the same link, found base"),
+    ('<observe kind="line" link="object" at="0 0 0" axis="0 0 0"/>', "axis, found 0 0 0, allowed: a non-zero vector"),
+    ('<observe kind="edge" link="object" at="0 0 0" axis="0 0 1" radius="0"/>', "radius .m., found 0.0"),
+    ('<observe kind="inclination" link="base"/>', "of the base itself, found base"),
+    ('<observe kind="encoder" joint="gear"/>', "unknown joint, found gear, allowed: free"),
+    ('<observe kind="encoder" joint="free"/>', "the joint 'free', found free, allowed: one with one axis"),
+    ('<observe kind="direction" camera="eye" link="object"/>', "observe direction without the attribute, found axis"),
+    ('<camera name="eye" link="object"/>', "a second camera of this name, found eye"),
+    ('<camera name="ear" link="thing"/>', "camera 'ear': unknown link, found thing"),
+    ('<camera name="ear" link="base"> <image focal="-1"/> </camera>', "focal of <image>, found -1, allowed: more"),
+    ('<observe kind="point" leg="a,b" link="object" at="0 0 0"/>', "a label that no list could name, found a,b"),
+    (2 * '<observe kind="point" leg="a" link="object" at="0 0 0"/>',
+     "a second one of this label, found a"),
+]
+
+
+@pytest.mark.parametrize(("line", "said"), WRONG)
+def test_what_is_wrong_in_a_file_is_said_in_its_line(line: str, said: str, tmp_path: Path) -> None:
+    file = tmp_path / "body.urdf"
+    file.write_text(BODY.replace("OBSERVE", line))
+    with pytest.raises(BadRobotFile, match=f"^{re.escape(str(file))}:6: .*{said}"):
+        load(file)
+
+
+ASKED_WRONG = [
+    (["--see", "point"], "--see, found 'point', allowed: "),
+    (["--see", "point:platform"], "where on the link"),
+    (["--see", "point:platform@1,2"], "observe point: at, found '1 2', allowed: 3 numbers"),
+    (["--see", "point:thing@1,2,3"], "unknown link, found 'thing', allowed: base"),
+    (["--see", "line:platform@1,2,3"], "without the attribute, found 'axis'"),
+    (["--see", "point:platform@1,2,3/0,0,1"], "more than the kind needs, found '0,0,1', allowed: at"),
+    (["--see", "ear=point:platform@1,2,3"], "unknown camera, found 'ear', allowed: none is named"),
+    (["--camera", "a=base", "--camera", "b=rod_1", "--see", "point:platform@1,2,3"], "by which camera, allowed: a=po"),
+    (["--camera", "a=base@1,2", "--see", "point:platform@1,2,3"], "--camera a=base@1,2, found '1,2', allowed: 3 num"),
+    (["--camera", "a=base@1deg,2,3", "--see", "point:platform@1,2,3"], "found '1deg,2,3', allowed: metres"),
+    (["--camera", "a=base@1,2,3/1,2,3/4", "--see", "point:platform@1,2,3"], "--camera, found 'a=base@1,2,3/1,2,3/4'"),
+    (["--camera", "nowhere", "--see", "point:platform@1,2,3"], "has no link for the camera, found 'nowhere'"),
+]
+
+
+@pytest.mark.parametrize(("words", "said"), ASKED_WRONG)
+def test_what_is_wrong_on_the_command_line_is_one_line(words: list[str], said: str, capsys: pytest.CaptureFixture[str]
+                                                       ) -> None:
+    assert execute(["legs", "gough_stewart", *words]) == 2
+    told = capsys.readouterr().err
+    assert told.startswith("hrsynth: ")
+    assert told.count("\n") == 1
+    assert said in told
+
+
+@pytest.mark.parametrize("command", ["modes", "singular", "atlas", "accuracy", "servo", "select", "path", "view"])
+def test_commands_that_know_segments_only_say_so(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+                                                 ) -> None:
+    save(with_sights(load("delta"), [parse_see("point:platform@0,0,0.1", [])]), tmp_path / "delta.urdf")
+    more = {"accuracy": ["--cone", "0.1deg"], "servo": ["--start", "x=0", "--goal", "x=0.01"],
+            "select": ["--start", "x=0", "--goal", "x=0.01"], "path": ["--start", "x=0", "--goal", "x=0.01"]}
+    assert execute([command, str(tmp_path / "delta.urdf"), *more.get(command, [])]) == 2
+    assert "knows directions of segments only" in capsys.readouterr().err
+
+
+def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[str]) -> None:
+    see = ["point:platform@0.1,0,0", "hand=point:world@0,0,-1", "direction:rod_1/0,0,1", "encoder:slide_1"]
+    cameras = ["eye=base@0.3,0.1,0/10deg,0,0", "hand=platform@0,0,0.1"]
+    words = [word for name, texts in (("--see", see), ("--camera", cameras)) for text in texts for word in (name, text)]
+    see[0] = words[1] = "eye=" + see[0]
+    assert execute(["check", "gough_stewart", "--observe", "1", *words, "--json"]) == 0
+    told = json.loads(capsys.readouterr().out)["observed"]
+    setting = ObservedRobot.of("gough_stewart", "1", cameras, see=see)
+    assert told == [o.to_dict() for o in setting.observed]
+    assert [(each["leg"], each["kind"], each["camera"]) for each in told] == [
+        ("1", "direction", None), ("point_1", "point", "eye"), ("point_2", "point", "hand"),
+        ("direction_1", "direction", None), ("encoder_1", "encoder", None)]
+    point = setting.observed[1]
+    assert isinstance(point, CameraObservation)
+    assert point.camera is not None
+    np.testing.assert_allclose(point.camera.pose, parse_camera(cameras[0]).pose)
+
+
+def test_what_a_file_lists_is_watched_and_can_be_chosen(tmp_path: Path) -> None:
+    file = tmp_path / "body.urdf"
+    points = "\n".join(f'<observe kind="point" camera="eye" link="object" at="{x}"/>' for x in ("1 0 0", "0 1 0"))
+    file.write_text(BODY.replace("OBSERVE", points))
+    robot = load(file)
+    assert [o.leg for o in robot.observations] == ["point_1", "point_2"]
+    assert [o.line for o in robot.observations] == [6, 7]
+    with pytest.raises(BadRequest, match="world"):
+        parse_see("hand=point:world", [])
+
+
+def test_every_element_is_documented() -> None:
+    text = PAGE.read_text("utf-8")
+    words = ["<camera", "name=", "link=", "<origin", "<image", "focal=", "width=", "height=", "<observe", "kind=",
+             "camera=", "`at`", "`axis`", "`radius`", "`joint`", "`leg`"]
+    assert [word for word in words if word not in text.replace("at=", "`at`")] == []
+    assert {name.rstrip("?") for kind in kinds().values() for name in kind.needs} == {"at", "axis", "radius", "joint"}
+
+
+def test_the_help_names_every_kind(capsys: pytest.CaptureFixture[str]) -> None:
+    assert execute(["derive", "--help"]) == 0
+    told = " ".join(capsys.readouterr().out.split())
+    assert [kind for kind in kinds() if kind not in told[told.index("--see"):]] == []
