@@ -151,7 +151,7 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
 
     result = FORMS[form](Rewriting.of(evidence, _check(samples, STEP_SAMPLES)))
     by_paper = None
-    if result.state.chains:
+    if result.state.actuators:
         tell("certificate")
         hidden: Mechanism | None = finished(setting, result.state)
         assert hidden is not None
@@ -159,7 +159,8 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
         if not (certificate.passed and result.virtual_only):
             result, hidden, certificate = _fallback(setting, evidence, samples, certificate, FORMS[form])
         architecture: Architecture | None = result.state.architecture()
-        if paper and form == "simplified" and architecture is not None:
+        segments = all(each.by_segment for each in setting.observed)
+        if paper and form == "simplified" and architecture is not None and segments:
             tell("the paper's form")
             by_paper = _paper_form(setting, evidence, samples, architecture, certificate)
     else:
@@ -174,8 +175,10 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
 def finished(setting: ObservedRobot, state: State) -> Mechanism:
     """The hidden robot as a file writes it: a spanning tree, names of its own, its observations."""
     mechanism = state.mechanism
-    observations = tuple(o for o in setting.observed if o.link in mechanism.links)
-    return spanning(replace(mechanism, name=f"{setting.robot.name}_hidden", observations=observations, file=None))
+    observations = tuple(o for o in setting.observed if {o.link, o.seen_from or o.link} <= mechanism.links.keys())
+    cameras = tuple(camera for camera in mechanism.cameras if camera.link in mechanism.links)
+    return spanning(replace(mechanism, name=f"{setting.robot.name}_hidden", observations=observations, cameras=cameras,
+                            file=None))
 
 
 def _check(samples: Samples, count: int | None) -> Check:

@@ -83,12 +83,19 @@ class LegDecomposition(Value):
             return None
         return frame[:3, :3].T @ (centre - frame[:3, 3])
 
+    def floats(self, leg: Leg) -> bool:
+        """Whether a leg is no more than the free joint of a body that nothing holds."""
+        return not leg.links and any(self.mechanism.joints[name].type is JointType.FREE for name in leg.joints
+                                     if name in self.mechanism.joints)
+
     def word(self, leg: Leg) -> Word:
         """The leg's word, from the base to the platform (without the end joint where it takes the platform).
 
         What a virtual chain hangs on, seen from a camera on another leg, is written as if it hung on the base.
         """
         mechanism = self.mechanism
+        if self.floats(leg):
+            return Word((Letter(JointType.FREE.value),))
         links = {mechanism.base, leg.attach, *leg.links}
         kept = {mechanism.base, leg.attach}
         if mechanism.reference not in links:
@@ -161,6 +168,10 @@ def decompose(mechanism: Mechanism) -> LegDecomposition:
                             next(iter(ends - {mechanism.base}))))
     for joint in live:
         if mechanism.base in joint.links and joint.other(mechanism.base) in platform:
+            legs.append(Leg("", (), (joint.name,), joint.other(mechanism.base)))
+    floating = [j for j in mechanism.joints.values() if j.type is JointType.FREE and mechanism.base in j.links]
+    for joint in floating if not legs else ():
+        if joint.other(mechanism.base) in platform:
             legs.append(Leg("", (), (joint.name,), joint.other(mechanism.base)))
     if not legs:
         raise BadMechanism(f"{mechanism.name}: no leg joins the base {mechanism.base!r} and the platform",

@@ -34,6 +34,8 @@ def default_observation(anatomy: LegDecomposition, leg: Leg, last: bool = False)
 
 def _default(anatomy: LegDecomposition, leg: Leg, last: bool = False) -> tuple[Direction, str]:
     """The default segment of a leg, and why it is that one."""
+    if anatomy.floats(leg):
+        raise NoSegment(f"leg {leg.label} has no segment to observe: nothing holds the platform", leg.joints[0])
     segments = _Segments(anatomy, leg, NOISE)
     path, nodes, base = segments.path, segments.nodes, anatomy.mechanism.base
     for i, edge in enumerate(path):

@@ -18,6 +18,8 @@ from ..mechanism import Joint, JointType, Mechanism, graphs
 from ..mechanism.composites import WordEdge, WordGraph
 from ..mechanism.legs import LegDecomposition
 from ..mechanism.normal import centre_pair
+from ..mechanism.observations.direction import SeenAxis
+from ..mechanism.sights import CameraObservation
 from ..tolerances import LOCUS, SOLVED
 
 
@@ -105,6 +107,17 @@ class Evidence:
         home = self.mechanism.links[self.reference].pose[:3, :3]
         values = [target.measured[index][1] for member in self.samples.members for target in member.way]
         return np.asarray(values) @ home.T
+
+    def far(self, index: int) -> Array | None:
+        """A unit vector in base axes, fixed in the reference link, as far as possible from all sampled values of what
+        the chain of observation ``index`` turns first; None where the values do not say what that is."""
+        seen = self.samples.question.observations[index]
+        assert isinstance(seen, SeenAxis | CameraObservation)
+        values = np.asarray([target.measured[index][1] for member in self.samples.members for target in member.way])
+        units = np.broadcast_to(seen.dimension, seen.size)
+        pointing = seen.pointing(values * self.samples.twin.length**units)
+        home = self.mechanism.links[seen.seen_from or self.reference].pose @ seen.view
+        return None if pointing is None else home[:3, :3] @ far_from(pointing)
 
     def spins(self, link: str, direction: Array) -> bool:
         """Whether a link can turn about its own direction with every other link at rest.

@@ -38,6 +38,20 @@ class VirtualChain(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class SensorChain(Value):
+    """The virtual chain of an observation that is no direction of a segment: its own ``links`` and ``joints`` between
+    the ``reference`` link and ``link``, the joints that are ``actuators``. An encoder has neither links nor joints: its
+    actuator is the real joint."""
+
+    leg: str
+    link: str
+    reference: str
+    links: tuple[str, ...]
+    joints: tuple[str, ...]
+    actuators: tuple[str, ...]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class State(Value):
     """A mechanism on its way from the real robot to its hidden robot."""
 
@@ -48,6 +62,18 @@ class State(Value):
     """Labels of the legs that were dropped."""
     owners: Mapping[str, str] = field(default_factory=dict)
     """The leg of each virtual link."""
+    sensors: tuple[SensorChain, ...] = ()
+    """The chains of observations that are no directions of segments: they stay as the lift makes them."""
+
+    @property
+    def actuators(self) -> set[str]:
+        """The joints that the chains actuate."""
+        return {chain.actuator for chain in self.chains} | {name for each in self.sensors for name in each.actuators}
+
+    @property
+    def watched(self) -> set[str]:
+        """The links that sensors observe or see from."""
+        return {link for each in self.sensors for link in (each.link, each.reference)}
 
     def chain(self, leg: str) -> tuple[VirtualChain, ...]:
         """The chains of a leg."""
@@ -62,8 +88,8 @@ class State(Value):
                        owners={k: v for k, v in table.items() if k in mechanism.links})
 
     def observed(self) -> tuple[str, ...]:
-        """Labels of the legs that still have a virtual chain, in order."""
-        return tuple(dict.fromkeys(chain.leg for chain in self.chains))
+        """Labels of the legs that still have a virtual chain, and of what else is observed, in order."""
+        return tuple(dict.fromkeys([*(chain.leg for chain in self.chains), *(each.leg for each in self.sensors)]))
 
     def anatomy(self) -> LegDecomposition:
         """The legs of the rewritten mechanism: the real ones that are left, with their virtual links."""
@@ -75,7 +101,24 @@ class State(Value):
             links = [n for n in leg.links if n in mechanism.links]
             links += [n for n in mechanism.links if self.owners.get(n) == leg.label]
             legs.append(replace(leg, links=tuple(links), joints=tuple(self._joints(leg, set(links)))))
-        return LegDecomposition(mechanism, tuple(n for n in self.real.platform if n in mechanism.links), tuple(legs))
+        drawn = mechanism
+        for chain in self.sensors:
+            if chain.joints:
+                drawn = self._hung(drawn, chain, legs)
+        return LegDecomposition(drawn, tuple(n for n in self.real.platform if n in mechanism.links), tuple(legs))
+
+    def _hung(self, mechanism: Mechanism, chain: SensorChain, legs: list[Leg]) -> Mechanism:
+        """Put a sensor's chain into the leg that has its link or else its reference, or make it a leg of its own; as it
+        is drawn and written: what it hangs on outside of that is taken for the base."""
+        for link in (chain.link, chain.reference):
+            for number, leg in enumerate(legs):
+                if link in leg.links:
+                    own = {mechanism.base, leg.attach, *leg.links}
+                    legs[number] = replace(leg, links=(*leg.links, *chain.links), joints=(*leg.joints, *chain.joints))
+                    return _relinked(mechanism, chain, own)
+        attach = chain.reference if chain.link == mechanism.base else chain.link
+        legs.append(Leg(chain.leg, chain.links, chain.joints, attach))
+        return _relinked(mechanism, chain, {mechanism.base, attach})
 
     def _joints(self, leg: Leg, links: set[str]) -> list[str]:
         mechanism = self.mechanism
@@ -83,6 +126,7 @@ class State(Value):
         names = []
         others = {n for other in self.real.legs if other.label != leg.label for n in other.links}
         others |= {n for n, owner in self.owners.items() if owner != leg.label}
+        others |= {n for chain in self.sensors for n in chain.links}
         others.discard(mechanism.reference)
         for joint in mechanism.joints.values():
             touches = set(joint.links)
@@ -95,6 +139,13 @@ class State(Value):
     def architecture(self) -> Architecture:
         """The architecture so far, in words."""
         return self.anatomy().architecture()
+
+
+def _relinked(mechanism: Mechanism, chain: SensorChain, known: set[str]) -> Mechanism:
+    """With the ends of a chain that lie on no known link moved to the base."""
+    ends = [(chain.joints[0], chain.reference), (chain.joints[-1], chain.link)]
+    joints = {name: mechanism.joints[name].relinked(link, mechanism.base) for name, link in ends if link not in known}
+    return mechanism.changed(joints=joints.values()) if joints else mechanism
 
 
 def towards(joint: Joint, before: str) -> Joint:

@@ -75,7 +75,7 @@ class Rewriting:
         observed leg has one or is blind."""
         driven = {joint.name for joint in self.state.mechanism.joints.values() if joint.actuated}
         return (all(step.accepted for step in self.steps if step.always)
-                and driven == {chain.actuator for chain in self.state.chains})
+                and driven == self.state.actuators)
 
     def attempt(self, rule: Rule[Any, Any], leg: str | None) -> Rewriting:
         """The first of a rule's proposals that is accepted, if one is."""
@@ -188,7 +188,7 @@ def keep_unobserved(at: Rewriting) -> Rewriting:
 
 def unless_blind(strategy: Strategy) -> Strategy:
     """A strategy for robots of which some leg is not blind."""
-    return lambda at: strategy(at) if at.state.chains else at
+    return lambda at: strategy(at) if at.state.actuators else at
 
 
 LIFTED = chain(whole_robot(Stage.MOTORS), each_leg(observed, Stage.LIFT))

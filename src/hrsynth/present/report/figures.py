@@ -96,7 +96,7 @@ def step_figures(found: Derivation) -> list[StepFigure]:
     for number, step in enumerate(found.steps, 1):
         if step.state is None:
             continue
-        after, then = step.state.anatomy(), {chain.actuator for chain in step.state.chains}
+        after, then = step.state.anatomy(), step.state.actuators
         leg = step.leg if step.leg in anatomy.labels and step.leg in after.labels else None
         one = StepFigure(step.rule, SOURCES.get(step.rule, ""), (number,), (step.leg,) if step.leg else (),
                          (step.reason,), step.largest_angle, _picture(step, "before", anatomy, leg, seen, virtual),

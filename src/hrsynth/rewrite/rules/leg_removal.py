@@ -2,8 +2,8 @@
 
     base – leg – platform   →   (nothing)        the platform and the observed legs move as before        (MMT 4.2)
 
-The twists of the platform and of all links on which observed legs end must stay the same; the leg that carries the
-camera stays.
+The twists of the platform, of all links on which observed legs end and of all links that sensors observe or see from
+must stay the same; a leg that carries a camera or what is observed otherwise stays.
 """
 
 from __future__ import annotations
@@ -18,13 +18,18 @@ from ..state import State
 
 def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[str] | Refusal]:
     """The leg, which has no virtual chain."""
-    if state.mechanism.reference in state.real.leg(leg).links:
+    own = state.real.leg(leg)
+    if state.mechanism.reference in own.links:
         yield Refusal("the leg carries the camera")
+        return
+    if state.watched & set(own.links) or state.actuators & set(own.joints):
+        yield Refusal("the leg carries what is observed or sees")
         return
     observed = state.observed()
     ends = dict.fromkeys(each.attach for each in state.real.legs if each.label in observed)
+    bodies = dict.fromkeys((*ends, *sorted(state.watched)))
     yield Match(leg, "platform and observed legs move as before without it",
-                bodies=tuple(end for end in ends if end != state.mechanism.platform))
+                bodies=tuple(each for each in bodies if each not in (state.mechanism.platform, state.mechanism.base)))
 
 
 def apply(state: State, leg: str) -> State:

@@ -1,8 +1,10 @@
-"""The exact lift: a virtual chain that constrains nothing measures what the camera sees.
+"""The exact lift: a virtual chain that constrains nothing measures what the sensor sees, whatever the kind.
 
     reference –P–P–P– T –U̲– W –R(d)– ℓ        (docs/pages/theory.md, section 3; MMT Fig. 2(b); always)
+    reference –U̲(C)–P–S(B)– ℓ, and so on        each kind has its chain (docs/pages/observations.md)
+    R – → R̲ –                                  an encoder actuates its joint
 
-T only translates relative to the reference link, so the first axis of U̲ keeps its direction there.
+Of a direction T only translates relative to the reference link, so the first axis of U̲ keeps its direction there.
 """
 
 from __future__ import annotations
@@ -10,73 +12,113 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
-import numpy as np
-
-from ...geometry.vectors import Array, pose, unit
-from ...mechanism import Joint, JointType, Link, Motor
-from ...mechanism.observations.direction import Direction
-from ..evidence import Evidence, ProximalChain, far_from
+from ...geometry.vectors import Array, pose
+from ...mechanism import Joint, JointType, Link, Motor, Observation
+from ...mechanism.observations.direction import SeenAxis
+from ...mechanism.observations.encoder import Encoder
+from ...mechanism.sights import CameraObservation, VirtualJoint
+from ..evidence import Evidence, ProximalChain
 from ..rule import Match, Rule, Stage, whole_leg
-from ..state import State, VirtualChain
+from ..state import SensorChain, State, VirtualChain
+
+SEGMENT = ("slide_x", "slide_y", "slide_z", "virtual", "roll"), ("guide_x", "guide_y", "carrier", "bearing")
+"""The names of the joints and links of a direction's chain."""
 
 
 @dataclass(frozen=True, eq=False)
 class Lifting:
-    """What a chain is to measure: ``link`` ℓ, its direction u, the anchor A, the part before ℓ; ``first`` is the first
-    axis of U̲, ``tag`` what tells the chain's names from others."""
+    """A chain to be hung between ``reference`` and ``link``, of an observation of the label ``leg``; ``proximal`` is
+    the part before ℓ, None for what is no direction of a segment; ``tag`` tells the chain's names from others."""
 
+    leg: str
     tag: str
     link: str
-    direction: Array
-    anchor: Array
-    proximal: ProximalChain | None
-    first: Array
+    reference: str
+    joints: tuple[VirtualJoint, ...]
+    segment: bool
+    proximal: ProximalChain | None = None
 
 
-def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[tuple[str, list[Lifting]]]]:
+def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[list[Lifting | Encoder]]]:
     """One match for each leg: a chain for each of its observations."""
-    links = state.mechanism.links
-    found: list[Lifting] = []
+    found: list[Lifting | Encoder] = []
     for index, observation in enumerate(evidence.samples.question.observations):
-        if observation.leg != leg or not isinstance(observation, Direction):
+        if observation.leg != leg:
             continue
-        link = evidence.carried(observation.link)
-        proximal, before = evidence.proximal(link), evidence.joints_before(link)
-        u = unit(links[observation.link].pose[:3, :3] @ observation.direction)
-        anchor = proximal.anchor if proximal else before[0].point if before else links[link].pose[:3, 3]
-        found.append(Lifting(f"{leg}_{index}" if found else leg, link, u, anchor, proximal,
-                             far_from(evidence.directions(index))))
-    yield Match((leg, found), "PPP-U̲-R(d) from the reference link to the observed link constrains nothing")
+        tag = f"{leg}_{index}" if found else leg
+        if isinstance(observation, Encoder):
+            found.append(observation)
+        elif observation.by_segment:
+            found.append(_segment(state, evidence, observation, index, tag))
+        else:
+            found.append(_sensor(state, evidence, observation, index, tag))
+    words = dict.fromkeys("an encoder actuates its joint" if isinstance(each, Encoder) else
+                          "PPP-U̲-R(d) from the reference link to the observed link constrains nothing" if each.segment
+                          else "a chain of six freedoms from the reference link to the observed link constrains nothing"
+                          for each in found)
+    yield Match(found, "; ".join(words))
 
 
-def apply(state: State, found: tuple[str, list[Lifting]]) -> State:
-    """The robot with these chains."""
-    leg, liftings = found
-    for lifting in liftings:
-        state = _lifted(state, leg, lifting)
+def _segment(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> Lifting:
+    """The chain of a direction, its anchor A where the leg's joint K is."""
+    assert isinstance(seen, SeenAxis)
+    links, reference = state.mechanism.links, state.mechanism.reference
+    link = evidence.carried(seen.link)
+    proximal, before = evidence.proximal(link), evidence.joints_before(link)
+    anchor = proximal.anchor if proximal else before[0].point if before else links[link].pose[:3, 3]
+    at = seen.sighting(links[reference].pose, links[seen.link].pose, evidence.far(index))
+    return Lifting(seen.leg, tag, link, reference, seen.chain(replace(at, B=anchor)), True, proximal)
+
+
+def _sensor(state: State, evidence: Evidence, seen: Observation, index: int, tag: str) -> Lifting:
+    """The chain of any other observation."""
+    assert isinstance(seen, SeenAxis | CameraObservation)
+    links, reference = state.mechanism.links, seen.seen_from or state.mechanism.reference
+    at = seen.sighting(links[reference].pose, links[seen.link].pose, evidence.far(index))
+    return Lifting(seen.leg, tag, seen.link, reference, seen.chain(at), False)
+
+
+def apply(state: State, found: list[Lifting | Encoder]) -> State:
+    """The robot with these chains, and these joints actuated."""
+    for each in found:
+        state = _encoded(state, each) if isinstance(each, Encoder) else _lifted(state, each)
     return state
 
 
-def _lifted(state: State, leg: str, lifting: Lifting) -> State:
-    mechanism, anchor, proximal = state.mechanism, lifting.anchor, lifting.proximal
-    e1, u = lifting.first, lifting.direction
-    e2 = unit(np.cross(e1, u))
-    e3 = np.cross(e1, e2)
-    names = {key: mechanism.fresh(f"{key}_{lifting.tag}") for key in
-             ("slide_x", "slide_y", "slide_z", "carrier", "bearing", "virtual", "roll", "guide_x", "guide_y")}
-    path = [mechanism.reference, names["guide_x"], names["guide_y"], names["carrier"]]
-    sliders = tuple(names[f"slide_{a}"] for a in "xyz")
-    links = [Link(name, pose(anchor)) for name in (*path[1:], names["bearing"])]
-    joints = [Joint(name, JointType.PRISMATIC, a, b, anchor, (axis,))
-              for name, a, b, axis in zip(sliders, path, path[1:], (e1, e2, e3), strict=False)]
-    joints.append(Joint(names["virtual"], JointType.UNIVERSAL, names["carrier"], names["bearing"], anchor, (e1, e2),
-                        motor=Motor(names["virtual"])))
-    joints.append(Joint(names["roll"], JointType.REVOLUTE, names["bearing"], lifting.link, anchor, (u,)))
+def _lifted(state: State, lifting: Lifting) -> State:
+    mechanism, tag = state.mechanism, lifting.tag
+    count = len(lifting.joints)
+    names, between = SEGMENT if lifting.segment else (
+        tuple(f"sense_{number}" for number in range(1, count + 1)),
+        tuple(f"sensor_{number}" for number in range(1, count)))
+    joint_names, link_names = ([mechanism.fresh(f"{name}_{tag}") for name in each] for each in (names, between))
+    path = [lifting.reference, *link_names, lifting.link]
+    joints = [Joint(name, JointType(joint.letter), a, b, joint.at, joint.axes, Motor(name) if joint.actuated else None)
+              for name, joint, a, b in zip(joint_names, lifting.joints, path, path[1:], strict=False)]
+    links = [Link(name, pose(joint.at)) for name, joint in zip(link_names, lifting.joints, strict=False)]
+    changed = mechanism.changed(links=links, joints=joints)
+    if not lifting.segment:
+        driven = tuple(joint.name for joint in joints if joint.actuated)
+        sensor = SensorChain(lifting.leg, lifting.link, lifting.reference, tuple(link_names), tuple(joint_names),
+                             driven)
+        return replace(state, mechanism=changed, sensors=(*state.sensors, sensor))
+    turning, proximal = lifting.joints[3], lifting.proximal
+    u: Array = lifting.joints[4].axes[0]
     k_joint, before = (None, None) if proximal is None else (proximal.k_joint.name, proximal.before)
-    chain = VirtualChain(leg, lifting.link, u, anchor, k_joint, before, names["carrier"], sliders, tuple(path[1:3]),
-                         names["virtual"], names["bearing"], names["roll"])
-    return replace(state, mechanism=mechanism.changed(links=links, joints=joints), chains=(*state.chains, chain),
-                   owners={**state.owners, **{link.name: leg for link in links}})
+    chain = VirtualChain(lifting.leg, lifting.link, u, turning.at, k_joint, before, link_names[2],
+                         tuple(joint_names[:3]), tuple(link_names[:2]), joint_names[3], link_names[3], joint_names[4])
+    return replace(state, mechanism=changed, chains=(*state.chains, chain),
+                   owners={**state.owners, **{link: lifting.leg for link in link_names}})
+
+
+def _encoded(state: State, seen: Encoder) -> State:
+    """The real joint with a motor; of two coordinates of one joint the second changes nothing."""
+    joint = state.mechanism.joints[seen.joint]
+    if joint.actuated:
+        return state
+    changed = state.mechanism.changed(joints=[replace(joint, motor=Motor(joint.name))])
+    sensor = SensorChain(seen.leg, seen.link, str(seen.seen_from), (), (), (joint.name,))
+    return replace(state, mechanism=changed, sensors=(*state.sensors, sensor))
 
 
 RULE = Rule("lift", "MMT 3.2, Fig. 2(b)", Stage.LIFT, find, apply, whole_leg, always=True)

@@ -46,6 +46,9 @@ def substitution(state: State, evidence: Evidence, chain: VirtualChain
     if chain.k_joint is not None and chain.k_joint not in state.mechanism.joints:
         yield Match(None, f"{chain.k_joint!r} before {chain.link!r} is taken over already")
         return
+    if chain.link in state.watched:
+        yield Refusal(f"{chain.link!r} carries a camera or another observation")
+        return
     proximal = evidence.proximal(chain.link)
     if proximal is None or chain.k_joint is None or chain.before is None:
         yield Refusal("no single R, U or S joint stands before the observed link")
