@@ -151,14 +151,15 @@ def test_the_same_is_measured_where_links_become_parts_of_others(kind: type[Obse
     np.testing.assert_allclose(other, one if same else turned @ one, atol=1e-12)
 
 
-def test_a_circle_seen_from_its_axis_shows_three_numbers() -> None:
+def test_a_circle_seen_from_its_axis_or_edge_on_shows_less() -> None:
     """There its chain still has five motors: the image loses two freedoms, not the chain."""
     rng = np.random.default_rng(1)
     kind = kinds()["image_circle"]
     X, X_c = pose(), pose((0, 0, -1.0), random_rotation(rng))
     seen = kind("p", "l", at=np.zeros(3), axis=np.array([0, 0, 1.0]), radius=0.2)  # type: ignore[call-arg]
     assert np.linalg.matrix_rank(rates(seen, X_c, X), tol=1e-8) == 3
-    aside = pose((0.1, 0, -1.0), X_c[:3, :3])
+    edge_on, aside = (pose(centre, X_c[:3, :3]) for centre in ((0.8, 0.6, 0), (0.1, 0, -1.0)))
+    assert np.linalg.matrix_rank(rates(seen, edge_on, X), tol=1e-8) == 2
     assert np.linalg.matrix_rank(rates(seen, aside, X), tol=1e-8) == 5
 
 

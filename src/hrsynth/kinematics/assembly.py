@@ -25,7 +25,7 @@ from .configuration import ClosedConfiguration
 from .leg_reach import alone
 from .locked import zeroed_at
 from .pinocchio_model import PinocchioModel
-from .tasks import Target, solve
+from .tasks import LinkPoses, Target, solve
 from .ways import Part, ways
 
 STARTS = 24
@@ -99,7 +99,7 @@ class Assembler:
         poses = {link: displacement @ mechanism.links[link].pose for link in self.anatomy.platform}
         base = mechanism.links[mechanism.base].pose
         twin = PinocchioModel(zeroed_at(mechanism, {mechanism.base: base, **poses}), self.length)
-        target = _Poses(tuple(bodies.items()))
+        target = LinkPoses(tuple(bodies.items()))
         residual = np.inf
         for start in _starts(twin):
             q, residual = solve(twin, start, target, tolerance=SOLVED, iterations=60)
@@ -181,17 +181,6 @@ class _Closing:
     found: tuple[PinocchioModel, Array] | None
     miss: Miss | None = None
     held: bool = False
-
-
-@dataclass(frozen=True, eq=False)
-class _Poses:
-    """Poses wanted of several links."""
-
-    wanted: tuple[tuple[str, Array], ...]
-
-    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
-        parts = [Target(link, X, None, twin.mechanism.base, ()).rows(twin, q) for link, X in self.wanted]
-        return np.concatenate([error for error, _ in parts]), np.vstack([rows for _, rows in parts])
 
 
 def _turned_as(X: Array, wanted: Array) -> bool:

@@ -11,16 +11,16 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadMechanism
-from ..geometry.ranks import CLEAN, kernel_basis, largest_angle
+from ..geometry.ranks import CLEAN, kernel_basis, largest_angle, range_basis
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from ..results import Result
-from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION
+from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation
-from .sampling import Samples, track_path
-from .tasks import Target
+from .sampling import Sample, Samples, track_path
+from .tasks import LinkPoses, Target, solve
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,6 +82,8 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         angle = np.pi / 2
         return verdict(str(error))
     active = twin.actuated()
+    usual = [max(ranks) for ranks in zip(*(map(shown, members)), strict=True)]
+    kept = () if all(o.by_segment for o in question.observations) else _as_they_were(samples, hidden)
     start = float(np.linalg.norm(twin.residual(twin.q0)))
     if start > FOLLOWED:
         worst = start
@@ -94,6 +96,8 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         if not residual <= FOLLOWED:
             angle = np.pi / 2
             return verdict(f"cannot follow the real robot: misses by {residual:.2g}")
+        if kept:
+            q = _at_real_poses(twin, q, member, _visible(way[-1], blind), kept)
         at = ClosedConfiguration.of(twin, q, FOLLOWED)
         here = member.configuration.pose(question.platform)[:3, 3]
         theirs = relation(at, asked, blind=blind)
@@ -104,10 +108,34 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
             return verdict(f"a rank is not clear: gap {gap:.2g}", Mismatch(ours, theirs, here))
         if not angle <= SAME_RELATION:
             return verdict(_difference(ours, theirs, angle), Mismatch(ours, theirs, here))
-        if active and not _parametrise(at, asked, active, blind, complete):
+        if active and shown(member) == usual and not _parametrise(at, asked, active, blind, complete):
             angle = np.pi / 2
             return verdict("the virtual actuators do not parametrise the observed directions")
     return verdict("")
+
+
+def shown(member: Sample) -> list[int]:
+    """How many independent numbers each observation shows at a sample: fewer where it is singular itself, as a circle
+    that is seen edge-on."""
+    relation = member.relation
+    return [range_basis(relation.basis[relation.rows_of(place)], 1.0)[1].value for place in range(len(relation.sizes))]
+
+
+def _as_they_were(samples: Samples, hidden: Mechanism) -> tuple[str, ...]:
+    """The links that a hidden robot keeps with all their joints: where the platform's pose and what is observed leave
+    them a choice, only their own poses say where they are."""
+    real = samples.twin.mechanism
+    same = {name for name, joint in real.joints.items() if name in hidden.joints
+            and (hidden.joints[name].type, hidden.joints[name].links) == (joint.type, joint.links)}
+    return tuple(link for link in real.links if link in hidden.links and link != real.base
+                 and all(joint.name in same for joint in real.joints_of(link)))
+
+
+def _at_real_poses(twin: PinocchioModel, q: Array, member: Sample, target: Target, kept: tuple[str, ...]) -> Array:
+    """The configuration with the kept links where the real robot has them too, if it is found from one without."""
+    poses = tuple((link, member.configuration.pose(link)) for link in kept)
+    found, residual = solve(twin, q, LinkPoses(poses, target), tolerance=SOLVED)
+    return found if residual <= FOLLOWED else q
 
 
 def _visible(target: Target, blind: frozenset[str]) -> Target:

@@ -88,6 +88,20 @@ class Target(Value):
         return np.concatenate(errors), np.concatenate([*blocks, *rates])
 
 
+@dataclass(frozen=True, eq=False)
+class LinkPoses:
+    """Poses (4, 4) wanted of several links, and what else is wanted besides."""
+
+    wanted: tuple[tuple[str, Array], ...]
+    besides: Task | None = None
+
+    def rows(self, twin: PinocchioModel, q: Array) -> tuple[Array, Array]:
+        """Error (reached − wanted) and its Jacobian."""
+        parts = [Target(link, X, None, twin.mechanism.base, ()).rows(twin, q) for link, X in self.wanted]
+        parts += [] if self.besides is None else [self.besides.rows(twin, q)]
+        return np.concatenate([error for error, _ in parts]), np.vstack([rows for _, rows in parts])
+
+
 def solve(twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance: float = CLOSED,
           iterations: int = 30) -> tuple[Array, float]:
     """The configuration that damped Gauss-Newton reaches from ``q``, and the residual left (loops and task).

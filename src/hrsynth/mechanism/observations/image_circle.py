@@ -40,12 +40,12 @@ def _listed(Q: Array) -> Array:
 class ImageCircle(CameraObservation):
     """The cone of rays to the circle (centre B, normal d), a symmetric matrix of norm 1, p from C to B.
 
-    Five numbers, but three where C lies on the circle's axis.
+    Five numbers, but three where C lies on the circle's axis, and two in its plane (a double line).
     """
 
     kind = "image_circle"
     words = "a circle of known radius in the image: its conic"
-    locked = "as `circle`; two moments less where C is on its axis"
+    locked = "as `circle`; two less where C is on its axis, three in its plane"
     needs = ("at", "axis", "radius")
     size = 6
     rank = 5

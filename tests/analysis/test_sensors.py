@@ -1,0 +1,205 @@
+"""Observations of every kind, of every robot: the lift is certified, leg removal keeps what it must, verdicts agree
+with an independent computation."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from hrsynth.analysis.controllability import legs
+from hrsynth.analysis.derive import Derivation, derive
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.description import load, native, shipped
+from hrsynth.errors import BadRequest
+from hrsynth.geometry.vectors import Array, pose
+from hrsynth.mechanism.builder import Builder
+from hrsynth.mechanism.model import Mechanism
+from hrsynth.mechanism.observations import kinds
+from hrsynth.tolerances import SAME_RELATION
+from kinematics.robots import ROBOTS
+from oracle import exponential
+from strategies import pods, random_direction, random_rotation
+
+KINDS = sorted(kinds())
+POINTS = [f"point:platform@{at}" for at in ("0.1,0,0", "-0.1,0.1,0", "0,0.1,0.1", "0.05,-0.1,0")]
+
+
+@cache
+def free_body() -> Mechanism:
+    """A body that nothing holds, one metre before a camera."""
+    builder = Builder("body")
+    builder.link("base")
+    builder.link("platform", (0.1, 0.05, 1.2), random_rotation(np.random.default_rng(1)))
+    builder.joint("free", "6", "base", "platform", (0.1, 0.05, 1.2))
+    return builder.build(platform="platform")
+
+
+@cache
+def arm() -> Mechanism:
+    """A serial arm of six R with random axes."""
+    rng = np.random.default_rng(3)
+    builder, before, here = Builder("arm"), "base", np.zeros(3)
+    builder.link("base")
+    for number in range(1, 7):
+        name = "platform" if number == 6 else f"link_{number}"
+        builder.link(name, here, random_rotation(rng))
+        builder.joint(f"joint_{number}", "R", before, name, here, axis=random_direction(rng), motor=True)
+        before, here = name, here + rng.uniform(0.2, 0.5) * random_direction(rng)
+    return builder.build(platform="platform")
+
+
+@cache
+def spatial() -> Mechanism:
+    """A random robot with six legs in a tilted base."""
+    return pods(("UPS",) * 6, np.random.default_rng(5))
+
+
+def asked(mechanism: Mechanism, kind: str, rng: np.random.Generator) -> list[str]:
+    """Observations of a kind: of the platform from the base, and (all but encoders) of the base from the platform."""
+    needs = kinds()[kind].needs
+    if "joint" in needs:
+        joint = next(j for j in mechanism.joints.values() if j.type in ("R", "P", "U", "C"))
+        return [f"encoder:{joint.name}"]
+    if kind == "inclination":
+        return [f"{kind}:{mechanism.platform}"]
+    far = 4 * mechanism.length
+    words = []
+    for camera, link in (("eye", mechanism.platform), ("hand", mechanism.base)):
+        at, axis = far / 20 * rng.normal(size=3), random_direction(rng)
+        text = f"{camera}={kind}:{link}"
+        text += "@" + ",".join(map(str, at)) if "at" in needs else ""
+        text += "/" + ",".join(map(str, axis)) if "axis" in needs else ""
+        words.append(text + (f"/{far / 6}" if "radius" in needs else ""))
+    return words
+
+
+def watched(mechanism: Mechanism, kind: str) -> ObservedRobot:
+    rng, far = np.random.default_rng(KINDS.index(kind)), 4 * mechanism.length
+    cameras = []
+    for name, link in (("eye", mechanism.base), ("hand", mechanism.platform)):
+        centre = mechanism.links[mechanism.platform].pose[:3, 3] + far * random_direction(rng)
+        local = np.linalg.inv(mechanism.links[link].pose) @ pose(centre)
+        cameras.append(f"{name}={link}@" + ",".join(map(str, local[:3, 3])) + "/0.3,-0.2,0.1")
+    return ObservedRobot.of(mechanism, camera=cameras, see=asked(mechanism, kind, rng), samples=5)
+
+
+def certified(mechanism: Mechanism, kind: str, form: str = "simplified") -> Derivation:
+    """The law: the lift, and what is left of it, have the relation of the robot; so does what is written of it."""
+    setting = watched(mechanism, kind)
+    found = derive(setting, form=form)
+    assert found.certificate.passed
+    assert found.certificate.largest_angle < SAME_RELATION
+    lifts = [step for step in found.steps if step.rule == "lift"]
+    assert lifts
+    assert all(step.accepted for step in lifts)
+    assert found.hidden is not None
+    read = native.parse(native.write(found.hidden))
+    assert [o.key for o in read.observations] == [o.key for o in found.hidden.observations]
+    return found
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("robot", ["free_body", "arm", "gough_stewart"])
+def test_every_kind_is_certified(robot: str, kind: str) -> None:
+    mechanism = load(robot) if robot in shipped() else {"free_body": free_body, "arm": arm}[robot]()
+    if robot == "free_body" and kind == "encoder":
+        with pytest.raises(BadRequest, match="one with one axis or two"):
+            ObservedRobot.of(mechanism, see="encoder:free")
+        return
+    certified(mechanism, kind)
+
+
+def robot_of(name: str) -> Mechanism:
+    return spatial() if name == "spatial" else arm() if name == "arm" else load(name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("robot", [*ROBOTS, "spatial"])
+def test_all_kinds_together_are_certified_on_every_robot(robot: str) -> None:
+    """Each lift is a step that is certified alone."""
+    mechanism = robot_of(robot)
+    every = [watched(mechanism, kind) for kind in KINDS]
+    see = [word for kind in KINDS for word in asked(mechanism, kind, np.random.default_rng(KINDS.index(kind)))]
+    cameras = [f"{c.name}={c.link}@" + ",".join(map(str, c.pose[:3, 3])) for c in every[0].robot.cameras]
+    found = derive(mechanism, camera=cameras, see=see)
+    assert found.certificate.passed
+    assert sum(step.rule == "lift" and step.accepted for step in found.steps) == len(see)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("robot", [*ROBOTS, "spatial"])
+def test_every_kind_is_certified_on_every_robot(robot: str, kind: str) -> None:
+    for form in ("simplified", "general"):
+        certified(robot_of(robot), kind, form)
+
+
+# ---- image points
+
+
+def eye_in_hand(mechanism: Mechanism, count: int) -> ObservedRobot:
+    """Points of the base, seen from a camera on the platform."""
+    rng, X = np.random.default_rng(2), mechanism.links[mechanism.platform].pose
+    places = [X[:3, 3] + X[:3, :3] @ (np.array([0, 0, 1.0]) + 0.3 * rng.normal(size=3)) for _ in range(count)]
+    return ObservedRobot.of(mechanism, camera=f"hand={mechanism.platform}",
+                            see=["point:world@" + ",".join(map(str, place)) for place in places])
+
+
+def test_three_points_of_a_free_body_are_three_ups() -> None:
+    found = derive(free_body(), see=POINTS[:3])
+    assert found.hidden_architecture is not None
+    assert found.hidden_architecture.unicode == "3-U̲PS"
+    assert (str(found.architecture), found.verdict.verdict, found.verdict.rank) == ("6", "controllable", 6)
+    assert found.paper is None
+
+
+@pytest.mark.parametrize("count", [3, 4])
+def test_points_seen_from_the_hand_of_an_arm(count: int) -> None:
+    """The arm itself goes: what is left is the camera between the points."""
+    setting = eye_in_hand(arm(), count)
+    found = derive(setting)
+    assert found.hidden_architecture is not None
+    assert found.hidden_architecture.unicode == f"{count}-SPU̲"
+    assert found.verdict == "controllable"
+    ranks = {len(each.legs): each.rank for each in legs(setting).sets}
+    assert ranks == {size: min(2 * size, 6) for size in range(1, count + 1)}
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_verdicts_agree_with_pixels_of_the_arm(count: int) -> None:
+    """The rank of pixels' derivatives by the joints' angles, by the product of exponentials and differences alone."""
+    setting = eye_in_hand(arm(), count)
+    robot = setting.robot
+    hand = robot.links["platform"].pose
+    points = [robot.links["base"].pose @ np.append(o.to_dict()["at"], 1.0) for o in setting.observed]
+
+    def pixels(angles: Array) -> Array:
+        D = np.eye(4)
+        for joint, angle in zip(robot.joints.values(), angles, strict=True):
+            R = exponential(angle * joint.axis)
+            D = D @ pose(joint.point - R @ joint.point, R)
+        seen = [np.linalg.inv(D @ hand) @ point for point in points]
+        return np.concatenate([each[:2] / each[2] for each in seen])
+
+    angles, h = np.random.default_rng(4).uniform(-0.1, 0.1, 6), 1e-6
+    J = np.column_stack([(pixels(angles + h * e) - pixels(angles - h * e)) / (2 * h) for e in np.eye(6)])
+    assert np.linalg.matrix_rank(J, tol=1e-5) == derive(setting).verdict.rank
+
+
+def test_a_leg_that_carries_what_is_observed_or_sees_is_never_removed() -> None:
+    """A point on a rod, a camera on another, an encoder in a third."""
+    found = derive("gough_stewart", camera="eye=rod_2", see=["point:rod_1@0,0,0.1", "encoder:slide_3"])
+    refused = {step.leg: step.reason for step in found.steps if step.rule == "leg removal" and not step.accepted}
+    assert {"1", "2", "3"} <= refused.keys()
+    assert all("carries what is observed or sees" in refused[leg] for leg in ("1", "2", "3"))
+    assert found.hidden is not None
+    assert {"rod_1", "rod_2", "rod_3"} <= found.hidden.links.keys()
+
+
+def test_motions_that_move_an_observed_value_are_not_idle() -> None:
+    """A rod that spins between two balls, seen by a camera."""
+    plain, watched_ = (ObservedRobot.of("delta", see=see) for see in (None, ["point:rod_1a@0.05,0.02,-0.1"]))
+    assert plain.mobility.total == watched_.mobility.total
+    assert plain.mobility.idle == watched_.mobility.idle + 1
