@@ -155,7 +155,7 @@ def endings(robot: RobotLike, observe: LegsLike = None, camera: str | None = Non
     >>> hrsynth.endings("rrrrr_m1", at="x=0,y=0.25").attracting[0].kind
     'goal'
     """
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("endings")
     asked = asked_pose(at)
     setting = setting.telling([asked])
     require_seen(setting)
