@@ -8,20 +8,22 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any
 
+from ..analysis.aspects.path import PathAnswer
 from ..analysis.derive import Derivation
 from ..analysis.modes.modes import AssemblyModes
 from ..description import load
 from ..errors import BadRequest, CertificateRefused, PoseNotReached
 from ..mechanism import Mechanism
 from ..tolerances import SAME_RELATION
-from . import modes, ranks
+from . import modes, paths, ranks, verify_certificate, verify_path
 from .verify_certificate import NotAccepted, once
-from .verify_certificate import verify as _verify
+from .verify_path import PathNotAccepted
 
 
-def certificate(found: AssemblyModes | Derivation) -> dict[str, Any]:
-    """The certificate of a complete list of modes, or of a derivation's verdict in exact arithmetic: plain data, as
-    ``verify`` and the one file ``verify_certificate.py`` check it. Raises ``NoCertificate``.
+def certificate(found: AssemblyModes | Derivation | PathAnswer) -> dict[str, Any]:
+    """The certificate of a complete list of modes, of a derivation's verdict in exact arithmetic, or of a path: plain
+    data, as ``verify`` and one file, ``verify_certificate.py`` or ``verify_path.py``, check it. Raises
+    ``NoCertificate``.
 
     >>> hrsynth.certificate(hrsynth.modes("3rrr_m1"))["complex"]
     6
@@ -30,10 +32,12 @@ def certificate(found: AssemblyModes | Derivation) -> dict[str, Any]:
         return modes.certificate(found)
     if isinstance(found, Derivation):
         return ranks.certificate(found)
-    raise BadRequest("what has a certificate", type(found).__name__, "what modes or derive answer")
+    if isinstance(found, PathAnswer):
+        return paths.certificate(found)
+    raise BadRequest("what has a certificate", type(found).__name__, "what modes, derive or path answer")
 
 
-def written(found: AssemblyModes | Derivation) -> bytes:
+def written(found: AssemblyModes | Derivation | PathAnswer) -> bytes:
     """A certificate as the content of a file."""
     return (json.dumps(certificate(found), indent=1) + "\n").encode()
 
@@ -58,15 +62,16 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
         except (OSError, ValueError, RecursionError) as error:
             why = getattr(error, "strerror", None) or "it is no JSON"
             raise BadRequest(f"the certificate cannot be read: {why}", name,
-                             "a file that modes or derive wrote with --certificate") from None
+                             "a file that modes, derive or path wrote with --certificate") from None
     try:
-        proved = _verify(record)
-    except NotAccepted as reason:
+        checker = verify_path if record.get("claim") == "path" else verify_certificate
+        proved = checker.verify(record)
+    except (NotAccepted, PathNotAccepted) as reason:
         raise CertificateRefused(name, str(reason)) from None
     if robot is not None:
         robot = load(robot)
         try:
-            own = (modes if record["claim"] == "modes" else ranks).again(record, robot)
+            own = {"modes": modes, "ranks": ranks, "path": paths}[record["claim"]].again(record, robot)
         except (BadRequest, PoseNotReached) as error:
             raise CertificateRefused(name, f"it is not about {robot.name}: {error}") from None
         except (KeyError, TypeError, ValueError, AttributeError) as error:
@@ -79,7 +84,7 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
 def _same(one: Any, other: Any) -> bool:
     """Whether two records of geometry are alike; what was solved for is left out."""
     if isinstance(one, dict) and isinstance(other, dict):
-        left_out = {"robot", "boxes", "bound", "sha256", "stacks"}
+        left_out = {"robot", "boxes", "bound", "sha256", "stacks", "path"}
         return one.keys() - left_out == other.keys() - left_out and all(
             _same(one[key], other[key]) for key in one.keys() - left_out)
     if isinstance(one, list) and isinstance(other, list):

@@ -215,9 +215,10 @@ QUESTIONS = (
              ("quattro --observe 1,4", "3rrr_m1 --observe 2,1,3 -o atlas.png")),
     Question("path", "Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, "
              "undecided.",
-             (START, _goal("Where it ends; mode:2 is a mode with the directions at the start."), *WATCHED),
+             (START, _goal("Where it ends; mode:2 is a mode with the directions at the start."), *WATCHED,
+              _file("path", "certificate")),
              ("quattro --observe 1,4 --start x=0.05 --goal x=-0.05,phi=20deg",
-              "3rrr_m1 --start x=0,y=0 --goal mode:2")),
+              "3rrr_m1 --start x=0,y=0 --goal mode:2 --certificate c.json")),
     Question("servo", "A servo run on the directions of legs, simulated: where it ends, and what it passes on the way.",
              (START, _goal("Pose whose directions are desired."), *WATCHED,
               Option("gain", "λ of the control law (1/s).", None, float, 0.8, high=1e6),

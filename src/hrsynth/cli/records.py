@@ -622,7 +622,9 @@ class PathRecord(TypedDict):
 
 
 class Path(OfRobot, PathRecord):
-    """The same of a robot."""
+    """The same of a robot, and the certificate that was asked for."""
+
+    certificate_file: str | None
 
 
 class PairRecord(TypedDict):

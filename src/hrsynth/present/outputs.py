@@ -205,7 +205,7 @@ OUTPUTS = {
         File("cannot draw the modes", figures("modes:picture"), "The picture of the modes",
              "Draw the modes: modes.png, .pdf, .svg.", nothing="modes:why_undrawn", drawn=True),
         CERTIFICATE)),
-    "path": Outputs("text.poses:path"),
+    "path": Outputs("text.poses:path", (CERTIFICATE,)),
     "robot": Outputs("text.robots:robot"),
     "select": Outputs("text.runs:selection"),
     "servo": Outputs("text.runs:servo", (

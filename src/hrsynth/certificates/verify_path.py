@@ -1,0 +1,279 @@
+"""Check a certificate of a path: `python verify_path.py c.json`. Integers and fractions only.
+
+A *pose* is the position p of a point and a quaternion q, which need not be of length one. On a path both go straight
+from pose to pose, so the platform turns about one axis on each piece. Each leg is in closed form: its tip, a vector of
+the pose, decides what it carries in its *working mode*, as long as the leg reaches (theory.md, section 9).
+
+*same aspect*: on each piece, p, q and all that follows are enclosed in intervals whose ends are rounded outwards to
+multiples of 2^-96. All legs reach, and the condition, an expression in vectors, is nowhere zero: it keeps its sign from
+the first pose to the last. *separated*: it has other signs at two poses, so it is zero on every path between them, in
+whatever working modes. That the condition is that of the hidden robot's Type 2 singularities is not proved here.
+"""
+
+import hashlib
+import json
+import math
+import sys
+from collections.abc import Iterable
+from fractions import Fraction
+from itertools import pairwise
+from typing import Any
+
+ONE = 1 << 96  # intervals are pairs of integers, in units of one over this
+Interval = tuple[int, int]
+Vector = list[Interval]
+
+
+class PathNotAccepted(Exception):
+    """Why a certificate is not accepted."""
+
+
+def need(true: Any, why: str) -> None:
+    if not true:
+        raise PathNotAccepted(why)
+
+
+def number(text: Any) -> Fraction:
+    need(isinstance(text, str) and len(text) < 300 and not set(text) - set("0123456789/.-"), "a number in words")
+    return Fraction(text)
+
+
+def interval(x: Fraction, y: Fraction | None = None) -> Interval:  # the least that holds one or two fractions
+    low, high = sorted([x, x if y is None else y])
+    return math.floor(low * ONE), math.ceil(high * ONE)
+
+
+def plus(a: Interval, b: Interval) -> Interval:
+    return a[0] + b[0], a[1] + b[1]
+
+
+def minus(a: Interval, b: Interval) -> Interval:
+    return a[0] - b[1], a[1] - b[0]
+
+
+def times(a: Interval, b: Interval) -> Interval:
+    products = [x * y for x in a for y in b]
+    return min(products) // ONE, -(-max(products) // ONE)
+
+
+def over(a: Interval, b: Interval) -> Interval:
+    need(b[0] * b[1] > 0, "a denominator that may be zero")
+    quotients = [(x * ONE, y) for x in a for y in b]
+    return min(x // y for x, y in quotients), max(-(-x // y) for x, y in quotients)
+
+
+def square(a: Interval) -> Interval:
+    low, high = sorted(map(abs, a))
+    return 0 if a[0] * a[1] <= 0 else low * low // ONE, -(-high * high // ONE)
+
+
+def root(a: Interval) -> Interval:
+    need(a[0] > 0, "a leg that may not reach, or a vector that may be zero")
+    return math.isqrt(a[0] * ONE), math.isqrt(a[1] * ONE) + 1
+
+
+def total(values: Iterable[Interval]) -> Interval:
+    found: Interval = (0, 0)
+    for each in values:
+        found = plus(found, each)
+    return found
+
+
+def add(u: Vector, v: Vector) -> Vector:
+    return [plus(a, b) for a, b in zip(u, v, strict=True)]
+
+
+def sub(u: Vector, v: Vector) -> Vector:
+    return [minus(a, b) for a, b in zip(u, v, strict=True)]
+
+
+def scaled(c: Interval, u: Vector) -> Vector:
+    return [times(c, a) for a in u]
+
+
+def dot(u: Vector, v: Vector) -> Interval:
+    return total(times(a, b) for a, b in zip(u, v, strict=True))
+
+
+def norm2(u: Vector) -> Interval:
+    return total(map(square, u))
+
+
+def cross(u: Vector, v: Vector) -> Vector:
+    return [minus(times(u[i], v[j]), times(u[j], v[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
+
+
+def unit(u: Vector) -> Vector:
+    size = root(norm2(u))
+    return [over(a, size) for a in u]
+
+
+def vector(texts: Any) -> Vector:
+    need(isinstance(texts, list) and len(texts) == 3, "a vector of another length")
+    return [interval(number(x)) for x in texts]
+
+
+def rotation(q: Vector) -> list[Vector]:  # of the quaternions in a box; shape (3, 3)
+    w, *v = q
+    size, c = norm2(q), total([square(w), *(minus((0, 0), square(x)) for x in v)])
+    need(size[0] > 0, "a quaternion that may be zero")
+    R = [[times((2 * ONE, 2 * ONE), times(a, b)) for b in v] for a in v]
+    for i in range(3):
+        R[i][i] = plus(times((2 * ONE, 2 * ONE), square(v[i])), c)
+        j, k = (i + 1) % 3, (i + 2) % 3
+        twist = times((2 * ONE, 2 * ONE), times(w, v[k]))
+        R[i][j], R[j][i] = minus(R[i][j], twist), plus(R[j][i], twist)
+    return [[over(x, size) for x in row] for row in R]
+
+
+def point(rule: Any, p: Vector, R: list[Vector]) -> Vector:  # follows p + R turned + constant
+    follows, turned, constant = rule
+    need(follows in (True, False), "a vector that follows the pose, or does not")
+    turned = vector(turned)
+    found = add([dot(row, turned) for row in R], vector(constant))
+    return add(found, p) if follows else found
+
+
+def plainly(text: Any) -> Interval:  # a number of a leg
+    return interval(number(text))
+
+
+def crank(leg: Any, D: Vector, side: Interval) -> Vector:
+    """B on a circle about ``axis``, |D - B| = rod: D' B = (|D|^2 + radius^2 - rod^2) / 2 with D' normal to the axis."""
+    axis, radius, rod = vector(leg["axis"]), plainly(leg["radius"]), plainly(leg["rod"])
+    flat = sub(D, scaled(over(dot(D, axis), norm2(axis)), axis))
+    far = norm2(flat)
+    share = times(minus(plus(norm2(D), square(radius)), square(rod)), interval(Fraction(1, 2)))
+    margin = root(minus(times(square(radius), far), square(share)))
+    spoke = add(scaled(share, flat), scaled(times(margin, side), cross(unit(axis), flat)))
+    return [over(x, far) for x in spoke]
+
+
+def rail(leg: Any, D: Vector, side: Interval) -> Vector:
+    """B along ``axis``, |D - B| = rod."""
+    axis, rod = unit(vector(leg["axis"])), plainly(leg["rod"])
+    along = dot(D, axis)
+    margin = root(minus(square(rod), norm2(sub(D, scaled(along, axis)))))
+    return scaled(plus(along, times(side, margin)), axis)
+
+
+def slide(leg: Any, D: Vector, side: Interval) -> Vector:
+    """The direction of a rod through D, at the distance ``aside`` from the base point on the side of axis x u."""
+    if leg["axis"] is None:
+        return scaled(side, unit(D))
+    axis, aside = unit(vector(leg["axis"])), plainly(leg["aside"])
+    flat = sub(D, scaled(dot(D, axis), axis))
+    far = norm2(flat)
+    drawn = times(side, root(minus(far, square(aside))))
+    return [over(x, far) for x in sub(scaled(drawn, flat), scaled(aside, cross(axis, flat)))]
+
+
+LEGS: dict[str, Any] = {"crank": (crank, True), "rail": (rail, True), "slide": (slide, False)}
+
+
+def carried(leg: Any, p: Vector, R: list[Vector]) -> Vector:  # what a leg carries at poses
+    solve, placed = LEGS[leg["kind"]]
+    need(leg["mode"] in (1, -1), "a working mode")
+    centre = vector(leg["centre"])
+    found = solve(leg, sub(point(leg["tip"], p, R), centre), (leg["mode"] * ONE,) * 2)
+    return add(centre, found) if placed else found
+
+
+def valued(each: Any, p: Vector, R: list[Vector], legs: list[Vector]) -> Vector:
+    """A vector: by a rule, a leg's, or the unit vector from one to another, turned about a third."""
+    kind, *rest = each
+    if kind == "point":
+        return point(rest, p, R)
+    if kind == "leg":
+        k, sense, offset = rest
+        need(sense in (1, -1) and k in range(len(legs)), "a leg that there is not")
+        return add(scaled((sense * ONE,) * 2, legs[k]), vector(offset))
+    need(kind == "unit" and len(rest) == 3, "a vector of another kind")
+    start, end, axis = rest
+    along = sub(valued(end, p, R, legs), valued(start, p, R, legs))
+    return unit(along if axis is None else cross(valued(axis, p, R, legs), along))
+
+
+def evaluated(tree: Any, values: Any) -> Any:  # an expression: a number, a symbol, or an operation and its operands
+    if isinstance(tree, str):
+        return values[tree] if tree in values else plainly(tree)
+    name, *parts = tree
+    found: list[Any] = [evaluated(each, values) for each in parts]
+    if name in ("dot", "cross", "det"):
+        return dot(*found) if name == "dot" else cross(*found) if name == "cross" else dot(found[0], cross(*found[1:]))
+    need(name in ("+", "*") and found, "an operation of another name")
+    result, *others = sorted(found, key=lambda each: isinstance(each, tuple))
+    for each in others:
+        if name == "*":
+            result = scaled(each, result) if isinstance(result, list) else times(each, result)
+        else:
+            result = add(result, each) if isinstance(result, list) else plus(result, each)
+    return result
+
+
+def condition(record: Any, legs: Any, p: Vector, q: Vector) -> Interval:  # its value at all poses in boxes
+    R = rotation(q)
+    held = [carried(leg, p, R) for leg in legs]
+    values = {symbol: valued(each, p, R, held) for symbol, each in record["vectors"].items()}
+    values |= {symbol: sub(values[symbol], values[record["points"][0]]) for symbol in record["points"]}
+    found = evaluated(record["condition"], values)
+    need(isinstance(found, tuple), "a condition that is no number")
+    return found
+
+
+def sign(found: Interval) -> int:
+    need(found[0] * found[1] > 0, "the condition may be zero")
+    return 1 if found[0] > 0 else -1
+
+
+def pose(record: Any) -> list[list[Fraction]]:
+    need(len(record) == 2 and list(map(len, record)) == [3, 4], "a pose of another form")
+    return [[number(x) for x in part] for part in record]
+
+
+def path(record: Any) -> str:
+    poses, legs = [pose(each) for each in record["path"]], record["legs"]
+    need(record["verdict"] in ("same aspect", "separated") and len(poses) > 1, "another verdict, or too few poses")
+    need(record["ends"] == [record["path"][0], record["path"][-1]], "the ends of another path")
+    if record["verdict"] == "separated":
+        need(len(poses) == len(legs) == 2, "two poses, each in its working modes")
+        one, other = (sign(condition(record, each, [interval(x) for x in p], [interval(x) for x in q]))
+                      for (p, q), each in zip(poses, legs, strict=True))
+        need(one != other, "the condition has one sign at both poses")
+        return "separated: the condition has opposite signs at the two poses"
+    need(len(legs) == 1, "one set of working modes")
+    signs = set()
+    for piece in pairwise(poses):
+        p, q = ([interval(x, y) for x, y in zip(*parts, strict=True)] for parts in zip(*piece, strict=True))
+        signs.add(sign(condition(record, legs[0], p, q)))
+    need(len(signs) == 1, "the condition changes its sign")
+    return f"same aspect: on {len(poses) - 1} pieces of a path all legs reach and the condition is nowhere zero"
+
+
+def digest(record: Any) -> str:
+    rest = {key: each for key, each in record.items() if key != "sha256"}
+    return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def once(pairs: Any) -> Any:  # an object of JSON; of two keys a reader may see one, Python the other
+    need(len(dict(pairs)) == len(pairs), "a key that is told twice")
+    return dict(pairs)
+
+
+def verify(record: Any) -> str:  # what a certificate proves, in words; raises PathNotAccepted
+    try:
+        need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1"
+             and record["claim"] == "path", "this is no certificate of a path")
+        need(record["sha256"] == digest(record), "the file was changed: another digest")
+        return path(record)
+    except Exception as error:
+        raise error if isinstance(error, PathNotAccepted) else PathNotAccepted(f"no certificate: {error!r}") from None
+
+
+if __name__ == "__main__":
+    try:
+        with open(sys.argv[1], encoding="utf-8") as file:
+            print("accepted:", verify(json.load(file, object_pairs_hook=once)))
+    except (PathNotAccepted, OSError, ValueError, IndexError, RecursionError) as error:
+        print("refused:", error)
+        sys.exit(3)
