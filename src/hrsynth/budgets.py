@@ -232,14 +232,18 @@ RUN_EVALUATIONS = 20_000
 """Configurations that the integrator may ask for in a servo run."""
 LONGEST_RUN = 10_000.0
 """Seconds that a run with noise, on the physics bench or along a way may take: these go on to their end."""
-ENDING_STARTS = 100
+ENDING_STARTS = 200
 """Starts of one round in which critical points of a loop's error are sought."""
-ENDING_ROUNDS = 16
-"""Rounds at most."""
+ENDING_ROUNDS = 12
+"""Rounds at most, of robots with many coordinates."""
+ENDING_EFFORT = 300
+"""Coordinates of all rounds together, up to which there may be more rounds of robots with few."""
 ENDING_DESCENTS = 3
-"""Rounds before the last one at least where only what attracts is sought."""
-ENDING_LATE = 0.04
-"""Part of the critical points that the later half of the starts may find first, twice, for the search to end."""
+"""Rounds before the last one at least."""
+ENDING_LATE = 0.005
+"""Part of the critical points that the later half of the starts may find first for the search to end."""
+ENDING_LATE_DESCENT = 0.02
+"""The same where only what attracts is sought."""
 ENDING_WALK = 6
 """Random steps along the loops from the starts of one round to those of the next."""
 ENDING_STEPS = 80

@@ -723,6 +723,7 @@ class RestRecord(TypedDict):
     error: float
     curvatures: list[float]
     proved: bool
+    decided: bool
     radius_m: Number
     radius_rad: Number
     reversed: list[str]
@@ -733,6 +734,16 @@ class RestRecord(TypedDict):
     beyond: list[str]
     other_legs: list[str] | None
     met: int
+    ways: int
+
+
+class SignedModesRecord(TypedDict):
+    """How many poses there are with the directions of some legs reversed, complex ones too."""
+
+    reversed: list[str]
+    modes: int | None
+    complex: int | None
+    complete: bool
 
 
 class EndingsAnswer(OfRobot):
@@ -744,9 +755,11 @@ class EndingsAnswer(OfRobot):
     camera: str
     complex: int | None
     complete: bool
+    signs: list[SignedModesRecord]
     proof: str
     starts: int
     attracting: int
+    measured: list[str]
     endings: list[RestRecord]
     singular: list[RestRecord]
     continua: list[RestRecord]

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..tolerances import AFFINE_ROUNDING, CHAIN_ROUNDING
-from .vectors import Array
+from .vectors import Array, cross
 
 
 class AffineForms:
@@ -174,6 +174,8 @@ def stacked(parts: Sequence[Any], axis: int = -1) -> Any:
 
 def crossed(a: Any, b: Any) -> Any:
     """a × b along the last dimension."""
+    if not isinstance(a, AffineForms) and not isinstance(b, AffineForms):
+        return cross(a, b)
     (a0, a1, a2), (b0, b1, b2) = ([x[..., k] for k in range(3)] for x in (a, b))
     return stacked([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0])
 

@@ -231,6 +231,8 @@ def _sharpened(directions: Array) -> Array:
 
 def mapped(R: Any, p: Any) -> Any:
     """R p (…, 3)."""
+    if _floats(R) and _floats(p):
+        return np.matmul(R, p[..., None])[..., 0]
     return (R * p[..., None, :]).sum(-1)
 
 
@@ -242,8 +244,14 @@ def _turned(R: Any, axis: Array, angle: Any) -> Any:
     return R + once * sine[..., None, None] + _product(R, K @ K) * (1 - cosine)[..., None, None]
 
 
+def _floats(x: Any) -> bool:
+    return isinstance(x, np.ndarray) and x.dtype.kind == "f"
+
+
 def _product(R: Any, K: Array) -> Any:
     """R K for a matrix of numbers (3, 3)."""
+    if _floats(R):
+        return R @ K
     return (R[..., :, :, None] * K).sum(-2)
 
 

@@ -22,8 +22,7 @@ def unexplained(part: LoopPart) -> tuple[LoopEquation, ...]:
     """
     found = []
     chosen = [each.of.name for block in part.blocks for each in block.equations]
-    needed = {loop.name: group_dimension(part.system, loop) - _freedoms(part.system, loop)
-              for loop in part.loops if loop.swung is None}
+    needed = {loop.name: dependent_rows(part.system, loop) for loop in part.loops if loop.swung is None}
     for each in part.left_out:
         name = each.of.name
         if name not in needed or chosen.count(name) != needed[name]:
@@ -31,8 +30,9 @@ def unexplained(part: LoopPart) -> tuple[LoopEquation, ...]:
     return tuple(found)
 
 
-def _freedoms(system: LoopSystem, loop: JointLoop) -> int:
-    return JointType(system.mechanism.joints[loop.name].type).freedoms
+def dependent_rows(system: LoopSystem, loop: JointLoop) -> int:
+    """How many independent equations close a loop: on which all others depend."""
+    return group_dimension(system, loop) - JointType(system.mechanism.joints[loop.name].type).freedoms
 
 
 def group_dimension(system: LoopSystem, loop: JointLoop) -> int:

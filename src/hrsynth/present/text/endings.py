@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from .tables import GAP, Rows, camera, head, listing, named, table
 
 if TYPE_CHECKING:
-    from ...simulation.endings.endings import Endings, RestPoint
+    from ...simulation.endings.endings import Endings, RestPoint, SignedModes
 
 LISTED_SADDLES = 12
 """Rests that do not attract which are told one by one."""
@@ -24,7 +24,7 @@ def endings(found: Endings) -> str:
         left = len(others) - LISTED_SADDLES
         rows += [("do not", [*told, *([f"and {left} more (--json lists them)"] if left > 0 else [])]), *GAP]
     rows += [("continua", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.continua])]
-    rows += [("all", found.proof if found.complete else f"not proved to be all: {found.proof}")]
+    rows += [("all", [*map(_signs, found.lists), f"the others are found, not proved to be all: {found.search.words}"])]
     return listing(rows)
 
 
@@ -38,12 +38,21 @@ def _line(each: RestPoint) -> list[str]:
         notes.append(f"{named('leg', each.reversed)} reversed")
     if each.across:
         notes.append(f"{named('leg', each.across)} at right angles")
+    if each.ways > 1:
+        notes.append(f"in {each.ways} working modes")
     if each.other_legs:
         notes.append(f"{named('leg', each.other_legs)} in another working mode")
     if each.beyond:
         notes.append(f"beyond the limits of {', '.join(each.beyond)}")
     return [each.kind, f"{each.error:.3g}" if each.kind == "critical" else "0", each.stability, str(each.pose),
             "; ".join(notes)]
+
+
+def _signs(each: SignedModes) -> str:
+    which = f"with {named('leg', each.reversed)} reversed" if each.reversed else "with the desired directions"
+    if each.listed is None:
+        return f"poses {which}: found, not listed"
+    return f"poses {which}: {each.listed.count}, {'all' if each.complete else 'found, not proved to be all'}"
 
 
 def _why(each: RestPoint) -> str:

@@ -7,7 +7,7 @@ they carry, aᵢ the axis of a turn, zero of a slide.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -63,37 +63,39 @@ class SweptChains:
 
     def __init__(self, system: LoopSystem, values: Sequence[Any]) -> None:
         self.system, self.values = system, values
-        self._swept: dict[tuple[int, ...], tuple[Swept, Any]] = {}
+        self._swept: dict[tuple[int, ...], tuple[Swept, Any, Any, Any]] = {}
+        self._known: dict[tuple[Any, ...], CarriedVector] = {}
 
-    def _chain(self, chain: tuple[int, ...]) -> tuple[Swept, Any]:
+    def _chain(self, chain: tuple[int, ...]) -> tuple[Swept, Any, Any, Any]:
+        """What a chain does, and below each other (…, k, 3) the axes of turns, points of them, the axes of slides."""
         if chain not in self._swept:
-            swept = self.system.displacement(chain, self.values)
+            swept, none = self.system.displacement(chain, self.values), np.zeros(3)
             slides = [self.system.coordinates[i].slides for i in chain]
-            axes = [np.zeros(3) if slide else axis for slide, axis in zip(slides, swept.axes, strict=True)]
-            self._swept[chain] = swept, _rows(axes)
+            rows = [[none if slide else axis for slide, axis in zip(slides, swept.axes, strict=True)],
+                    [none if point is None else point for point in swept.points],
+                    [axis if slide else none for slide, axis in zip(slides, swept.axes, strict=True)]]
+            self._swept[chain] = swept, *(stacked(each, -2) if chain else np.zeros((0, 3)) for each in rows)
         return self._swept[chain]
 
     def point(self, chain: tuple[int, ...], p: Array) -> CarriedVector:
         """The place of a point (3,), as it lies at zero, behind a chain."""
-        swept, axes = self._chain(chain)
-        at = swept.at(p)
-        return CarriedVector(at, _parts(chain, [swept.rate(k, at) for k in range(len(chain))], axes))
+        key = (chain, *p.tolist())
+        if key not in self._known:
+            swept, axes, points, slides = self._chain(chain)
+            at = swept.at(p)
+            self._known[key] = CarriedVector(at, _parts(
+                chain, lambda: crossed(axes, at[..., None, :] - points) + slides, axes))
+        return self._known[key]
 
     def direction(self, chain: tuple[int, ...], d: Array) -> CarriedVector:
         """A direction (3,), as it is at zero, behind a chain."""
-        swept, axes = self._chain(chain)
+        swept, axes, *_ = self._chain(chain)
         v = mapped(swept.R, d)
-        turned = [swept.turned(k, v) for k in range(len(chain))]
-        return CarriedVector(v, _parts(chain, [np.zeros(3) if each is None else each for each in turned], axes))
+        return CarriedVector(v, _parts(chain, lambda: crossed(axes, v[..., None, :]), axes))
 
 
-def _parts(chain: tuple[int, ...], columns: Sequence[Any], axes: Any) -> tuple[ChainColumns, ...]:
-    return (ChainColumns(np.array(chain, dtype=np.intp), _rows(columns), axes),) if chain else ()
-
-
-def _rows(vectors: Sequence[Any]) -> Any:
-    """Vectors (…, 3) below each other, (…, k, 3)."""
-    return stacked(vectors, -2) if vectors else np.zeros((0, 3))
+def _parts(chain: tuple[int, ...], columns: Callable[[], Any], axes: Any) -> tuple[ChainColumns, ...]:
+    return (ChainColumns(np.array(chain, dtype=np.intp), columns(), axes),) if chain else ()
 
 
 class Total:

@@ -4,36 +4,37 @@ them attract (docs/pages/theory.md, section 11)."""
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...analysis.asked import configurations_at
+from ...analysis.modes.modes import AssemblyModes, modes
 from ...analysis.observed import LegsLike, ObservedRobot, RobotLike
 from ...analysis.posture import ConfigurationAnalysis
 from ...analysis.question import question
 from ...constraints.pattern import attached
-from ...errors import LoopsNotClosed
-from ...geometry.vectors import Array, pose_difference
+from ...errors import HrsynthError, LoopsNotClosed
+from ...geometry.affine import affine
+from ...geometry.vectors import Array, pose_difference, transform
 from ...kinematics.assembly import ASSEMBLED, BEYOND, of_links
-from ...kinematics.branch import Signature
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
-from ...kinematics.relation import relation
 from ...mechanism.pose import Pose, PoseLike, asked_pose
 from ...progress import tell
-from ...results import Result
-from ...tolerances import DAMPED, SAME_ENDING, SAME_RELATION, VANISHED
+from ...results import Result, Value
+from ...tolerances import DAMPED, SAME_ENDING, VANISHED
 from ..ending import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
 from ..law import FixedDirections, Law, directions
 from ..servo import require_regular, require_seen
+from .carried import SweptChains
+from .enclosure import EnclosedPoint, enclosed, unexplained_rows
 from .error import RestSystem
-from .search import Critical, critical_points, walked
+from .search import NEARBY, Critical, CriticalPoints, critical_points, descend, in_mode, walked
 
 CRITICAL = "critical"
-NEARBY = 0.02
-"""Step (characteristic lengths, radians) to a configuration that shows the operation mode in which a rest lies."""
 STABLE, SADDLE, UNSTABLE, UNDECIDED = "stable", "saddle", "unstable", "undecided"
 
 
@@ -43,11 +44,13 @@ class RestPoint:
     ``stability`` stable (it attracts), saddle, unstable (nothing is drawn to it) or undecided; ``curvatures`` are the
     eigenvalues of the Hessian of ½ ‖e‖² along the motions of the loops (characteristic lengths, radians), ascending.
 
-    The rest lies within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite where it was only found. ``reversed``
+    Exactly one rest lies within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite where it was only found;
+    ``decided``: whether the signs of the curvatures are proved. ``reversed``
     names legs whose direction is opposite to the desired one, ``across`` those at right angles to it. ``singular`` says
     why fewer velocities are seen there than at other poses, None where all are; ``boundary`` whether that is a leg's
     reach. ``assembly`` is ``beyond limits`` where joints (``beyond``) are outside their limits, else ``yes``;
-    ``other_legs`` are in another working mode than at the goal (None where that is not known).
+    ``other_legs`` are in another working mode than at the goal (None where that is not known); in so many working
+    modes (``ways``) it was found, from so many starts (``met``).
     """
 
     pose: Pose
@@ -58,6 +61,7 @@ class RestPoint:
     configuration: ClosedConfiguration
     shift: float = np.inf
     turn: float = np.inf
+    decided: bool = False
     reversed: tuple[str, ...] = ()
     across: tuple[str, ...] = ()
     singular: str | None = None
@@ -65,6 +69,7 @@ class RestPoint:
     beyond: tuple[str, ...] = ()
     other_legs: tuple[str, ...] | None = None
     met: int = 0
+    ways: int = 1
 
     @property
     def proved(self) -> bool:
@@ -88,18 +93,42 @@ class RestPoint:
         """The record of the command line."""
         return {"pose": self.pose.to_dict(), "kind": self.kind, "stable": self.stable, "stability": self.stability,
                 "error": self.error, "curvatures": list(self.curvatures), "proved": self.proved,
+                "decided": self.decided,
                 "radius_m": self.shift if self.proved else None, "radius_rad": self.turn if self.proved else None,
                 "reversed": list(self.reversed), "across": list(self.across), "singular": self.singular,
                 "boundary": self.boundary, "assembly": self.assembly, "beyond": list(self.beyond),
-                "other_legs": None if self.other_legs is None else list(self.other_legs), "met": self.met}
+                "other_legs": None if self.other_legs is None else list(self.other_legs), "met": self.met,
+                "ways": self.ways}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SignedModes(Value):
+    """The poses at which the error vanishes with the directions of the legs ``reversed`` opposite to the desired ones:
+    the list of all modes with these, None where it could not be made."""
+
+    reversed: tuple[str, ...]
+    listed: AssemblyModes | None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the list is proved to be all."""
+        return self.listed is not None and self.listed.found.complete
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        known = self.listed
+        return {"reversed": list(self.reversed), "modes": None if known is None else len(known.modes),
+                "complex": None if known is None or known.found.continuum else known.found.complex,
+                "complete": self.complete}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Endings(Result, shown_as="endings"):
     """All that was found of where the loop can rest with the directions of one pose, the goal: ``rests`` one by one,
     the goal first, then those that attract; ``continua``: one rest each of those that fill curves or surfaces.
-    ``complete``: whether a computation proves that there are no others, and ``proof`` which; ``starts`` how many were
-    led to rests."""
+    ``lists`` are those of the modes and of the antipodal poses of each combination of signs that was met; equations of
+    the loops ``measured`` are met as well as numbers tell and not enclosed; ``search`` says how rests were sought.
+    """
 
     setting: ObservedRobot
     goal: ClosedConfiguration
@@ -107,9 +136,14 @@ class Endings(Result, shown_as="endings"):
     desired: Array
     rests: tuple[RestPoint, ...]
     continua: tuple[RestPoint, ...]
-    complete: bool
-    proof: str
-    starts: int
+    lists: tuple[SignedModes, ...]
+    measured: tuple[str, ...]
+    search: CriticalPoints
+
+    @property
+    def complete(self) -> bool:
+        """Whether these are proved to be all: never yet."""
+        return False
 
     @property
     def endings(self) -> tuple[RestPoint, ...]:
@@ -133,8 +167,10 @@ class Endings(Result, shown_as="endings"):
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
-        return {"at": self.pose.to_dict(), **self.setting.to_dict(), "complex": None, "complete": self.complete,
-                "proof": self.proof, "starts": self.starts, "attracting": len(self.attracting),
+        return {"at": self.pose.to_dict(), **self.setting.to_dict(), "complex": self.lists[0].to_dict()["complex"],
+                "complete": self.complete, "signs": [each.to_dict() for each in self.lists],
+                "proof": self.search.words, "starts": self.search.starts, "attracting": len(self.attracting),
+                "measured": list(self.measured),
                 "endings": [each.to_dict() for each in self.endings],
                 "singular": [each.to_dict() for each in self.singular],
                 "continua": [each.to_dict() for each in self.continua]}
@@ -184,55 +220,131 @@ class RestSearch:
 
     def answer(self, seed: int = 0, *, minima: bool = False, rounds: Iterable[Array] | None = None) -> Endings:
         """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`."""
-        setting = self.setting
+        setting, motion = self.setting, self.setting.motion
         found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds)
-        rests = [each for one in found.isolated if (each := self.read(one)) is not None]
-        continua = [each for one in found.continua if (each := self.read(one)) is not None]
+        isolated = self._in_mode(found.isolated)
+        lists = self._lists(isolated)
+        isolated += [each for one in lists for each in self._listed(one, isolated, found.idle)]
+        tell("enclosures")
+        boxes = enclosed(self.system, [each.point for each in isolated], found.idle)
+        rests = _ways([each for one, box in zip(isolated, boxes, strict=True)
+                       if (each := self.read(one, box)) is not None], self)
+        continua = [each for one in self._in_mode(found.continua) if (each := self.read(one)) is not None]
         order = {GOAL: 0, MODE: 1, ANTIPODAL: 2, CRITICAL: 3}
         rests.sort(key=lambda each: (order[each.kind], not each.stable, each.error))
-        motion = setting.motion
         return Endings(setting, self.goal, motion.pose(self.goal.pose(motion.link)), self.desired, tuple(rests),
-                       tuple(continua), False, found.words, found.starts)
+                       tuple(continua), tuple(lists), unexplained_rows(self.system), found)
 
-    def read(self, found: Critical) -> RestPoint | None:
-        """A critical point as a pose of the robot; None where its loops do not close."""
-        motion, point = self.setting.motion, found.point
+    def _lists(self, found: Sequence[Critical]) -> list[SignedModes]:
+        """The lists of modes of those combinations of signs at which the error was found to vanish, that of the goal
+        first."""
+        known: dict[tuple[str, ...], AssemblyModes | None] = {}
+        for at in (self.goal, *(self._placed(each.point.q) for each in found if each.point.value < VANISHED**2)):
+            if at is not None and (reversed_ := self._reversed(at)) not in known:
+                try:
+                    known[reversed_] = modes(self.setting, at=at)
+                except HrsynthError:
+                    known[reversed_] = None
+        return [SignedModes(*each) for each in known.items()]
+
+    def _listed(self, given: SignedModes, found: Sequence[Critical], idle: int) -> list[Critical]:
+        """The modes of a list that are none of those that were found."""
+        if given.listed is None:
+            return []
+        places = [each.configuration for each in given.listed.modes if each.configuration is not None]
+        old = [at for each in found if each.point.value < VANISHED**2 and (at := self._placed(each.point.q))]
+        new = [at for at in places if not any(self.alike(at, each) and self._reversed(each) == given.reversed
+                                              for each in old)]
+        if not new:
+            return []
+        q = np.array([self.system.system.read(at.pose) for at in new])
+        return [Critical(each, 0) for each in descend(self.system, q, np.zeros(len(q), dtype=np.intp), idle)]
+
+    def _placed(self, q: Array) -> ClosedConfiguration | None:
+        """The robot at coordinates (N,); None where its loops do not close."""
         try:
-            at = of_links(self.goal.twin, lambda link: self.system.system.pose(link, point.q.tolist()))
+            return of_links(self.goal.twin, partial(self.system.system.pose, values=q.tolist()))
         except LoopsNotClosed:
             return None
+
+    def _reversed(self, at: ClosedConfiguration) -> tuple[str, ...]:
+        """The legs whose direction is opposite to the desired one, as far as it is along it."""
+        cosines = np.sum(directions(at, self.law.question)[0] * self.desired, axis=1)
+        return tuple(o.leg for o, c in zip(self.law.question.observations, cosines, strict=True) if c < VANISHED - 1)
+
+    def alike(self, at: ClosedConfiguration, other: ClosedConfiguration) -> bool:
+        """Whether the platform is at the same pose."""
+        return all(pose_difference(at.pose(body), other.pose(body), self.goal.twin.length) <= SAME_ENDING
+                   for body in attached(self.setting.anatomy))
+
+    def read(self, found: Critical, box: EnclosedPoint | None = None) -> RestPoint | None:
+        """A critical point as a pose of the robot; None where its loops do not close."""
+        motion, point = self.setting.motion, found.point
+        at = self._placed(point.q)
+        if at is None:
+            return None
         command = self.law.at(at, FixedDirections(self.desired)(0.0))
-        if command.pull > SAME_ENDING or not self._in_mode(found):
+        if command.pull > SAME_ENDING:
             return None
         u = command.directions
         cosines = np.sum(u * self.desired, axis=1)
         labels = [o.leg for o in self.law.question.observations]
         error = command.size
-        reversed_ = tuple(label for label, c in zip(labels, cosines, strict=True) if c < -1 + VANISHED)
+        reversed_ = self._reversed(at)
         across = tuple(label for label, c in zip(labels, cosines, strict=True) if abs(c) < VANISHED)
         kind, singular, boundary = CRITICAL, None, False
         if error < VANISHED:
-            kind = ANTIPODAL if reversed_ else GOAL if self._at_goal(at) else MODE
+            kind = ANTIPODAL if reversed_ else GOAL if self.alike(at, self.goal) else MODE
         elif float(command.values[-1]) < DAMPED:
             why = rest(self.setting, at, command)
             singular, boundary = why.reason, why.name == BOUNDARY
-        return RestPoint(motion.pose(at.pose(motion.link)), kind, stability(point.curvatures), error,
-                         tuple(map(float, point.curvatures)), at, reversed=reversed_, across=across, singular=singular,
+        X = at.pose(motion.link)
+        shift, turn = (np.inf, np.inf) if box is None else self._radius(box, X)
+        state = stability(point.curvatures if box is None or box.index is None else box.signs(len(point.curvatures)))
+        return RestPoint(motion.pose(X), kind, state, error, tuple(map(float, point.curvatures)), at, shift, turn,
+                         box is not None and box.index is not None, reversed=reversed_, across=across,
+                         singular=singular,
                          boundary=boundary, beyond=tuple(outside(at.twin, at.q)), met=found.met)
 
-    def _in_mode(self, found: Critical) -> bool:
-        """Whether configurations nearby are of the operation mode of the zero configuration."""
-        q = walked(self.system, found.point.q[None], np.random.default_rng(0), 2, NEARBY)[0]
-        try:
-            at = of_links(self.goal.twin, lambda link: self.system.system.pose(link, q.tolist()))
-        except LoopsNotClosed:
-            return False
-        drawn = self.setting.everything
-        return drawn.signature.agrees(Signature.of(relation(at, drawn.question)))
+    def _radius(self, box: EnclosedPoint, X: Array) -> tuple[float, float]:
+        """How far the platform can be from its pose X (4, 4) over a box (m, rad)."""
+        loops, motion = self.system.system, self.setting.motion
+        forms = [affine(np.array([x]), np.zeros((1, 0)), np.array([r])) for x, r in zip(box.q, box.radius, strict=True)]
+        carrier, chain = SweptChains(loops, forms), loops.way(loops.body[motion.link])
+        zero = loops.mechanism.links[motion.link].pose
+        told = [transform(X, motion.point) / loops.length, *X[:3, :3].T]
+        vectors = [carrier.point(chain, transform(zero, motion.point) / loops.length),
+                   *(carrier.direction(chain, axis) for axis in zero[:3, :3].T)]
+        off = [float(np.linalg.norm((each.value - at).size)) for each, at in zip(vectors, told, strict=True)]
+        # |ΔR| = 2 √2 sin(θ / 2) ≥ 2 √2 θ / π
+        return off[0] * loops.length, float(np.pi / np.sqrt(8) * np.linalg.norm(off[1:])) if motion.body else 0.0
 
-    def _at_goal(self, at: ClosedConfiguration) -> bool:
-        return all(pose_difference(at.pose(body), self.goal.pose(body), self.goal.twin.length) <= SAME_RELATION
-                   for body in attached(self.setting.anatomy))
+    def _in_mode(self, found: Sequence[Critical]) -> list[Critical]:
+        """Those near which configurations are of the operation mode of the zero configuration."""
+        q = np.array([each.point.q for each in found]).reshape(len(found), self.system.size[0])
+        nearby = walked(self.system, q, np.random.default_rng(0), 2, NEARBY) if found else q
+        return [each for each, good in zip(found, in_mode(self.system, self.setting, nearby), strict=True) if good]
+
+
+def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
+    """Rests at one pose with the same measured directions as one: in the working modes nearest to the goal's, with how
+    many there are."""
+    setting = search.setting
+    segments = [directions(each.configuration, setting.everything.question)[0] for each in rests]
+    home = directions(search.goal, setting.everything.question)[0]
+    groups: list[list[int]] = []
+    for k, each in enumerate(rests):
+        seen = directions(each.configuration, search.law.question)[0]
+        own = next((group for group in groups if search.alike(rests[group[0]].configuration, each.configuration)
+                    and np.abs(directions(rests[group[0]].configuration, search.law.question)[0] - seen).max()
+                    < SAME_ENDING), None)
+        if own is None:
+            groups.append([k])
+        else:
+            own.append(k)
+    best = [min(group, key=lambda k: float(np.linalg.norm(segments[k] - home))) for group in groups]
+    return [replace(rests[k], ways=len(group), met=sum(rests[i].met for i in group))
+            for k, group in zip(best, groups, strict=True)]
 
 
 def stability(curvatures: Sequence[float] | Array) -> str:

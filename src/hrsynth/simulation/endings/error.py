@@ -10,7 +10,7 @@ Bᵀ ∇E = 0, at the critical points of E on the configurations G(q) = 0. With 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -168,13 +168,16 @@ class RestSystem(Value):
         values = measure(goal.twin, goal.q, question.reference, question.observations)[2]
         terms = tuple(term(system, question.reference, each, value)
                       for each, value in zip(question.observations, values, strict=True))
+        return cls(system, (), (), terms).chosen_at(np.array([system.read(each.pose) for each in generic]))
+
+    def chosen_at(self, q: Array) -> RestSystem:
+        """The same with equations that are independent at configurations (c, N)."""
+        system = self.system
         every = [(loop, row) for loop in system.loops for row in loop.rows]
-        q = np.array([system.read(each.pose) for each in generic])
         _, rates = whole(system, system.loops, system.gears, list(q.T), (len(q),))
-        chosen = independent(rates)
-        count = len(every)
-        return cls(system, tuple(every[k] for k in chosen if k < count),
-                   tuple(system.gears[k - count] for k in chosen if k >= count), terms)
+        chosen, count = independent(rates, self.size[1] or None), len(every)
+        return replace(self, rows=tuple(every[k] for k in chosen if k < count),
+                       gears=tuple(system.gears[k - count] for k in chosen if k >= count))
 
     @property
     def size(self) -> tuple[int, int]:
@@ -229,15 +232,15 @@ class RestEquations:
         return self.slope + (self.DG * multipliers[..., :, None]).sum(-2)
 
 
-def independent(rates: Array) -> list[int]:
-    """Rows of a matrix (…, m, N) that are as many as are independent at most of the places, and are independent at all
+def independent(rates: Array, rank: int | None = None) -> list[int]:
+    """Rows of a matrix (c, m, N), as many as ``rank`` or as are independent at most of the places, that are so at all
     of them if any are: those of a pivoted QR decomposition of all places beside each other."""
     if not rates.shape[-2]:
         return []
     from scipy.linalg import qr
 
-    values = np.linalg.svd(rates, compute_uv=False)
-    rank = int(np.median((values > RANK_CUTOFF).sum(axis=-1)))
+    if rank is None:
+        rank = int(np.median((np.linalg.svd(rates, compute_uv=False) > RANK_CUTOFF).sum(axis=-1)))
     _, _, order = qr(np.concatenate(list(rates), axis=-1).T, mode="economic", pivoting=True)
     return sorted(order[:rank].tolist())
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -19,7 +20,9 @@ from numpy.typing import NDArray
 from ...analysis.observed import ObservedRobot
 from ...budgets import (
     ENDING_DESCENTS,
+    ENDING_EFFORT,
     ENDING_LATE,
+    ENDING_LATE_DESCENT,
     ENDING_ROUNDS,
     ENDING_STARTS,
     ENDING_STEPS,
@@ -27,8 +30,12 @@ from ...budgets import (
     FARTHEST_ENDING,
 )
 from ...constraints.pattern import attached
+from ...errors import LoopsNotClosed
 from ...geometry.vectors import Array
+from ...kinematics.assembly import of_links
+from ...kinematics.branch import Signature
 from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.relation import relation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
@@ -40,6 +47,10 @@ LONGEST_STEP = 0.25
 """Longest change of a coordinate in a step (characteristic lengths, radians)."""
 WALK_STEP = 0.3
 """The same of a random step between starts."""
+WIDEST_SLIDE = 2.5
+"""Coordinate of a slide (characteristic lengths) up to which one is drawn."""
+NEARBY = 0.02
+"""Step (characteristic lengths, radians) to a configuration that shows the operation mode in which a point lies."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -146,7 +157,7 @@ def walked(system: RestSystem, q: Array, rng: np.random.Generator, steps: int, l
         tangents = Tangents.of(RestEquations(system, list(q.T)).DG)
         way = _times(tangents.Z, rng.normal(size=(len(q), tangents.Z.shape[-1])))
         there = closed(system, q + longest * rng.uniform(0.2, 1.0, (len(q), 1)) * way / np.abs(way).max(
-            axis=-1, keepdims=True))
+            axis=-1, keepdims=True), 6)
         good = np.linalg.norm(RestEquations(system, list(there.T)).G, axis=-1) < CRITICAL
         good &= np.abs(there - q).max(axis=-1) < 2 * longest
         q = np.where(good[:, None], there, q)
@@ -191,6 +202,7 @@ class CriticalPoints(Value):
 
     isolated: tuple[Critical, ...]
     continua: tuple[Critical, ...]
+    idle: int
     starts: int
     late: int
 
@@ -200,22 +212,31 @@ class CriticalPoints(Value):
         return f"found from {self.starts:,} random starts, {self.late} of them first in the second half of these"
 
 
-def starts(system: RestSystem, homes: Array, seed: int = 0) -> Iterator[Array]:
-    """Rounds of closed configurations (c, N), where random walks from some (n, N) have come to."""
+def starts(system: RestSystem, homes: Array, seed: int = 0, setting: ObservedRobot | None = None) -> Iterator[Array]:
+    """Rounds of closed configurations (c, N), where random walks from some (n, N) have come to; with a ``setting`` also
+    from random closings in its operation mode, and what has left that is called back."""
     rng = np.random.default_rng(seed)
+    strict = False
+    if setting is not None:
+        drawn = anywhere(system, rng, ENDING_STARTS)
+        good = in_mode(system, setting, drawn)
+        homes, strict = np.concatenate([homes, drawn[good]]), not good.all()
     q = homes[np.arange(ENDING_STARTS) % len(homes)]
     while True:
         q = walked(system, q, rng, ENDING_WALK)
+        if strict and setting is not None:
+            astray = ~in_mode(system, setting, q)
+            q[astray] = homes[rng.integers(len(homes), size=int(astray.sum()))]
         yield q
 
 
 def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConfiguration, seed: int = 0, *,
                     minima: bool = False, rounds: Iterable[Array] | None = None) -> CriticalPoints:
-    """The critical points to which random walks from the samples lead, in rounds, until the later half of the starts
-    finds few new ones; ``minima``: only descent, which finds what attracts; ``rounds``: of :func:`starts`, where they
-    are known."""
-    relation = setting.samples.members[0].relation
-    idle, freedoms = relation.mobility - relation.dimension, relation.dimension
+    """The critical points to which random walks from the samples and from random closings lead, in rounds, until the
+    later half of the starts finds few new ones; ``minima``: only descent, which finds what attracts; ``rounds``: of
+    :func:`starts`, where they are known."""
+    seen = setting.samples.members[0].relation
+    idle, freedoms = seen.mobility - seen.dimension, seen.dimension
     homes = np.array([system.system.read(at.pose) for at in (goal, *setting.configurations)])
     rng = np.random.default_rng([seed, 1])
     bodies = attached(setting.anatomy)
@@ -223,9 +244,12 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
     families: dict[tuple[int, ...], Critical] = {}
     fresh: list[int] = []
     points = descend(system, homes[:1], np.zeros(1, dtype=np.intp), idle)
-    for number, q in enumerate(islice(rounds or starts(system, homes, seed), ENDING_ROUNDS)):
+    most = max(ENDING_ROUNDS, ENDING_EFFORT // system.size[0])
+    for number, q in enumerate(islice(rounds or starts(system, homes, seed, setting), most)):
         tell("starts")
-        points += descend(system, q, rng.integers(1 if minima else freedoms + 1, size=len(q)), idle)
+        # what attracts matters most: two of five starts go down all along
+        index = rng.integers(freedoms + 1, size=len(q)) * (rng.random(len(q)) < (0.0 if minima else 0.6))
+        points += descend(system, q, index, idle)
         new = 0
         for point, mark in zip(points, marks(system, setting, bodies, points), strict=True):
             flat = np.abs(point.curvatures) < SAME_ENDING
@@ -245,11 +269,32 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
         points = []
         fresh.append(new)
         count = sum(map(len, known.values()))
-        if number >= (ENDING_DESCENTS if minima else 1) and 2 * sum(fresh[len(fresh) // 2 :]) <= ENDING_LATE * count:
+        allowed = (ENDING_LATE_DESCENT if minima else ENDING_LATE) * count
+        if number >= ENDING_DESCENTS and sum(fresh[len(fresh) // 2 :]) <= allowed:
             break
     late = sum(fresh[len(fresh) // 2 :])
     isolated = tuple(Critical(point, met) for own in known.values() for _, point, met, _ in own)
-    return CriticalPoints(isolated, tuple(families.values()), ENDING_STARTS * len(fresh), late)
+    return CriticalPoints(isolated, tuple(families.values()), idle, ENDING_STARTS * len(fresh), late)
+
+
+def anywhere(system: RestSystem, rng: np.random.Generator, count: int) -> Array:
+    """Closed configurations (c, N) to which random coordinates lead, as many as close."""
+    slides = np.array([each.slides for each in system.system.coordinates])
+    q = rng.uniform(-1.0, 1.0, (count, len(slides))) * np.where(slides, WIDEST_SLIDE, np.pi)
+    q = closed(system, q, 40)
+    return q[np.linalg.norm(RestEquations(system, list(q.T)).G, axis=-1) < CRITICAL]
+
+
+def in_mode(system: RestSystem, setting: ObservedRobot, q: Array) -> NDArray[np.bool_]:
+    """Which of some closed configurations (c, N), regular ones, are of the operation mode of the zero configuration."""
+    drawn, kept = setting.everything, np.zeros(len(q), dtype=bool)
+    for k, each in enumerate(q):
+        try:
+            at = of_links(drawn.twin, partial(system.system.pose, values=each.tolist()))
+        except LoopsNotClosed:
+            continue
+        kept[k] = drawn.signature.agrees(Signature.of(relation(at, drawn.question)))
+    return kept
 
 
 def marks(system: RestSystem, setting: ObservedRobot, bodies: Sequence[str], points: Sequence[CriticalPoint]) -> Array:

@@ -1,0 +1,160 @@
+"""Critical points of the error enclosed: that there is exactly one in a box, and of which index.
+
+Unknowns are the coordinates and the multipliers (q, μ), equations ∇E + DGᵀ μ = 0 and G = 0; where motions are idle, as
+many coordinates are held. With K the derivatives, [[H, DGᵀ], [DG, 0]], enclosed over the box |x − x₀| ≤ r, and Y about
+K⁻¹, Krawczyk's operator −Y F(x₀) + (1 − Y K) [−r, r] inside [−r, r] proves one zero there (A. Neumaier, Interval
+Methods for Systems of Equations, 1990, section 5.1). VᵀKV, V about the eigenvectors of K, then has the inertia of K
+(Sylvester), which is that of H along the motions of the loops beside m positive and m negative ones; its diagonal tells
+it where it outweighs the rest of each row (Gershgorin).
+
+The equations of the loops that are not among G hold where they follow from these (:func:`unexplained_rows`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...analysis.branch.redundant import dependent_rows
+from ...budgets import TUBE_RADII, TUBE_WIDER
+from ...geometry.affine import AffineForms, affine, combined
+from ...geometry.vectors import Array
+from ...results import Value
+from ...tolerances import AFFINE_ROUNDING, THINNEST_TUBE
+from .error import RestEquations, RestSystem
+from .search import CriticalPoint, Tangents
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class EnclosedPoint(Value):
+    """A box |q − q₀| ≤ r (N,) that holds exactly one critical point with its idle coordinates held; ``index`` is the
+    number of negative eigenvalues of the Hessian along the motions of the loops, the others positive, None where that
+    was not proved."""
+
+    q: Array
+    radius: Array
+    index: int | None
+
+    def signs(self, count: int) -> Array:
+        """The signs (count,) of the eigenvalues, ascending."""
+        return np.where(np.arange(count) < (self.index or 0), -1.0, 1.0)
+
+
+def enclosed(system: RestSystem, points: Sequence[CriticalPoint], idle: int) -> list[EnclosedPoint | None]:
+    """Boxes around critical points, None where nothing was proved; where the equations of the loops that were chosen
+    are nearly dependent, with others."""
+    found = _enclosed(system, np.array([each.q for each in points]), idle) if points else []
+    for k, (each, point) in enumerate(zip(found, points, strict=True)):
+        if each is None or each.index is None:
+            (again,) = _enclosed(system.chosen_at(point.q[None]), point.q[None], idle)
+            found[k] = again or each
+    return found
+
+
+def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | None]:
+    """The same with given equations, for configurations (c, N)."""
+    size, count = system.size
+    at = RestEquations(system, list(q.T))
+    mu = Tangents.of(at.DG).multipliers(at.slope)
+    free = np.array([_free(system, each, idle) for each in q])
+    # over held coordinates the identity
+    mask = np.concatenate([free, np.ones((len(q), count))], axis=-1)
+
+    def evaluated(radius: Array) -> tuple[AffineForms, AffineForms]:
+        """F (c, n) and K (c, n, n) over boxes of radii (c, n), n = N + m."""
+        forms = [affine(q[:, i], np.zeros((len(q), 0)), radius[:, i]) for i in range(size)]
+        held = affine(mu, np.zeros((*mu.shape, 0)), radius[:, size:])
+        at = RestEquations(system, forms)
+        F, K = (AffineForms(np.zeros((1, *shape)), np.zeros(shape))
+                for shape in (radius.shape, (*radius.shape, radius.shape[-1])))
+        bend, pull, DG = at.bend(held), at.pull(held), at.DG
+        for total, part, place in ((F, pull, (slice(size),)), (F, at.G, (slice(size, None),)),
+                                   (K, bend, (slice(size), slice(size))),
+                                   (K, DG, (slice(size, None), slice(size)))):
+            total.v[(..., *place)], total.r[(..., *place)] = part.v, part.r
+        K.v[..., :size, size:] = np.swapaxes(DG.v, -1, -2)
+        K.r[..., :size, size:] = np.swapaxes(DG.r, -1, -2)
+        both = mask[:, :, None] * mask[:, None, :]
+        held_one = (1 - mask)[..., None] * np.eye(mask.shape[-1])
+        return AffineForms(F.v * mask, F.r * mask), AffineForms(K.v * both + held_one, K.r * both)
+
+    still = np.zeros(mask.shape)
+    with np.errstate(all="ignore"):
+        F, K = evaluated(still)
+        Y = np.linalg.inv(K.v[0] + _lost(K.v[0]))
+        e = combined(Y, F).size
+        radius = TUBE_WIDER * e + THINNEST_TUBE
+        done, found = np.zeros(len(q), dtype=bool), still.copy()
+        inertia = np.full(len(q), -1)
+        for _ in range(TUBE_RADII):
+            _, K = evaluated(radius)
+            M = (np.eye(mask.shape[-1]) - combined(Y, K)).size
+            wanted = e + (M @ radius[..., None])[..., 0]
+            fits = np.all(wanted * (1 + AFFINE_ROUNDING) < radius, axis=-1) & ~done
+            found[fits] = radius[fits]
+            inertia[fits] = _negative(K)[fits]
+            done |= fits
+            if done.all():
+                break
+            radius = np.where(done[:, None], radius, TUBE_WIDER * np.maximum(wanted, radius))
+    return [EnclosedPoint(q[k], found[k, :size] * free[k],
+                          None if inertia[k] < 0 else int(inertia[k]) - count) if done[k] else None
+            for k in range(len(q))]
+
+
+def _lost(K: Array) -> Array:
+    """What is added to singular matrices (c, n, n) so that they can be inverted: nothing is proved of them."""
+    known = np.where(np.isfinite(K), K, 0.0)
+    values = np.linalg.svd(known, compute_uv=False)
+    lost = ~np.isfinite(K).all(axis=(-1, -2)) | (values[..., -1] <= 1e-14 * values[..., 0])
+    return np.where(lost[:, None, None], np.eye(K.shape[-1]) - K, 0.0)
+
+
+def _negative(K: AffineForms) -> Array:
+    """The numbers (c,) of negative eigenvalues of all symmetric matrices in K (c, n, n), −1 where that was not proved:
+    of VᵀKV each diagonal entry outweighs its row."""
+    middle, spread = K.v[0], K.spread
+    known = np.isfinite(middle).all(axis=(-1, -2)) & np.isfinite(spread).all(axis=(-1, -2))
+    middle, spread = (np.where(known[:, None, None], each, 0.0) for each in (middle, spread))
+    _, V = np.linalg.eigh((middle + np.swapaxes(middle, -1, -2)) / 2)
+    back, size = np.swapaxes(V, -1, -2), np.abs(V)
+    D = back @ middle @ V
+    doubt = np.swapaxes(size, -1, -2) @ (spread + 8 * AFFINE_ROUNDING * (np.abs(middle) + spread)) @ size
+    scale = 1 / np.sqrt(np.abs(np.diagonal(D, axis1=-2, axis2=-1)) + 1e-300)
+    D, doubt = (each * scale[..., :, None] * scale[..., None, :] for each in (D, doubt))
+    diagonal = np.diagonal(D, axis1=-2, axis2=-1)
+    rest = (np.abs(D) + doubt).sum(axis=-1) - np.abs(diagonal)
+    proved = known & np.all(np.abs(diagonal) > rest * (1 + AFFINE_ROUNDING), axis=-1)
+    return np.where(proved, (diagonal < 0).sum(axis=-1), -1)
+
+
+def _free(system: RestSystem, q: Array, idle: int) -> Array:
+    """1 for coordinates (N,) that are solved for, 0 for as many as motions are idle, those that tell these apart best.
+    """
+    free = np.ones(len(q))
+    if idle:
+        from scipy.linalg import qr
+
+        motions = idle_motions(system, q, idle)
+        _, _, order = qr(motions.T, mode="economic", pivoting=True)
+        free[order[:idle]] = 0.0
+    return free
+
+
+def idle_motions(system: RestSystem, q: Array, idle: int) -> Array:
+    """Motions of the loops (N, idle) along which E is flattest: those that are idle."""
+    at = RestEquations(system, list(q[None].T))
+    tangents = Tangents.of(at.DG)
+    Z = tangents.Z[0]
+    values, vectors = np.linalg.eigh(Z.T @ at.bend(tangents.multipliers(at.slope))[0] @ Z)
+    return np.asarray(Z @ vectors[:, np.argsort(np.abs(values))[:idle]])
+
+
+def unexplained_rows(system: RestSystem) -> tuple[str, ...]:
+    """The loops of which equations were left out that do not follow from the chosen ones."""
+    chosen = [loop.name for loop, _ in system.rows]
+    return tuple(loop.name for loop in system.system.loops
+                 if chosen.count(loop.name) < len(loop.rows)
+                 and chosen.count(loop.name) != dependent_rows(system.system, loop))
