@@ -236,8 +236,8 @@ QUESTIONS = (
     Question("endings", "All poses at which the loop can rest, and which of them attract: the goal, modes, antipodal "
              "poses, critical poses of the error.",
              (Option("at", "The goal: pose whose directions are desired, as x=0.02,y=0.1,z=-0.7; or mode:2.", "POSE",
-                     default=NEEDED), *WATCHED),
-             ("3rrr_m1 --at x=0.02,y=0,phi=10deg", "quattro --observe 1,4 --at x=0.05,y=0.1,z=-0.7")),
+                     default=NEEDED), *WATCHED, _file("endings")),
+             ("3rrr_m1 --at x=0.02,y=0,phi=10deg", "quattro --observe 1,4 --at x=0.05,y=0.1,z=-0.7 -o endings.png")),
     Question("accuracy", "How far the platform can be off where the observed directions are off by up to given angles.",
              (Option("cone", "Half-angle of the cone about each observed direction, as 0.1deg; or one a leg: "
                      "1=0.1deg,2=0.2deg.", "ANGLE", default=NEEDED),

@@ -746,7 +746,7 @@ class SignedModesRecord(TypedDict):
     complete: bool
 
 
-class EndingsAnswer(OfRobot):
+class EndingsAnswer(OfRobot, WrittenTo):
     """All poses at which a loop can rest: where all velocities are seen, where fewer are (`singular`), and one of each
     of those that fill curves or surfaces (`continua`)."""
 

@@ -195,7 +195,9 @@ OUTPUTS = {
              "report_file", computed="report.parts:parts", plotted=HTML),
         CERTIFICATE,
         File("cannot draw the robots", {".svg": "drawings.schematic:derivation_svg"}, option=None, plotted=()))),
-    "endings": Outputs("text.endings:endings"),
+    "endings": Outputs("text.endings:endings", (
+        File("cannot draw the endings", figures("endings:picture"), "The picture of the endings",
+             "Draw the endings: endings.png, .pdf, .svg.", drawn=True),)),
     "export": Outputs("text.robots:exported", (
         CodeFile("cannot write the code", dict.fromkeys((".hpp", ".h", ".py"), "text.robots:code"), "The code",
              "Write the code: robot.hpp (C++), robot.py (NumPy).", plotted=()),)),

@@ -16,13 +16,15 @@ LISTED_SADDLES = 12
 def endings(found: Endings) -> str:
     """The goal, the rests that attract, some of those that do not, and whether that is all."""
     drawn = [each for each in found.rests if each.stability in ("stable", "undecided")]
-    others = [each for each in found.rests if each not in drawn]
+    others = [each for each in found.rests if each.stability not in ("stable", "undecided")]
+    boxed = [each for each in found.rests if each.proved]
     rows: Rows = [*head(found.setting), *camera(found.setting), ("goal", str(found.pose)), *GAP,
                   ("attract", table([_line(each) for each in drawn], HEADS).splitlines()), *GAP]
     if others:
         told = table([_line(each) for each in others[:LISTED_SADDLES]], HEADS).splitlines()
         left = len(others) - LISTED_SADDLES
         rows += [("do not", [*told, *([f"and {left} more (--json lists them)"] if left > 0 else [])]), *GAP]
+    rows += [("enclosed", _enclosed(found, boxed)), *GAP]
     rows += [("continua", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.continua])]
     rows += [("all", [*map(_signs, found.lists), f"the others are found, not proved to be all: {found.search.words}"])]
     return listing(rows)
@@ -31,9 +33,20 @@ def endings(found: Endings) -> str:
 HEADS = ("kind", "‖e‖", "", "pose", "")
 
 
+def _enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:
+    """How many are enclosed, and what that says."""
+    if not boxed:
+        return []
+    wide = max(each.shift for each in boxed), max(each.turn for each in boxed)
+    what = "the loops" if not found.measured else f"the loops, of {', '.join(found.measured)} as far as independent"
+    return [f"{len(boxed)} of {len(found.rests)}: exactly one rest within {1e3 * wide[0]:.1g} mm and {wide[1]:.1g} "
+            f"rad, proved for {what}", f"whether it attracts is proved for {sum(each.decided for each in boxed)}"]
+
+
 def _line(each: RestPoint) -> list[str]:
-    notes = [] if each.singular is None else [each.singular.split(": ")[-1] if each.boundary else
-                                              each.singular.split("vanishes ")[-1]]
+    notes = []
+    if each.singular is not None and not each.across:
+        notes.append(each.singular.split(": " if each.boundary else "vanishes ")[-1])
     if each.reversed:
         notes.append(f"{named('leg', each.reversed)} reversed")
     if each.across:

@@ -74,7 +74,8 @@ class SweptChains:
             rows = [[none if slide else axis for slide, axis in zip(slides, swept.axes, strict=True)],
                     [none if point is None else point for point in swept.points],
                     [axis if slide else none for slide, axis in zip(slides, swept.axes, strict=True)]]
-            self._swept[chain] = swept, *(stacked(each, -2) if chain else np.zeros((0, 3)) for each in rows)
+            axes, points, along = (stacked(each, -2) if chain else np.zeros((0, 3)) for each in rows)
+            self._swept[chain] = swept, axes, points, along
         return self._swept[chain]
 
     def point(self, chain: tuple[int, ...], p: Array) -> CarriedVector:

@@ -5,12 +5,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 
 from ...analysis.asked import configurations_at
+from ...analysis.aspects.leg_forms import LegPattern, pattern
+from ...analysis.aspects.path_segments import path_coordinates
+from ...analysis.aspects.vector_expressions import NoLegForm
 from ...analysis.modes.modes import AssemblyModes, modes
 from ...analysis.observed import LegsLike, ObservedRobot, RobotLike
 from ...analysis.posture import ConfigurationAnalysis
@@ -146,6 +149,11 @@ class Endings(Result, shown_as="endings"):
         return False
 
     @property
+    def starts(self) -> int:
+        """How many starts were led to rests."""
+        return self.search.starts
+
+    @property
     def endings(self) -> tuple[RestPoint, ...]:
         """The rests at which all velocities are seen."""
         return tuple(each for each in self.rests if each.singular is None)
@@ -169,7 +177,7 @@ class Endings(Result, shown_as="endings"):
         """The record of the command line, without the command's own fields."""
         return {"at": self.pose.to_dict(), **self.setting.to_dict(), "complex": self.lists[0].to_dict()["complex"],
                 "complete": self.complete, "signs": [each.to_dict() for each in self.lists],
-                "proof": self.search.words, "starts": self.search.starts, "attracting": len(self.attracting),
+                "proof": self.search.words, "starts": self.starts, "attracting": len(self.attracting),
                 "measured": list(self.measured),
                 "endings": [each.to_dict() for each in self.endings],
                 "singular": [each.to_dict() for each in self.singular],
@@ -304,7 +312,8 @@ class RestSearch:
         return RestPoint(motion.pose(X), kind, state, error, tuple(map(float, point.curvatures)), at, shift, turn,
                          box is not None and box.index is not None, reversed=reversed_, across=across,
                          singular=singular,
-                         boundary=boundary, beyond=tuple(outside(at.twin, at.q)), met=found.met)
+                         boundary=boundary, beyond=tuple(outside(at.twin, at.q)),
+                         other_legs=self._other_legs(at), met=found.met)
 
     def _radius(self, box: EnclosedPoint, X: Array) -> tuple[float, float]:
         """How far the platform can be from its pose X (4, 4) over a box (m, rad)."""
@@ -318,6 +327,29 @@ class RestSearch:
         off = [float(np.linalg.norm((each.value - at).size)) for each, at in zip(vectors, told, strict=True)]
         # |ΔR| = 2 √2 sin(θ / 2) ≥ 2 √2 θ / π
         return off[0] * loops.length, float(np.pi / np.sqrt(8) * np.linalg.norm(off[1:])) if motion.body else 0.0
+
+    @cached_property
+    def _forms(self) -> LegPattern | None:
+        """The closed forms of the legs, which tell their working modes; None where there are none."""
+        setting = self.setting
+        members = (setting.everything.start, *setting.configurations)
+        for each in path_coordinates(setting.anatomy, setting.samples.question, setting.dof, members):
+            try:
+                return pattern(setting.anatomy, (), each, members)
+            except NoLegForm:
+                continue
+        return None
+
+    def _other_legs(self, at: ClosedConfiguration) -> tuple[str, ...] | None:
+        """The legs that are in another working mode than at the goal; None where that is not known."""
+        try:
+            one, other = (self._forms.forms(each) for each in (self.goal, at)) if self._forms else (None, None)
+        except NoLegForm:
+            return None
+        if one is None or other is None:
+            return None
+        return tuple(dict.fromkeys(str(limb.label) for limb, a, b in zip(one.limbs, one.modes, other.modes,
+                                                                        strict=True) if a != b))
 
     def _in_mode(self, found: Sequence[Critical]) -> list[Critical]:
         """Those near which configurations are of the operation mode of the zero configuration."""

@@ -1,0 +1,76 @@
+"""All endings of a loop → a picture: the robot at the goal, and the platform at every pose that attracts."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..kinematics.configuration import ClosedConfiguration
+from ..simulation.endings.endings import CRITICAL, STABLE, Endings, RestPoint
+from .paper import PNG, Paper, legend_within, printed, settled
+from .plots import COLOURS, empty_figure, entry, pose_words, styled
+from .skeleton import legs_of, outline
+from .sketch import Sketch
+from .view.view import plane_normal
+
+WIDE, TALL, EDGE, SCALES = 7.2, 6.4, 0.2, 0.8
+"""Width and height of the picture, its margin, and the room for the scales (inches)."""
+WITHIN = 1.6
+"""How far from the middle of the robot a rest may be to be drawn, as a multiple of the robot's size."""
+LOOKS: dict[str, dict[str, Any]] = {
+    "goal": {"color": COLOURS[2], "marker": "*", "markersize": 13},
+    "mode": {"color": COLOURS[0], "marker": "D", "markersize": 8},
+    "antipodal": {"color": COLOURS[3], "marker": "s", "markersize": 8},
+    "critical": {"color": COLOURS[1], "marker": "o", "markersize": 8},
+    "other": {"color": "0.6", "marker": "x", "markersize": 5}}
+WORDS = {"goal": "the goal", "mode": "another mode", "antipodal": "antipodal pose",
+         "critical": "pose with an error that attracts", "other": "rest that does not attract"}
+
+
+@styled
+def picture(found: Endings, paper: Paper = PNG) -> bytes:
+    """The endings as a figure on ``paper``."""
+    goal, platform = found.goal, found.setting.anatomy.platform
+    mechanism, motion = goal.twin.mechanism, found.setting.motion
+    ground = np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
+    robot = [*legs_of(goal, platform), *_outlines(goal, platform)]
+    extent = np.vstack([ground, *robot])
+    middle, size = (extent.min(axis=0) + extent.max(axis=0)) / 2, float(np.ptp(extent, axis=0).max())
+    drawn = [(each, motion.position(each.configuration.pose(motion.link))) for each in found.rests]
+    near = [(each, p) for each, p in drawn if np.abs(p - middle).max() <= WITHIN * size]
+    shapes = [(look(each), _outlines(each.configuration, platform)) for each, _ in near if each.stability == STABLE]
+    every = np.vstack([extent, *(p for _, p in near), *(stroke for _, some in shapes for stroke in some)])
+    figure = empty_figure(paper.wide(WIDE), TALL)
+    far = len(drawn) - len(near)
+    beyond = f"; {far} more farther away" if far else ""
+    title = figure.suptitle(f"{found.setting.robot.name}, legs {', '.join(found.setting.labels)} observed, goal "
+                            f"{pose_words(found.pose)}\n{len(found.attracting)} of {len(found.rests)} rests attract"
+                            f"{beyond}", va="top")
+    above = settled(figure, title)
+    kinds = [kind for kind in WORDS if any(look(each) == kind for each, _ in near)]
+    entries = [entry("robot at the goal", color="0.72"), *(entry(WORDS[k], linestyle="", **LOOKS[k]) for k in kinds)]
+    low = legend_within(figure, entries, figure.get_figwidth(), loc="lower center")
+    wide, tall = figure.get_figwidth(), figure.get_figheight()
+    box = (SCALES / wide, (low + SCALES) / tall, 1 - (SCALES + EDGE) / wide, 1 - (low + SCALES + above + EDGE) / tall)
+    sketch = Sketch.of(plane_normal(motion), ground, [])
+    place = sketch.place(figure, box, every)
+    for stroke in robot:
+        sketch.stroke(place, stroke, color="0.72", linewidth=1.2)
+    for kind, some in shapes:
+        for stroke in some:
+            sketch.stroke(place, stroke, color=LOOKS[kind]["color"], linewidth=1.6, zorder=5)
+    for kind in reversed(kinds):
+        points = np.array([p for each, p in near if look(each) == kind])
+        sketch.stroke(place, points, linestyle="", zorder=8 if kind != "other" else 4, **LOOKS[kind])
+    sketch.stroke(place, ground, color="black", marker="s", markersize=4, linestyle="", zorder=6)
+    return printed(figure, paper)
+
+
+def look(each: RestPoint) -> str:
+    """As which kind a rest is drawn."""
+    return each.kind if each.kind != CRITICAL or each.stability == STABLE else "other"
+
+
+def _outlines(at: ClosedConfiguration, platform: Any) -> list[Any]:
+    return [outline(at.twin.mechanism, link, at.pose(link)) for link in platform]
