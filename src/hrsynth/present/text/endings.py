@@ -65,7 +65,8 @@ def _signs(each: SignedModes) -> str:
     which = f"with {named('leg', each.reversed)} reversed" if each.reversed else "with the desired directions"
     if each.listed is None:
         return f"poses {which}: found, not listed"
-    return f"poses {which}: {each.listed.count}, {'all' if each.complete else 'found, not proved to be all'}"
+    known = "proved to be all" if each.complete else "found, not proved to be all"
+    return f"poses {which}: {each.listed.count}, {known}"
 
 
 def _why(each: RestPoint) -> str:
