@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -19,8 +20,9 @@ from ..kinematics.steps import HALVINGS, nearest, track
 from ..mechanism.pose import Grid, Pose
 from ..progress import tell
 from ..tolerances import AS_PRINTED
-from .grids import ready
-from .placing import Placer
+
+if TYPE_CHECKING:
+    from .placing import Placer
 
 
 def generic_motion(start: ClosedConfiguration, question: Measurement) -> PlatformMotion:
@@ -64,6 +66,8 @@ def sweep(start: ClosedConfiguration, question: Measurement, grid: Grid, motion:
     motion = motion or generic_motion(start, question)
     goals = [motion.goal(pose, start.twin.mechanism.name) for pose in grid.poses()]
     home = motion.at_home()
+    from .grids import ready
+
     at_once, hopeless = ({}, set()) if placer is None else ready(placer, motion, goals)
 
     def lead(cell: int, origin: ClosedConfiguration, halvings: int) -> ClosedConfiguration | None:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections import Counter
-from importlib.metadata import PackageNotFoundError, distribution
 from pathlib import Path
 
 from ..errors import MissingExtra
@@ -20,6 +19,8 @@ def examples() -> dict[str, Path]:
 
     >>> robots = hrsynth.examples()
     """
+    from importlib.metadata import PackageNotFoundError, distribution
+
     try:
         folder = Path(str(distribution(PACKAGE).locate_file(FOLDER)))
     except PackageNotFoundError:
