@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from hrsynth.geometry.vectors import Array, hat, inverse, perpendicular, pose, rotation_about
+from hrsynth.geometry.vectors import Array, cross, hat, inverse, perpendicular, pose
 from hrsynth.mechanism.model import Joint, JointType, Mechanism
 from hrsynth.mechanism.observation import Observation
 from hrsynth.mechanism.observations.direction import Direction
@@ -75,10 +75,12 @@ def same_relation(A: Array, B: Array) -> float:
     return float(np.arcsin(min(1.0, sine)))
 
 
-def exponential(rotation_vector: Array) -> Array:
-    """The rotation by ``|rotation_vector|`` about it; shape (3, 3)."""
-    angle = float(np.linalg.norm(rotation_vector))
-    return rotation_about(rotation_vector, angle) if angle > 1e-300 else np.eye(3)
+def exponential(rotation_vectors: Array) -> Array:
+    """Rodrigues: the rotations by ``|v|`` about vectors v (..., 3); shape (..., 3, 3)."""
+    angles = np.sqrt((rotation_vectors**2).sum(-1))[..., None]
+    K = hat(rotation_vectors / np.maximum(angles, 1e-300))
+    angles = angles[..., None]
+    return np.asarray(np.eye(3) + np.sin(angles) * K + (1 - np.cos(angles)) * (K @ K))
 
 
 def logarithm(R: Array) -> Array:
@@ -138,15 +140,15 @@ class Rows:
             n, p_i, p_j = turned(i, normals), o[i] + turned(i, at_i), o[j] + turned(j, at_j)
             residual[:split] = np.einsum("ka,ka->k", n, p_j - p_i)
             rows = np.arange(split)
-            J[rows, i] = -np.hstack((n, np.cross(p_j - o[i], n)))
-            J[rows, j] = np.hstack((n, np.cross(p_j - o[j], n)))
+            J[rows, i] = -np.hstack((n, cross(p_j - o[i], n)))
+            J[rows, j] = np.hstack((n, cross(p_j - o[j], n)))
         if self.moments:
             i, j, alphas, betas, levels = self._packed_moments
             alpha, beta = turned(i, alphas), turned(j, betas)
             residual[split:] = np.einsum("ka,ka->k", alpha, beta) - levels
             rows = np.arange(split, count)
-            J[rows, i, 3:] = -np.cross(beta, alpha)
-            J[rows, j, 3:] = np.cross(beta, alpha)
+            across = cross(beta, alpha)
+            J[rows, i, 3:], J[rows, j, 3:] = -across, across
         return residual, J
 
     @cached_property
@@ -241,6 +243,7 @@ class Oracle:
         scaled, _ = self._scaled(self.rows, state)
         return float(np.max(np.abs(scaled), initial=0.0)) if self.rows.stands(state) else float("inf")
 
+    @cached_property
     def _units(self) -> Array:
         """SI velocity for each dimensionless velocity (v / length, omega)."""
         return np.tile([self.length] * 3 + [1.0] * 3, len(self.moving))
@@ -250,7 +253,7 @@ class Oracle:
         residual, J = rows.evaluate(state)
         scale = np.ones(len(rows))
         scale[: len(rows.forces)] /= self.length
-        units = self._units()
+        units = self._units
         return scale * residual, scale[:, None] * J[:, self.moving].reshape(len(rows), len(units)) * units
 
     def kernel(self, state: Array) -> tuple[Array, float]:
@@ -262,7 +265,7 @@ class Oracle:
         columns = J.shape[1]
         _, values, right = np.linalg.svd(np.vstack((J, np.zeros((max(0, columns - len(J)), columns)))))
         rank, gap = split_rank(values, columns)
-        return self._units()[:, None] * right[rank:].T, gap
+        return self._units[:, None] * right[rank:].T, gap
 
     def mobility(self, state: Array) -> int:
         """dim T_qC, idle motions included. Raises :class:`Undecided`."""
@@ -311,15 +314,14 @@ class Oracle:
 
     def moved(self, state: Array, velocity: Array) -> Array:
         """Every link turned and shifted by its own twist for a unit of time; not closed."""
-        result = state.copy()
-        for number, (v, omega) in zip(self.moving, velocity.reshape(-1, 2, 3), strict=True):
-            result[number, :3, :3] = exponential(omega) @ state[number, :3, :3]
-            result[number, :3, 3] += v
+        result, twists = state.copy(), velocity.reshape(-1, 6)
+        result[self.moving, :3, :3] = exponential(twists[:, 3:]) @ state[self.moving, :3, :3]
+        result[self.moving, :3, 3] += twists[:, :3]
         return result
 
     def _size(self, velocity: Array) -> float:
         """The largest twist of a link, without dimension."""
-        return float(np.max(np.linalg.norm((velocity / self._units()).reshape(-1, 6), axis=1), initial=0.0))
+        return float(np.max(np.linalg.norm((velocity / self._units).reshape(-1, 6), axis=1), initial=0.0))
 
     def _settle(self, rows: Rows, state: Array, iterations: int) -> tuple[Array, float]:
         """Levenberg-Marquardt, damped by the residual (constraints may be redundant): the state and what is left.
@@ -327,7 +329,7 @@ class Oracle:
         Gives up where seven steps on end bring next to nothing.
         """
         r, J = self._scaled(rows, state)
-        units, damping, slow = self._units(), 1.0, 0
+        units, damping, slow = self._units, 1.0, 0
         for _ in range(iterations):
             left = float(np.linalg.norm(r))
             if left < 1e-14 or slow > 6:
@@ -385,7 +387,7 @@ class Oracle:
         again, shorter, where closing it would lead away from it, and where the mobility rises. Raises
         :class:`NotAssembled` where no step succeeds.
         """
-        state, heading = self.zero(), np.zeros(len(self._units()))
+        state, heading = self.zero(), np.zeros(len(self._units))
         freedoms = self.mobility(state)
         for _ in range(n):
             gone, tries = 0.0, 0
@@ -411,7 +413,7 @@ class Oracle:
 
     def _heading(self, rng: np.random.Generator, state: Array, before: Array) -> Array:
         """A random velocity of size 1 that keeps some of the heading before it, and moves the platform if it can."""
-        units = self._units()
+        units = self._units
         K = self._believed(state) / units[:, None]
         T = self.twist(K, self.mechanism.platform)
         drawn = K @ rng.normal(size=K.shape[1])

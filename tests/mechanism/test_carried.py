@@ -27,7 +27,7 @@ FAR = (0.3, 0.5, 0.7)
 def scattered(mechanism: Mechanism, tries: int, seed: int) -> Iterator[Array]:
     """Up to four closed states from links thrown anywhere: of any operation mode, any assembly mode."""
     oracle, rng, given = Oracle(mechanism), np.random.default_rng(seed), 0
-    units = oracle._units()
+    units = oracle._units
     for number in range(tries):
         try:
             thrown = FAR[number % len(FAR)] * units * rng.normal(size=len(units))
