@@ -71,7 +71,8 @@ class Linkage:
         """
         count = len(self.lengths)
         best, most = None, 0.0
-        for _ in range(LINKAGE_STARTS):
+        spans = np.hypot(self.lengths, self.offsets)
+        for _ in range(LINKAGE_STARTS if 2 * spans.max() <= spans.sum() else 0):  # no link is longer than the others
             found = self.closed(rng.uniform(-math.pi, math.pi, count))
             if found is None:
                 continue
