@@ -10,12 +10,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 
 import numpy as np
 
 from ..geometry.ranks import kernel_basis, range_basis
 from ..geometry.screws import point_velocity
-from ..geometry.vectors import Array, hat, inverse
+from ..geometry.vectors import Array, hat
 from ..mechanism import Joint, Mechanism, Observation
 from ..mechanism.legs import Leg
 from ..mechanism.screws import constraints
@@ -30,7 +31,8 @@ class _Bodies:
     def __init__(self, at: ClosedConfiguration, links: Sequence[str], joints: Sequence[Joint]) -> None:
         self.at = at
         self.place = {link: i for i, link in enumerate(links)}
-        self.A = constraints(joints, self.place, lambda joint: joint_at(at, joint))
+        pose = cache(at.pose)
+        self.A = constraints(joints, self.place, lambda joint: joint_at(at, joint, pose))
 
     def pose(self, link: str) -> Array:
         """X_BL with the position in characteristic lengths."""
@@ -88,22 +90,20 @@ def interaction(at: ClosedConfiguration, question: Measurement) -> Array:
     return found - hidden @ (hidden.T @ found)
 
 
-def joint_at(at: ClosedConfiguration, joint: Joint) -> tuple[Array, list[Array]]:
-    """Centre (characteristic lengths) and axes of a joint where a configuration has them."""
-    point, axes = carry_joint(at.twin.mechanism, joint, at.pose)
+def joint_at(at: ClosedConfiguration, joint: Joint, pose: Callable[[str], Array] | None = None
+             ) -> tuple[Array, list[Array]]:
+    """Centre (characteristic lengths) and axes of a joint where a configuration, whose links are at these poses, has
+    them."""
+    point, axes = carry_joint(at.twin.mechanism, joint, pose or at.pose)
     return point / at.twin.length, axes
 
 
 def carry_joint(mechanism: Mechanism, joint: Joint, pose: Callable[[str], Array]) -> tuple[Array, list[Array]]:
     """Centre (m) and axes of a joint, carried by links that are at these poses (4, 4)."""
 
-    def displacement(link: str) -> Array:
-        return pose(link) @ inverse(mechanism.links[link].pose)
-
-    D = displacement(joint.predecessor)
-    carriers = (joint.predecessor, joint.successor)
-    axes = [displacement(link)[:3, :3] @ axis for link, axis in zip(carriers, joint.axes, strict=False)]
-    return D[:3, :3] @ joint.point + D[:3, 3], axes
+    carriers = [pose(link) @ mechanism.links[link].inverse for link in joint.links[: max(1, len(joint.axes))]]
+    axes = [D[:3, :3] @ axis for D, axis in zip(carriers, joint.axes, strict=False)]
+    return carriers[0][:3, :3] @ joint.point + carriers[0][:3, 3], axes
 
 
 def rezero(at: ClosedConfiguration) -> Mechanism:

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import BadMechanism
-from ..geometry.vectors import Array, frozen, unit
+from ..geometry.vectors import Array, frozen, inverse, unit
 from ..results import Result, Value, content
 from ..tolerances import SAME_GEOMETRY
 from .graphs import Adjacency, adjacency
@@ -84,6 +84,11 @@ class Link(Value):
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "pose", frozen(self.pose))
+
+    @cached_property
+    def inverse(self) -> Array:
+        """X_LB at the zero configuration."""
+        return inverse(self.pose)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

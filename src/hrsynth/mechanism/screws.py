@@ -19,7 +19,7 @@ Geometry = Callable[[Joint], tuple[Numbers, Sequence[Numbers]]]
 
 def transmitted(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:
     """The wrenches that a joint transmits, 6 − freedoms of them: what it allows is reciprocal to all of them."""
-    basis = [np.array([int(i == k) for i in range(3)], dtype=point.dtype) for k in range(3)]
+    basis = np.eye(3, dtype=point.dtype)
     forces = [force(e, point) for e in basis]
     couples = [couple(e) for e in basis]
     match kind:
@@ -43,7 +43,7 @@ def transmitted(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> lis
 
 def allowed(kind: JointType, point: Numbers, axes: Sequence[Numbers]) -> list[Numbers]:
     """The twists of the successor that a joint allows, one a freedom: reciprocal to all that it transmits."""
-    basis = [np.array([int(i == k) for i in range(3)], dtype=point.dtype) for k in range(3)]
+    basis = np.eye(3, dtype=point.dtype)
     match kind:
         case JointType.REVOLUTE | JointType.UNIVERSAL:
             return [rotation(axis, point) for axis in axes]
@@ -66,13 +66,12 @@ def constraints(joints: Sequence[Joint], place: Mapping[str, int], geometry: Geo
 
     ``place`` numbers the links whose twists are unknown; a link that is not in it (the base) rests.
     """
-    rows = []
+    blocks = [np.zeros((0, 6 * len(place)), dtype=dtype)]
     for joint in joints:
-        point, axes = geometry(joint)
-        for wrench in transmitted(joint.type, point, axes):
-            row = np.zeros(6 * len(place), dtype=dtype)
-            for link, sign in ((joint.successor, 1), (joint.predecessor, -1)):
-                if link in place:
-                    row[6 * place[link] : 6 * place[link] + 6] += sign * wrench
-            rows.append(row)
-    return np.array(rows, dtype=dtype) if rows else np.zeros((0, 6 * len(place)), dtype=dtype)
+        wrenches = np.array(transmitted(joint.type, *geometry(joint))).reshape(-1, 6)
+        block = np.zeros((len(wrenches), 6 * len(place)), dtype=dtype)
+        for link, sign in ((joint.successor, 1), (joint.predecessor, -1)):
+            if link in place:
+                block[:, 6 * place[link] : 6 * place[link] + 6] += sign * wrenches
+        blocks.append(block)
+    return np.concatenate(blocks)
