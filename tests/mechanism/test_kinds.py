@@ -136,6 +136,22 @@ def test_values_are_told_in_the_frame_of_the_camera(kind: type[Observation]) -> 
 
 
 @pytest.mark.parametrize("kind", [*CHAINED, AngleEncoder, SlideEncoder], ids=lambda kind: kind.__name__)
+def test_what_needs_turns_only_is_the_same_whatever_the_points_do(kind: type[Observation]) -> None:
+    rng = np.random.default_rng(3)
+    if issubclass(kind, Encoder):
+        seen: Observation = kind("p", "l", "j", random_direction(rng), *rng.normal(size=(2, 3)),  # type: ignore[call-arg]
+                                 seen_from="c")
+        X_c, X = random_pose(rng), random_pose(rng)
+    else:
+        seen, X_c, X = far(rng, kind)
+    V_c, V = rng.normal(size=(2, 6, 3))
+    elsewhere = V.copy()
+    elsewhere[:3] = rng.normal(size=(3, 3))
+    same = np.allclose(seen.rate(X_c, X, V_c, V), seen.rate(X_c, X, V_c, elsewhere), rtol=0, atol=1e-12)
+    assert same is kind.turns_only
+
+
+@pytest.mark.parametrize("kind", [*CHAINED, AngleEncoder, SlideEncoder], ids=lambda kind: kind.__name__)
 def test_the_same_is_measured_where_links_become_parts_of_others(kind: type[Observation]) -> None:
     rng = np.random.default_rng(6)
     a = random_direction(rng)

@@ -152,6 +152,27 @@ def test_rates_and_values_of_candidates_have_the_same_units(robot: str) -> None:
         np.testing.assert_allclose(own * mechanism.length ** np.asarray(dimension, dtype=float), metres, atol=1e-9)
 
 
+@pytest.mark.parametrize("robot", ["quattro", "3prp", "gough_stewart"])
+def test_what_is_measured_does_not_depend_on_what_else_is_asked(robot: str) -> None:
+    """Each candidate alone, and all together with poses of no link, of one and of all (of one twice)."""
+    mechanism = setting_of(robot, ("1",)).mechanism
+    observations = [each.observation for each in candidates(setting_of(robot, ("1",)))]
+    assert {each.turns_only for each in observations} == {True, False}
+    q = walked(PinocchioModel(mechanism)).q
+    alone = [measure(PinocchioModel(mechanism), q, mechanism.reference, [each]) for each in observations]
+    links = tuple(mechanism.links)
+    for asked in ((), (mechanism.platform,), (*links, mechanism.platform)):
+        twin = PinocchioModel(mechanism)
+        for _ in range(2):
+            X, V, values, rates = measure(twin, q, mechanism.reference, observations, asked)
+            for link, pose_, velocity in zip(asked, X, V, strict=True):
+                np.testing.assert_array_equal(pose_, twin.poses(q, (link,))[0])
+                np.testing.assert_array_equal(velocity, twin.velocity(q, link))
+            for (_, _, (value,), (rate,)), other, moving in zip(alone, values, rates, strict=True):
+                np.testing.assert_allclose(other, value, rtol=0, atol=1e-13)
+                np.testing.assert_allclose(moving, rate, rtol=0, atol=1e-13)
+
+
 def test_a_split_universal_joint_has_the_encoders_of_its_halves() -> None:
     """Two R in the place of a U read what its two encoders read."""
     rng = np.random.default_rng(2)

@@ -60,6 +60,8 @@ class PinocchioModel:
         self._placements = self.data.oMi
         self._several: dict[tuple[str, ...], tuple[list[int], Array, Array]] = {}
         self._q: Array | None = None
+        self.measured: tuple[tuple[object, ...], Array, tuple[Array, Array, list[Array], list[Array]]] | None = None
+        """What was measured last: what was asked, where, and the answer."""
 
     def __repr__(self) -> str:
         return f"<{type(self).__name__}: {self.mechanism.name}>"
@@ -250,15 +252,18 @@ class PinocchioModel:
         self.at(q)
         return self.frames(q, (link,))[1][0]
 
-    def frames(self, q: Array, links: tuple[str, ...]) -> tuple[Array, Array]:
-        """Poses (k, 4, 4) and velocities (k, 6, nv) of several links at once."""
+    def frames(self, q: Array, links: tuple[str, ...], whole: int | None = None) -> tuple[Array, Array]:
+        """Poses (k, 4, 4) and velocities (k, 6, nv) of several links at once; after the first ``whole`` (default: all)
+        the linear parts are those of the points at the base's origin."""
         X = self.poses(q, links)
         V = self.data.J * self._several[links][2]
-        x, y, z = (X[:, :3, 3] / self.length).T[:, :, None]
-        u, v, w = V[:, 3], V[:, 4], V[:, 5]
-        V[:, 0] += v * z - w * y  # the origin's velocity: ω × p more than that of the point at the base's origin
-        V[:, 1] += w * x - u * z
-        V[:, 2] += u * y - v * x
+        if whole != 0:
+            first = V[:whole]
+            x, y, z = (X[:whole, :3, 3] / self.length).T[:, :, None]
+            u, v, w = first[:, 3], first[:, 4], first[:, 5]
+            first[:, 0] += v * z - w * y  # the origin's velocity: ω × p more than that of the base's origin
+            first[:, 1] += w * x - u * z
+            first[:, 2] += u * y - v * x
         return X, V
 
     def poses(self, q: Array, links: tuple[str, ...]) -> Array:

@@ -58,7 +58,7 @@ class Held(Value):
             return np.zeros(0), np.zeros((0, twin.nv))
         _, _, values, rates = measure(twin, q, self.reference, [o for o, _ in self.measured])
         errors = [o.apart(value, wanted) for value, (o, wanted) in zip(values, self.measured, strict=True)]
-        return np.concatenate(errors), np.vstack(rates)
+        return np.concatenate(errors), np.concatenate(rates)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -111,7 +111,7 @@ def solve(twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance
     """
     def advance(q: Array, at: Residual, factor: float) -> Array:
         normal = at.J.T @ at.J
-        normal.flat[:: twin.nv + 1] += max(factor * at.size**2, 1e-14)
+        normal.reshape(-1)[:: twin.nv + 1] += max(factor * at.size**2, 1e-14)
         step: Array = np.asarray(np.linalg.solve(normal, -(at.J.T @ at.error)), dtype=float)
         return twin.moved(q, shortened(step, 0.5))
 

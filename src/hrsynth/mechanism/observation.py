@@ -32,6 +32,8 @@ class Observation(Value):
     dimension: ClassVar[int | Array] = 0
     """Power of length in the measured value, one for all rows or one for each: 0 for pure numbers and angles, 1 for
     lengths; who compares values of different observations divides by that power of a characteristic length."""
+    turns_only: ClassVar[bool] = False
+    """Whether the rates need angular velocities alone: then the linear ones may be those of any point."""
 
     leg: str
     link: str

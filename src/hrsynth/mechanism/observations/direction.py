@@ -39,6 +39,7 @@ class SeenAxis(Observation):
     size = 3
     rank = 2
     rational = True
+    turns_only = True
     direction: Array
 
     def __post_init__(self) -> None:

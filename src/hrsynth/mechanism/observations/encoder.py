@@ -47,6 +47,7 @@ class AngleEncoder(Encoder):
     and not parallel to the axis: any normal of it for R and C, the other axis for U.
     """
 
+    turns_only = True
     mark: Array
     start: Array
 
