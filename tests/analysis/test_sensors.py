@@ -10,9 +10,11 @@ import pytest
 
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.derive import Derivation, derive
-from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.analysis.exact import architecture
+from hrsynth.analysis.observed import ObservedRobot, restricted
+from hrsynth.analysis.verdict import verdict_of
 from hrsynth.description import load, native, shipped
-from hrsynth.errors import BadRequest
+from hrsynth.errors import BadRequest, RankUndecided
 from hrsynth.geometry.vectors import Array, pose
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Mechanism
@@ -109,6 +111,29 @@ def test_every_kind_is_certified(robot: str, kind: str) -> None:
             ObservedRobot.of(mechanism, see="encoder:free")
         return
     assert certified(mechanism, kind).verdict.rank > 0
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("robot", ["free_body", "arm", "gough_stewart", "delta"])
+def test_exact_ranks_are_those_of_samples(robot: str, kind: str) -> None:
+    """For a generic camera, point and axis, of one observation and of two; one edge alone is irrational."""
+    if (robot, kind) == ("free_body", "encoder"):
+        return
+    setting = watched({"free_body": free_body, "arm": arm}[robot]() if robot in ("free_body", "arm") else load(robot),
+                      kind)
+    exact = architecture(setting)
+    for observed in (setting.observed, setting.observed[:1]):
+        found = exact.verdict(observed)
+        if kind == "edge":
+            assert (found.exact, found.reason) == (False, "what is measured by edge edge_1 is not rational")
+            continue
+        assert found.exact, found.reason
+        try:
+            samples = restricted(setting.everything, observed)
+            assert found.rank == verdict_of(setting, [o.leg for o in observed], samples).rank
+        except RankUndecided:  # a circle far away hardly shows how it is turned
+            assert (kind, found.rank) == ("image_circle", min(5 * len(observed), found.dof))
+        assert found.proved is (found.rank == found.dof)
 
 
 def robot_of(name: str) -> Mechanism:

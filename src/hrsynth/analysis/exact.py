@@ -33,13 +33,14 @@ from ..mechanism import Mechanism, Observation
 from ..mechanism.carried import Tie, carried_by_joints, ties
 from ..mechanism.model import JointType
 from ..mechanism.observation import labels_of
-from ..mechanism.observations.direction import Direction
+from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.relations import Relations, recognise
 from ..results import Compared
 from ..tolerances import CLOSED
 from .instances import Instance, NotRecognised, draw, instance, ranks_at
 from .kept import degree, kept
 from .observed import ObservedRobot, selected
+from .sensor_rows import DEGREE, SensorPlaces, has_exact_rates
 from .verdict import word
 
 INSTANCES = 5
@@ -107,7 +108,7 @@ class ExactArchitecture:
     is the mobility at the first configuration of the relations, the zero configuration.
     """
 
-    def __init__(self, mechanism: Mechanism, relations: Relations, observations: Sequence[Direction],
+    def __init__(self, mechanism: Mechanism, relations: Relations, observations: Sequence[Observation],
                  relation: Relation, start: int | None = None) -> None:
         self.mechanism = mechanism
         self.relations = relations
@@ -199,7 +200,8 @@ class ExactArchitecture:
             found += [self.instance(i) for i in range(1, TESTS)]
             for each in found:
                 _same("dim ρ of these legs", each.ranks(places)[0], found[0].ranks(places)[0])
-        return tested * (degree(self.relations, len(found[0].free)) / (2 * LARGEST_RANDOM)) ** TESTS
+        rows = sum(each.size for each in self.observations if not isinstance(each, SeenAxis))
+        return tested * (degree(self.relations, len(found[0].free) + DEGREE * rows) / (2 * LARGEST_RANDOM)) ** TESTS
 
     def _spins(self, link: str, places: Sequence[int]) -> bool:
         """Whether a link is a rod between two S joints that can spin unseen."""
@@ -207,15 +209,21 @@ class ExactArchitecture:
         if (len(joints) != 2 or {joint.type for joint in joints} != {JointType.SPHERICAL}
                 or link in (self.mechanism.base, self.mechanism.platform, self.mechanism.reference)):
             return False
+        sensors = [self.observations[i] for i in places if not isinstance(self.observations[i], SeenAxis)]
+        if any(link in (o.link, o.seen_from) for o in (*sensors, *(self.observations[i] for i in places))
+               if o in sensors or o.seen_from is not None):
+            return False
         ends = {self.relations.centres[joint.name] for joint in joints}
-        return all(self.relations.sights[i].kind == "between" and set(self.relations.sights[i].points) == ends
+        sights = dict(zip((i for i, o in enumerate(self.observations) if isinstance(o, SeenAxis)),
+                          self.relations.sights, strict=False))
+        return all(sights[i].kind == "between" and set(sights[i].points) == ends
                    for i in places if self.observations[i].link == link)
 
     def _rank(self, observed: Sequence[Observation]) -> tuple[int, int]:
         """The largest rank seen, and the instances looked at: one that sees everything is enough."""
         unknown = [o for o in observed if o.key not in self._places]
         if unknown:
-            raise NotRecognised(f"the measurement of link {unknown[0].link} is not a direction")
+            raise NotRecognised(f"what is measured by {unknown[0].kind} {unknown[0].leg} is not rational")
         places = [self._places[o.key] for o in observed]
         dimension = selected(self.relation, places).dimension
         best = 0
@@ -238,10 +246,12 @@ def architecture(setting: ObservedRobot) -> ExactArchitecture:
 def architecture_of(mechanism: Mechanism, question: Measurement, at: Sequence[ClosedConfiguration], relation: Relation
                     ) -> ExactArchitecture:
     """The architecture of a mechanism from configurations ``at`` which relations must persist, and ρ at one of them."""
-    places = [i for i, o in enumerate(question.observations) if type(o) is Direction]
-    directions = [o for o in question.observations if type(o) is Direction]
-    relations = recognise(mechanism, frames_at(at), directions, question.point)
-    return ExactArchitecture(mechanism, relations, directions, selected(relation, places), at[0].kernel()[0].shape[1])
+    places = [i for i, o in enumerate(question.observations) if has_exact_rates(o)]
+    observed = [question.observations[i] for i in places]
+    sensors = SensorPlaces.of(observed, mechanism)
+    directions = [*(o for o in observed if isinstance(o, SeenAxis)), *sensors.watched()]
+    relations = recognise(mechanism, frames_at(at), directions, question.point, sensors.points)
+    return ExactArchitecture(mechanism, relations, observed, selected(relation, places), at[0].kernel()[0].shape[1])
 
 
 def power_above(chance: float) -> str:

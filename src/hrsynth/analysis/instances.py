@@ -21,11 +21,12 @@ from ..geometry.incidences import Incidence
 from ..geometry.ranks import rank_of
 from ..geometry.screws import normals
 from ..geometry.vectors import Numbers, cross
-from ..mechanism import Joint, Mechanism, graphs
-from ..mechanism.observations.direction import Direction
+from ..mechanism import Joint, Mechanism, Observation, graphs
+from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.relations import DirectionSource, Relations
 from ..mechanism.screws import allowed
 from ..tolerances import RANK_CUTOFF, RANK_GAP
+from .sensor_rows import SensorPlaces, rates
 
 if TYPE_CHECKING:
     from flint import fmpz_mat
@@ -48,7 +49,8 @@ class Geometry:
 @dataclass(frozen=True, eq=False)
 class Instance:
     """Exact maps on a basis of ker A, the velocities that all joints allow: the platform's twist (twist rows,
-    mobility), and u × (ω − ω of the reference) for each observed direction (3, mobility)."""
+    mobility), u × (ω − ω of the reference) for each observed direction (3, mobility), and what
+    :func:`.sensor_rows.rates` gives for other observations."""
 
     geometry: Geometry
     twist: Numbers
@@ -115,22 +117,32 @@ def ranks_at(relations: Relations, place: int) -> tuple[int, ...]:
     return tuple(found)
 
 
-def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[Direction], drawn: Geometry
+def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[Observation], drawn: Geometry
              ) -> Instance:
-    """The kinematics of a mechanism with this geometry, from the rates of its joints: whole numbers throughout."""
+    """The kinematics of a mechanism with this geometry, from the rates of its joints: whole numbers throughout.
+
+    The relations are those for the directions among the observations, and then for what the others rest on.
+    """
     screws = {name: _screws(joint, relations, drawn) for name, joint in mechanism.joints.items()}
-    velocities, loops = _velocities(mechanism, screws)
+    velocities, loops, columns = _velocities(mechanism, screws)
+    places = SensorPlaces.of(observations, mechanism)
+    sights = iter(relations.sights)
+    directions = {o.key: seen(next(sights), drawn) for o in observations if isinstance(o, SeenAxis)}
+    further = [seen(sight, drawn) for sight in sights]
     t = velocities[mechanism.platform]
     if relations.point is not None:
         point, scale = scaled(drawn.centres[relations.point])
         t = scale * t[:3] + cross(t[3:], point[:, None], axis=-2)
     parts = [t]
-    for observation, sight in zip(observations, relations.sights, strict=True):
-        turn = velocities[observation.link] - velocities[observation.seen_from or mechanism.reference]
-        parts.append(cross(scaled(seen(sight, drawn))[0][:, None], turn[3:], axis=-2))
+    for observation in observations:
+        if observation.key in directions:
+            turn = velocities[observation.link] - velocities[observation.seen_from or mechanism.reference]
+            parts.append(cross(scaled(directions[observation.key])[0][:, None], turn[3:], axis=-2))
+        else:
+            parts.append(rates(observation, places, relations, drawn.centres, further, mechanism, velocities, columns))
     free, _ = _reduced(loops)
-    t, *rates = np.split(_times(np.vstack(parts), free), np.cumsum([len(part) for part in parts[:-1]]))
-    return Instance(drawn, t, tuple(rates), velocities, free, loops, tuple(parts))
+    t, *moving = np.split(_times(np.vstack(parts), free), np.cumsum([len(part) for part in parts[:-1]]))
+    return Instance(drawn, t, tuple(moving), velocities, free, loops, tuple(parts))
 
 
 def _screws(joint: Joint, relations: Relations, drawn: Geometry) -> Numbers:
@@ -146,9 +158,10 @@ def _screws(joint: Joint, relations: Relations, drawn: Geometry) -> Numbers:
     return np.array(found, dtype=object).reshape(-1, 6).T
 
 
-def _velocities(mechanism: Mechanism, screws: Mapping[str, Numbers]) -> tuple[dict[str, Numbers], Numbers]:
+def _velocities(mechanism: Mechanism, screws: Mapping[str, Numbers]
+                ) -> tuple[dict[str, Numbers], Numbers, dict[str, slice]]:
     """The twists of all links (6, rates) along a tree of joints, and what the other joints ask of the rates (rows,
-    rates): that their loops stay closed."""
+    rates): that their loops stay closed; the rates of each joint."""
     joints = list(mechanism.joints.values())
     sizes = np.cumsum([0, *(screws[joint.name].shape[1] for joint in joints)])
     own = {joint.name: slice(*sizes[i : i + 2]) for i, joint in enumerate(joints)}
@@ -164,7 +177,7 @@ def _velocities(mechanism: Mechanism, screws: Mapping[str, Numbers]) -> tuple[di
             loop = velocities[joint.successor] - velocities[joint.predecessor]
             loop[:, own[joint.name]] -= screws[joint.name]
             loops.append(loop)
-    return velocities, np.vstack(loops)
+    return velocities, np.vstack(loops), own
 
 
 def _directions(relations: Relations, rng: random.Random) -> tuple[tuple[Numbers, ...], list[int]]:

@@ -27,7 +27,7 @@ def certificate(found: Derivation) -> dict[str, Any]:
     except NotRecognised as reason:
         raise NoCertificate(name, str(reason)) from None
     places = [i for i, o in enumerate(exact.observations) if o.key in {each.key for each in found.setting.observed}]
-    if len(places) != len(found.setting.observed):
+    if not all(each.by_segment for each in found.setting.observed):
         raise NoCertificate(name, "not all that is measured is a direction")
     matrices = {"A": at.loops, "X": at.rows[0], "Y": np.vstack([at.rows[1 + i] for i in places])}
     whole = {key: [[int(c) for c in row] for row in rows] for key, rows in matrices.items()}

@@ -24,7 +24,7 @@ from ..geometry.vectors import Array, cross, dot, inverse, transform, triple, un
 from ..tolerances import RANK_GAP, SAME_DIRECTION, SAME_PLANE, SAME_POINT
 from . import graphs
 from .model import Joint, JointType, Mechanism
-from .observations.direction import Direction
+from .observations.direction import SeenAxis
 
 AXIAL = (JointType.REVOLUTE, JointType.CYLINDRICAL)
 """Joints whose centre may slide along their axis without consequence."""
@@ -80,16 +80,20 @@ class Relations:
         return "axes of " + ", ".join(joints) if joints else "an observed direction"
 
 
-def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Sequence[Direction] = (),
-              point: Array | None = None) -> Relations:
+def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Sequence[SeenAxis] = (),
+              point: Array | None = None, points: Sequence[tuple[str, Sequence[float]]] = ()) -> Relations:
     """The relations that hold at all configurations; ``poses`` are X_BL (configurations, 4, 4) of every link.
 
-    ``point`` is the platform's point in the platform's frame, for a point body.
+    ``point`` is the platform's point in the platform's frame, for a point body; ``points`` are further ones, with their
+    links, in whose frames they are: they are the last centres.
     """
     drawn, sieve = _Drawing(mechanism, poses, point), Sieve()
+    for link, at in points:
+        drawn.add_point(link, np.asarray(at))
     classes, members = _parallels(sieve, np.array(drawn.directions).reshape(-1, drawn.size, 3))
     axes = {name: tuple(members[i] for i in numbers) for name, numbers in drawn.axes.items()}
-    points = np.array(drawn.points).reshape(len(drawn.points), drawn.size, 3) / mechanism.length
+    centres = np.array(drawn.points).reshape(len(drawn.points), drawn.size, 3) / mechanism.length
+    further = len(points)
     fixed: list[list[str]] = [[] for _ in classes]
     for name, numbers in axes.items():
         for number, link in zip(numbers, mechanism.joints[name].links, strict=False):
@@ -99,7 +103,7 @@ def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Se
         u = drawn.turned(observation)
         own = [i for i, links in enumerate(drawn.hosts) if observation.link in links]
         near = sorted({c for joint in mechanism.joints_of(observation.link) for c in axes[joint.name]})
-        sight = _sight(u, classes, points, own, near)
+        sight = _sight(u, classes, centres, own, near)
         if sight is None:
             sight = DirectionSource("class", classes=(len(classes),))
             classes = np.concatenate([classes, u[None]])
@@ -111,15 +115,15 @@ def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Se
     owns = [set(axes[name]) for name in drawn.centres]
     slides = [own if mechanism.joints[name].type in AXIAL else set()
               for name, own in zip(drawn.centres, owns, strict=True)]
-    bare = [set[int]()] * (len(points) - len(owns))
-    found = incidences(sieve, classes, points, drawn.together(), owns + bare, slides + bare)
+    bare = [set[int]()] * (len(centres) - len(owns))
+    found = incidences(sieve, classes, centres, drawn.together(), owns + bare, slides + bare)
     order = sorted(place, key=place.__getitem__)
 
     def placed(numbers: Iterable[int]) -> tuple[int, ...]:
         return tuple(place[i] for i in numbers)
 
     return Relations({name: placed(numbers) for name, numbers in axes.items()}, tower, drawn.centres,
-                     None if point is None else len(points) - 1, len(points),
+                     None if point is None else len(centres) - 1 - further, len(centres),
                      tuple(replace(each, classes=placed(each.classes)) for each in found),
                      tuple(replace(each, classes=placed(each.classes)) for each in sights),
                      tuple(drawn.carriers), tuple(tuple(fixed[i]) for i in order),
@@ -159,10 +163,13 @@ class _Drawing:
             self.hosts.append(())
             self.carriers.append(link)
         if point is not None:
-            X = mechanism.links[mechanism.platform].pose
-            self.points.append(self._at(mechanism.platform, transform(X, point)))
-            self.hosts.append((mechanism.platform,))
-            self.carriers.append(mechanism.platform)
+            self.add_point(mechanism.platform, point)
+
+    def add_point(self, link: str, place: Array) -> None:
+        """A further point, in the frame of its link."""
+        self.points.append(self._at(link, transform(self.mechanism.links[link].pose, place)))
+        self.hosts.append((link,))
+        self.carriers.append(link)
 
     def _add(self, joint: Joint) -> None:
         self.axes[joint.name] = []
@@ -194,7 +201,7 @@ class _Drawing:
                     found.append((link, moved))
         return found
 
-    def turned(self, observation: Direction) -> Array:
+    def turned(self, observation: SeenAxis) -> Array:
         """The observed direction in base axes (configurations, 3)."""
         link = self.mechanism.links[observation.link]
         return np.asarray(self.turns[link.name] @ link.pose[:3, :3] @ observation.direction)

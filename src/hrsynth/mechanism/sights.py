@@ -120,6 +120,8 @@ class CameraObservation(Observation):
     """The wrenches that it transmits when it is held, for the table of all kinds."""
     rational: ClassVar[bool] = True
     """Whether its wrenches are polynomials of C, B, d and z."""
+    along_z: ClassVar[bool] = False
+    """Whether the camera's z axis matters."""
     rank: ClassVar[int]
     """Independent numbers that are measured."""
 

@@ -24,6 +24,7 @@ class PointDepth(CameraObservation):
     needs = ("at",)
     size = 1
     rank = 1
+    along_z = True
     dimension = 1
 
     @staticmethod

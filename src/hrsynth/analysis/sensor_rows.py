@@ -1,0 +1,110 @@
+"""Exact rates of observations of all kinds: on the relative twist of two links, the wrenches that are transmitted when
+the observation is held, at the points and directions of a rational instance; of an encoder its joint's own rate.
+
+These wrenches are polynomials of the camera's centre C, the point B, the axis d and the camera's z axis, so their rank
+is that of the measured rates wherever those are regular (docs/pages/observations.md).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..geometry.vectors import Numbers
+from ..mechanism import Direction, Mechanism, Observation
+from ..mechanism.observations.direction import SeenAxis
+from ..mechanism.observations.encoder import AngleEncoder, Encoder
+from ..mechanism.relations import Relations
+from ..mechanism.sights import CameraObservation, Sighting
+
+DEGREE = 4
+"""No wrench of a kind has a larger degree in points and directions together, each counted as the largest of them."""
+
+Place = tuple[str, tuple[float, ...]]
+"""A point (m) or a direction in the frame of a link."""
+
+
+@dataclass(frozen=True, eq=False)
+class SensorPlaces:
+    """The points and directions, fixed in links, on which observations rest besides joints: every one once."""
+
+    points: tuple[Place, ...]
+    directions: tuple[Place, ...]
+
+    @classmethod
+    def of(cls, observations: Sequence[Observation], mechanism: Mechanism) -> SensorPlaces:
+        """Those of some observations."""
+        points: dict[Place, None] = {}
+        directions: dict[Place, None] = {}
+        for each in observations:
+            for point in _points(each, mechanism):
+                points[point] = None
+            for direction in _directions(each, mechanism):
+                directions[direction] = None
+        return cls(tuple(points), tuple(directions))
+
+    def watched(self) -> list[Direction]:
+        """The directions as if each was observed: that is how relations find what they are parallel to."""
+        return [Direction("", link, np.array(axis)) for link, axis in self.directions]
+
+
+def has_exact_rates(seen: Observation) -> bool:
+    """Whether an observation has exact rates: all but a single edge of a cylinder, whose plane is irrational."""
+    return isinstance(seen, SeenAxis | Encoder) or (isinstance(seen, CameraObservation) and seen.rational)
+
+
+def rates(seen: Observation, places: SensorPlaces, relations: Relations, centres: Numbers, sights: Sequence[Numbers],
+          mechanism: Mechanism, velocities: Mapping[str, Numbers], columns: Mapping[str, slice]) -> Numbers:
+    """The rates of an observation for each joint's rate, whole numbers (rows, rates); ``centres`` are rational, the
+    ``sights`` the directions of ``places``, ``columns`` those of each joint."""
+    from flint import fmpq
+
+    total = next(iter(velocities.values())).shape[1]
+    if isinstance(seen, Encoder):
+        row = np.zeros((1, total), dtype=object)
+        row[0, columns[seen.joint].start + _coordinate(seen, mechanism)] = 1
+        return row
+    assert isinstance(seen, CameraObservation)
+    B, C = (centres[relations.count - len(places.points) + places.points.index(point)]
+            for point in _points(seen, mechanism))
+    axes = [sights[places.directions.index(axis)] for axis in _directions(seen, mechanism)]
+    nothing = np.array([fmpq(0)] * 3, dtype=object)
+    d = axes[0] if seen.axis is not None else nothing
+    turn = velocities[seen.link] - velocities[seen.seen_from or mechanism.reference]
+    wrenches = seen.wrenches(Sighting(C, axes[-1] if axes else nothing, B, d))
+    return np.vstack([_whole(wrench) @ turn for wrench in wrenches])
+
+
+def _whole(wrench: Numbers) -> Numbers:
+    from flint import fmpq
+
+    from .instances import scaled
+
+    return scaled(np.array([fmpq(x) for x in wrench], dtype=object))[0]
+
+
+def _coordinate(seen: Encoder, mechanism: Mechanism) -> int:
+    """The number of an encoder's coordinate among those of its joint, as its twists are told."""
+    joint = mechanism.joints[seen.joint]
+    if joint.type == "U":
+        return int(seen.link != joint.successor)
+    return int(isinstance(seen, AngleEncoder) and joint.type == "C")
+
+
+def _points(seen: Observation, mechanism: Mechanism) -> tuple[Place, ...]:
+    """B and C."""
+    if not isinstance(seen, CameraObservation):
+        return ()
+    reference = seen.seen_from or mechanism.reference
+    return (seen.link, tuple(seen.at.tolist())), (reference, tuple(seen.view[:3, 3].tolist()))
+
+
+def _directions(seen: Observation, mechanism: Mechanism) -> tuple[Place, ...]:
+    """d, where there is one; the camera's z axis, where the depth is measured."""
+    if not isinstance(seen, CameraObservation):
+        return ()
+    own = () if seen.axis is None else ((seen.link, tuple(seen.axis.tolist())),)
+    reference = seen.seen_from or mechanism.reference
+    return (*own, *([(reference, tuple(seen.view[:3, 2].tolist()))] if seen.along_z else []))
