@@ -223,7 +223,10 @@ class ExactArchitecture:
         """The largest rank seen, and the instances looked at: one that sees everything is enough."""
         unknown = [o for o in observed if o.key not in self._places]
         if unknown:
-            raise NotRecognised(f"what is measured by {unknown[0].kind} {unknown[0].leg} is not rational")
+            odd = unknown[0]
+            raise NotRecognised(f"the measurement of link {odd.link} is not a direction, and not among what is observed"
+                                if has_exact_rates(odd) else
+                                f"what is measured by {odd.kind} {odd.leg} is not rational")
         places = [self._places[o.key] for o in observed]
         dimension = selected(self.relation, places).dimension
         best = 0
