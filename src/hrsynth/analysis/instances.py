@@ -11,7 +11,7 @@ from __future__ import annotations
 import random
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from math import gcd, lcm
+from math import gcd
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from ..budgets import LARGEST_RANDOM
 from ..geometry.incidences import Incidence
 from ..geometry.ranks import rank_of
 from ..geometry.screws import normals
-from ..geometry.vectors import Numbers, cross
+from ..geometry.vectors import Numbers, cross, scaled
 from ..mechanism import Joint, Mechanism, Observation, graphs
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.relations import DirectionSource, Relations
@@ -248,12 +248,6 @@ def _whole(vector: Numbers) -> Numbers:
     """The shortest vector of whole numbers along a rational one."""
     numbers, _ = scaled(vector)
     return numbers // gcd(*numbers)
-
-
-def scaled(vector: Numbers) -> tuple[Numbers, int]:
-    """The first multiple of a rational vector that has whole entries, and how many times it is taken."""
-    scale = lcm(*(int(x.q) for x in vector))
-    return np.array([x.p * (scale // x.q) for x in vector], dtype=object), scale
 
 
 def kernel(rows: Numbers) -> Numbers:

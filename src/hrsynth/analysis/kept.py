@@ -20,10 +20,10 @@ from itertools import groupby
 
 import numpy as np
 
-from ..geometry.vectors import Numbers, cross, dot
+from ..geometry.vectors import Numbers, cross, dot, scaled
 from ..mechanism.carried import Tie
 from ..mechanism.relations import Relations
-from .instances import Instance, scaled
+from .instances import Instance
 
 
 def kept(every: Sequence[Tie], relations: Relations, found: Instance) -> list[bool]:

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..geometry.vectors import Numbers
+from ..geometry.vectors import Numbers, scaled
 from ..mechanism import Direction, Mechanism, Observation
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.observations.encoder import AngleEncoder, Encoder
@@ -79,8 +79,6 @@ def rates(seen: Observation, places: SensorPlaces, relations: Relations, centres
 
 def _whole(wrench: Numbers) -> Numbers:
     from flint import fmpq
-
-    from .instances import scaled
 
     return scaled(np.array([fmpq(x) for x in wrench], dtype=object))[0]
 

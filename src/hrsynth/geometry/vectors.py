@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from math import lcm
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,12 @@ def frozen(values: ArrayLike) -> Array:
     array = np.array(values, dtype=float)
     array.setflags(write=False)
     return array
+
+
+def scaled(vector: Numbers) -> tuple[Numbers, int]:
+    """The first multiple of a rational vector that has whole entries, and how many times it is taken."""
+    scale = lcm(*(int(x.q) for x in vector))
+    return np.array([x.p * (scale // x.q) for x in vector], dtype=object), scale
 
 
 def unit(vector: ArrayLike) -> Array:
