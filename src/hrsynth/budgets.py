@@ -332,3 +332,16 @@ RAYS = 3000
 """Rays from a goal along which it is seen, not proved, how high the error rises."""
 RADIUS_BOXES = 60_000
 """Boxes with which a certified radius is tried, at most."""
+
+# The audit of published tables
+
+AUDIT_STEPS = 60
+"""Steps in which a published robot is closed from a random start, or is not."""
+AUDIT_TRIALS = 12
+"""Random starts of each published robot, and again as many where its dimensions are to obey a relation."""
+AUDIT_POSES = 4
+"""Poses at which dimensions have to close at once there."""
+AUDIT_BATCH = 128
+"""Robots that are closed together."""
+AUDIT_DRAWS = 12
+"""Draws of the turns of a leg, in exact arithmetic, before its orientation is given up."""

@@ -339,3 +339,21 @@ CERTIFIED_LEVEL = 0.95
 """Part of the error at which a ray is seen to stop rising up to which it is tried to prove that all rays rise."""
 RADIUS_SHARES = (0.97, 0.9, 0.8, 0.65, 0.5, 0.3)
 """Parts of the radius that rays show that are tried, one after the other, as the certified one."""
+
+# The audit of published tables
+
+AUDIT_STIFF = 0.2
+"""How far dimensions follow, beside joints and poses, when a robot with random ones is closed."""
+AUDIT_DAMPED = 1e-2
+"""Damping of the closing of published robots, as part of the squared residual, and its largest value."""
+AUDIT_LONGEST = 0.4
+"""Longest step (metres, radians) of one unknown there."""
+AUDIT_FAR = 1e3
+"""Residual (metres, radians) at which a start is given up there."""
+AUDIT_CHANGED = 0.05
+"""Relative change of each dimension, and step (metres, radians) of each joint, after which a robot is closed again:
+what it does then belongs to generic dimensions."""
+AUDIT_SLIGHT = 0.03
+"""Dimension (metres, radians) below which a robot counts as closed by a degenerate one."""
+AUDIT_TURNED = 1e-3
+"""Turn (radians) off the stated motion below which a platform counts as not having left it."""

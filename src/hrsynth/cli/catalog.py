@@ -1,9 +1,10 @@
-"""The commands of the catalog: build, list, show, site.
+"""The commands of the catalog: build, list, show, site, audit.
 
 Their records, besides ``command`` ("catalog build" …) and ``version``: ``build`` gives ``groups``, each with
 ``group``, ``words``, ``now`` (made), ``before`` and ``file`` (null while it is not complete), with ``--check`` instead
 ``stale``, one text for each thing; ``list`` gives ``total`` and ``entries``; ``show`` gives ``entry``, ``drawing``
-(lines), ``note`` and ``file``; ``site`` as told by ``catalog site --help``.
+(lines), ``note`` and ``file``; ``site`` as told by ``catalog site --help``; ``audit``
+its table by groups and every disagreement.
 """
 
 from __future__ import annotations
@@ -127,6 +128,22 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
     _say("site", done.to_dict(), sited(done.to_dict()), json)
 
 
+def audit(folder: str, output: str | None, only: str | None, sample: int | None, json: bool, seed: int) -> None:
+    """Compare published tables of symmetric robots with what is computed."""
+    from ..catalog.audit.run import audit as run
+    from ..errors import BadRequest
+    from ..present.text.audit import audited
+
+    if output is not None and Path(output).suffix != ".jsonl":
+        raise BadRequest("records are kept a line each", output, "a file that ends in .jsonl")
+    with Progress(counted=True) as progress:
+        found = run(folder, only=only, sample=sample, seed=seed, kept=output,
+                    tell=lambda _, done, total: progress.count("robots", done, total)).to_dict()
+    for defect in found["defects"]:
+        warn(defect)
+    _say("audit", {**found, "file": output}, audited(found), json)
+
+
 def _word(text: str, kept: str | None) -> tuple[str, str]:
     """The word of an architecture that is given by it, by a name or by its legs, and what else is called so."""
     from ..catalog import load
@@ -196,12 +213,22 @@ COMMANDS = (
      "server.", site,
      (output("A new or empty folder, or an older site, which is replaced.", "DIR", NEEDED), *FILTER, WORKERS, ANEW,
       KEPT, JSON)),
+    ("audit", "Compare published tables of symmetric parallel robots with what is computed: kind of motion, working "
+     "motors, loss of rank.", audit,
+     (Option("folder", "A folder with chains/, robots/ and synthesis/; the page 'audit' has their format.", "FOLDER",
+             default=NEEDED, argument=True),
+      output("Keep the records, a line a robot; the same command goes on there. It has the instances modulo primes.",
+             "FILE.jsonl"),
+      Option("only", "One group of the tables: 3T1R."),
+      Option("sample", "So many robots of each group, drawn at random.", "N", int, low=1), JSON,
+      Option("seed", "Seed of --sample and of dimensions and configurations.", None, int, 0, low=0))),
 )
 EXAMPLES = {
     "build": ("planar -o mine.sqlite", "--check --sample 20"),
     "list": ("--legs 3-R*RR --verdict controllable", "--motion 2T1R --base-motors --modes 6", "--text Hexaglide"),
     "show": ("'3(Rz*-Rz-Rz)'", "Delta -o delta.urdf"),
     "site": ("-o pages --group planar",),
+    "audit": ("tables --only 3T1R", "tables --sample 2000 -o audit.jsonl"),
 }
 for name, words, run, options in COMMANDS:
     add_command(catalog, name, words, options, run, EXAMPLES[name])

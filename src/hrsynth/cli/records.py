@@ -1050,6 +1050,81 @@ class CatalogSite(Head):
     differ: list[Differing]
 
 
+class AuditedKind(TypedDict):
+    """How often a kind of disagreement occurs that is settled so."""
+
+    kind: str
+    settled: str
+    number: int
+
+
+class AuditedSight(TypedDict):
+    """How many robots have this verdict when all legs are watched, at generic dimensions, and so many legs at least
+    show as much as all."""
+
+    verdict: str
+    fewest: int
+    number: int
+
+
+class AuditedGroup(TypedDict):
+    """A group of published robots: how many were compared, how many move as stated or further, and of the stated losses
+    of rank and numbers of working choices of motors how many agree."""
+
+    group: str
+    robots: int
+    without_chain: int
+    moves_as_stated: int
+    moves_further: int
+    not_found: int
+    choices: int
+    choices_agree: int
+    choices_agree_in_stated: int
+    choices_not_stated: int
+    choices_not_compared: int
+    counts: int
+    counts_agree: int
+    watching: list[AuditedSight]
+    kinds: list[AuditedKind]
+
+
+class TableDisagreementRecord(TypedDict):
+    """A figure of a table that is not what is computed, with its file and line, its kind and what settles it."""
+
+    robot: str
+    group: str
+    at: str
+    kind: str
+    theirs: str
+    ours: str
+    settled: str
+
+
+class NoLegChain(TypedDict):
+    """A robot whose leg chain is in no table."""
+
+    group: str
+    robot: str
+    chain: str
+
+
+class CatalogAudit(Head):
+    """Published tables compared: `rows` of them, `compared` ones, those that `agree` in all that is stated; `kinds`
+    and `settlements` in words; `file` has the records with their instances modulo primes."""
+
+    folder: str
+    rows: int
+    compared: int
+    agree: int
+    groups: list[AuditedGroup]
+    kinds: dict[str, str]
+    settlements: dict[str, str]
+    disagreements: list[TableDisagreementRecord]
+    defects: list[str]
+    without_chain: list[NoLegChain]
+    file: str | None
+
+
 class FindingRecord(TypedDict):
     """What a rule found; `line` is null where it is about the whole file, `fix` what to do about it, and `mends`
     whether --fix does it."""
@@ -1087,5 +1162,5 @@ RECORDS: dict[str, Any] = {
     "accuracy": AccuracyAnswer, "select": Select, "export": Exported, "view": ViewAnswer, "verify": Verify,
     "robots": Robots, "convert": Convert, "import": Import, "lint": LintAnswer,
     "catalog build": CatalogBuild, "catalog list": CatalogList, "catalog show": CatalogShow,
-    "catalog site": CatalogSite}
+    "catalog site": CatalogSite, "catalog audit": CatalogAudit}
 """The type of each command's record."""
