@@ -238,8 +238,8 @@ ENDING_ROUNDS = 12
 """Rounds at most, of robots with many coordinates."""
 ENDING_EFFORT = 300
 """Coordinates of all rounds together, up to which there may be more rounds of robots with few."""
-ENDING_DESCENTS = 3
-"""Rounds before the last one at least."""
+ENDING_DESCENTS, ENDING_LEAST = 3, 7
+"""Rounds before the last one at least where only what attracts is sought, and where all rests are."""
 ENDING_LATE = 0.005
 """Part of the critical points that the later half of the starts may find first for the search to end."""
 ENDING_LATE_DESCENT = 0.02

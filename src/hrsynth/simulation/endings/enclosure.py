@@ -31,11 +31,12 @@ from .search import CriticalPoint, Tangents
 class EnclosedPoint(Value):
     """A box |q − q₀| ≤ r (N,) that holds exactly one critical point with its idle coordinates held; ``index`` is the
     number of negative eigenvalues of the Hessian along the motions of the loops, the others positive, None where that
-    was not proved."""
+    was not proved. Loops ``measured`` have equations that were left out and do not follow from the others."""
 
     q: Array
     radius: Array
     index: int | None
+    measured: tuple[str, ...] = ()
 
     def signs(self, count: int) -> Array:
         """The signs (count,) of the eigenvalues, ascending."""
@@ -99,9 +100,9 @@ def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | N
             if done.all():
                 break
             radius = np.where(done[:, None], radius, TUBE_WIDER * np.maximum(wanted, radius))
-    return [EnclosedPoint(q[k], found[k, :size] * free[k],
-                          None if inertia[k] < 0 else int(inertia[k]) - count) if done[k] else None
-            for k in range(len(q))]
+    measured = unexplained_rows(system)
+    return [EnclosedPoint(q[k], found[k, :size] * free[k], None if inertia[k] < 0 else int(inertia[k]) - count,
+                          measured) if done[k] else None for k in range(len(q))]
 
 
 def _lost(K: Array) -> Array:

@@ -33,7 +33,7 @@ from ..ending import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
 from ..law import FixedDirections, Law, directions
 from ..servo import require_regular, require_seen
 from .carried import SweptChains
-from .enclosure import EnclosedPoint, enclosed, unexplained_rows
+from .enclosure import EnclosedPoint, enclosed
 from .error import RestSystem
 from .search import NEARBY, Critical, CriticalPoints, critical_points, descend, in_mode, walked
 
@@ -238,16 +238,17 @@ class RestSearch:
         rests = _ways([each for one, box in zip(isolated, boxes, strict=True)
                        if (each := self.read(one, box)) is not None], self)
         continua = [each for one in self._in_mode(found.continua) if (each := self.read(one)) is not None]
+        measured = tuple(dict.fromkeys(name for box in boxes if box for name in box.measured))
         order = {GOAL: 0, MODE: 1, ANTIPODAL: 2, CRITICAL: 3}
         rests.sort(key=lambda each: (order[each.kind], not each.stable, each.error))
         return Endings(setting, self.goal, motion.pose(self.goal.pose(motion.link)), self.desired, tuple(rests),
-                       tuple(continua), tuple(lists), unexplained_rows(self.system), found)
+                       tuple(continua), tuple(lists), measured, found)
 
     def _lists(self, found: Sequence[Critical]) -> list[SignedModes]:
         """The lists of modes of those combinations of signs at which the error was found to vanish, that of the goal
         first."""
         known: dict[tuple[str, ...], AssemblyModes | None] = {}
-        for at in (self.goal, *(self._placed(each.point.q) for each in found if each.point.value < VANISHED**2)):
+        for at in (self.goal, *(self._placed(each.point.q) for each in found if each.point.vanishes)):
             if at is not None and (reversed_ := self._reversed(at)) not in known:
                 try:
                     known[reversed_] = modes(self.setting, at=at)
@@ -260,7 +261,7 @@ class RestSearch:
         if given.listed is None:
             return []
         places = [each.configuration for each in given.listed.modes if each.configuration is not None]
-        old = [at for each in found if each.point.value < VANISHED**2 and (at := self._placed(each.point.q))]
+        old = [at for each in found if each.point.vanishes and (at := self._placed(each.point.q))]
         new = [at for at in places if not any(self.alike(at, each) and self._reversed(each) == given.reversed
                                               for each in old)]
         if not new:

@@ -23,6 +23,7 @@ from ...budgets import (
     ENDING_EFFORT,
     ENDING_LATE,
     ENDING_LATE_DESCENT,
+    ENDING_LEAST,
     ENDING_ROUNDS,
     ENDING_STARTS,
     ENDING_STEPS,
@@ -39,7 +40,7 @@ from ...kinematics.relation import relation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
-from ...tolerances import CRITICAL, CRITICAL_FLAT, SAME_ENDING
+from ...tolerances import CRITICAL, CRITICAL_FLAT, ERROR_ROUNDING, SAME_ENDING
 from .carried import SweptChains
 from .error import RestEquations, RestSystem
 
@@ -64,6 +65,11 @@ class CriticalPoint(Value):
     residual: float
     curvatures: Array
     value: float
+
+    @property
+    def vanishes(self) -> bool:
+        """Whether e = 0, as far as E = ½ ‖e‖², a difference of numbers of size one, tells it."""
+        return self.value < ERROR_ROUNDING
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,8 +275,8 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
         points = []
         fresh.append(new)
         count = sum(map(len, known.values()))
-        allowed = (ENDING_LATE_DESCENT if minima else ENDING_LATE) * count
-        if number >= ENDING_DESCENTS and sum(fresh[len(fresh) // 2 :]) <= allowed:
+        least, late = (ENDING_DESCENTS, ENDING_LATE_DESCENT) if minima else (ENDING_LEAST, ENDING_LATE)
+        if number >= least and sum(fresh[len(fresh) // 2 :]) <= late * count:
             break
     late = sum(fresh[len(fresh) // 2 :])
     isolated = tuple(Critical(point, met) for own in known.values() for _, point, met, _ in own)
