@@ -343,11 +343,12 @@ class RestSearch:
 
     def _other_legs(self, at: ClosedConfiguration) -> tuple[str, ...] | None:
         """The legs that are in another working mode than at the goal; None where that is not known."""
-        try:
-            one, other = (self._forms.forms(each) for each in (self.goal, at)) if self._forms else (None, None)
-        except NoLegForm:
+        if self._forms is None:
             return None
-        if one is None or other is None:
+        try:
+            with np.errstate(invalid="ignore"):
+                one, other = (self._forms.forms(each) for each in (self.goal, at))
+        except NoLegForm:
             return None
         return tuple(dict.fromkeys(str(limb.label) for limb, a, b in zip(one.limbs, one.modes, other.modes,
                                                                         strict=True) if a != b))
