@@ -170,6 +170,16 @@ def test_every_disagreement_is_told_and_settled(tables: Path):
     assert found["agree"] == 4
 
 
+def test_as_many_freedoms_of_another_kind_are_no_agreement(tmp_path: Path):
+    """Three freedoms of a planar robot are not one translation and two turns."""
+    folder = write(tmp_path / "other")
+    for path in (folder / "robots").iterdir():
+        path.unlink()
+    (folder / "robots" / "sym_1T2R_list.csv").write_text("Name\nP3RRR1G1P1;S3RRR1\n")
+    (found,) = audit(folder).disagreements
+    assert (found["kind"], found["theirs"], found["ours"]) == ("not found to move so", "1T2R", "2T1R")
+
+
 def test_tables_with_holes_are_read(tables: Path, tmp_path: Path):
     folder = write(tmp_path / "holes")
     chains = folder / "chains" / "S3RRR.csv"

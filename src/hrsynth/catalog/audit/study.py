@@ -140,7 +140,9 @@ def _trial(robots: Sequence[PublishedRobot], letters: Sequence[str], random: np.
     kept, clear = within(one.twists, one.dof, axes, one.gap)
     kept_later, clear_later = within(two.twists, two.dof, axes, two.gap)
     same = closed & persists & (one.dof == two.dof) & (one.translations == two.translations) & (kept == kept_later)
-    good = same & (kept == wanted) & (one.idle == two.idle)
+    shifts = two.translations - robots[0].motion[0]
+    kind = (shifts == 0) | ((shifts > 0) & (two.dof > wanted))
+    good = same & (kept == wanted) & (one.idle == two.idle) & kind
     finite = _followed(of, again, two, axes, wanted, random)
     held = {driven: _held(legs, later, robots, driven, axes) for driven in _every(robots)}
     found: list[Studied | None] = []
