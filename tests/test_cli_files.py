@@ -23,6 +23,7 @@ GRID = ["--grid", "x=0:0.02:2,y=0.2:0.24:2"]
 DRAWN = {"check": ["check", "rrrrr_m1", *GRID], "modes": ["modes", "3rrr_m1"],
          "atlas": ["atlas", "3rrr_m1", "--observe", "2,1,3"],
          "accuracy": ["accuracy", "rrrrr_m1", "--cone", "0.1deg", *GRID],
+         "basins": ["basins", "rrrrr_m1", "--to", "x=0.02,y=0.24", "--grid", "x=0.01:0.02:2,y=0.24", "--jobs", "1"],
          "servo": ["servo", "rrrrr_m1", "--start", "x=0,y=0.2", "--goal", "x=0.02,y=0.22"],
          "singular": ["singular", "rrrrr_m1", "--points", "5", "--steps", "5"]}
 FILES = {**{name: [([*asked, "-o", f"{name}.svg"], [f"{name}.svg"])] for name, asked in DRAWN.items()},

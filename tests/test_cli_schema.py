@@ -33,6 +33,7 @@ QUICK = {
     "endings": ["rrrrr_m1 --at x=0,y=0.2"],
     "servo": ["rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22",
               "rrrrr_m1 --start x=0,y=0.2 --goal x=0.02,y=0.22 --noise 0.1deg --time 3"],
+    "basins": ["3rrr_m1 --to x=0,y=0,phi=0 --grid x=-0.01:0.01:2,y=0,phi=0 --jobs 1"],
     "accuracy": ["delta --cone 0.1deg --at x=0.1", "rrrrr_m1 --cone 0.1deg --at x=0,y=0.3332050807568877",
                  "rrrrr_m1 --cone 0.1deg --grid x=0:0.02:2,y=0.2:0.22:2 --nonlinear 4"],
     "select": ["rrrrr_m1 --start x=0.05 --goal x=-0.01,y=0.03 --runs 1 --sight auto"],

@@ -39,19 +39,21 @@ if TYPE_CHECKING:
     from .present.view.view import view
     from .progress import following
     from .selection.select import select
+    from .simulation.endings.basins import basins
     from .simulation.endings.endings import endings
     from .simulation.servo import servo
 
 __version__ = "0.2.0"
-__all__ = ["__version__", "accuracy", "advise", "atlas", "branch", "catalog", "certificate", "check", "derive", "draw",
-           "endings", "examples", "export",
-           "following", "forget", "html", "legs", "lint", "load", "map", "modes", "observe",
+__all__ = ["__version__", "accuracy", "advise", "atlas", "basins", "branch", "catalog", "certificate", "check",
+           "derive", "draw", "endings", "examples", "export", "following", "forget", "html", "legs", "lint", "load",
+           "map", "modes", "observe",
            "path", "save", "select", "servo", "shipped", "singular", "studio", "text", "verify", "view"]
 
 _HOME = {
     "accuracy": ".analysis.accuracy.accuracy",
     "advise": ".analysis.advice",
     "atlas": ".analysis.aspects.atlas",
+    "basins": ".simulation.endings.basins",
     "branch": ".analysis.branch.proof",
     "certificate": ".certificates",
     "check": ".analysis.check",

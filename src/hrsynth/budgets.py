@@ -230,6 +230,15 @@ RUN_AWAY = 20.0
 """Characteristic lengths from its start at which a platform has run away."""
 RUN_EVALUATIONS = 20_000
 """Configurations that the integrator may ask for in a servo run."""
+FLOW_STARTS, FLOW_STARTS_ONE_BY_ONE = 100_000, 2_500
+"""Starts of runs, where many are followed at once and where each is simulated."""
+FLOW_PART, FLOW_SINGLE = 2_500, 4
+"""Starts, and single runs, that are one piece of work for a process."""
+FLOW_FOLLOWED, FLOW_CHECKED, FLOW_NAMED = 24, 6, 16
+"""Of many runs at once, those that could not go on and are simulated one by one, others that are held against that, and
+the poses of rest that are named."""
+FLOW_STEPS = 4_000
+"""Steps of many runs at once."""
 LONGEST_RUN = 10_000.0
 """Seconds that a run with noise, on the physics bench or along a way may take: these go on to their end."""
 ENDING_STARTS = 200

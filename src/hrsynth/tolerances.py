@@ -287,6 +287,28 @@ VANISHED = 1e-8
 angles."""
 CRITICAL_FLAT = 1e-7
 """Curvature of the error below which it counts as none while a critical point is sought."""
+FLOWED = 3e-5
+"""Error of a step (characteristic lengths, radians) of many runs at once."""
+RUNS_ALIKE = 1e-5
+"""Difference of poses (characteristic lengths, entries of rotations) and of ‖e‖ up to which runs end alike."""
+FLOW_SLOPE = 1e-6
+"""Step of the differences of their velocities and reach margins."""
+FLOW_SHORTEST_STEP = 1e-4
+"""Step (time constants) at which a run that comes no farther within reach has come to a stretched leg."""
+FLOW_STRETCHED = 1e-2
+"""Reach margin, part of that at home, up to which a leg is stretched there."""
+FLOW_TURNED = 1e-6
+"""The same of a leg that slides through a fixed point: below it the leg turns over."""
+FLOW_WEAK = 3.0
+"""Multiple of ``DAMPED`` below which what the joints do to the platform is taken anew at each step."""
+FLOW_ANEW = 1e-2
+"""How far a pose is (characteristic lengths, entries of its matrix) from where that was taken last."""
+FLOW_WALL = 1e-8
+"""Reach margin, part of that at home, at which a run goes along where a leg is stretched that is not watched."""
+FLOW_SERVED = 1e-6
+"""Norm of the error from which Newton's method does the rest."""
+IN_PLANE = 1e-3
+"""Distance (characteristic lengths, radians) up to which an end of runs is drawn in a plane."""
 BENCH_SETTLED = 1e-6
 """‖e‖ at which the physics bench has settled."""
 BENCH_STEADY = 1e-3

@@ -150,7 +150,7 @@ class Batch(Value):
         k, n = len(watched), len(X)
         quick = self.compiled(n, watched, half) if compiled is None else compiled and self._can_be_compiled()
         rows = self._program(watched).run(X, ROWS, compiled=quick)
-        twists = self._span
+        twists = self.span
         reached, u = rows[0] > 0, rows[1 : 1 + 3 * k].reshape(k, 3, n)
         M = rows[1 + 3 * k :].reshape(3 * k, twists.shape[1], n)
         if not self.closed:
@@ -160,6 +160,16 @@ class Batch(Value):
             u[..., ~reached], M[..., ~reached] = np.nan, np.nan
         return Evaluation(reached, u.transpose(2, 0, 1), M.transpose(2, 0, 1), twists, position, orientation,
                           tuple(self.normals[name] for name in watched))
+
+    def rows_at(self, X: Array, watched: Sequence[str]) -> tuple[Array, Array, Array]:
+        """Of closed forms: the reach margins of all legs (n, legs), 1 of a leg that always reaches; the directions
+        (n, k, 3) of the ``watched`` ones and their rates (n, k, 3, d) for the twists of ``span``."""
+        program, n = self._program(watched), len(X)
+        rows = program.run(X, (*(f"margin_{name}" for name in self.legs), *ROWS[1:]))
+        ends = np.cumsum([len(self.legs), 3 * len(watched)])
+        margins, u, M = np.split(rows, ends)
+        k, d = len(watched), self.span.shape[1]
+        return margins.T, u.T.reshape(n, k, 3), M.T.reshape(n, k, 3, d)
 
     def reached(self, X: Array) -> Flags:
         """Where closed forms alone reach the poses X (n, 4, 4); what else ``evaluate`` says is left out."""
@@ -183,7 +193,7 @@ class Batch(Value):
         return names
 
     @cached_property
-    def _span(self) -> Array:
+    def span(self) -> Array:
         """The coordinates' twists (m, rad), (6, D)."""
         return self.coordinates.twists * np.repeat([self.length, 1.0], 3)[:, None]
 
@@ -193,7 +203,7 @@ class Batch(Value):
         if not self.closed or n < enough or find_spec("numba") is None:
             return False
         return n >= POSES_FOR_COMPILING or (self._program(legs).compiled(ROWS) and (
-            cones is None or bounds_compiled(len(legs), self._span, cones)))
+            cones is None or bounds_compiled(len(legs), self.span, cones)))
 
     def _can_be_compiled(self) -> bool:
         """True; raises ``BadRequest`` where numba is not there, or does not take this batch."""
@@ -212,7 +222,7 @@ class Batch(Value):
         return self.programs[key]
 
     def _traced(self, watched: tuple[str, ...]) -> Program:
-        program, d = Program.of(X=12), self._span.shape[1]
+        program, d = Program.of(X=12), self.span.shape[1]
 
         def pose(X: Components) -> dict[str, Components]:
             """p and R; a sum of numbers that are not all finite is not its own double's half."""
@@ -221,7 +231,7 @@ class Batch(Value):
             return {"p": p, "R": R, "finite": [where(abs(whole - whole) <= 0.0, 1.0, 0.0)]}
 
         def leg_rows(p: Components, R: Components, *, name: str, leg: ClosedFormLeg) -> dict[str, Components]:
-            twists = program.number(self._span.ravel())
+            twists = program.number(self.span.ravel())
             margin, u, M = direction_rows(leg, p, R, twists, program.number)
             found: dict[str, Components] = {f"margin_{name}": [margin]}
             return found | ({f"u_{name}": u, f"M_{name}": M} if name in watched else {})
@@ -247,7 +257,7 @@ class Batch(Value):
     def _iterated(self, X: Array, watched: Sequence[str], reached: Flags, u: Array, M: Array) -> tuple[Array, Array]:
         """Fill in the rows of legs that are solved by iteration, and ``reached``; Mᵀ (3 k, d, n) and its twists."""
         n, constant = len(X), self.coordinates.constant
-        basis = np.empty((n, self._span.shape[1], self.coordinates.dof))
+        basis = np.empty((n, self.span.shape[1], self.coordinates.dof))
         X = np.where(reached[:, None, None], X, self.home)
         for start in range(0, n, CHUNK):
             here = slice(start, start + CHUNK)
@@ -263,11 +273,11 @@ class Batch(Value):
                 basis[here], there = self._feasible(list(states.values()))
                 reached[here] &= there
         if constant:
-            return M, self._span
-        return np.einsum("rcn,ncd->rdn", M, basis), self._span @ basis
+            return M, self.span
+        return np.einsum("rcn,ncd->rdn", M, basis), self.span @ basis
 
     def _followed(self, leg: IterativeLeg, X: Array) -> IterativeLegStates:
-        return leg.followed_from_zero(self.coordinates, self.home, X, self._span)
+        return leg.followed_from_zero(self.coordinates, self.home, X, self.span)
 
     def _feasible(self, states: Sequence[IterativeLegStates]) -> tuple[Array, Flags]:
         """An orthonormal basis (n, D, d) of the coordinates of the twists that all legs allow, and where it has the

@@ -238,6 +238,18 @@ QUESTIONS = (
              (Option("at", "The goal: pose whose directions are desired, as x=0.02,y=0.1,z=-0.7; or mode:2.", "POSE",
                      default=NEEDED), *WATCHED, _file("endings")),
              ("3rrr_m1 --at x=0.02,y=0,phi=10deg", "quattro --observe 1,4 --at x=0.05,y=0.1,z=-0.7 -o endings.png")),
+    Question("basins", "Where the servo loop to a goal ends, from each start of a line, plane or box of poses.",
+             (Option("to", "Pose whose directions are desired.", "POSE", default=NEEDED), *WATCHED,
+              Option("plane", "Plane of starts, as z=-0.7: all of it that is reached (default: one through the goal).",
+                     "PART=VALUE"),
+              Option("grid", "A line, plane or box of starts, such as x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7 "
+                     "(from:to:count).", "GRID"),
+              Option("steps", "Starts along each side of the plane (default: 100; 15 where each is simulated by "
+                     "itself).", None, int, low=2, high=300),
+              Option("jobs", "Processes (default: as many as cores).", None, int, low=1),
+              _file("basins")),
+             ("quattro --observe 1,4 --to z=-0.7 --plane z=-0.7,phi=0 -o basins.png",
+              "3rrr_m1 --to x=0,y=0,phi=0 --grid x=-0.1:0.1:50,y=0,phi=0")),
     Question("accuracy", "How far the platform can be off where the observed directions are off by up to given angles.",
              (Option("cone", "Half-angle of the cone about each observed direction, as 0.1deg; or one a leg: "
                      "1=0.1deg,2=0.2deg.", "ANGLE", default=NEEDED),

@@ -765,6 +765,51 @@ class EndingsAnswer(OfRobot, WrittenTo):
     continua: list[RestRecord]
 
 
+class BasinEndRecord(TypedDict):
+    """Where runs end, as one of them was seen to; how many starts, and what part of all, end there; `pose` and `error`
+    (‖e‖) are null where they do not come to rest at one pose."""
+
+    ended: str
+    reason: str
+    matched_mode: int | None
+    pose: PoseRecord | None
+    error: Number
+    starts: int
+    share: float
+    example: PoseRecord
+
+
+class CertifiedRecord(TypedDict):
+    """From how far around the goal every start is proved to end there, and what part that is of the goal's basin among
+    the starts."""
+
+    words: str
+    radius_m: float
+    radius_rad: Number
+    covered: float
+
+
+class BasinsAnswer(OfRobot, WrittenTo):
+    """Where runs from each pose of a grid end: `cells` are numbers of `ends`, counted from 0, -1 where the robot cannot
+    start; `damped` starts come to a singularity on their way. `abreast`: whether they were integrated abreast; then
+    `followed` were simulated one by one instead, and of `checked` others `agreed` ended at the same pose."""
+
+    to: PoseRecord
+    observed: list[Watched]
+    camera: str
+    poses: str
+    axes: dict[str, list[float]]
+    starts: int
+    ends: list[BasinEndRecord]
+    cells: Array
+    damped: int
+    abreast: bool
+    followed: int
+    checked: int
+    agreed: int
+    certified: CertifiedRecord | None
+
+
 class ConeRecord(TypedDict):
     """A watched direction, and the half-angle of the cone about it."""
 
@@ -1159,6 +1204,7 @@ RECORDS: dict[str, Any] = {
     "derive": Derive, "legs": LegsAnswer, "check": CheckAnswer, "singular": Singular, "advise": Advise,
     "branch": Branch, "modes": AssemblyModesRecord, "atlas": AtlasAnswer, "path": Path, "servo": Servo,
     "endings": EndingsAnswer,
+    "basins": BasinsAnswer,
     "accuracy": AccuracyAnswer, "select": Select, "export": Exported, "view": ViewAnswer, "verify": Verify,
     "robots": Robots, "convert": Convert, "import": Import, "lint": LintAnswer,
     "catalog build": CatalogBuild, "catalog list": CatalogList, "catalog show": CatalogShow,

@@ -182,6 +182,9 @@ OUTPUTS = {
         File("cannot draw the atlas", figures("atlas:picture"), "The picture of the atlas",
              "Draw the table and, of three rods on cranks in a plane, the singular curve with the modes: atlas.png, "
              ".pdf, .svg.", computed="atlas:section", record="section", nothing="atlas:undrawn", drawn=True),)),
+    "basins": Outputs("text.runs:basins", (
+        File("cannot write the basins", {**figures("basins:picture"), CSV: "basins:table"}, "The map of basins",
+             "Draw where each start ends: basins.png, .pdf, .svg, or a table, basins.csv.", drawn=True),)),
     "branch": Outputs("text.branches:branch"),
     "certificate": Outputs("text.robots:certificate"),
     "check": Outputs("text.poses:check", (

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
     from ...analysis.accuracy.pose_errors import ErrorEllipsoid, PoseErrors
     from ...analysis.accuracy.sampled import Sampled
     from ...selection.select import Candidate, ModeCount, Selection
+    from ...simulation.endings.basins import Basins
     from ...simulation.result import Servo
 
 PARTS_FROM_LINEAR = 0.1
@@ -62,6 +63,38 @@ def servo(found: Servo) -> str:
         met = least["smallest"] is not None and least["smallest"] < DAMPED
         rows.append(("", "a Type 2 singularity met and left again on the same side" if met
                      else "no singularity crossed"))
+    return listing(rows)
+
+
+def basins(found: Basins) -> str:
+    """The goal, the starts, where they end and how many each, and how that was found."""
+    from ...simulation.endings.basins import LETTERS
+
+    size = " × ".join(f"{count} {name}" for count, name in zip(found.grid.shape, found.grid.names, strict=True))
+    rows = [*head(found.setting), *camera(found.setting), ("to", str(found.goal)),
+            ("starts", [f"{found.starts:,} of {size}: {found.grid}"]), *GAP]
+    lines = [[letter, each.ending.name, f"{each.count:,}", f"{100 * each.share:.3g} %",
+              "" if each.pose is None else str(each.pose), str(each.example)]
+             for letter, each in zip(LETTERS, found.ends, strict=False)]
+    rows.append(("ends", table(lines, ("", "ended", "starts", "share", "at", "from, for example")).splitlines()))
+    rows += [("why" if number == 0 else "", f"{letter}: {each.ending.reason}")
+             for number, (letter, each) in enumerate(zip(LETTERS, found.ends, strict=False))]
+    notes = []
+    if not found.abreast:
+        notes.append("each start simulated by itself: a leg is no closed form, a joint has limits, or other links are "
+                     "watched")
+    elif found.checked:
+        notes.append(f"integrated abreast; of {found.checked} starts that were simulated by themselves besides, "
+                     f"{found.agreed} ended at the same pose")
+    if found.abreast and found.followed:
+        notes.append(f"{found.followed} runs could not be followed so, and were simulated by themselves")
+    if count := int(np.sum(found.damped)):
+        notes.append(f"{count:,} runs ({100 * count / found.starts:.2g} %) come to a singularity on their way: there "
+                     "noise may lead them elsewhere")
+    rows.append(("found", notes))
+    if found.certified is not None:
+        part = f": {100 * found.covered:.2g} % of its basin, as far as that is drawn" if found.certified.length else ""
+        rows.append(("certified", f"{found.certified.words}{part}"))
     return listing(rows)
 
 

@@ -1,0 +1,208 @@
+"""Where each start ends → a map of basins with the ends drawn in, or a table."""
+
+from __future__ import annotations
+
+import csv
+import io
+from typing import Any
+
+import numpy as np
+
+from ..simulation.ending import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE, TIME, UNDECIDED
+from ..simulation.endings.basins import LETTERS, NOT_REACHED, BasinEnd, Basins, place_of
+from ..simulation.endings.flow import Flags, Places
+from ..tolerances import IN_PLANE
+from . import plots
+from .paper import PNG, Paper, printed
+from .plots import (
+    COLOURS,
+    MapPlane,
+    cell_edges,
+    entry,
+    heading,
+    layer_title,
+    missing_entry,
+    panels,
+    styled,
+    tick_values,
+)
+from .sketch import axis_label
+
+SHADES = {GOAL: (COLOURS[2], "#7FCEB9"), MODE: (COLOURS[0], COLOURS[5], "#B9DDF3"), ANTIPODAL: (COLOURS[3], "#E8C4D8"),
+          MINIMUM: (COLOURS[4], "#F5D48A"), BOUNDARY: (COLOURS[1], "#EFB48D"), TIME: ("0.3",), UNDECIDED: ("0.5",)}
+"""Colours of the ends of each kind, the largest first."""
+MARKS = {GOAL: "*", MODE: "o", ANTIPODAL: "X", MINIMUM: "v", BOUNDARY: "s", UNDECIDED: "P", TIME: "d"}
+LEAST_MAP = 2.4
+"""The least width (inches) of one of several maps."""
+ROOM = 3.0
+"""Cells from the border of a basin at which its letter has room."""
+DAMPED: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.25", "hatch": "....", "linewidth": 0.0}
+"""How starts are drawn whose runs come to a singularity."""
+
+
+def colours(ends: tuple[BasinEnd, ...]) -> list[str]:
+    """A colour an end: one hue a kind; those of a kind beyond its last shade share it."""
+    found, met = [], dict.fromkeys(SHADES, 0)
+    for each in ends:
+        shades = SHADES[each.ending.name]
+        found.append(shades[min(met[each.ending.name], len(shades) - 1)])
+        met[each.ending.name] += 1
+    return found
+
+
+@styled
+def picture(found: Basins, paper: Paper = PNG) -> bytes:
+    """The starts in the colours of their ends: a strip for a line, a map for a plane, one for each value of the third
+    part for a box; the ends where they lie, filled in the plane and hollow beside it."""
+    from matplotlib.patches import Patch
+    from matplotlib.patheffects import Normal, Stroke
+
+    figure, layers = (_strip if found.grid.ndim == 1 else _maps)(found, paper)
+    shades, grid = colours(found.ends), found.grid
+    for place, plane, cells, damped, level in layers:
+        _layer(place, plane, cells, damped, shades)
+        if plane is not None:
+            _ends(place, plane, found, level)
+            _certified(place, plane, found, level)
+            plane.finish(place, plane.x, plane.y)
+    entries = [Patch(facecolor=shade, label=_told(letter, each))
+               for letter, each, shade in zip(LETTERS, found.ends, shades, strict=False)]
+    if found.region is not None and grid.ndim == 2:
+        entries.append(entry("certified: every start inside ends at the goal", color="white", linewidth=1.6,
+                             path_effects=[Stroke(linewidth=3.4, foreground="black"), Normal()]))
+    if found.damped.any():
+        entries.append(Patch(label="the run comes to a singularity", **DAMPED))
+    if (found.cells == NOT_REACHED).any():
+        entries.append(missing_entry())
+    if grid.ndim > 1:
+        entries += [entry("an end in this plane", linestyle="", marker="o", color="black"),
+                    entry("an end beside this plane", linestyle="", marker="o", markerfacecolor="none", color="black")]
+        entries += MapPlane.of(grid.axes, found.setting.motion, 0.4, 1.6).robot(figure, found.setting.everything.start)
+    plots.legend(figure, entries, paper)
+    heading(figure, f"{found.setting.robot.name}, legs {', '.join(found.setting.labels)} observed: where each start "
+            f"ends\ngoal {plots.pose_words(found.goal)}; starts: ", grid.fixed, "")
+    return printed(figure, paper)
+
+
+def _told(letter: str, end: BasinEnd) -> str:
+    matched = f" {end.ending.matched}" if end.ending.matched else ""
+    return f"{letter}  {end.ending.name}{matched}: {100 * end.share:.3g} %"
+
+
+def _strip(found: Basins, paper: Paper) -> tuple[Any, list[Any]]:
+    """The figure of a line, and its one layer, without a plane."""
+    ((name, values),) = found.grid.axes
+    figure, (place,) = panels(1, 1, 7.0, 2.4, paper)
+    edges = cell_edges(tick_values(name, values))
+    place.set(xlabel=axis_label(name), xlim=(edges[0], edges[-1]), ylim=(0, 1), yticks=[])
+    for letter, each, shade in zip(LETTERS, found.ends, colours(found.ends), strict=False):
+        here = None if each.X is None else float(place_of(found.setting.motion, each.X, (name,))[0])
+        if here is not None and edges[0] <= here <= edges[-1]:
+            place.plot(here, 0.5, MARKS[each.ending.name], color=shade, markeredgecolor="black", markersize=11,
+                       clip_on=False, label=letter)
+    return figure, [(place, None, found.cells, found.damped, None)]
+
+
+def _maps(found: Basins, paper: Paper) -> tuple[Any, list[Any]]:
+    """The figure of a plane or a box, and its layers: axes, plane, cells, which are damped, value of the third part."""
+    pname, ps = (*found.grid.axes, ("", np.zeros(1)))[2]
+    plane = MapPlane.of(found.grid.axes, found.setting.motion, 0.4, 1.6)
+    columns = paper.columns(min(len(ps), 3), LEAST_MAP)
+    rows, size = -(-len(ps) // columns), 5.6 if len(ps) == 1 else 3.4
+    figure, axes = panels(rows, columns, size * columns + 1.0, (size * plane.tall + 0.7) * rows + 0.8, paper,
+                          (1.2, 0.8 + 0.7 * rows), LEAST_MAP if columns > 1 else 0.0)
+    shape = (*found.grid.shape[:2], -1)
+    cells, damped = found.cells.reshape(shape), found.damped.reshape(shape)
+    layers = []
+    for k, place in enumerate(axes):
+        place.set_visible(k < len(ps))
+        if k < len(ps):
+            plots.outer(place, k, columns, len(ps))
+            if pname:
+                layer_title(place, pname, tick_values(pname, ps)[k])
+            layers.append((place, plane, cells[..., k], damped[..., k], float(ps[k]) if pname else None))
+    return figure, layers
+
+
+def _layer(place: Any, plane: MapPlane | None, cells: Places, damped: Flags, shades: list[str]) -> None:
+    """Colours of starts, dots on those whose runs come to a singularity, and the letters of the basins."""
+    from matplotlib.colors import ListedColormap
+    from scipy.ndimage import distance_transform_edt
+
+    values = np.where(cells == NOT_REACHED, np.nan, cells.astype(float))
+    style = {"cmap": ListedColormap(shades), "vmin": -0.5, "vmax": len(shades) - 0.5}
+    if plane is None:
+        low, high = place.get_xlim()
+        edges = np.linspace(low, high, len(cells) + 1)
+        place.axvspan(low, high, zorder=0, linewidth=0, **plots.MISSING)
+        place.pcolormesh(edges, [0, 1], np.ma.masked_invalid(values[None]), **style)
+        return
+    plane.cells(place, values, **style)
+    if damped.any():
+        corners = np.meshgrid(cell_edges(plane.x), cell_edges(plane.y), indexing="ij")
+        middle = plane.at(*np.meshgrid(plane.x, plane.y, indexing="ij"))
+        if min(damped.shape) > 1:
+            place.contourf(*middle, damped.astype(float), levels=[0.5, 1.5], colors="none", hatches=["...."])
+        else:
+            place.pcolor(*plane.at(*corners), np.ma.masked_where(~damped, damped.astype(float)), **DAMPED)
+    for number, letter in zip(range(len(shades)), LETTERS, strict=False):
+        room = distance_transform_edt(np.pad(cells == number, 1))[1:-1, 1:-1]
+        if room.max(initial=0.0) >= ROOM:
+            i, j = np.unravel_index(np.argmax(room), room.shape)
+            u, v = plane.at(plane.x[i], plane.y[j])
+            place.text(u, v, letter, ha="center", va="center", weight="bold",
+                       path_effects=outlined())
+
+
+def _certified(place: Any, plane: MapPlane, found: Basins, level: float | None) -> None:
+    """The border of what is certified, in a plane."""
+    if found.region is None or level is not None:
+        return
+    near, inside = found.region
+    u, v = plane.at(*np.meshgrid(*(tick_values(name, values) for name, values in near.axes), indexing="ij"))
+    for colour, width in (("black", 3.4), ("white", 1.6)):
+        place.contour(u, v, inside.astype(float), levels=[0.5], colors=[colour], linewidths=[width], zorder=4)
+
+
+def outlined() -> list[Any]:
+    """Strokes of letters that are read on any colour."""
+    from matplotlib.patheffects import Normal, Stroke
+
+    return [Stroke(linewidth=2.5, foreground="white"), Normal()]
+
+
+def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> None:
+    """The ends where they lie, those of the plane filled."""
+    motion, length = found.setting.motion, found.target.twin.length
+    spots: list[tuple[float, float, str]] = []
+    for letter, each in zip(LETTERS, found.ends, strict=False):
+        if each.X is None:
+            continue
+        u, v = plane.spots(place_of(motion, each.X, plane.names)[None])
+        if not (plane.x[0] <= u[0] <= plane.x[-1] and plane.y[0] <= v[0] <= plane.y[-1]):
+            continue
+        held = {name: values[0] for name, values in found.grid.fixed.given.items() if name != "rpy"}
+        if level is not None:
+            held[found.grid.names[2]] = level
+        away = np.abs(place_of(motion, each.X, tuple(held)) - np.array(list(held.values())))
+        inside = bool(np.all(away <= IN_PLANE * length)) if held else True
+        place.plot(u, v, MARKS[each.ending.name], markersize=14 if each.ending.name == GOAL else 8, zorder=5,
+                   markerfacecolor="black" if inside else "none", markeredgecolor="black", markeredgewidth=1.2)
+        spots.append((float(u[0]), float(v[0]), letter))
+    for k, (x, y, letter) in enumerate(spots):
+        turn = 2 * np.pi * (k + 0.5) / len(spots)
+        place.annotate(letter, (x, y), (13 * np.cos(turn), 13 * np.sin(turn)), textcoords="offset points", fontsize=9,
+                       ha="center", va="center", zorder=6, path_effects=outlined())
+
+
+def table(found: Basins) -> bytes:
+    """Comma-separated values: a line a start (metres, radians), what its run ended at, and whether it came to a
+    singularity; empty where the robot cannot start."""
+    stream = io.StringIO()
+    lines = csv.writer(stream, lineterminator="\n")
+    lines.writerow([*found.grid.names, "end", "ended", "damped"])
+    places, marks = found.grid.places().tolist(), found.damped.ravel()
+    for place, cell, damped in zip(places, found.cells.ravel(), marks, strict=True):
+        told = ["", "", ""] if cell == NOT_REACHED else [LETTERS[cell], found.ends[cell].ending.name, int(damped)]
+        lines.writerow([*map(repr, place), *told])
+    return stream.getvalue().encode()

@@ -1,0 +1,253 @@
+"""Many runs of the law abreast: Rosenbrock's method of order 2 (Shampine and Reichelt, *The MATLAB ODE suite*, 1997),
+each run with steps of its own, in charts about the pose where its step begins.
+
+The damped law is stiff where a run goes along a singularity, so the method is implicit. A watched leg that is stretched
+goes on in its other working mode; one that is not watched holds the platform (:mod:`.flow`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...budgets import FLOW_STEPS
+from ...geometry.vectors import Array
+from ...progress import tell
+from ...results import Value
+from ...tolerances import (
+    AT_REST,
+    DAMPED,
+    FLOW_ANEW,
+    FLOW_SERVED,
+    FLOW_SHORTEST_STEP,
+    FLOW_SLOPE,
+    FLOW_STRETCHED,
+    FLOW_TURNED,
+    FLOW_WALL,
+    FLOW_WEAK,
+    FLOWED,
+    RUNS_ALIKE,
+    SERVED,
+)
+from ..run import AWAY, EFFORT, LOST, REST, SERVED_AT, TIME
+from .flow import Commanded, Flags, Flow, Places
+
+GAMMA = 1 / (2 + np.sqrt(2))
+E32 = 6 + np.sqrt(2)
+LONGEST_STEP = 2.0
+"""Time constants: a longer step of an implicit method would stay at a rest that repels."""
+POLISHED = 4
+"""Newton steps at the end of a run whose error vanishes."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Runs(Value):
+    """Where n runs ended: platform poses (n, 4, 4), ‖e‖ (n,), why they stopped (words of ``run``), which legs are in
+    another working mode than at first and which hold the platform, (n, legs), whether the law was damped on the way
+    (``weak``, (n,)), and the time (time constants)."""
+
+    X: Array
+    size: Array
+    stopped: NDArray[np.str_]
+    flipped: Flags
+    active: Flags
+    weak: Flags
+    times: Array
+
+    @classmethod
+    def joined(cls, parts: Sequence[Runs]) -> Runs:
+        """Several as one."""
+        return cls(*(np.concatenate([getattr(each, name) for each in parts]) for name in cls.__dataclass_fields__))
+
+    def groups(self, length: float, seen: Flags) -> list[Places]:
+        """The runs that came to rest, by the poses and the working modes of the ``seen`` legs in which they did, the
+        largest group first."""
+        left, found = np.flatnonzero(np.isin(self.stopped, (SERVED_AT, REST))), []
+        while len(left):
+            gap = np.abs(self.X[left] - self.X[left[0]])
+            gap[:, :3, 3] /= length
+            alike = (gap.max(axis=(1, 2)) <= RUNS_ALIKE) & (np.abs(self.size[left] - self.size[left[0]]) <= RUNS_ALIKE)
+            alike &= (self.flipped[left] == self.flipped[left[0]])[:, seen].all(axis=1)
+            found.append(left[alike])
+            left = left[~alike]
+        return sorted(found, key=lambda group: (-len(group), group[0]))
+
+
+class Abreast:
+    """Runs on their way: poses, working modes and holding legs of all, and what is commanded there."""
+
+    def __init__(self, flow: Flow, X: Array, farthest: float) -> None:
+        n, legs = len(X), len(flow.legs)
+        self.flow, self.X, self.first, self.farthest = flow, X.copy(), X, farthest
+        self.flipped, self.active = np.zeros((n, legs), dtype=bool), np.zeros((n, legs), dtype=bool)
+        self.times, self.steps = np.zeros(n), np.full(n, 0.05)
+        self.stopped = np.full(n, "", dtype="U8")
+        self.weak = np.zeros(n, dtype=bool)
+        self.pointed = np.array([flow.points[flow.legs.index(name)] for name in flow.watched])
+        self.roots = np.repeat(flow.roots(flow.batch.home[None], self.flipped[:1])[0], n, axis=0)
+        self.taken = np.repeat(flow.batch.home[None], n, axis=0)
+
+    def run(self, horizon: float) -> Runs:
+        """All runs to their ends, or to the ``horizon`` (time constants)."""
+        live = np.arange(len(self.X))
+        here = self._at(live)
+        self.stopped[~here.reached] = LOST
+        for _ in range(FLOW_STEPS):
+            tell("run")
+            kept = self.stopped[live] == ""
+            live, here = live[kept], _part(here, kept)
+            if not len(live):
+                break
+            here = self._step(live, here)
+            self._end(live, here, horizon)
+        self.stopped[self.stopped == ""] = EFFORT
+        served = np.flatnonzero(self.stopped == SERVED_AT)
+        for _ in range(POLISHED):
+            self.X[served] = self.flow.moved(self.X[served], self._at(served).velocity)
+        size = self._at(np.arange(len(self.X))).size
+        self.stopped[(self.stopped == SERVED_AT) & ~(size <= SERVED)] = LOST
+        return Runs(self.X, size, self.stopped, self.flipped, self.active, self.weak, self.times)
+
+    def _at(self, live: Places) -> Commanded:
+        return self.flow.at(self.X[live], self.flipped[live], self.active[live], self.roots[live])
+
+    def _step(self, live: Places, here: Commanded) -> Commanded:
+        """One step of each; where it is too long, or leaves what is reached, a shorter one is next."""
+        flow, chart = self.flow, (self.X[live], self.flipped[live], self.active[live], self.roots[live])
+        X, flipped, active, root = chart
+        n, d = here.velocity.shape
+        h, f = self.steps[live][:, None], here.velocity
+
+        def rate(y: Array) -> tuple[Array, Flags]:
+            """ẏ at one or several coordinates of each run's chart, (m n, d)."""
+            X, *rest = (np.tile(each, (len(y) // n, *[1] * (each.ndim - 1))) for each in chart)
+            there = flow.at(flow.moved(X, y), *rest)
+            return flow.rate(y, there.velocity), there.reached
+
+        ahead, met = rate(np.repeat(FLOW_SLOPE * np.eye(d), n, axis=0))
+        slope = np.where(met[:, None], ahead - np.tile(f, (d, 1)), 0.0) / FLOW_SLOPE
+        J = slope.reshape(d, n, d).transpose(1, 2, 0)
+        W = np.linalg.inv(np.eye(d) - GAMMA * h[:, :, None] * J)
+
+        def solved(rhs: Array) -> Array:
+            return np.asarray((W @ rhs[:, :, None])[..., 0])
+
+        k1 = solved(f)
+        f1, met = rate(h * k1 / 2)
+        k2 = solved(f1 - k1) + k1
+        y = h * k2
+        Y = flow.moved(X, y)
+        slid = np.flatnonzero(active.any(axis=1))
+        if len(slid):
+            Y[slid] = self._on_wall(Y[slid], flipped[slid], active[slid])
+        there = flow.at(Y, flipped, active, root)
+        # a leg that slides through a fixed point keeps its direction there
+        turned = np.sum(here.u * there.u, axis=2) < 0
+        met &= there.reached & ~(turned & self.pointed).any(axis=1)
+        k3 = solved(flow.rate(y, there.velocity) - E32 * (k2 - f1) - 2 * (k1 - f))
+        error = np.max(np.abs(h / 6 * (k1 - 2 * k2 + k3)), axis=1) / FLOWED
+        error = np.where(met & np.isfinite(error), error, np.inf)
+        good = error <= 1
+        with np.errstate(divide="ignore"):
+            factor = np.where(met, np.clip(0.8 / np.cbrt(error), 0.2, 4.0), 0.25)
+        done = live[good]
+        self.X[done], self.times[done] = Y[good], self.times[done] + self.steps[done]
+        self.steps[live] = np.minimum(self.steps[live] * factor, LONGEST_STEP)
+        here = _merged(here, there, good)
+        changed = self._stretched(live, here, met) | self._released(live, here, good) | self._weakened(live, here, good)
+        if changed.any():
+            here = _merged(here, self._at(live), changed)
+            self.stopped[live[changed & ~here.reached]] = LOST
+        return here
+
+    def _stretched(self, live: Places, here: Commanded, met: Flags) -> Flags:
+        """Change the working mode, or what holds the platform, of runs that come no farther; which they are."""
+        flow = self.flow
+        margins = np.where(self.active[live], np.inf, here.margins)
+        leg = np.argmin(margins, axis=1)
+        least, seen = margins[np.arange(len(live)), leg], flow.seen[leg]
+        short, turning = self.steps[live] < FLOW_SHORTEST_STEP, seen & flow.points[leg]
+        stuck = short & ~met & ~turning
+        lost = stuck & (least > FLOW_STRETCHED)
+        through = np.flatnonzero((stuck & seen & ~lost) | (short & turning & (least < FLOW_TURNED)))
+        if len(through):
+            came = self._crossed(live[through], leg[through], least[through], here.velocity[through])
+            lost[through] = stuck[through] & ~came
+            through = through[came]
+        walled = np.flatnonzero(stuck & ~seen & ~lost)
+        if len(walled):
+            runs = live[walled]
+            self.active[runs, leg[walled]] = True
+            self.X[runs] = self._on_wall(self.X[runs], self.flipped[runs], self.active[runs])
+            self.steps[runs] = 2 * FLOW_SHORTEST_STEP
+        self.stopped[live[lost]] = LOST
+        changed = np.zeros_like(met)
+        changed[walled] = changed[through] = True
+        return changed
+
+    def _crossed(self, runs: Places, leg: Places, margin: Array, velocity: Array) -> Flags:
+        """Give runs the other working mode of a leg, and move them on to where it is stretched as little again: √margin
+        goes through zero at a steady pace. Which of them are on their way there."""
+        flow, own = self.flow, np.arange(len(runs))
+        rate = np.einsum("nd,nd->n", flow.slopes(self.X[runs], self.flipped[runs])[own, leg], velocity)
+        came = rate < 0
+        runs, leg, velocity = runs[came], leg[came], velocity[came]
+        self.flipped[runs, leg] ^= True
+        time = -2 * margin[came] / rate[came]
+        after = np.where(flow.points[leg][:, None], velocity, self._at(runs).velocity)
+        self.X[runs] = flow.moved(self.X[runs], time[:, None] * (velocity + after))
+        self.steps[runs] = np.where(flow.points[leg], self.steps[runs], 2 * FLOW_SHORTEST_STEP)
+        return came
+
+    def _weakened(self, live: Places, here: Commanded, good: Flags) -> Flags:
+        """Take S anew where it counts; which runs these are."""
+        near = good & (here.weakest < FLOW_WEAK * DAMPED) & (self.stopped[live] == "")
+        self.weak[live[near & (here.weakest < DAMPED)]] = True
+        apart = np.abs(self.X[live] - self.taken[live])
+        apart[:, :3, 3] /= self.flow.batch.length
+        near &= apart.max(axis=(1, 2)) > FLOW_ANEW
+        runs = live[near]
+        if len(runs):
+            found, closed = self.flow.roots(self.X[runs], self.flipped[runs])
+            self.roots[runs[closed]], self.taken[runs] = found[closed], self.X[runs]
+        return near
+
+    def _released(self, live: Places, here: Commanded, good: Flags) -> Flags:
+        """Let go of legs that no longer hold the platform; which runs they are of."""
+        free = self.active[live] & ~here.held & good[:, None]
+        some = free.any(axis=1)
+        self.active[live[some]] &= ~free[some]
+        self.steps[live[some]] = np.minimum(self.steps[live[some]], FLOW_SHORTEST_STEP * 2)
+        return np.asarray(some)
+
+    def _on_wall(self, X: Array, flipped: Flags, active: Flags) -> Array:
+        """The poses next to X (n, 4, 4) where the active legs' margins are ``FLOW_WALL`` (two Newton steps)."""
+        for _ in range(2):
+            miss = np.where(active, FLOW_WALL - self.flow.margins(X, flipped), 0.0)
+            N = np.where(active[:, :, None], self.flow.slopes(X, flipped), 0.0)
+            X = self.flow.moved(X, (np.linalg.pinv(N, rcond=1e-6) @ miss[:, :, None])[..., 0])
+        return X
+
+    def _end(self, live: Places, here: Commanded, horizon: float) -> None:
+        """Mark the runs that are at an end."""
+        speed = np.linalg.norm(here.velocity, axis=1)
+        shift = np.linalg.norm(self.X[live][:, :3, 3] - self.first[live][:, :3, 3], axis=1)
+        for word, at_end in ((SERVED_AT, here.size <= FLOW_SERVED), (REST, speed <= AT_REST * here.size),
+                             (TIME, self.times[live] >= horizon), (AWAY, shift > self.farthest)):
+            self.stopped[live[at_end & (self.stopped[live] == "")]] = word
+
+
+def _part(here: Commanded, kept: Flags) -> Commanded:
+    return Commanded(*(getattr(here, name)[kept] for name in Commanded.__dataclass_fields__))
+
+
+def _merged(here: Commanded, there: Commanded, good: Flags) -> Commanded:
+    """What is commanded there where ``good``, else here."""
+    found = []
+    for name in Commanded.__dataclass_fields__:
+        one, other = getattr(here, name), getattr(there, name)
+        found.append(np.where(good.reshape(-1, *[1] * (one.ndim - 1)), other, one))
+    return Commanded(*found)

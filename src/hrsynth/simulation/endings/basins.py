@@ -1,0 +1,382 @@
+"""Where runs to one goal end, from each start of a line, plane or box of poses: many abreast where the batch knows the
+robot, else one by one."""
+
+from __future__ import annotations
+
+import math
+import os
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property, partial
+from itertools import chain
+from typing import Any
+
+import numpy as np
+
+from ...analysis.accuracy.error_map import Mapper
+from ...analysis.asked import configurations_at
+from ...analysis.observed import LegsLike, ObservedRobot, RobotLike
+from ...analysis.question import question
+from ...batch.grids import poses_over
+from ...batch.reach import sweep
+from ...budgets import (
+    FLOW_CHECKED,
+    FLOW_FOLLOWED,
+    FLOW_NAMED,
+    FLOW_PART,
+    FLOW_SINGLE,
+    FLOW_STARTS,
+    FLOW_STARTS_ONE_BY_ONE,
+    RUN_AWAY,
+)
+from ...errors import BadRequest, PlaneNotMet
+from ...geometry.so3 import turn_about
+from ...geometry.vectors import Array, pose_difference
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.platform_motion import PlatformMotion
+from ...mechanism.pose import Grid, Pose, PoseLike, as_pose, asked_pose
+from ...progress import tell
+from ...results import Result, Value
+from ...tolerances import RUNS_ALIKE
+from ..ending import BOUNDARY, ENDINGS, GOAL, TIME, UNDECIDED, Ending, EndingClassifier
+from ..law import directions
+from ..run import AWAY, EFFORT, LOST, POISED, REST, SERVED_AT
+from ..run import TIME as OVER
+from ..servo import ServoTask
+from .abreast import Abreast, Runs
+from .endings import Endings
+from .flow import Flags, Flow, Places
+from .radius import CertifiedRadius, certified_radius
+
+SIDE, SIDE_ONE_BY_ONE = 100, 15
+"""Starts along each side of a plane, abreast and one by one."""
+REGION, REGION_SIDE = 1.1, (0, 401, 81, 25)
+"""Half the width over which what is certified is drawn, in its radii, and the poses along each side, by the number of
+parts that vary."""
+LETTERS = "ABCDEFGHIJKLMNOPQRSTUVWXYZ"
+"""Names of the ends in text and picture."""
+NOT_REACHED = -1
+"""The number of a start at which the robot cannot be."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BasinEnd(Value):
+    """Where runs end: the ``ending`` of one of them, simulated one by one; the platform's pose X (4, 4) and ‖e‖ where
+    they come to rest at one; how many starts, and what part of all, end there; ``example`` is one of them."""
+
+    ending: Ending
+    pose: Pose | None
+    X: Array | None
+    size: float
+    count: int
+    share: float
+    example: Pose
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"ended": self.ending.name, "reason": self.ending.reason, "matched_mode": self.ending.matched,
+                "pose": self.pose and self.pose.to_dict(), "error": None if self.X is None else self.size,
+                "starts": self.count, "share": self.share, "example": self.example.to_dict()}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Basins(Result, shown_as="basins"):
+    """Where runs from each pose of a grid end: ``cells`` holds the number of the end, in the grid's shape, −1 where the
+    robot cannot start; ``damped`` the starts whose runs come to a singularity, where the law is damped. ``abreast``
+    says whether they were integrated abreast; then ``followed`` of them were simulated one by one because that could
+    not go on, and of ``checked`` others ``agreed`` ended at the same pose."""
+
+    setting: ObservedRobot
+    goal: Pose
+    target: ClosedConfiguration
+    grid: Grid
+    ends: tuple[BasinEnd, ...]
+    cells: Places
+    damped: Flags
+    abreast: bool
+    followed: int = 0
+    checked: int = 0
+    agreed: int = 0
+    certified: CertifiedRadius | None = None
+    """From how far around the goal every start is proved to end there."""
+
+    @property
+    def starts(self) -> int:
+        """At how many poses of the grid the robot can start."""
+        return int(np.sum(self.cells != NOT_REACHED))
+
+    @cached_property
+    def region(self) -> tuple[Grid, Flags] | None:
+        """Poses of the drawn set around the goal, and which of them are in what is certified; None where none is."""
+        found = self.certified
+        if found is None or not found.length:
+            return None
+        motion, goal = self.setting.motion, self.target.pose(self.setting.motion.link)
+        half = [(found.angle or 0.0) if name == "phi" else found.length for name in self.grid.names]
+        middle = place_of(motion, goal, self.grid.names)
+        near = Grid(tuple((name, np.linspace(m - REGION * h, m + REGION * h, REGION_SIDE[self.grid.ndim]))
+                          for name, m, h in zip(self.grid.names, middle, half, strict=True)), self.grid.fixed)
+        X, possible = poses_over(motion, near, self.setting.robot.name, near.places())
+        inside = np.array([met and found.holds(each) for met, each in zip(possible, X, strict=True)])
+        return (near, inside.reshape(near.shape)) if inside.any() else None
+
+    @property
+    def covered(self) -> float:
+        """How much of the goal's basin, as far as it is drawn, is certified."""
+        goal = next((i for i, each in enumerate(self.ends) if each.ending.name == GOAL), None)
+        if self.region is None or goal is None:
+            return 0.0
+        sizes = [np.sum(inside) * math.prod(float(v[1] - v[0]) for _, v in grid.axes)
+                 for grid, inside in (self.region, (self.grid, self.cells == goal))]
+        return float(sizes[0] / sizes[1])
+
+    def members(self, listed: Endings) -> tuple[int | None, ...]:
+        """The place of each end in a list of rests with the same goal; None where it is not on the list, or no rest."""
+        length, link = self.target.twin.length, self.setting.motion.link
+        rests = [(rest.configuration.pose(link), rest.error) for rest in listed.rests]
+        return tuple(next((i for i, (X, size) in enumerate(rests) if each.X is not None
+                           and abs(size - each.size) <= RUNS_ALIKE
+                           and pose_difference(X, each.X, length) <= RUNS_ALIKE), None) for each in self.ends)
+
+    def headline(self) -> str:
+        """The robot and what part of the starts comes to the goal."""
+        share = next((each.share for each in self.ends if each.ending.name == GOAL), 0.0)
+        return f"{self.setting.headline()}: {100 * share:.3g} % of {self.starts:,} starts end at the goal {self.goal}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line, without the command's own fields."""
+        return {"to": self.goal.to_dict(), **self.setting.to_dict(), "poses": str(self.grid),
+                "axes": {name: values.tolist() for name, values in self.grid.axes}, "starts": self.starts,
+                "ends": [each.to_dict() for each in self.ends], "cells": self.cells.tolist(),
+                "damped": int(np.sum(self.damped)), "abreast": self.abreast, "followed": self.followed,
+                "checked": self.checked, "agreed": self.agreed,
+                "certified": {"words": self.certified.words, "radius_m": self.certified.length,
+                              "radius_rad": self.certified.angle, "covered": self.covered} if self.certified else None}
+
+
+@question()
+def basins(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *, to: PoseLike,
+           plane: PoseLike | None = None, grid: str | None = None, steps: int | None = None, jobs: int | None = None,
+           seed: int = 0) -> Basins:
+    """Where the loop that servoes the directions at the pose ``to`` ends, from each start of a plane of poses (by
+    default one through the goal, all of it that is reached, ``steps`` poses a side) or of a ``grid``, a line, plane or
+    box such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
+
+    ``observe`` and ``camera`` as for ``derive``. The law is that of ``servo`` with exact directions. Robots whose legs
+    are closed forms are integrated abreast, others one by one. There are ``jobs`` processes, by default as many as
+    cores; the answer does not depend on them.
+
+    Raises ``BadRequest`` for names that there are not, legs that do not see the platform, a singular goal, too many
+    starts; ``PoseNotReached``, ``PlaneNotMet`` for poses out of reach.
+
+    >>> hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid="x=-0.02:0.02:5,y=-0.02:0.02:5,phi=0")
+    <Basins: 3rrr_m1, watching 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0>
+    """
+    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    asked = asked_pose(to)
+    setting = setting.telling([asked])
+    if plane is not None and grid is not None:
+        raise BadRequest("basins: both a plane and a grid are given", str(grid), "one of them")
+    (goal,) = configurations_at(setting, [asked])
+    if jobs is not None and jobs < 1:
+        raise BadRequest("number of processes", jobs, "1 or more")
+    search = BasinSearch(setting, goal, ServoTask.between(setting, goal, goal), jobs or os.cpu_count() or 1)
+    return search.over(Grid.parse(grid, FLOW_STARTS) if grid else search.plane(plane, steps), seed)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Outcome(Value):
+    """How a run ended that was simulated one by one; where it came to rest the platform's pose X (4, 4) and ‖e‖."""
+
+    ending: Ending
+    X: Array | None = None
+    size: float = np.inf
+
+    def alike(self, other: Outcome, length: float) -> bool:
+        """Whether two runs end alike: at one pose, or for one reason."""
+        if self.X is None or other.X is None or self.ending.name != other.ending.name:
+            said = [(each.ending.name, each.ending.reason if each.ending.name == BOUNDARY else "", each.X is None)
+                    for each in (self, other)]
+            return said[0] == said[1]
+        return pose_difference(self.X, other.X, length) <= RUNS_ALIKE
+
+
+@dataclass(frozen=True, eq=False)
+class BasinSearch:
+    """A goal and the loop that leads to it, of which many starts are followed, in so many processes (``jobs``)."""
+
+    setting: ObservedRobot
+    goal: ClosedConfiguration
+    task: ServoTask
+    jobs: int
+
+    @cached_property
+    def flow(self) -> Flow | None:
+        """The law abreast; None where a leg is no closed form, a joint has limits, or something else is watched than
+        the legs' own segments."""
+        setting, own = self.setting, set(map(id, self.setting.segments))
+        if setting.placer is None or setting.mechanism.limited or not all(id(o) in own for o in setting.observed):
+            return None
+        return Flow(setting.placer, tuple(setting.labels), self.task.directions)
+
+    def plane(self, plane: PoseLike | None, steps: int | None) -> Grid:
+        """The poses of a plane that are reached; by default one through the goal."""
+        motion, X = self.setting.motion, self.goal.pose(self.setting.motion.link)
+        if plane is not None:
+            fixed = as_pose(plane)
+        elif motion.planar:
+            fixed = Pose(phi=float(place_of(motion, X, ("phi",))[0]))
+        else:
+            fixed = Pose(z=float(motion.position(X)[2])) if motion.translations.shape[1] == 3 else Pose()
+        return Mapper(self.setting, np.zeros(0)).plane(fixed, steps or (SIDE if self.flow else SIDE_ONE_BY_ONE))
+
+    def over(self, grid: Grid, seed: int) -> Basins:
+        """The ends of the runs from all poses of a grid."""
+        name, motion = self.setting.robot.name, self.setting.motion
+        most, count = FLOW_STARTS if self.flow else FLOW_STARTS_ONE_BY_ONE, math.prod(grid.shape)
+        if count > most:
+            how = "" if self.flow else ", which are simulated one by one"
+            raise BadRequest(f"{name}: number of starts{how}", count, f"at most {most:,}")
+        X, possible = poses_over(motion, grid, name, grid.places())
+        found = self._abreast(X, possible, seed) if self.flow else self._one_by_one(grid)
+        if not len(found.outcomes):
+            raise PlaneNotMet(name, f"the grid {grid}", f"none of {count} is")
+        counts = np.bincount(found.cells[found.cells != NOT_REACHED], minlength=len(found.outcomes))
+        order = sorted(np.flatnonzero(counts), key=lambda i: (ENDINGS.index(found.outcomes[i].ending.name), -counts[i]))
+        ends, cells = [], np.full(count, NOT_REACHED)
+        for number, i in enumerate(order):
+            outcome, here = found.outcomes[i], np.flatnonzero(found.cells == i)
+            cells[here] = number
+            away = X[here, :3, 3] - np.median(X[here, :3, 3], axis=0)
+            middle = here[np.argmin(np.linalg.norm(away, axis=1))]
+            ends.append(BasinEnd(outcome.ending, None if outcome.X is None else motion.pose(outcome.X), outcome.X,
+                                 outcome.size, len(here), len(here) / counts.sum(), motion.pose(X[middle])))
+        return Basins(self.setting, motion.pose(self.goal.pose(motion.link)), self.goal, grid, tuple(ends),
+                      cells.reshape(grid.shape), found.damped.reshape(grid.shape), self.flow is not None,
+                      found.followed, found.checked, found.agreed, certified_radius(self.setting, self.goal))
+
+    def _abreast(self, X: Array, possible: Flags, seed: int) -> Found:
+        """The outcomes of starts X (n, 4, 4) that the batch follows, all abreast."""
+        flow, length = self.flow, self.goal.twin.length
+        assert flow is not None
+        starts = np.flatnonzero(possible & flow.batch.reached(X))
+        cells, damped = np.full(len(X), NOT_REACHED), np.zeros(len(X), dtype=bool)
+        if not len(starts):
+            return Found([], cells, damped)
+        horizon = self.task.conditions.horizon * self.task.law.gain
+        parts = [X[starts[k : k + FLOW_PART]] for k in range(0, len(starts), FLOW_PART)]
+        runs = Runs.joined(self._done(partial(_followed, flow.bare(), horizon, RUN_AWAY * length), parts))
+        damped[starts] = runs.weak
+        groups = runs.groups(length, flow.seen)
+        shown = groups[:FLOW_NAMED]
+        away, open_ = (np.flatnonzero(np.isin(runs.stopped, words)) for words in ((AWAY,), (LOST, EFFORT)))
+        followed = open_[np.unique(np.linspace(0, len(open_) - 1, FLOW_FOLLOWED).astype(int))] if len(open_) else open_
+        known = np.concatenate([*shown, away]).astype(int)
+        checked = np.random.default_rng(seed).choice(known, min(FLOW_CHECKED, len(known)), replace=False)
+        firsts = [*away[:1], *followed, *checked]
+        at = flow.configurations(runs.X[[group[0] for group in shown]], runs.flipped[[group[0] for group in shown]])
+        at += flow.configurations(X[starts[firsts]], np.zeros((len(firsts), len(flow.legs)), dtype=bool))
+        told = self._simulated(at)
+        numbers, outcomes = np.full(len(starts), -1), Outcomes(length)
+        for group, outcome in zip(shown, told, strict=False):
+            numbers[group] = outcomes.number(_at(outcome, runs.X[group[0]], length))
+        told = told[len(shown):]
+        if len(away):
+            numbers[away] = outcomes.number(told[0])
+        numbers[runs.stopped == OVER] = outcomes.number(Outcome(Ending(TIME, "the time was over")))
+        rest = told[min(len(away), 1):]
+        for run, outcome in zip(followed, rest, strict=False):
+            numbers[run] = outcomes.number(outcome)
+        same = [outcome.alike(outcomes.all[numbers[run]], length)
+                for run, outcome in zip(checked, rest[len(followed):], strict=True)]
+        numbers[numbers < 0] = outcomes.number(Outcome(Ending(UNDECIDED, "not followed to an end")))
+        cells[starts] = numbers
+        return Found(outcomes.all, cells, damped, len(followed), len(same), sum(same))
+
+    def _one_by_one(self, grid: Grid) -> Found:
+        """The outcomes of the starts of a grid, each simulated."""
+        everything = self.setting.everything
+        at = sweep(everything.start, everything.question, grid, self.setting.motion, self.setting.placer)
+        starts = np.array([i for i, each in enumerate(at) if each is not None], dtype=int)
+        cells, outcomes = np.full(len(at), NOT_REACHED), Outcomes(self.goal.twin.length)
+        for i, outcome in zip(starts, self._simulated([at[i] for i in starts]), strict=True):
+            cells[i] = outcomes.number(outcome)
+        return Found(outcomes.all, cells, np.zeros(len(at), dtype=bool), len(starts))
+
+    def _simulated(self, starts: Sequence[ClosedConfiguration | None]) -> list[Outcome]:
+        """The outcomes of single runs; undecided where there is no start."""
+        parts = [starts[k : k + FLOW_SINGLE] for k in range(0, len(starts), FLOW_SINGLE)]
+        return list(chain.from_iterable(self._done(partial(_simulated, self.task), parts)))
+
+    def _done(self, work: Callable[[Any], Any], parts: Sequence[Any]) -> list[Any]:
+        """What the parts give, in their order."""
+        if self.jobs == 1 or len(parts) == 1:
+            return [work(part) for part in parts]
+        from joblib import Parallel, delayed
+
+        found = []
+        for each in Parallel(n_jobs=min(self.jobs, len(parts)), batch_size=1, return_as="generator")(
+                delayed(work)(part) for part in parts):
+            tell("run")
+            found.append(each)
+        return found
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """The outcomes of starts (n,) by their numbers."""
+
+    outcomes: list[Outcome]
+    cells: Places
+    damped: Flags
+    followed: int = 0
+    checked: int = 0
+    agreed: int = 0
+
+
+class Outcomes:
+    """Outcomes that are told apart."""
+
+    def __init__(self, length: float) -> None:
+        self.all: list[Outcome] = []
+        self.length = length
+
+    def number(self, outcome: Outcome) -> int:
+        """The number of an outcome, a new one if need be."""
+        for number, each in enumerate(self.all):
+            if each.alike(outcome, self.length):
+                return number
+        self.all.append(outcome)
+        return len(self.all) - 1
+
+
+def place_of(motion: PlatformMotion, X: Array, names: Sequence[str]) -> Array:
+    """The values (m, rad) of parts of a platform pose X (4, 4)."""
+    turn = turn_about(motion.normal, X[:3, :3] @ motion.home[:3, :3].T)[0]
+    return np.array([turn if name == "phi" else motion.position(X)["xyz".index(name)] for name in names])
+
+
+def _at(outcome: Outcome, X: Array, length: float) -> Outcome:
+    """The outcome of runs abreast that end at X (4, 4), of which one was simulated on from there."""
+    if outcome.X is not None and pose_difference(outcome.X, X, length) <= RUNS_ALIKE:
+        return outcome
+    return Outcome(Ending(UNDECIDED, "a single run does not stay where these end"))
+
+
+def _followed(flow: Flow, horizon: float, farthest: float, X: Array) -> Runs:
+    return Abreast(flow, X, farthest).run(horizon)
+
+
+def _simulated(task: ServoTask, starts: Sequence[ClosedConfiguration | None]) -> list[Outcome]:
+    classifier = EndingClassifier(task.setting, task.goal, task.directions)
+    loop, found = task.loop(), []
+    for start in starts:
+        if start is None:
+            found.append(Outcome(Ending(UNDECIDED, "the robot was not found closed there")))
+            continue
+        run = loop.simulate(start, task.conditions.horizon)
+        ending = classifier.classify(run, directions(run.last, task.law.question)[0])
+        rests = run.stopped in (SERVED_AT, REST, POISED)
+        found.append(Outcome(ending, run.last.pose(task.setting.motion.link), run.commands[-1].size) if rests
+                     else Outcome(ending))
+    return found

@@ -1,0 +1,295 @@
+"""Where many runs end: the law abreast is the law, and what runs abreast end at is what single runs end at."""
+
+from __future__ import annotations
+
+import csv
+import io
+from functools import cache
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import hrsynth
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.errors import BadRequest, PlaneNotMet
+from hrsynth.geometry.screws import point_velocity
+from hrsynth.present.outputs import OUTPUTS
+from hrsynth.simulation.endings import basins as module
+from hrsynth.simulation.endings.abreast import Abreast, Runs
+from hrsynth.simulation.endings.flow import Flow
+from hrsynth.simulation.law import DAMPED
+from hrsynth.simulation.servo import ServoTask
+
+HORIZON = 60.0
+
+
+@cache
+def task(name: str, legs: str | None = None) -> tuple[ServoTask, Flow]:
+    setting = ObservedRobot.of(name, legs)
+    goal = setting.everything.start
+    made = ServoTask.between(setting, goal, goal)
+    return made, Flow(setting.placer, tuple(setting.labels), made.directions)
+
+
+def poses(flow: Flow, count: int, seed: int, wide: float) -> np.ndarray:
+    """Random poses that are reached, about home."""
+    y = np.random.default_rng(seed).uniform(-wide, wide, (20 * count, flow.batch.span.shape[1]))
+    X = flow.moved(np.repeat(flow.batch.home[None], len(y), axis=0), y)
+    return X[flow.batch.reached(X)][:count]
+
+
+def runs(flow: Flow, X: np.ndarray) -> Runs:
+    return Abreast(flow, X, 20 * flow.batch.length).run(HORIZON)
+
+
+def none(flow: Flow, n: int) -> np.ndarray:
+    return np.zeros((n, len(flow.legs)), dtype=bool)
+
+
+@pytest.mark.parametrize(("name", "legs", "singular"), [
+    ("quattro", "1,4", [-0.1757, -0.1931, -0.6481, 0.262]), ("3rpr_m1", None, None), ("gough_stewart", "1,3,5", None),
+    ("delta", "1,2", None), ("hexa", None, None)])
+def test_the_law_abreast_is_the_law(name: str, legs: str | None, singular: list[float] | None):
+    made, flow = task(name, legs)
+    X = poses(flow, 6, 1, 0.4)
+    if singular is not None:
+        c, s = np.cos(singular[3]), np.sin(singular[3])
+        near = flow.batch.home.copy()
+        near[:3, 3], near[:2, :2] = singular[:3], [[c, -s], [s, c]]
+        X = np.concatenate([X, near[None]])
+    found = flow.at(X, none(flow, len(X)), none(flow, len(X)), flow.roots(X, none(flow, len(X)))[0])
+    assert singular is None or found.weakest[-1] < DAMPED / 10
+    motion, length = made.setting.motion, flow.batch.length
+    for pose, at, velocity, size in zip(X, flow.configurations(X, none(flow, len(X))), found.velocity, found.size,
+                                        strict=True):
+        assert at is not None
+        command = made.law.at(at, made.desired(0.0))
+        twists = at.velocity(motion.link) @ command.velocity / made.law.gain
+        there = point_velocity(twists[:, None], pose[:3, :3] @ motion.point / length)[:, 0] * length
+        expected = np.concatenate([there, twists[3:]]) if motion.body else there
+        ours = flow.batch.span @ velocity
+        np.testing.assert_allclose(ours[: len(expected)], expected, atol=1e-6 * max(1.0, np.abs(expected).max()))
+        assert size == pytest.approx(command.size, abs=1e-9)
+
+
+def ends_agree(name: str, legs: str | None, X: np.ndarray) -> int:
+    """Hold runs abreast against single ones; how many."""
+    made, flow = task(name, legs)
+    found = runs(flow, X)
+    link, count = made.setting.motion.link, 0
+    for i, at in enumerate(flow.configurations(X, none(flow, len(X)))):
+        single = ServoTask.between(made.setting, at, made.goal).loop().simulate(at, made.conditions.horizon)
+        assert single.stopped == found.stopped[i] or {single.stopped, found.stopped[i]} <= {"poised", "rest"}
+        np.testing.assert_allclose(single.last.pose(link), found.X[i], atol=1e-4)
+        count += 1
+    return count
+
+
+def test_runs_abreast_end_where_single_runs_end():
+    assert ends_agree("3rrr_m1", None, poses(task("3rrr_m1")[1], 2, 2, 1.0)) == 2
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "legs"), [
+    ("3prr_m1", None), ("3puu", None), ("3rpr_m2", None), ("3ruu", None), ("3upu", None), ("6pus", None),
+    ("delta", None), ("delta", "1,2"), ("gough_stewart", "1,3,5"), ("linear_delta", None), ("orthoglide", None),
+    ("quattro", None), ("quattro", "1,4"), ("quattro", "2,3"), ("quattro_rigid", "1,2")])
+def test_runs_of_all_robots_abreast_end_where_single_runs_end(name: str, legs: str | None):
+    X = poses(task(name, legs)[1], 6, 7, 0.7)
+    assert ends_agree(name, legs, X) == len(X) > 2
+
+
+def test_a_stretched_leg_that_is_not_watched_holds_the_platform():
+    _, found = stretched()
+    _, flow = task("quattro", "1,4")
+    assert list(found.stopped) == ["rest", "rest"]
+    assert found.active.any(axis=1).all()
+    assert not found.active[:, flow.seen].any()
+    assert (found.size > 0.05).all()
+
+
+@pytest.mark.slow
+def test_single_runs_end_at_the_stretched_leg_too():
+    assert ends_agree("quattro", "1,4", stretched()[0]) == 2
+
+
+def stretched() -> tuple[np.ndarray, Runs]:
+    """Two starts whose runs end where legs that are not watched are stretched, and these runs."""
+    _, flow = task("quattro", "1,4")
+    X = np.repeat(flow.batch.home[None], 2, axis=0)
+    X[:, :3, 3] = [[-0.5, -0.35, -0.7], [-0.5, 0.35, -0.7]]
+    return X, runs(flow, X)
+
+
+def test_a_watched_leg_passes_its_fixed_point_with_its_direction():
+    """A rod through a point turns over there: the direction is kept, the working mode is not."""
+    _, flow = task("3rpr_m1")
+    X = poses(flow, 60, 5, 1.2)[20:]
+    found = runs(flow, X)
+    crossed = found.flipped.any(axis=1)
+    assert crossed.any()
+    assert set(found.stopped[crossed]) <= {"served", "rest", "away"}
+
+
+@pytest.mark.slow
+def test_single_runs_pass_fixed_points_too():
+    _, flow = task("3rpr_m1")
+    X = poses(flow, 60, 5, 1.2)
+    crossed = runs(flow, X).flipped.any(axis=1)
+    assert ends_agree("3rpr_m1", None, X[crossed][:4]) > 1
+
+
+def planar(x: np.ndarray, base: np.ndarray, tips: np.ndarray) -> np.ndarray:
+    """The directions (3, 2) of rods from base points to the tips of a platform at x, y, φ."""
+    c, s = np.cos(x[2]), np.sin(x[2])
+    arms = x[:2] + tips @ np.array([[c, s], [-s, c]]) - base
+    return arms / np.linalg.norm(arms, axis=1)[:, None]
+
+
+def test_runs_end_where_plain_integration_of_the_plane_does():
+    """The law in three coordinates, e_i = sin ∠(u_i, u_di), by SciPy: no mechanism, no batch."""
+    made, flow = task("3rpr_m1")
+    setting, twin = made.setting, made.goal.twin
+    mechanism, platform = setting.mechanism, setting.mechanism.platform
+    turning = [joint for joint in mechanism.joints.values() if joint.type.name == "REVOLUTE"]
+    base = np.array([joint.point[:2] for joint in turning if mechanism.base in joint.links])
+    home = made.goal.pose(platform)
+    tips = np.array([joint.point[:2] - home[:2, 3] for joint in turning if platform in joint.links])
+    assert base.shape == tips.shape == (3, 2)
+    start = np.array([*home[:2, 3], 0.0])
+    wanted = planar(start, base, tips)
+    scale = np.array([twin.length, twin.length, 1.0])
+
+    def error(x: np.ndarray) -> np.ndarray:
+        u = planar(x, base, tips)
+        return u[:, 0] * wanted[:, 1] - u[:, 1] * wanted[:, 0]
+
+    def rate(_: float, x: np.ndarray) -> np.ndarray:
+        steps = 1e-6 * np.diag(scale)
+        L = np.array([(error(x + step) - error(x - step)) / 2e-6 for step in steps]).T
+        return -scale * np.linalg.solve(L, error(x))
+
+    X, smooth = poses(flow, 40, 11, 0.8), 0
+    found = runs(flow, X)
+    for pose, end, weak, flipped in zip(X, found.X, found.weak, found.flipped, strict=True):
+        if weak or flipped.any():
+            continue  # where the law is damped, or a rod turns over, these three coordinates are not enough
+        turn = home[:2, :2].T @ pose[:2, :2]
+        begin = [*pose[:2, 3], np.arctan2(turn[1, 0], turn[0, 0])]
+        plain = solve_ivp(rate, (0, 30), begin, rtol=1e-7, atol=1e-9).y[:, -1]
+        np.testing.assert_allclose(end[:2, 3], plain[:2], atol=1e-6)
+        across = home[:2, :2] @ np.array([np.cos(plain[2]), np.sin(plain[2])])
+        np.testing.assert_allclose(end[:2, 0], across, atol=1e-6)
+        smooth += 1
+        if smooth == 8:
+            break
+    assert smooth == 8
+
+
+GRID = "x=0:0.3:6,y=0:0.3:7,phi=0"
+
+
+@cache
+def small() -> hrsynth.simulation.endings.basins.Basins:
+    return hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid=GRID, jobs=1)
+
+
+def test_every_start_has_its_end():
+    found = small()
+    assert found.cells.shape == (6, 7)
+    assert sum(each.count for each in found.ends) == found.starts == 42
+    assert sum(each.share for each in found.ends) == pytest.approx(1)
+    assert found.ends[0].ending.name == "goal"
+    assert len(found.ends) > 1
+    assert found.checked == found.agreed == 2
+    for number, each in enumerate(found.ends):
+        assert np.sum(found.cells == number) == each.count
+
+
+@pytest.fixture(autouse=True)
+def few_single_runs(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(module, "FLOW_CHECKED", 2)
+
+
+@pytest.mark.slow
+def test_ends_do_not_depend_on_how_the_work_is_shared_out(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(module, "FLOW_PART", 5)
+    hrsynth.forget()
+    found = hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid=GRID, jobs=1)
+    # at a singularity of the law the last digits decide
+    firm = ~(found.damped | small().damped)
+    assert firm.sum() > 20
+    np.testing.assert_array_equal(found.cells[firm], small().cells[firm])
+    assert [each.ending.name for each in found.ends] == [each.ending.name for each in small().ends]
+
+
+@pytest.mark.slow
+def test_ends_do_not_depend_on_the_number_of_processes(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.setattr(module, "FLOW_PART", 20)
+    both = [hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid=GRID, jobs=jobs) for jobs in (1, 2)]
+    assert both[0].to_dict() == both[1].to_dict()
+
+
+def test_every_start_within_the_certified_radius_ends_at_the_goal():
+    found = small()
+    assert found.certified is not None
+    assert found.certified.length > 0
+    goal = found.target.pose(found.setting.motion.link)
+    _, flow = task("3rpr_m1")
+    flow = Flow(flow.placer, flow.watched, hrsynth.simulation.law.directions(
+        found.target, found.setting.samples.question)[0])
+    rng = np.random.default_rng(0)
+    y = rng.uniform(-1, 1, (200, 3)) * [found.certified.length / flow.batch.length] * 2 + [0]
+    X = flow.moved(np.repeat(goal[None], 200, axis=0), y * [1, 1, 0] + rng.uniform(-1, 1, (200, 1))
+                   * [0, 0, found.certified.angle])
+    X = X[[found.certified.holds(each) for each in X]]
+    assert len(X) > 20
+    np.testing.assert_allclose(runs(flow, X).X, np.broadcast_to(goal, X.shape), atol=1e-8)
+
+
+def test_what_is_drawn_as_certified_is_around_the_goal():
+    found = hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid="x=-0.1:0.1:5,y=-0.1:0.1:5,phi=0", jobs=1)
+    grid, inside = found.region
+    x, y = (values for _, values in grid.axes)
+    far = np.hypot(*np.meshgrid(x, y, indexing="ij"))
+    np.testing.assert_array_equal(inside, far <= found.certified.length)
+    goal = found.ends[0].count * 0.05**2
+    assert found.covered == pytest.approx(np.pi * found.certified.length**2 / goal, rel=0.05)
+
+
+def test_the_table_has_a_line_a_start():
+    content = next(file for file in OUTPUTS["basins"].files).content(small(), ".csv", {})[0]
+    rows = list(csv.DictReader(io.StringIO(content.decode())))
+    assert len(rows) == 42
+    names = {letter: each.ending.name for letter, each in zip("ABCDEFG", small().ends, strict=False)}
+    assert all(names[row["end"]] == row["ended"] for row in rows)
+
+
+@pytest.mark.parametrize("grid", ["x=-0.02:0.02:4,y=0.02,phi=0", "x=-0.02:0.02:3,y=0:0.01:2,phi=-0.1:0.1:2"])
+def test_lines_and_boxes_are_drawn(grid: str, tmp_path):
+    found = hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid=grid, jobs=1)
+    hrsynth.draw(found, tmp_path / "basins.png")
+    assert (tmp_path / "basins.png").read_bytes().startswith(b"\x89PNG")
+    assert "100 %" in repr(found)
+    assert "goal" in hrsynth.text(found)
+
+
+def test_other_robots_are_simulated_one_by_one():
+    found = hrsynth.basins("rrrrr_m1", to="x=0.02,y=0.24", grid="x=0:0.02:2,y=0.22:0.24:2", jobs=1)
+    assert not found.abreast
+    assert found.followed == found.starts == 4
+    assert [each.ending.name for each in found.ends] == ["goal"]
+
+
+@pytest.mark.parametrize(("asked", "word"), [
+    ({"plane": "z=-0.7", "grid": "x=0:0.1:2"}, "both"), ({"grid": "x=0:1:400,y=0:1:400"}, "160000"),
+    ({"jobs": 0, "grid": "x=0:0.1:2"}, "processes")])
+def test_what_cannot_be_asked_is_refused(asked: dict[str, str], word: str):
+    with pytest.raises(BadRequest, match=word):
+        hrsynth.basins("quattro", "1,4", to="z=-0.7", **asked)
+
+
+def test_starts_out_of_reach_are_refused():
+    with pytest.raises(PlaneNotMet, match="none of 2"):
+        hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid="x=5:6:2,y=0,phi=0")
