@@ -13,7 +13,7 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.kinematics.chart import TangentChart
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.simulation.endings.enclosure import enclosed
-from hrsynth.simulation.endings.endings import Endings, RestPoint, RestSearch, endings
+from hrsynth.simulation.endings.endings import Endings, RestPoint, RestSearch, endings, stability
 from hrsynth.simulation.endings.search import CriticalPoint
 from hrsynth.simulation.law import FixedDirections
 from hrsynth.simulation.run import Loop
@@ -121,3 +121,12 @@ def test_a_thousand_random_starts_find_no_other(name: str, legs: str | None) -> 
     setting = ObservedRobot.of(name, legs)
     goal = setting.motion.pose(setting.configurations[3].pose(setting.motion.link))
     assert not counted(endings(setting, at=str(goal)), 1000).strangers
+
+
+@pytest.mark.parametrize(("curvatures", "word"), [
+    ([0.1, 2.0], "stable"), ([-0.1, 2.0], "saddle"), ([-2.0, -0.1], "unstable"), ([1e-9, 1.0], "undecided"),
+    ([-1e-9, 1.0], "undecided"), ([-0.1, 1e-9], "unstable"), ([-0.1, 1e-9, 1.0], "saddle")])
+def test_a_flat_direction_never_attracts_for_sure(curvatures: list[float], word: str) -> None:
+    """Only where all curvatures are surely positive does a rest attract; one that is surely negative is enough that it
+    does not."""
+    assert stability(curvatures) == word

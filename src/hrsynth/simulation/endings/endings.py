@@ -384,6 +384,6 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
 def stability(curvatures: Sequence[float] | Array) -> str:
     """What the eigenvalues of a Hessian say."""
     values = np.asarray(curvatures)
-    if np.any(np.abs(values) < SAME_ENDING):
-        return UNDECIDED if np.all(values > -SAME_ENDING) else SADDLE if np.any(values > SAME_ENDING) else UNDECIDED
-    return STABLE if np.all(values > 0) else UNSTABLE if np.all(values < 0) else SADDLE
+    if np.any(values < -SAME_ENDING):
+        return SADDLE if np.any(values > SAME_ENDING) else UNSTABLE
+    return STABLE if np.all(values > SAME_ENDING) else UNDECIDED
