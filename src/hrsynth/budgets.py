@@ -341,6 +341,10 @@ RAYS = 3000
 """Rays from a goal along which it is seen, not proved, how high the error rises."""
 RADIUS_BOXES = 60_000
 """Boxes with which a certified radius is tried, at most."""
+COVER_BOXES = 2_000_000
+"""Boxes of platform poses that are looked at, at most, where all critical points of the error are to be listed."""
+BOXES_AT_ONCE = 4096
+"""Boxes of those that are looked at together."""
 
 # The audit of published tables
 

@@ -363,6 +363,12 @@ CERTIFIED_LEVEL = 0.95
 """Part of the error at which a ray is seen to stop rising up to which it is tried to prove that all rays rise."""
 RADIUS_SHARES = (0.97, 0.9, 0.8, 0.65, 0.5, 0.3)
 """Parts of the radius that rays show that are tried, one after the other, as the certified one."""
+COVER_REACH = 3.0
+"""Half the width (characteristic lengths) of the box of platform positions that is looked at where legs have none."""
+SHORTEST_ROD = 0.05
+"""Length (characteristic lengths) of a rod that slides below which its leg counts as out of reach."""
+SMALLEST_BOX = 1e-4
+"""Part of the whole box below which a box of poses that is not settled is left open."""
 
 # The audit of published tables
 

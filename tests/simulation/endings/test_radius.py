@@ -34,7 +34,7 @@ def starts(found, rng, count):
     return poses
 
 
-def ends(setting, found, poses, steps=400, step=0.25):
+def ends(setting, found, poses, steps=120, step=0.25):
     """How far from the goal's pose runs of the damped law end (metres and radians together), by the midpoint rule."""
     batch, motion, goal = setting.batch, found.motion, found.goal.pose(found.motion.link)
     legs = list(setting.labels)
@@ -116,7 +116,7 @@ def test_all_starts_within_it_end_at_the_goal(name, led):
     found = certified(setting)
     assert found.length > 0.01 * setting.mechanism.length
     if led:
-        assert np.all(ends(setting, found, starts(found, rng, 200), 200) < 1e-6)
+        assert np.all(ends(setting, found, starts(found, rng, 200)) < 1e-6)
 
 
 def test_a_goal_that_the_directions_do_not_see_is_undecided():

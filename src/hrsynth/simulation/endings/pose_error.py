@@ -10,7 +10,7 @@ coordinates x: the point's shift along a basis (characteristic lengths), then γ
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -58,13 +58,14 @@ class SeenDirection(Value):
 
 @dataclass(frozen=True, eq=False)
 class Turning:
-    """An observed direction u, the one that is wanted, and u̇ along some directions of the coordinates: ``plain``[j] +
-    ``steep``[j] / ``along``, which vanishes at the leg's limit."""
+    """An observed direction u, the one that is wanted, and u̇ along some directions of the coordinates: ``plain``[j] −
+    ``normal``[j] ``slip`` / ``along``, which vanishes at the leg's limit."""
 
     u: Components
     wanted: Components
     plain: Sequence[Components]
-    steep: Sequence[Components]
+    normal: Sequence[Any]
+    slip: Components
     along: Any
 
     @property
@@ -75,15 +76,14 @@ class Turning:
     @property
     def rates(self) -> list[Components]:
         """ė along each direction."""
-        return [cross([a + b / self.along for a, b in zip(plain, steep, strict=True)], self.wanted)
-                for plain, steep in zip(self.plain, self.steep, strict=True)]
+        return [cross(minus(plain, scaled(normal / self.along, self.slip)), self.wanted)
+                for plain, normal in zip(self.plain, self.normal, strict=True)]
 
     @property
-    def slopes(self) -> list[tuple[Any, Any]]:
-        """e · ė = −(u · u*) (u̇ · u*) along each direction: its two parts, the second to be divided by ``along``."""
+    def slopes(self) -> tuple[list[Any], Any]:
+        """e · ė = −(u · u*) (u̇ · u*) along each direction: the plain part; κ of the rest, κ ``normal``/``along``."""
         c = dot(self.u, self.wanted)
-        return [(-(c * dot(plain, self.wanted)), -(c * dot(steep, self.wanted)))
-                for plain, steep in zip(self.plain, self.steep, strict=True)]
+        return [-(c * dot(plain, self.wanted)) for plain in self.plain], c * dot(self.slip, self.wanted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,14 +101,18 @@ class ErrorRates:
     @property
     def slopes(self) -> list[Any]:
         """E's rates along the directions, where no leg is at its limit."""
-        parts = [[plain + steep / each.along for plain, steep in each.slopes] for each in self.seen]
+        parts = []
+        for each in self.seen:
+            plain, steep = each.slopes
+            parts.append([a + steep * normal / each.along for a, normal in zip(plain, each.normal, strict=True)])
         return [sum(column) for column in zip(*parts, strict=True)]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PoseError(Value):
-    """The error about a goal, in its working mode: the goal's pose (``p``, ``R``), the basis of shifts (3, k) and of
-    turns (3, m), all limbs, what is observed. Lengths in characteristic lengths."""
+    """The error about a goal, in its working mode: the pose (``p``, ``R``) from which coordinates count, by default the
+    goal's, the basis of shifts (3, k) and of turns (3, m), all limbs, what is observed. Lengths in characteristic
+    lengths."""
 
     length: float
     motion: PlatformMotion
@@ -122,6 +126,9 @@ class PoseError(Value):
     """What was fitted to samples and not read from the joints."""
     limits: tuple[str, ...] = ()
     """Joints whose limits are not looked at."""
+    goal: tuple[Array, Array] | None = None
+    """The goal's pose, in whose working modes ``wanted`` the limbs are there; None where these are its own."""
+    wanted: tuple[float, ...] = ()
 
     @classmethod
     def of(cls, setting: ObservedRobot, goal: ClosedConfiguration) -> PoseError:
@@ -150,6 +157,12 @@ class PoseError(Value):
                        each.motion.rotations if each.turning else np.zeros((3, 0)), limbs, seen,
                        (*known.fitted, *rules), (*mechanism.limited, *mechanism.wrists))
         raise NotEnclosed(reason)
+
+    def elsewhere(self, p: Array, R: Array, modes: Sequence[float]) -> PoseError:
+        """The error to the same goal about another pose, in other working modes."""
+        limbs = tuple(replace(limb, mode=mode) for limb, mode in zip(self.limbs, modes, strict=True))
+        return replace(self, p=p, R=R, limbs=limbs, goal=self.goal or (self.p, self.R),
+                       wanted=self.wanted or tuple(limb.mode for limb in self.limbs))
 
     @property
     def size(self) -> int:
@@ -184,7 +197,8 @@ class PoseError(Value):
     def at(self, x: Components, directions: Sequence[Components], number: Number) -> ErrorRates:
         """What the error does at coordinates x, and along directions of the coordinates."""
         p, R = self.pose(x, number)
-        goal = number(self.p), number(self.R.ravel())
+        place, turn = self.goal or (self.p, self.R)
+        goal = number(place), number(turn.ravel())
         k = self.shifts.shape[1]
         twists = [self._twist(x[k:], each, number) for each in directions]
         margins = [limb.at(self._tip(limb, p, R, number)[0], number, limb.mode)[0] for limb in self.limbs]
@@ -228,9 +242,10 @@ class PoseError(Value):
     def _turning(self, seen: SeenDirection, here: Place, goal: Place, twists: Sequence[tuple[Components, Components]],
                  number: Number) -> Turning:
         """An observed direction, and how it changes with twists of the platform's point."""
-        u, wanted = self._direction(seen, *here, number), self._direction(seen, *goal, number)
+        own = None if seen.limb is None or not self.wanted else self.wanted[seen.limb]
+        u, wanted = self._direction(seen, *here, number), self._direction(seen, *goal, number, own)
         if seen.limb is None:
-            return Turning(u, wanted, [cross(w, u) for _, w in twists], [[0.0, 0.0, 0.0]] * len(twists), 1.0)
+            return Turning(u, wanted, [cross(w, u) for _, w in twists], [0.0] * len(twists), u, 1.0)
         limb = self.limbs[seen.limb]
         tip, arm = self._tip(limb, *here, number)
         margin, carried = limb.at(tip, number, limb.mode)
@@ -242,17 +257,17 @@ class PoseError(Value):
             along = (-limb.mode) * (gain * sqrt(margin))
         else:
             gain, slip, along = (seen.sense * limb.mode) / sqrt(margin), u, 1.0
-        return Turning(u, wanted, [scaled(gain, y) for y in tips],
-                       [scaled(-(gain * dot(u, y)), slip) for y in tips], along)
+        return Turning(u, wanted, [scaled(gain, y) for y in tips], [gain * dot(u, y) for y in tips], slip, along)
 
-    def _direction(self, seen: SeenDirection, p: Components, R: Components, number: Number) -> Components:
-        """An observed direction at a pose."""
+    def _direction(self, seen: SeenDirection, p: Components, R: Components, number: Number, mode: float | None = None
+                   ) -> Components:
+        """An observed direction at a pose, in its limb's working mode or in another one."""
         if seen.rule is not None:
             return plus(transformed(R, number(seen.rule.turned)), number(seen.rule.constant))
         assert seen.limb is not None
         limb = self.limbs[seen.limb]
         tip = self._tip(limb, p, R, number)[0]
-        carried = limb.at(tip, number, limb.mode)[1]
+        carried = limb.at(tip, number, mode or limb.mode)[1]
         return scaled(seen.sense / number(limb.rod), minus(tip, carried)) if isinstance(limb, OnRod) else scaled(
             seen.sense, carried)
 
