@@ -228,3 +228,40 @@ def test_motions_that_move_an_observed_value_are_not_idle() -> None:
     plain, watched_ = (ObservedRobot.of("delta", see=see) for see in (None, ["point:rod_1a@0.05,0.02,-0.1"]))
     assert plain.mobility.total == watched_.mobility.total
     assert plain.mobility.idle == watched_.mobility.idle + 1
+
+
+def circumcircle(points: Array) -> tuple[Array, float, Array]:
+    """Centre, radius and unit normal."""
+    a, b = points[1] - points[0], points[2] - points[0]
+    normal = np.cross(a, b)
+    centre = points[0] + np.cross(normal, (a @ a) * b - (b @ b) * a) / (-2 * normal @ normal)
+    return centre, float(np.linalg.norm(points[0] - centre)), normal / np.linalg.norm(normal)
+
+
+def smallest(points: Array, cameras: Array) -> Array:
+    """The smallest singular value of the rates of three image points of a free body, for each camera centre."""
+    kind, V, found = kinds()["point"], np.eye(6), []
+    seen = [kind("p", "l", at=point) for point in points]  # type: ignore[call-arg]
+    for C in cameras:
+        _, rates = kind.together(seen, pose(C), np.array([pose()] * 3), np.zeros((6, 6)), np.array([V] * 3))
+        found.append(np.linalg.svd(rates, compute_uv=False)[5])
+    return np.array(found)
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_three_points_are_singular_on_the_danger_cylinder_and_nowhere_else(seed: int) -> None:
+    """The circular cylinder over the circumcircle: 2500 centres of the camera on it and as many off it, for each of two
+    triangles; collinear points are singular everywhere."""
+    rng = np.random.default_rng(seed)
+    points = rng.normal(size=(3, 3))
+    centre, radius, z = circumcircle(points)
+    np.testing.assert_allclose(np.linalg.norm(points - centre, axis=1), radius)
+    x = (points[0] - centre) / radius
+    turn, height = rng.uniform(0, 2 * np.pi, 2500), rng.uniform(0.3, 2, 2500) * rng.choice([-1, 1], 2500)
+    around = np.cos(turn)[:, None] * x + np.sin(turn)[:, None] * np.cross(z, x)
+    on, off = (centre + each * around + height[:, None] * z
+               for each in (radius, radius * rng.choice([0.8, 1.25], 2500)[:, None]))
+    assert smallest(points, on).max() < 1e-12
+    assert smallest(points, off).min() > 1e-7
+    line = points[0] + np.outer([0.0, 0.4, 1.3], points[1] - points[0])
+    assert smallest(line, on[:100]).max() < 1e-12

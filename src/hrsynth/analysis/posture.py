@@ -74,7 +74,7 @@ class Distances:
     the largest, ``condition`` the largest over the smallest; None where Mᵀ does not exist even generically.
     ``constraints`` is the weakest singular value of the loops, as part of the largest. ``millimetres`` and ``degrees``
     are the platform's motion along its weakest freedom for each degree by which the observed directions are wrong; None
-    where it is infinite or Mᵀ does not exist.
+    where it is infinite, where Mᵀ does not exist and where something else than angles is measured.
     """
 
     type2: float | None
@@ -204,6 +204,8 @@ class ConfigurationAnalysis(Value):
             return Distances(0.0, 1 / largest if largest else None, constraints, None, None, None)
         weakest = float(values[rank - 1])
         moved = found.twists @ right[rank - 1] / weakest
+        if not all(each.angular for each in self.setting.observed):
+            return Distances(weakest, 1 / largest, constraints, largest / weakest, None, None)
         return Distances(weakest, 1 / largest, constraints, largest / weakest,
                          1e3 * at.twin.length * float(np.linalg.norm(moved[:3])) * float(np.radians(1)),
                          float(np.linalg.norm(moved[3:])))

@@ -35,6 +35,9 @@ class Observation(Value):
     turns_only: ClassVar[bool] = False
     """Whether the rates need angular velocities alone: then the linear ones may be those of any point."""
 
+    angular: ClassVar[bool] = False
+    """Whether its errors are angles: unit vectors and turns."""
+
     leg: str
     link: str
     line: int | None = field(default=None, kw_only=True, compare=False)

@@ -1,5 +1,5 @@
 """Cameras, and what they see of a link: observations that are functions of a point B and an axis d fixed in the link,
-both in the frame of a camera with its centre C on the reference link (docs/pages/theory.md, section 13).
+both in the frame of a camera with its centre C on the reference link (docs/pages/observations.md).
 
 A kind gives its value and partial derivatives, the wrenches that remain when it is held, and its virtual chain.
 """

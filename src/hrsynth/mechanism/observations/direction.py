@@ -37,6 +37,7 @@ class SeenAxis(Observation):
 
     locked = "two moments ⟂ u"
     size = 3
+    angular = True
     rank = 2
     rational = True
     turns_only = True

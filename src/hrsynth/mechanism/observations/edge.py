@@ -39,6 +39,7 @@ class CylinderEdge(CameraObservation):
     locked = "the force n at the axis, the moment d × n"
     needs = ("at", "axis", "radius")
     size = 3
+    angular = True
     rank = 2
     rational = False
 

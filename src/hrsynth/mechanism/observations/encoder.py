@@ -48,6 +48,7 @@ class AngleEncoder(Encoder):
     """
 
     turns_only = True
+    angular = True
     mark: Array
     start: Array
 

@@ -23,6 +23,7 @@ class ImageLine(CameraObservation):
     locked = "the force n at the line, the moment d × n"
     needs = ("at", "axis")
     size = 3
+    angular = True
     rank = 2
 
     @staticmethod

@@ -21,6 +21,7 @@ class ImagePoint(CameraObservation):
     locked = "two forces at B, ⟂ CB"
     needs = ("at",)
     size = 3
+    angular = True
     rank = 2
 
     @staticmethod

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from ...analysis.aspects.path import PathAnswer
     from ...analysis.check import Check, GridCheck
     from ...analysis.modes.modes import AssemblyMode, AssemblyModes
+    from ...analysis.observed import ObservedRobot
     from ...analysis.posture import Distances, Kinds, Posture
     from ...analysis.singularity.singular import Singularity
 
@@ -40,7 +41,7 @@ def check(found: Check) -> str:
                    f"{written.total} as the file is written, {generic.total} in normal form"),
             ("lengths in", f"{found.length:.4g} m (the characteristic length), angles in radians")]
     for posture in found.postures:
-        rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture, found.length)]
+        rows += [*GAP, ("pose", str(posture.pose)), *_posture(posture, found.length, found.setting)]
     redundant = [f"the loop {each.loop}: {each.rows} of its constraints" for each in found.redundant]
     rows += [*GAP, ("redundant", redundant or "no constraint")]
     if found.grid is not None:
@@ -64,14 +65,16 @@ def _free(grid: GridCheck) -> Iterator[str]:
         yield name if not values else f"{name} = {low}" if low == high else f"{name} {low} to {high}"
 
 
-def _posture(posture: Posture, length: float) -> Rows:
+def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
+    shown = "directions" if all(each.by_segment for each in setting.observed) else "observations"
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
     rows = [("mobility", f"{mobility.total}, of which {mobility.idle} idle; the platform has "
              + ("one freedom" if dof == 1 else f"{dof} freedoms")),
-            *_kinds("hidden robot", f"the directions show {posture.hidden.rank} of {dof}", posture.hidden, "not seen")]
+            *_kinds("hidden robot", f"the {shown} show {posture.hidden.rank} of {dof}", posture.hidden, "not seen")]
     if far.condition is not None and far.type2 is not None and far.type1 is not None:
         rows += [("", f"singular values of Mᵀ {far.type2:.3g} to {1 / far.type1:.3g}, condition {far.condition:.3g}"),
-                 ("", f"one degree of error in the directions{_moved(far, length)}")]
+                 *([("", f"one degree of error in the {shown}{_moved(far, length)}")]
+                   if all(each.angular for each in setting.observed) else [])]
         if far.condition > 1 / NOISE:
             rows.append(("", f"nearly singular: dimensions known to {NOISE:g} cannot tell it from a singularity"))
     elif far.type2 is None:

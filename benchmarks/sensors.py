@@ -1,0 +1,22 @@
+"""What a hidden robot of three image points costs beside one of three directions: ``python benchmarks/sensors.py``."""
+
+from __future__ import annotations
+
+from measure import least
+
+from hrsynth.analysis.derive import derive
+from hrsynth.analysis.question import forget
+
+ROBOT = "gough_stewart"
+POINTS = [f"point:platform@{at}" for at in ("0.1,0,0", "-0.1,0.1,0", "0,0.1,0.1")]
+
+
+def asked(**options: object) -> None:
+    """The question, with nothing remembered."""
+    forget()
+    derive(ROBOT, **options)  # type: ignore[arg-type]
+
+
+if __name__ == "__main__":
+    directions, points = least(lambda: asked(observe="1,2,3"), lambda: asked(camera="eye=base@0.3,0.1,0", see=POINTS))
+    print(f"three directions {directions:.3f} s, three image points {points:.3f} s: {points / directions:.2f} times")
