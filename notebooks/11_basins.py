@@ -1,0 +1,95 @@
+# %% [markdown]
+# # 11. Endings and basins
+#
+# A loop that watches the directions of legs drives their error to zero, or to where it falls no more. Where that is
+# depends on where the robot starts. This notebook colours each start by where its run ends.
+
+# %%
+import matplotlib.pyplot as plt
+import numpy as np
+
+import hrsynth
+
+plt.style.use("hrsynth.present.style")
+
+
+def shown(found):
+    """The ends of the starts, in the order of the table above the picture."""
+    x, y = (values for _, values in found.grid.axes[:2])
+    figure, place = plt.subplots(figsize=(4.5, 4))
+    cells = np.ma.masked_less(found.cells, 0)
+    drawn = place.pcolormesh(x, y, cells.T, cmap="viridis", vmin=0, vmax=max(1, len(found.ends) - 1))
+    bar = figure.colorbar(drawn, ticks=range(len(found.ends)))
+    bar.ax.set_yticklabels([each.ending.name for each in found.ends])
+    place.set(xlabel="x (m)", ylabel="y (m)", aspect="equal")
+    plt.show()
+
+
+# %% [markdown]
+# ## A planar robot
+#
+# The 3-R̲PR with its three rods watched, and starts that are turned as the goal is. A rod that slides through its base
+# joint turns over there: then its direction ends opposite to the desired one. The error u × u* cannot see that
+# (*antipodal*).
+
+# %%
+planar = hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid="x=-0.3:0.3:21,y=-0.3:0.3:21,phi=0", jobs=1)
+print(planar)
+shown(planar)
+
+# %% [markdown]
+# The line *certified* is of another kind than the picture. The picture is a sample: between two starts anything may
+# happen. What is certified is proved for every start within that distance and that turn, by enclosures of the error.
+
+# %% [markdown]
+# ## Why four legs are sometimes worse than two
+#
+# Two legs of the Quattro see its four freedoms; four legs see them twice, which is more accurate. But more directions do
+# not always mean fewer places at which all of them are right. The goal x = y = 0, z = −0.5 m, not turned, is symmetric,
+# and so is another pose, below it, at which *all four* rods have the same directions again. It attracts:
+
+# %%
+goal, starts = "x=0,y=0,z=-0.5,phi=0", "x=-0.6:0.6:12,y=-0.6:0.6:12,z=-0.7,phi=0"
+four = hrsynth.basins("quattro", to=goal, grid=starts, jobs=1)
+print(four)
+
+# %%
+two = hrsynth.basins("quattro", ["1", "4"], to=goal, grid=starts, jobs=1)
+print(two)
+shown(two)
+
+# %% [markdown]
+# With four legs not one of these starts comes to the goal: all are drawn to the other pose, and none meets a singularity
+# on the way there. With two legs a few come to the goal, others to a third pose or to where a leg is stretched. Neither
+# is a good choice for this goal from there, and the picture says so before the robot is moved. At a goal that is not
+# symmetric, four legs have one pose only with its directions, two legs still have two:
+
+# %%
+for legs in (None, ["1", "4"]):
+    print(len(hrsynth.modes("quattro", legs, at=goal).modes), "and",
+          len(hrsynth.modes("quattro", legs, at="x=0.05,y=0.1,z=-0.5,phi=0.2").modes), "modes, legs", legs or "all")
+
+# %% [markdown]
+# ## Exercises
+#
+# 1. At which pose do the runs of the four legs end? Show that the directions of all four legs are those of the goal.
+# 2. How many times larger than the certified region is the goal's basin of the planar robot, as far as it is drawn?
+# 3. How many of the planar robot's starts end where noise may decide?
+
+# %% [markdown]
+# ## Solutions
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 1. the largest difference of the directions at both poses
+end = four.ends[0]
+batch = hrsynth.observe("quattro").batch
+seen = batch.evaluate(np.stack([end.X, four.target.pose(batch.coordinates.link)])).directions
+print(end.pose, np.abs(seen[0] - seen[1]).max().round(9))
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 2. by the areas
+print(round(1 / planar.covered), "times")
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 3. those that come to a singularity of the law on their way
+print(planar.damped.sum(), "of", planar.starts)
