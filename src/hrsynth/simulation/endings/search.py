@@ -275,8 +275,8 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
         points = []
         fresh.append(new)
         count = sum(map(len, known.values()))
-        least, late = (ENDING_DESCENTS, ENDING_LATE_DESCENT) if minima else (ENDING_LEAST, ENDING_LATE)
-        if number >= least and sum(fresh[len(fresh) // 2 :]) <= late * count:
+        least, part = (ENDING_DESCENTS, ENDING_LATE_DESCENT) if minima else (ENDING_LEAST, ENDING_LATE)
+        if number >= least and sum(fresh[len(fresh) // 2 :]) <= part * count:
             break
     late = sum(fresh[len(fresh) // 2 :])
     isolated = tuple(Critical(point, met) for own in known.values() for _, point, met, _ in own)
