@@ -117,10 +117,11 @@ hrsynth.draw(maps["24"])
 #
 # MMT Appendix A.2 puts all this in an order: throw away sets of legs that do not see everything, that are singular at
 # an end, or that have a singularity between start and goal; rank the rest by accuracy; simulate the best (left out
-# here with `runs=0`: the run is above). `select` does it:
+# here with `runs=0`: the run is above). `select` does it; before accuracy it ranks by where else the loop may end (left
+# out with `endings=0`):
 
 # %%
-best = hrsynth.select(robot, start=START, goal=GOAL, size=2, runs=0)
+best = hrsynth.select(robot, start=START, goal=GOAL, size=2, runs=0, endings=0)
 best
 
 # %% [markdown]

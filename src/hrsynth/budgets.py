@@ -253,6 +253,8 @@ ENDING_LATE = 0.005
 """Part of the critical points that the later half of the starts may find first for the search to end."""
 ENDING_LATE_DESCENT = 0.02
 """The same where only what attracts is sought."""
+SELECT_ROUNDS = 4
+"""Rounds for each set of legs of which the best is selected."""
 ENDING_WALK = 6
 """Random steps along the loops from the starts of one round to those of the next."""
 ENDING_STEPS = 80

@@ -23,9 +23,12 @@ from hrsynth.description import load
 from hrsynth.errors import BadRequest, PoseNotReached
 from hrsynth.geometry.vectors import pose, rotation_from_rpy
 from hrsynth.mechanism.pose import Pose
+from hrsynth.selection.loop_ends import LoopEnds, fewer_are_better
 from hrsynth.selection.select import Candidate, Criteria, Selection, _Work, select
 from hrsynth.selection.sight import CameraView, camera_at, hidden
 from hrsynth.simulation.camera import Camera, cylinders
+from hrsynth.simulation.endings.endings import RestSearch
+from hrsynth.simulation.endings.radius import CertifiedRadius, certified_radius
 
 START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 
@@ -33,7 +36,7 @@ START, GOAL = "x=0,y=0,z=-0.75,phi=0", "x=-0.2,y=0,z=-0.56,phi=0"
 @cache
 def found() -> Selection:
     return select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65",
-                  cone="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1)
+                  cone="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1, endings=0)
 
 
 @cache
@@ -110,7 +113,7 @@ def test_what_is_kept_does_not_depend_on_the_clock(monkeypatch: pytest.MonkeyPat
     ticks = itertools.count(step=3600.0)
     monkeypatch.setattr("time.monotonic", lambda: next(ticks))
     slow = select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65",
-                  cone="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1)
+                  cone="1=0.2deg,2=0.1deg,3=0.1deg", size=2, runs=1, endings=0)
     assert told(slow) == told(found())
     assert slow.left is None
 
@@ -119,7 +122,7 @@ def test_what_is_kept_does_not_depend_on_the_clock(monkeypatch: pytest.MonkeyPat
 def test_what_is_not_examined_is_neither_kept_nor_discarded(examine: int, seconds: float | None) -> None:
     """And nothing else is said of the others than with all examined."""
     part = select(load("delta"), start="x=0,y=0,z=-0.6", goal="x=0.1,y=0.05,z=-0.65", runs=1, size=2,
-                  cone="1=0.2deg,2=0.1deg,3=0.1deg", examine=examine, seconds=seconds)
+                  cone="1=0.2deg,2=0.1deg,3=0.1deg", examine=examine, seconds=seconds, endings=0)
     begun = 0 if seconds else examine
     whole, left = told(found()), {each.legs for each in part.unexamined}
     assert len(part.kept) == begun
@@ -132,6 +135,50 @@ def test_what_is_not_examined_is_neither_kept_nor_discarded(examine: int, second
     assert part.to_dict()["not_examined"]["count"] == len(left)
     assert ("time was over" if seconds else f"the {examine} most accurate") in str(part.left)
     assert "not examined" in str(part)
+
+
+def ends(others: tuple[str, ...] | None, length: float) -> LoopEnds:
+    at = work().goal
+    radius = CertifiedRadius(at, work().setting.motion, length, None, 0.0, 0.0, 1, "not proved")
+    return LoopEnds(others, None if others is None else radius)
+
+
+def test_endings_rank_before_accuracy() -> None:
+    """Fewer poses that attract, then a radius of a higher power of two; sets of which that is not known come last."""
+    ranked = [ends((), 0.05), ends((), 0.01), ends((), 0.0), ends(("mode",), 0.05), ends(None, 0.0)]
+    ranks = [Candidate(("1",), "controllable", ends=each).rank for each in (*ranked, None)]
+    assert ranks == sorted(ranks)
+    assert ranks[:5] == sorted(set(ranks))
+    assert ranks[4] == ranks[5]
+    assert ends((), 0.017).order == ends((), 0.03).order
+
+
+def test_why_fewer_legs_are_better() -> None:
+    """Only where a set that holds them has more poses that attract, or a smaller radius; and of the largest such."""
+    best = ("1", "2"), ends((), 0.03)
+    assert fewer_are_better(best, [(("1", "2", "3"), ends((), 0.02)), (("1", "3", "4"), ends(("mode",), 0.0))]) is None
+    worse = [(("1", "2", "3"), ends(("mode",), 0.03)), (("1", "2", "3", "4"), ends(("critical", "critical"), 0.03))]
+    assert fewer_are_better(best, worse) == (
+        "fewer legs are better here: with 1, 2 the loop was found to be drawn to no other pose besides the goal, with "
+        "1, 2, 3, 4 to 2 critical; the errors of more directions than there are freedoms can balance where they do not "
+        "vanish")
+    assert fewer_are_better(best, [(("1", "2", "3"), ends(None, 0.0))]) is None
+    assert "the certified radius is 30 mm, with 1, 2, 3 it is 4 mm" in str(
+        fewer_are_better(best, [(("1", "2", "3"), ends((), 0.004))]))
+
+
+def test_endings_are_those_of_the_single_questions() -> None:
+    """The kinds of what attracts besides the goal, and the certified radius, of the set that is kept."""
+    best = select("rrrrr_m1", start="x=0.05", goal="x=-0.01,y=0.03", runs=0).kept[0]
+    setting = ObservedRobot.of("rrrrr_m1", best.legs)
+    goal = reach(setting.everything.start, setting.everything.question, Pose.parse("x=-0.01,y=0.03"), setting.motion)
+    assert best.ends is not None
+    assert best.ends.length == pytest.approx(certified_radius(setting, goal).length)
+    found = RestSearch.of(setting, goal).answer(minima=True).attracting
+    assert best.ends.others == tuple(sorted(each.kind for each in found if each.kind != "goal"))
+    assert best.ends.others
+    record = best.to_dict()["endings"]
+    assert record["attracting"] == len(record["kinds"]) == len(best.ends.others)
 
 
 def test_a_singular_end_discards() -> None:

@@ -262,13 +262,15 @@ QUESTIONS = (
                      "ones.", "COUNT", int, 0, low=0),
               _file("accuracy")),
              ("delta --cone 0.1deg --at x=0.1", "delta --cone 0.1deg --plane z=-0.6 -o map.png")),
-    Question("select", "Which legs to watch for a displacement: all sets, ranked by accuracy, and why the others are "
-             "discarded.",
+    Question("select", "Which legs to watch for a displacement: all sets, ranked by where else the loop may end and by "
+             "accuracy, and why the others are discarded.",
              (START, _goal("Goal pose."),
               Option("cone", "Half-angle of the cone about each direction, or one a leg: 1=0.1deg,2=0.2deg,…", "ANGLE",
                      default="0.1deg"),
               *WATCHED, Option("size", "Legs of the largest sets.", None, int, 4, low=1),
               Option("runs", "How many sets must pass a simulated run, best first.", None, int, 3, low=0),
+              Option("endings", "How many of the examined sets are asked where else the loop may end, the most "
+                     "accurate first.", None, int, 20, low=0),
               Option("sight", "Pose of the camera on the link that carries it (x right, y down, z ahead), as "
                      "x=0,y=0,z=0.5,rpy=180deg/0/0; or auto.", "POSE"),
               Option("focal", "Focal length of the camera, of 640 by 480 pixels.", "PIXELS", float, 800.0),

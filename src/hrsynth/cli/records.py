@@ -899,6 +899,17 @@ class DecisionRecord(TypedDict):
     reason: str
 
 
+class LoopEndsRecord(TypedDict):
+    """The rests that were found to attract besides the goal, how many and their kinds, and the certified radius; null
+    what is not known, and the reason."""
+
+    attracting: int | None
+    kinds: list[str] | None
+    certified_mm: float | None
+    certified_deg: float | None
+    reason: str | None
+
+
 class CandidateRecord(TypedDict):
     """A set of legs; null what was not asked."""
 
@@ -911,6 +922,7 @@ class CandidateRecord(TypedDict):
     seen: dict[str, float] | None
     modes: EndCounts
     aspect: DecisionRecord | None
+    endings: LoopEndsRecord | None
     run: DecisionRecord | None
 
 
@@ -924,7 +936,7 @@ class UnexaminedRecord(TypedDict):
 Select = TypedDict("Select", {
     "command": str, "version": str, "robot": str, "from": PoseRecord, "to": PoseRecord, "camera": str,
     "cones": dict[str, float], "sight": dict[str, Any] | None, "best": list[str] | None,
-    "not_examined": UnexaminedRecord, "sets": list[CandidateRecord]})
+    "fewer": str | None, "not_examined": UnexaminedRecord, "sets": list[CandidateRecord]})
 Select.__doc__ = "The sets of legs for a displacement, ranked; the cones by leg in degrees."
 
 

@@ -1,11 +1,13 @@
-"""Which legs to watch for one displacement (MMT A.2): all sets, ranked by the accuracy at the goal."""
+"""Which legs to watch for one displacement (MMT A.2): all sets, ranked by where else the loop may end and by the
+accuracy at the goal."""
 
 from __future__ import annotations
 
 import time
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import combinations
+from functools import cached_property
+from itertools import combinations, islice
 from typing import Any
 
 import numpy as np
@@ -20,7 +22,7 @@ from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike
 from ..analysis.posture import ConfigurationAnalysis, Posture
 from ..analysis.question import question
 from ..analysis.verdict import CONTROLLABLE, verdict_of
-from ..budgets import AXIS_SEEN
+from ..budgets import AXIS_SEEN, SELECT_ROUNDS
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
@@ -31,7 +33,10 @@ from ..progress import tell
 from ..results import Compared, Result, Value, by_name
 from ..simulation.camera import cylinders, placed
 from ..simulation.ending import GOAL
+from ..simulation.endings.endings import RestSearch
+from ..simulation.endings.search import starts
 from ..simulation.servo import servo
+from .loop_ends import LoopEnds, fewer_are_better
 from .sight import CameraView, camera_at, of_focal
 
 BUDGET = 2_000
@@ -53,6 +58,8 @@ class Criteria:
     """Sets, the most accurate first, of which modes and aspects are asked."""
     runs: int = 3
     """Sets that a simulated run is to lead to the goal."""
+    endings: int = 20
+    """Sets, of those that are examined and the most accurate first, whose endings are sought."""
     sight: str | None = None
     """The pose of a camera on the link that carries it, or ``auto`` for one that sees all legs well."""
     focal: float = FOCAL
@@ -64,6 +71,7 @@ class Criteria:
         if self.sight is None and self.focal != FOCAL:
             raise BadRequest("focal length without a camera", self.focal, "together with --sight")
         for what, value, least in (("legs of the largest sets", self.size, 1), ("number of runs", self.runs, 0),
+                                   ("sets whose endings are sought", self.endings, 0),
                                    ("sets that are examined", self.examine, 1)):
             if value < least:
                 raise BadRequest(what, value, f"at least {least}")
@@ -117,8 +125,15 @@ class Candidate(Value):
     start_modes: ModeCount | None = None
     goal_modes: ModeCount | None = None
     aspect: Decision | None = None
+    ends: LoopEnds | None = None
     run: Decision | None = None
     examined: bool = True
+
+    @property
+    def rank(self) -> tuple[float, ...]:
+        """What the best of the examined sets has least of: other poses that attract, certified radius, then ``order``;
+        sets whose endings were not sought come last."""
+        return (*(LoopEnds(None, None) if self.ends is None else self.ends).order, *self.order)
 
     @property
     def order(self) -> tuple[float, float, int]:
@@ -137,13 +152,14 @@ class Candidate(Value):
                 "seen": None if self.seen is None else dict(self.seen),
                 "modes": {"start": self.start_modes and self.start_modes.to_dict(),
                           "goal": self.goal_modes and self.goal_modes.to_dict()},
-                "aspect": self.aspect and self.aspect.to_dict(), "run": self.run and self.run.to_dict()}
+                "aspect": self.aspect and self.aspect.to_dict(), "endings": self.ends and self.ends.to_dict(),
+                "run": self.run and self.run.to_dict()}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Selection(Result, shown_as="select"):
-    """All sets of legs up to a size for one displacement: the kept ones, those not examined, the most accurate at the
-    goal before the others in both, then the discarded ones."""
+    """All sets of legs up to a size for one displacement: the kept ones by their ``rank``, those not examined, the most
+    accurate at the goal first, then the discarded ones."""
 
     setting: ObservedRobot
     start: Pose
@@ -171,6 +187,12 @@ class Selection(Result, shown_as="select"):
         """The sets of which it is not known whether they would be kept."""
         return tuple(each for each in self.candidates if not each.examined)
 
+    @property
+    def fewer(self) -> str | None:
+        """Why the best set serves better than one that holds more legs, None where that is not seen."""
+        known = [(each.legs, each.ends) for each in self.kept if each.ends is not None]
+        return fewer_are_better(known[0], known[1:]) if known and known[0][0] == self.kept[0].legs else None
+
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
         best = next(iter(self.kept), None)
@@ -180,7 +202,7 @@ class Selection(Result, shown_as="select"):
         return {"from": self.start.to_dict(), "to": self.goal.to_dict(), "camera": self.setting.mechanism.reference,
                 "cones": {o.leg: float(np.degrees(cone))
                           for o, cone in zip(self.setting.observed, self.cones, strict=True)},
-                "sight": camera, "best": None if best is None else list(best.legs),
+                "sight": camera, "best": None if best is None else list(best.legs), "fewer": self.fewer,
                 "not_examined": {"count": len(self.unexamined), "reason": self.left},
                 "sets": [each.to_dict() for each in self.candidates]}
 
@@ -189,15 +211,17 @@ class Selection(Result, shown_as="select"):
 @by_name(Criteria, "criteria")
 def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = None, start: PoseLike, goal: PoseLike,
            cone: Cones = "0.1deg", criteria: Criteria, seed: int = 0) -> Selection:
-    """All sets of legs for the displacement from ``start`` to ``goal``, ranked by the largest position error at the
-    goal for cones about the directions (``cone``: the half-angle of all, or one a leg; MMT A.2).
+    """All sets of legs for the displacement from ``start`` to ``goal``, ranked by how many poses besides the goal were
+    found to attract the loop, by the certified radius (those of one power of two are alike), then by the largest
+    position error at the goal for cones about the directions (``cone``: the half-angle of all, or one a leg; MMT A.2).
 
-    The fields of :class:`Criteria` can be given by their names: ``size``, ``examine``, ``runs``, ``sight``, ``focal``,
-    ``seconds``. The sets are those of the legs or links ``observe``, by default of all legs. A set is
-    discarded where it does not see every freedom, where an end is singular, where the camera (``sight``) sees too
-    little of a leg, where start and goal are proved to lie in different aspects, and where a simulated run ends
-    elsewhere. Modes and aspects are asked for the ``examine`` most accurate sets, the others are neither kept nor
-    discarded. Runs are made from the best set on, until ``runs`` of them ended at the goal.
+    The fields of :class:`Criteria` can be given by their names: ``size``, ``examine``, ``endings``, ``runs``,
+    ``sight``, ``focal``, ``seconds``. The sets are those of the legs or links ``observe``, by default of all legs. A
+    set is discarded where it does not see every freedom, where an end is singular, where the camera (``sight``) sees
+    too little of a leg, where start and goal are proved to lie in different aspects, and where a simulated run ends
+    elsewhere. Modes, aspects and endings are asked for the ``examine`` most accurate sets (endings for ``endings`` of
+    them), the others are neither kept nor discarded. Runs are made from the best set on, until ``runs`` of them ended
+    at the goal.
 
     Raises ``BadRequest``, ``PoseNotReached``.
 
@@ -217,7 +241,7 @@ def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = N
     sets = [legs for count in range(1, min(criteria.size, len(labels)) + 1) for legs in combinations(labels, count)]
     found, left = work.examined(sorted((work.first(legs) for legs in sets), key=lambda each: each.order))
     found.sort(key=lambda each: (each.discarded is not None, not each.examined,
-                                 each.order if each.discarded is None else (0, 0, 0)))
+                                 () if each.discarded is not None else each.rank))
     poses = [setting.motion.pose(at.pose(setting.motion.link)) for at in ends]
     return Selection(setting, poses[0], poses[1], tuple(found), half, work.sight, left)
 
@@ -302,8 +326,9 @@ class _Work:
             return ModeCount(None, None, False, str(error))
 
     def examined(self, candidates: Sequence[Candidate]) -> tuple[list[Candidate], str | None]:
-        """The candidates, best first, as many as are to be examined with their modes and aspects, and with simulated
-        runs until enough of them ended at the goal; why the others were left, None where there are none."""
+        """The candidates, of which as many as are to be examined, best first, have modes, aspects and endings, and from
+        the best of these on simulated runs until enough ended at the goal; why the others were left, None where there
+        are none."""
         most, runs = self.criteria.examine, self.criteria.runs
         found: list[Candidate] = []
         arrived = begun = 0
@@ -319,13 +344,28 @@ class _Work:
                 found.append(replace(candidate, examined=False))
                 continue
             begun += 1
-            candidate = self.decided(candidate)
-            if not candidate.discarded and arrived < runs:
+            found.append(self.ended(self.decided(candidate), begun))
+        for place in sorted(range(len(found)), key=lambda i: found[i].rank):
+            candidate = found[place]
+            if candidate.examined and not candidate.discarded and arrived < runs:
                 tell("runs")
-                candidate = self.ran(candidate)
-                arrived += candidate.discarded is None
-            found.append(candidate)
+                found[place] = self.ran(candidate)
+                arrived += found[place].discarded is None
         return found, left
+
+    def ended(self, candidate: Candidate, number: int) -> Candidate:
+        """The candidate, the ``number``-th that is examined, with where its loop may end."""
+        if candidate.discarded or number > self.criteria.endings:
+            return candidate
+        tell("endings")
+        return replace(candidate, ends=LoopEnds.of(self.watching(candidate.legs), self.goal, self.rounds))
+
+    @cached_property
+    def rounds(self) -> tuple[Array, ...]:
+        """Starts from which all sets' endings are sought."""
+        system = RestSearch.of(self.setting, self.goal).system
+        homes = np.array([system.system.read(at.pose) for at in (self.goal, *self.setting.configurations)])
+        return tuple(islice(starts(system, homes, self.seed), SELECT_ROUNDS))
 
     def ran(self, candidate: Candidate) -> Candidate:
         """The candidate with where its simulated run ends, and what the camera sees along it."""

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ...analysis.accuracy.accuracy import Accuracy
     from ...analysis.accuracy.pose_errors import ErrorEllipsoid, PoseErrors
     from ...analysis.accuracy.sampled import Sampled
+    from ...selection.loop_ends import LoopEnds
     from ...selection.select import Candidate, ModeCount, Selection
     from ...simulation.endings.basins import Basins
     from ...simulation.result import Servo
@@ -197,19 +198,24 @@ def selection(found: Selection) -> str:
         f"{o.leg} {np.degrees(cone):.4g}°" for o, cone in zip(observed, found.cones, strict=True))
     name, _ = head(found.setting)
     rows = [name, ("from", str(found.start)), ("to", str(found.goal)), ("cones", f"{angle} about each direction"),
-            ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}, the most accurate first")]
+            ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}")]
     if found.unexamined:
         rows.append(("", f"not examined: {len(found.unexamined)} ({found.left})"))
     if found.sight is not None:
         rows.append(("camera", f"on {found.sight.reference}"))
     blocks = [listing(rows)]
     if found.kept:
-        heads = ["legs", "mm", "degrees", "modes", "aspect", *(["seen"] if sight else []), "run"]
+        heads = ["legs", "others", "certified", "mm", "degrees", "modes", "aspect", *(["seen"] if sight else []),
+                 "run"]
         blocks.append(table([_row(each, sight, length) for each in found.kept], heads))
-        blocks.append("mm, degrees: largest errors at the goal; modes: those of the start / of the goal, in brackets\n"
-                      "those that the robot was found to reach; – not computed")
+        blocks.append("others: poses besides the goal that were found to attract the loop; certified: how far\n"
+                      "around the goal runs are certified to end at it; mm, degrees: largest errors at the goal;\n"
+                      "modes: those of the start / of the goal, in brackets those that the robot was found to\n"
+                      "reach; – not computed. Best first: by others, by certified (alike within a power of two), by mm")
+        if found.fewer is not None:
+            blocks.append(found.fewer)
     if found.unexamined:
-        blocks.append(table([_row(each, sight, length)[:3] for each in found.unexamined],
+        blocks.append(table([[_row(each, sight, length)[i] for i in (0, 3, 4)] for each in found.unexamined],
                             ["not examined", "mm", "degrees"]))
     discarded = [each for each in found.candidates if each.discarded is not None]
     if discarded:
@@ -223,11 +229,23 @@ def _row(each: Candidate, sight: bool, length: float) -> list[str]:
     assert errors is not None
     seen = [] if not sight else ["–" if each.seen is None else f"{100 * min(each.seen.values()):.0f} %"]
     position, orientation = errors.position.largest, errors.orientation.largest
-    return [", ".join(each.legs), f"{1e3 * position:.4g}" if bounded(position, length) else "not bounded",
+    return [", ".join(each.legs), *_ends(each.ends),
+            f"{1e3 * position:.4g}" if bounded(position, length) else "not bounded",
             f"{np.degrees(orientation):.4g}" if bounded(orientation) else "not bounded",
             f"{_modes(each.start_modes)} / {_modes(each.goal_modes)}",
             "–" if each.aspect is None else each.aspect.verdict, *seen,
             "–" if each.run is None else each.run.verdict]
+
+
+def _ends(ends: LoopEnds | None) -> list[str]:
+    """How many poses attract besides the goal, and the certified radius."""
+    if ends is None or ends.others is None:
+        return ["–", "–"]
+    if ends.radius is None or not ends.length:
+        return [str(len(ends.others)), "undecided"]
+    angle = ends.radius.angle
+    turn = "" if angle is None else f", {np.degrees(angle):.2g}°"
+    return [str(len(ends.others)), f"{1e3 * ends.length:.3g} mm{turn}"]
 
 
 def _modes(modes: ModeCount | None) -> str:
