@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.verdict import CONTROLLABLE, verdict_of
 from hrsynth.constraints.pattern import attached
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -35,7 +36,7 @@ class Starts:
     def __init__(self, name: str) -> None:
         found = setting(name)
         system = RestSearch.of(found, found.everything.start).system
-        self.more = starts(system, np.array([system.system.read(at.pose) for at in found.configurations]))
+        self.more = starts(system, np.array([system.system.read(at.pose) for at in found.configurations]), 0, found)
         self.drawn: list[np.ndarray] = []
 
     def __iter__(self) -> Iterator[np.ndarray]:
@@ -64,10 +65,9 @@ def random_sets(name: str, wanted: int) -> Iterator[Legs]:
             yield legs
 
 
-def mark(at: ClosedConfiguration, name: str) -> np.ndarray:
-    """What tells configurations apart: the directions of all segments, the poses of the platform's bodies."""
-    found = setting(name)
-    question = found.everything.question
+def mark(at: ClosedConfiguration, found: ObservedRobot) -> np.ndarray:
+    """What tells rests apart: the observed directions, the poses of the platform's bodies."""
+    question = found.samples.question
     seen = [o.value(at.pose(question.reference), at.pose(o.link)) for o in question.observations]
     for body in attached(found.anatomy):
         X = at.pose(body)
@@ -93,8 +93,8 @@ class Listed:
         name = found.setting.robot.name
         listed = RestSearch.of(found.setting, found.target).answer(minima=True, rounds=pool(name))
         last, end = found.settled, found.run.commands[-1]
-        here = mark(last, name)
-        away = [float(np.abs(mark(each.configuration, name) - here).max()) for each in listed.rests]
+        here = mark(last, found.setting)
+        away = [float(np.abs(mark(each.configuration, found.setting) - here).max()) for each in listed.rests]
         near = int(np.argmin(away)) if away else None
         return cls(found.ended, None if near is None else listed.rests[near], np.inf if near is None else away[near],
                    len(listed.attracting), any(abs(each.error - end.size) < NEAR for each in listed.continua))

@@ -905,8 +905,8 @@ class LoopEndsRecord(TypedDict):
 
     attracting: int | None
     kinds: list[str] | None
-    certified_mm: float | None
-    certified_deg: float | None
+    radius_mm: float | None
+    radius_deg: float | None
     reason: str | None
 
 

@@ -67,8 +67,8 @@ class LoopEnds(Value):
         angle = None if self.radius is None else self.radius.angle
         return {"attracting": None if self.others is None else len(self.others),
                 "kinds": None if self.others is None else list(self.others),
-                "certified_mm": 1e3 * self.length if self.length else None,
-                "certified_deg": None if angle is None or not self.length else float(np.degrees(angle)),
+                "radius_mm": 1e3 * self.length if self.length else None,
+                "radius_deg": None if angle is None or not self.length else float(np.degrees(angle)),
                 "reason": self.why or None}
 
 

@@ -365,7 +365,7 @@ class _Work:
         """Starts from which all sets' endings are sought."""
         system = RestSearch.of(self.setting, self.goal).system
         homes = np.array([system.system.read(at.pose) for at in (self.goal, *self.setting.configurations)])
-        return tuple(islice(starts(system, homes, self.seed), SELECT_ROUNDS))
+        return tuple(islice(starts(system, homes, self.seed, self.setting), SELECT_ROUNDS))
 
     def ran(self, candidate: Candidate) -> Candidate:
         """The candidate with where its simulated run ends, and what the camera sees along it."""

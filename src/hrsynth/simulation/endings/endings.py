@@ -227,14 +227,16 @@ class RestSearch:
         return cls(setting, goal, system, Law(question, setting.dof, 1.0), directions(goal, question)[0])
 
     def answer(self, seed: int = 0, *, minima: bool = False, rounds: Iterable[Array] | None = None) -> Endings:
-        """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`."""
+        """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`, of minima alone neither
+        lists nor enclosures."""
         setting, motion = self.setting, self.setting.motion
         found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds)
         isolated = self._in_mode(found.isolated)
-        lists = self._lists(isolated)
+        lists = [] if minima else self._lists(isolated)
         isolated += [each for one in lists for each in self._listed(one, isolated, found.idle)]
         tell("enclosures")
-        boxes = enclosed(self.system, [each.point for each in isolated], found.idle)
+        boxes = ([None] * len(isolated) if minima else
+                 enclosed(self.system, [each.point for each in isolated], found.idle))
         rests = _ways([each for one, box in zip(isolated, boxes, strict=True)
                        if (each := self.read(one, box)) is not None], self)
         continua = [each for one in self._in_mode(found.continua) if (each := self.read(one)) is not None]
