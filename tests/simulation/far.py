@@ -14,7 +14,6 @@ import json
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -140,6 +139,12 @@ def runs(name: str, watched: Legs | None, seed: int, count: int, known: set[Key]
                "ended": found.ended, "untrue": wrong, **member.to_dict()}
 
 
+def with_random_sets(name: str, count: int, known: set[Key]) -> Iterator[dict[str, Any]]:
+    """Records of so many runs with random sets of legs, or of some more."""
+    for seed, legs in enumerate(random_sets(name, -(-count // OF_ONE_SET)), 5):
+        yield from runs(name, legs, seed, OF_ONE_SET, known)
+
+
 def tables(records: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str, str]:
     """The tables of a log, by the marks that they stand between."""
     ways = {START: ("ended", ENDINGS), MEMBERS: ("member", MEMBER)}
@@ -173,10 +178,8 @@ def main() -> None:
     names = asked.names or CONTROLLABLE
     records = [json.loads(each) for each in asked.log.read_text().splitlines()] if asked.log.exists() else []
     known = {tuple(each[part] for part in KEY) for each in records}
-    ways = [way for name in names for way in (
-        runs(name, None, 4, asked.count, known),
-        chain.from_iterable(runs(name, legs, 5 + i, OF_ONE_SET, known)
-                            for i, legs in enumerate(random_sets(name, -(-asked.random // OF_ONE_SET)))))]
+    ways = [way for name in names for way in (runs(name, None, 4, asked.count, known),
+                                              with_random_sets(name, asked.random, known))]
     with asked.log.open("a", encoding="utf-8") as log:
         while ways:
             # one of each robot in turn: what is broken off has some of all
