@@ -209,9 +209,8 @@ class ExactArchitecture:
         if (len(joints) != 2 or {joint.type for joint in joints} != {JointType.SPHERICAL}
                 or link in (self.mechanism.base, self.mechanism.platform, self.mechanism.reference)):
             return False
-        sensors = [self.observations[i] for i in places if not isinstance(self.observations[i], SeenAxis)]
-        if any(link in (o.link, o.seen_from) for o in (*sensors, *(self.observations[i] for i in places))
-               if o in sensors or o.seen_from is not None):
+        others = (self.observations[i] for i in places if not self.observations[i].by_segment)
+        if any(link in (o.link, o.seen_from) for o in others):
             return False
         ends = {self.relations.centres[joint.name] for joint in joints}
         sights = dict(zip((i for i, o in enumerate(self.observations) if isinstance(o, SeenAxis)),
