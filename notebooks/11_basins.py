@@ -44,9 +44,9 @@ shown(planar)
 # %% [markdown]
 # ## Why four legs are sometimes worse than two
 #
-# Two legs of the Quattro see its four freedoms; four legs see them twice, which is more accurate. But more directions do
-# not always mean fewer places at which all of them are right. The goal x = y = 0, z = −0.5 m, not turned, is symmetric,
-# and so is another pose, below it, at which *all four* rods have the same directions again. It attracts:
+# Two legs of the Quattro see its four freedoms; four legs see them twice, which is more accurate. But more directions
+# do not always mean fewer places at which all of them are right. The goal x = y = 0, z = −0.5 m, not turned, is
+# symmetric, and so is another pose, below it, at which *all four* rods have the same directions again. It attracts:
 
 # %%
 goal, starts = "x=0,y=0,z=-0.5,phi=0", "x=-0.6:0.6:12,y=-0.6:0.6:12,z=-0.7,phi=0"
@@ -59,10 +59,10 @@ print(two)
 shown(two)
 
 # %% [markdown]
-# With four legs not one of these starts comes to the goal: all are drawn to the other pose, and none meets a singularity
-# on the way there. With two legs a few come to the goal, others to a third pose or to where a leg is stretched. Neither
-# is a good choice for this goal from there, and the picture says so before the robot is moved. At a goal that is not
-# symmetric, four legs have one pose only with its directions, two legs still have two:
+# With four legs not one of these starts comes to the goal: all are drawn to the other pose, and none meets a
+# singularity on the way there. With two legs a few come to the goal, others to a third pose or to where a leg is
+# stretched. Neither is a good choice for this goal from there, and the picture says so before the robot is moved. At
+# a goal that is not symmetric, four legs have one pose only with its directions, two legs still have two:
 
 # %%
 for legs in (None, ["1", "4"]):

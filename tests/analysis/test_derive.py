@@ -416,7 +416,9 @@ def test_bad_requests(observe: list[str] | None, camera: str | None, form: str, 
 
 def test_the_record() -> None:
     record = derived("delta", ("1",)).to_dict()
-    axis = derived("delta", ("1",)).setting.observed[0].direction.tolist()
+    seen = derived("delta", ("1",)).setting.observed[0]
+    assert isinstance(seen, Direction)
+    axis = seen.direction.tolist()
     assert record["observed"] == [{"leg": "1", "link": "rod_1a", "kind": "direction", "camera": None, "at": None,
                                    "axis": axis}]
     assert record["camera"] == "base"

@@ -17,6 +17,7 @@ import numpy as np
 
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.geometry.vectors import Array
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.simulation.endings.endings import Endings, endings
 from oracle import Oracle
 
@@ -41,7 +42,8 @@ class Descent:
     def __init__(self, found: Endings) -> None:
         setting = found.setting
         self.oracle = Oracle(setting.mechanism)
-        self.seen = [(self.oracle.index[o.link], o.direction) for o in setting.samples.question.observations]
+        self.seen = [(self.oracle.index[o.link], o.direction) for o in setting.samples.question.observations
+                     if isinstance(o, Direction)]
         self.desired = found.desired
         self.place = {number: 6 * k for k, number in enumerate(self.oracle.moving)}
         self.size = 6 * len(self.place)

@@ -18,7 +18,7 @@ from hrsynth.present.outputs import OUTPUTS
 from hrsynth.simulation.endings import basins as module
 from hrsynth.simulation.endings.abreast import Abreast, Runs
 from hrsynth.simulation.endings.flow import Flow
-from hrsynth.simulation.law import DAMPED
+from hrsynth.simulation.law import DAMPED, directions
 from hrsynth.simulation.servo import ServoTask
 
 HORIZON = 60.0
@@ -191,7 +191,7 @@ GRID = "x=0:0.3:6,y=0:0.3:7,phi=0"
 
 
 @cache
-def small() -> hrsynth.simulation.endings.basins.Basins:
+def small() -> module.Basins:
     return hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid=GRID, jobs=1)
 
 
@@ -237,7 +237,7 @@ def test_every_start_within_the_certified_radius_ends_at_the_goal():
     assert found.certified.length > 0
     goal = found.target.pose(found.setting.motion.link)
     _, flow = task("3rpr_m1")
-    flow = Flow(flow.placer, flow.watched, hrsynth.simulation.law.directions(
+    flow = Flow(flow.placer, flow.watched, directions(
         found.target, found.setting.samples.question)[0])
     rng = np.random.default_rng(0)
     y = rng.uniform(-1, 1, (200, 3)) * [found.certified.length / flow.batch.length] * 2 + [0]
