@@ -96,6 +96,10 @@ class BadMechanism(BadRequest):
     """A mechanism whose parts contradict each other (a joint of an unknown link, a zero axis)."""
 
 
+class NotMeasured(BadRequest):
+    """A measurement that has no value where the links are: a camera inside of the cylinder that it sees."""
+
+
 class Unanswered(HrsynthError):
     """Base of those where the request is sound and has no answer."""
 

@@ -158,7 +158,15 @@ def test_all_kinds_together_are_certified_on_every_robot(robot: str) -> None:
 @pytest.mark.parametrize("robot", [*ROBOTS, "spatial"])
 def test_every_kind_is_certified_on_every_robot(robot: str, kind: str) -> None:
     for form in ("simplified", "general"):
-        assert certified(robot_of(robot), kind, form).verdict.rank > 0
+        assert certified(robot_of(robot), kind, form).certificate.passed
+
+
+@pytest.mark.parametrize(("robot", "least"), [("rprpr_m1", 1), ("rrrrr_m2", 0)])
+def test_samples_with_the_camera_inside_of_a_cylinder_are_discarded(robot: str, least: int) -> None:
+    setting = watched(load(robot), "edge")
+    assert setting.everything.discarded >= least
+    assert all(np.isfinite(member.relation.basis).all() for member in setting.everything.members)
+    assert certified(load(robot), "edge").certificate.passed
 
 
 # ---- image points

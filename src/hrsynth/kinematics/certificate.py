@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..errors import BadMechanism
+from ..errors import BadMechanism, NotMeasured
 from ..geometry.ranks import CLEAN, kernel_basis, largest_angle, range_basis
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
@@ -91,7 +91,11 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
         return verdict(f"not assembled at the zero configuration (loop {twin.worst_loop(twin.q0)[0]!r} misses)")
     for member in members:
         way = member.way if complete else member.way[1::2]
-        q, residual = track_path(twin, [_visible(target, blind) for target in way])
+        try:
+            q, residual = track_path(twin, [_visible(target, blind) for target in way])
+        except NotMeasured as error:
+            angle = np.pi / 2
+            return verdict(f"cannot follow the real robot: {error}")
         worst = max(worst, residual)
         if not residual <= FOLLOWED:
             angle = np.pi / 2

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from ..budgets import EASY_ITERATIONS
-from ..errors import BadMechanism, BranchPoint, NotSampled
+from ..errors import BadMechanism, BranchPoint, NotMeasured, NotSampled
 from ..geometry.ranks import kernel_basis, largest_angle, range_basis
 from ..geometry.vectors import Array
 from ..mechanism.observation import Observation
@@ -122,7 +122,10 @@ def _mode(at: ClosedConfiguration, question: Measurement) -> OperationMode | Non
     """The operation mode that a configuration shows; None where its ranks are not clear, as beside a singularity."""
     if (steady := _steady(at)) is None or steady.kernel()[1].dropped > EXACT:
         return None
-    found = relation(steady, question)
+    try:
+        found = relation(steady, question)
+    except NotMeasured:
+        return None
     return OperationMode(Signature.of(found), at) if found.gap >= RANK_GAP else None
 
 
@@ -198,7 +201,10 @@ class _Walks:
         members, lonely = list[Sample](), list[Sample]()
         discarded = 0
         for number in range(4 * count):
-            sample = self.walk(roots[number % len(roots)])
+            try:
+                sample = self.walk(roots[number % len(roots)])
+            except NotMeasured:
+                sample = None
             if sample is None:
                 discarded += 1
                 continue
@@ -212,7 +218,10 @@ class _Walks:
     def _found_again(self, sample: Sample) -> bool:
         led = [replace(t, measured=tuple(pair for pair in t.measured if pair[0].key in self.leading))
                for t in sample.way]
-        return track_path(sample.configuration.twin, led, iterations=EASY_ITERATIONS)[1] <= FOLLOWED
+        try:
+            return track_path(sample.configuration.twin, led, iterations=EASY_ITERATIONS)[1] <= FOLLOWED
+        except NotMeasured:
+            return False
 
     def walk(self, start: ClosedConfiguration) -> Sample | None:
         """The sample at the end of a random walk; None where it is blocked, or its ranks are not clear."""

@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...errors import NotMeasured
 from ...geometry.screws import couple, force
 from ...geometry.vectors import Array, Numbers, cross, unit
 from ..sights import CameraObservation, Sighting, VirtualJoint, across, apart
@@ -16,9 +17,12 @@ from ..sights import CameraObservation, Sighting, VirtualJoint, across, apart
 
 def tangent(p: Array, d: Array, r: Array) -> Array:
     """n with n · d = 0, n · p = r, ‖n‖ = 1: the plane of normal n through C touches the cylinder; of the two the one
-    with n · (d × p) > 0. A negative r gives (with −n) the other plane."""
+    with n · (d × p) > 0. A negative r gives (with −n) the other plane. Raises ``NotMeasured`` where C is inside."""
     f = p - np.sum(p * d, axis=-1, keepdims=True) * d
     D = np.linalg.norm(f, axis=-1, keepdims=True)
+    if not np.all(np.abs(r) < D):
+        raise NotMeasured("an edge of a cylinder: distance of its axis from the camera's centre (m)", float(D.min()),
+                          f"more than its radius {float(np.abs(r).max()):g}")
     return np.asarray((r / D) * f / D + np.sqrt(1 - (r / D) ** 2) * cross(d, f / D))
 
 
