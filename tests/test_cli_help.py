@@ -88,6 +88,7 @@ def test_examples_are_commands(arguments: tuple[str, ...]):
 @pytest.mark.parametrize("words", [
     ["quattro", "--observe", "1,4", "-o", "a.urdf", "--seed", "3", "--close", "a:b", "--close", "-c:d", "--json"],
     ["-oa.urdf", "--close=a:b", "--seed=3", "--observe=1,4", "--json", "--close=-c:d", "quattro"],
+    ["-o=a.urdf", "--close=a:b", "--seed=3", "--observe=1,4", "--json", "--close=-c:d", "quattro"],
     ["--json", "--output=a.urdf", "--close", "a:b", "--seed", "4", "--close=-c:d", "--seed=3", "--observe", "1,4", "--",
      "quattro"]], ids=" ".join)
 def test_options_stand_anywhere_and_their_values_in_any_form(words: list[str]):
@@ -103,6 +104,9 @@ def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
     assert [command(("view",)).values(["delta", *more])["open_"] for more in ([], ["--no-open"], ["--open"])] == [
         True, False, True]
     assert command(("lint",)).values(["a", "--fix", "b", "--", "-c"])["files"] == ["a", "b", "-c"]
+    assert command(("lint",)).values(["--fix", "--", "-c", "--"])["files"] == ["-c", "--"]
+    assert command(("legs",)).values(["a", "--observe", "--", "--camera=--", "--close", "-h"]).items() >= {
+        "observe": "--", "camera": ["--"], "close": ["-h"]}.items()
 
 
 @pytest.mark.parametrize(("words", "told"), [
@@ -116,7 +120,9 @@ def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
     ("servo delta --gain 1e9", "--gain, found '1e9', allowed: a number, at most 1e+06"),
     ("modes delta --effort nan", "--effort, found 'nan'"),
     ("derive quattro a b", "derive takes no more words, found 'a b'"),
-    ("derive quattro --at", "--at needs a value"), ("derive quattro --json=3", "--json takes no value, found '3'"),
+    ("derive quattro --at", "--at: expected one argument, allowed: POSE"),
+    ("derive quattro --json=3", "--json: ignored explicit argument '3'"),
+    *[(f"derive quattro --seed{between}--", "--seed, found '--', allowed: an integer, at least 0") for between in " ="],
     ("nope", "no such command, found 'nope', allowed: derive"), ("catalog nope", "no such command, found 'nope'")])
 def test_what_cannot_be_read_is_refused_in_one_line(capsys, words: str, told: str):
     assert execute(words.split()) == 2

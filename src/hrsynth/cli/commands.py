@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import shutil
 import textwrap
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from itertools import takewhile
 from typing import Any
 
 from ..errors import BadRequest
@@ -44,57 +45,52 @@ class DeclaredCommand:
         """The value of each option by its name, None where help is asked for; what is called by an old name is told.
         Raises ``BadRequest``.
 
-        Options stand anywhere before ``--``, as ``--name VALUE``, ``--name=VALUE``, ``-n VALUE`` or ``-nVALUE``.
+        Options stand anywhere before ``--``, as ``--name VALUE``, ``--name=VALUE``, ``-n VALUE``, ``-n=VALUE`` or
+        ``-nVALUE``.
         """
+        from argparse import SUPPRESS, ArgumentError, ArgumentParser
+
         flags = {name: (each, told) for each in self.options for names in (*each.names, *each.old)
                  for name, told in zip(names.split("/"), (True, False), strict=False)}
-        given: dict[str, list[Any]] = {}
-        plain: list[str] = []
+        parser = ArgumentParser(add_help=False, allow_abbrev=False, exit_on_error=False, argument_default=SUPPRESS)
+        for name, (option, told) in flags.items():
+            how: dict[str, Any] = {"action": "append_const", "const": told} if option.kind is bool else {}
+            parser.add_argument(name, dest=option.name, **{"action": "append", **how})
+        # argparse takes a value that begins with a dash only behind "="
         rest = iter(words)
-        for word in rest:
-            if word == "--":
-                plain += rest
-            elif word == "-" or not word.startswith("-"):
-                plain.append(word)
-            elif word in HELP:
-                return None
-            else:
-                option, value = self._option(word, flags, rest)
-                given.setdefault(option.name, []).append(value)
-        for option in self.options:
-            if option.argument and plain:
-                count = len(plain) if option.several else 1
-                given[option.name], plain = [option.read(each) for each in plain[:count]], plain[count:]
-        if plain:
-            raise BadRequest(f"{self.name} takes no more words", " ".join(plain))
-        missing = [each.shown for each in self.options if each.default is NEEDED and each.name not in given]
-        if missing:
-            raise BadRequest(f"{self.name} needs {' and '.join(missing)}")
-        return {each.name: each.default if each.name not in given else given[each.name] if each.several
-                else given[each.name][-1] for each in self.options}
-
-    def _option(self, word: str, flags: dict[str, tuple[Option, bool]], rest: Iterator[str]) -> tuple[Option, Any]:
-        """The option that a word names, and its value: in the word, or the next one."""
-        name, given, value = word.partition("=")
-        if not word.startswith("--") and word[:2] in flags:
-            name, given, value = word[:2], word[2:], word[2:]
-        if name not in flags:
+        joined = [f"{word}={value}" if word in flags and flags[word][0].kind is not bool
+                  and (value := next(rest, None)) is not None else word for word in takewhile("--".__ne__, rest)]
+        if set(HELP) & set(joined):
+            return None
+        try:
+            found, plain = parser.parse_known_args(joined)
+        except ArgumentError as error:
+            option, _ = flags[str(error.argument_name)]
+            allowed = None if option.kind is bool else option.value
+            raise BadRequest(f"{error.argument_name}: {error.message}", None, allowed) from None
+        for name in (word.partition("=")[0] for word in plain if word.startswith("-") and word != "-"):
             from difflib import get_close_matches
 
             raise BadRequest(f"{self.name}: no such option", name, get_close_matches(name, flags) or sorted(flags))
-        option, told = flags[name]
-        if name in option.old:
-            warn(f"{name} is called {option.names[0]} now; the old name goes with 0.4")
-        if option.kind is bool:
-            if given:
-                raise BadRequest(f"{name} takes no value", value)
-            return option, told
-        if not given:
-            following = next(rest, None)
-            if following is None:
-                raise BadRequest(f"{name} needs a value", None, option.value)
-            value = following
-        return option, option.read(value)
+        for name in (word.partition("=")[0] for word in joined):
+            if name in flags and name in flags[name][0].old:
+                warn(f"{name} is called {flags[name][0].names[0]} now; the old name goes with 0.4")
+        given: dict[str, list[Any]] = vars(found)
+        plain += rest
+        for option in self.options:
+            if option.argument and plain:
+                count = len(plain) if option.several else 1
+                given[option.name], plain = plain[:count], plain[count:]
+        # Python 3.11 and 3.12 make [] of the value "--"
+        read = {each: [each.read("--" if value == [] else value) for value in given[each.name]]
+                for each in self.options if each.name in given}
+        if plain:
+            raise BadRequest(f"{self.name} takes no more words", " ".join(plain))
+        missing = [each.shown for each in self.options if each.default is NEEDED and each not in read]
+        if missing:
+            raise BadRequest(f"{self.name} needs {' and '.join(missing)}")
+        return {each.name: each.default if each not in read else read[each] if each.several else read[each][-1]
+                for each in self.options}
 
     def shown(self) -> str:
         """Usage, what it does, arguments, groups of options, examples."""
