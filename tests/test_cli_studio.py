@@ -74,7 +74,7 @@ def ask(capfd: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, str, s
 
 @pytest.mark.parametrize(("arguments", "words"), [
     (["nobody"], "neither a file nor a shipped robot"), (["nothing.urdf"], "no such file"),
-    (["--port", "70000"], "65535"), (["--port", "-1"], "greater than or equal to 0"),
+    (["--port", "70000"], "65535"), (["--port", "-1"], "at least 0"),
     (["3rrr_m1", "another"], "another"), (["3rrr_m1", "--observe", "1,,2"], "empty name"),
     (["/dev/null"], "not a regular file")])
 def test_what_cannot_be_done_is_refused_in_one_line(capfd, arguments: list[str], words: str):
