@@ -70,10 +70,12 @@ def test_every_kind_is_written_and_read_again(robot: str, rng: np.random.Generat
     assert native.write(read) == text
 
 
-@pytest.mark.parametrize("ending", ["xml", "sdf", "yaml"])
+@pytest.mark.parametrize("ending", ["xml", "sdf", "yaml", "usda"])
 @pytest.mark.parametrize("robot", ["gough_stewart", "3rrr_m1"])
 def test_every_kind_survives_in_other_dialects(robot: str, ending: str, tmp_path: Path) -> None:
     """The values at zero are the same; links are where they were."""
+    if ending == "usda":
+        pytest.importorskip("pxr")
     mechanism = seeing_all(robot, np.random.default_rng(2))
     save(mechanism, tmp_path / f"robot.{ending}")
     read = load(tmp_path / f"robot.{ending}")

@@ -11,11 +11,11 @@ from typing import Any
 import numpy as np
 
 from ..errors import BadMechanism, NotMeasured
-from ..geometry.ranks import CLEAN, kernel_basis, largest_angle, range_basis
+from ..geometry.ranks import CLEAN, kernel_basis, largest_angle
 from ..geometry.vectors import Array
 from ..mechanism import Mechanism
 from ..results import Result
-from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED
+from ..tolerances import FOLLOWED, RANK_GAP, SAME_RELATION, SOLVED, SURELY_SOMETHING
 from .configuration import ClosedConfiguration
 from .pinocchio_model import PinocchioModel
 from .relation import Measurement, Relation, relation
@@ -119,10 +119,11 @@ def certify(samples: Samples, hidden: Mechanism, *, count: int | None = None, bo
 
 
 def shown(member: Sample) -> list[int]:
-    """How many independent numbers each observation shows at a sample: fewer where it is singular itself, as a circle
-    that is seen edge-on."""
+    """How many independent numbers each observation shows clearly at a sample: fewer where it is itself nearly
+    singular, as a circle that is seen edge-on."""
     relation = member.relation
-    return [range_basis(relation.basis[relation.rows_of(place)], 1.0)[1].value for place in range(len(relation.sizes))]
+    rows = [relation.basis[relation.rows_of(place)] for place in range(len(relation.sizes))]
+    return [int(np.sum(np.linalg.svd(each, compute_uv=False) > SURELY_SOMETHING)) for each in rows]
 
 
 def _as_they_were(samples: Samples, hidden: Mechanism) -> tuple[str, ...]:

@@ -112,7 +112,11 @@ def solve(twin: PinocchioModel, q: Array, task: Task | None = None, *, tolerance
     def advance(q: Array, at: Residual, factor: float) -> Array:
         normal = at.J.T @ at.J
         normal.reshape(-1)[:: twin.nv + 1] += max(factor * at.size**2, 1e-14)
-        step: Array = np.asarray(np.linalg.solve(normal, -(at.J.T @ at.error)), dtype=float)
+        wanted = -(at.J.T @ at.error)
+        try:
+            step: Array = np.asarray(np.linalg.solve(normal, wanted), dtype=float)
+        except np.linalg.LinAlgError:  # singular but for rounding, beside which the least damping is nothing
+            step = np.asarray(np.linalg.lstsq(normal, wanted)[0], dtype=float)
         return twin.moved(q, shortened(step, 0.5))
 
     q, left = descend(q, lambda q: system(twin, q, task), advance, DAMPING, iterations,
