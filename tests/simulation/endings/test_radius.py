@@ -1,6 +1,8 @@
 """The certified radius: the enclosures hold what they enclose, and runs from all over it end at the goal, integrated
 with directions and rates of the batch engine, which reads the legs in another way."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,6 +11,7 @@ from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.enclosures import traced
 from hrsynth.geometry.affine import affine
 from hrsynth.geometry.so3 import exponential, logarithm
+from hrsynth.mechanism.model import Limits
 from hrsynth.simulation.endings.cones import ConeProver, RisingCones
 from hrsynth.simulation.endings.pose_error import PoseError
 from hrsynth.simulation.endings.radius import CERTIFIED, UNDECIDED, certified_radius
@@ -124,6 +127,16 @@ def test_a_goal_that_the_directions_do_not_see_is_undecided():
     found = certified_radius(setting, setting.everything.start)
     assert found.verdict == UNDECIDED
     assert "do not see" in found.words
+
+
+def test_where_joints_have_limits_nothing_is_certified():
+    """A run stops at a limit, however near to the goal it starts."""
+    robot = load("rrrrr_m1")
+    joint = replace(robot.joints["shoulder_1"], limits=Limits(-0.05, 0.05))
+    setting = ObservedRobot.of(replace(robot, joints={**robot.joints, "shoulder_1": joint}))
+    found = certified_radius(setting, setting.everything.start)
+    assert found.verdict == UNDECIDED
+    assert found.words.endswith("limits of joints: shoulder_1")
 
 
 @pytest.mark.long

@@ -44,7 +44,6 @@ class CertifiedRadius(Value):
     least: float
     boxes: int
     reason: str
-    limits: tuple[str, ...] = ()
 
     @property
     def verdict(self) -> str:
@@ -73,6 +72,8 @@ def certified_radius(setting: ObservedRobot, goal: ClosedConfiguration) -> Certi
         error = PoseError.of(setting, goal)
         if error.fitted:
             raise NotEnclosed(f"forms are fitted to samples: {', '.join(error.fitted)}")
+        if error.limits:
+            raise NotEnclosed(f"a run may stop at the limits of joints: {', '.join(error.limits)}")
         proved = _proved(error)
     except NotEnclosed as why:
         return CertifiedRadius(goal, setting.motion, 0.0, None, 0.0, 0.0, 0, str(why))
@@ -82,7 +83,7 @@ def certified_radius(setting: ObservedRobot, goal: ClosedConfiguration) -> Certi
     least = proved.rise / (error.size * float(np.linalg.norm(proved.prover.W, 2)) ** 2)
     reason = "forms of the legs and the error enclosed in cones about the goal"
     return CertifiedRadius(goal, error.motion, reach * error.length, angle, proved.level, least, proved.boxes + boxes,
-                           reason, error.limits)
+                           reason)
 
 
 def _proved(error: PoseError) -> ProvedCones:
