@@ -23,6 +23,7 @@ GRID = ["--grid", "x=0:0.02:2,y=0.2:0.24:2"]
 DRAWN = {"check": ["check", "rrrrr_m1", *GRID], "modes": ["modes", "3rrr_m1"],
          "atlas": ["atlas", "3rrr_m1", "--observe", "2,1,3"],
          "accuracy": ["accuracy", "rrrrr_m1", "--cone", "0.1deg", *GRID],
+         "endings": ["endings", "prrrp_m1", "--at", "mode:1"],
          "basins": ["basins", "rrrrr_m1", "--to", "x=0.02,y=0.24", "--grid", "x=0.01:0.02:2,y=0.24", "--jobs", "1"],
          "servo": ["servo", "rrrrr_m1", "--start", "x=0,y=0.2", "--goal", "x=0.02,y=0.22"],
          "singular": ["singular", "rrrrr_m1", "--points", "5", "--steps", "5"]}
@@ -57,7 +58,7 @@ def test_one_sentence_names_what_is_written(here: Path, capsys, arguments: list[
     assert all(sentences[0].count(name) == 1 for name in files)
 
 
-@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name == "singular"))
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in ("singular", "endings")))
                                   for name in DRAWN])
 def test_figures_are_written_as_wide_as_asked(here: Path, capsys, name: str):
     widths = {"120mm": 120 / 25.4, "11.5cm": 11.5 / 2.54, "4.5in": 4.5}
