@@ -363,7 +363,8 @@ class RestSearch:
 
 
 def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
-    """Rests at one pose with the same measured directions as one: in the working modes nearest to the goal's, with how
+    """Rests at one pose with the same measured directions as one: of the enclosed ones, if there are any, that in the
+    working modes nearest to the goal's (where loops are singular, coordinates are known to half their digits), with how
     many there are."""
     setting = search.setting
     segments = [directions(each.configuration, setting.everything.question)[0] for each in rests]
@@ -378,7 +379,8 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
             groups.append([k])
         else:
             own.append(k)
-    best = [min(group, key=lambda k: float(np.linalg.norm(segments[k] - home))) for group in groups]
+    best = [min(group, key=lambda k: (not rests[k].proved, float(np.linalg.norm(segments[k] - home))))
+            for group in groups]
     return [replace(rests[k], ways=len(group), met=sum(rests[i].met for i in group))
             for k, group in zip(best, groups, strict=True)]
 
