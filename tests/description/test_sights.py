@@ -135,6 +135,7 @@ ASKED_WRONG = [
     (["--see", "line:platform@1,2,3"], "without the attribute, found 'axis'"),
     (["--see", "point:platform@1,2,3/0,0,1"], "more than the kind needs, found '0,0,1', allowed: at"),
     (["--see", "ear=point:platform@1,2,3"], "unknown camera, found 'ear', allowed: none is named"),
+    (["--camera", "a=base", "--camera", "a=rod_1", "--see", "point:platform@1,2,3"], "a second camera of this name"),
     (["--camera", "a=base", "--camera", "b=rod_1", "--see", "point:platform@1,2,3"], "by which camera, allowed: a=po"),
     (["--camera", "a=base@1,2", "--see", "point:platform@1,2,3"], "--camera a=base@1,2, found '1,2', allowed: 3 num"),
     (["--camera", "a=base@1deg,2,3", "--see", "point:platform@1,2,3"], "found '1deg,2,3', allowed: metres"),

@@ -116,7 +116,7 @@ def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
     if more:
         raise BadRequest(f"--see {text}: more than the kind needs", "/".join(more), ", ".join(needs) or "nothing more")
     by_camera = issubclass(kinds()[kind], CameraObservation)
-    if by_camera and not camera and len(cameras) > 1:
+    if by_camera and not camera and len(set(cameras)) > 1:
         raise BadRequest(f"--see {text}: by which camera", None, ", ".join(f"{name}={rest}" for name in cameras))
     camera = camera or (cameras[0] if by_camera and cameras else "")
     try:
