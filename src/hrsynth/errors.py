@@ -97,7 +97,7 @@ class BadMechanism(BadRequest):
 
 
 class NotMeasured(BadRequest):
-    """A measurement that has no value where the links are: a camera inside of the cylinder that it sees."""
+    """A measurement that has no value where the links are: a camera in the cylinder or at the point that it sees."""
 
 
 class Unanswered(HrsynthError):

@@ -14,15 +14,15 @@ from hrsynth.analysis.exact import architecture
 from hrsynth.analysis.observed import ObservedRobot, restricted
 from hrsynth.analysis.verdict import verdict_of
 from hrsynth.description import load, native, shipped
-from hrsynth.errors import BadRequest, RankUndecided
-from hrsynth.geometry.vectors import Array, pose
+from hrsynth.errors import BadRequest, NotMeasured, RankUndecided
+from hrsynth.geometry.vectors import Array, pose, transform
 from hrsynth.mechanism.builder import Builder
 from hrsynth.mechanism.model import Mechanism
 from hrsynth.mechanism.observations import kinds
 from hrsynth.tolerances import SAME_RELATION
 from kinematics.robots import ROBOTS
 from oracle import exponential
-from strategies import pods, random_direction, random_rotation
+from strategies import pods, random_direction, random_rotation, transformed
 
 KINDS = sorted(kinds())
 POINTS = [f"point:platform@{at}" for at in ("0.1,0,0", "-0.1,0.1,0", "0,0.1,0.1", "0.05,-0.1,0")]
@@ -236,6 +236,20 @@ def test_motions_that_move_an_observed_value_are_not_idle() -> None:
     plain, watched_ = (ObservedRobot.of("delta", see=see) for see in (None, ["point:rod_1a@0.05,0.02,-0.1"]))
     assert plain.mobility.total == watched_.mobility.total
     assert plain.mobility.idle == watched_.mobility.idle + 1
+
+
+@pytest.mark.parametrize("kind", ["point", "distance", "image_line"])
+@pytest.mark.parametrize("seed", range(3))
+def test_what_always_goes_through_the_camera_s_centre_is_refused(kind: str, seed: int) -> None:
+    """A camera in an elbow sees the elbow's point of the other link: the digits of the place are all that moves."""
+    rng = np.random.default_rng(seed)
+    mechanism = transformed(load("3rrr_m1"), random_rotation(rng), rng.normal(size=3))
+    joint = mechanism.joints["elbow_1"]
+    here, there = (",".join(map(str, transform(np.linalg.inv(mechanism.links[link].pose), joint.point)))
+                   for link in joint.links)
+    see = f"eye={kind}:{joint.links[1]}@{there}" + ("/0.3,0.4,0.5" if kind == "image_line" else "")
+    with pytest.raises(NotMeasured, match="camera's centre"):
+        ObservedRobot.of(mechanism, camera=[f"eye={joint.links[0]}@{here}"], see=[see])
 
 
 def circumcircle(points: Array) -> tuple[Array, float, Array]:

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Self
 
 import numpy as np
 
-from ..errors import BadMechanism
+from ..errors import BadMechanism, NotMeasured
 from ..geometry.vectors import Array, Numbers, frozen, hat, inverse, perpendicular, transform, unit
 from ..results import Value
 from ..tolerances import SAME_POINT
@@ -239,7 +239,11 @@ def _stacked(observations: tuple[Observation, ...]) -> tuple[Array, Array, Array
 
 
 def normalised(w: Array) -> tuple[Array, Array]:
-    """w/‖w‖ (…, 3) of vectors w, and what its rate makes of ẇ: (I − n nᵀ)/‖w‖, (…, 3, 3)."""
+    """w/‖w‖ (…, 3) of vectors w, and what its rate makes of ẇ: (I − n nᵀ)/‖w‖, (…, 3, 3). Raises ``NotMeasured`` where
+    a w vanishes."""
     size = np.linalg.norm(w, axis=-1, keepdims=True)
+    if not np.all(size > SAME_POINT):
+        raise NotMeasured("a point or line in the image: distance from the camera's centre (m)", float(size.min()),
+                          f"more than {SAME_POINT:g}")
     n = w / size
     return n, (np.eye(3) - n[..., :, None] * n[..., None, :]) / size[..., None]
