@@ -271,14 +271,12 @@ class TestExamples:
         assert hrsynth.load("example:cassie.urdf").name == hrsynth.load("3rrr_m1").name
 
     def test_the_package_is_named_where_it_is_missing(self, monkeypatch):
-        from importlib.metadata import PackageNotFoundError
-
-        from hrsynth.description import example_data
+        from importlib import metadata
 
         def none(_):
-            raise PackageNotFoundError
+            raise metadata.PackageNotFoundError
 
-        monkeypatch.setattr(example_data, "distribution", none)
+        monkeypatch.setattr(metadata, "distribution", none)
         with pytest.raises(MissingExtra) as caught:
             hrsynth.load("example:cassie")
         assert 'pip install "hrsynth[examples]"' in str(caught.value)

@@ -93,7 +93,8 @@ def test_the_python_example_runs_and_prints_what_it_says():
     assert output.getvalue().splitlines() == said
 
 
-@pytest.mark.parametrize("command", dict.fromkeys(re.findall(r"\$ hrsynth (\w.*)", SHOWN)))
+@pytest.mark.parametrize("command", [pytest.param(each, marks=[pytest.mark.slow] * each.startswith("basins"))
+                                     for each in dict.fromkeys(re.findall(r"\$ hrsynth (\w.*)", SHOWN))])
 def test_the_commands_print_what_is_shown(command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,
                                           monkeypatch: pytest.MonkeyPatch):
     """Line by line, with its numbers; a page may leave lines out."""

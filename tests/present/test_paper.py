@@ -45,6 +45,9 @@ QUESTIONS: dict[str, Callable[[str], Any]] = {
                                                   goal="x=0.034,y=0.23,phi=23deg"),
     "servo in space": lambda _: hrsynth.servo("quattro", "1,4", start="x=0,y=0,z=-0.75,phi=0",
                                               goal="x=-0.2,y=0,z=-0.56,phi=0"),
+    "endings in the plane": lambda _: hrsynth.endings("prrrp_m1", at="mode:1"),
+    "basins of a plane": lambda _: hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid="x=0:0.3:6,y=0:0.3:7,phi=0",
+                                                  jobs=1),
     "atlas": lambda _: hrsynth.atlas("quattro", "1,4"),
     "atlas with its section": lambda folder: hrsynth.atlas(six_poses(folder)),
 }

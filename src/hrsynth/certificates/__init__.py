@@ -64,6 +64,8 @@ def verify(source: Mapping[str, Any] | str | Path, robot: Mechanism | str | Path
             raise BadRequest(f"the certificate cannot be read: {why}", name,
                              "a file that modes, derive or path wrote with --certificate") from None
     try:
+        if not isinstance(record, dict):
+            raise NotAccepted("it is no object")
         checker = verify_path if record.get("claim") == "path" else verify_certificate
         proved = checker.verify(record)
     except (NotAccepted, PathNotAccepted) as reason:

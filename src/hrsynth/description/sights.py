@@ -71,7 +71,9 @@ def spec_of(attributes: Mapping[str, str], line: int | None = None) -> SightSpec
 
 def attributes_of(seen: Observation, mechanism: Mechanism, decimals: int) -> dict[str, str]:
     """The attributes of an ``<observe>`` that say an observation, points with so many decimals; raises ``BadRequest``
-    where no camera that has a name is on the link from which it is seen."""
+    where it is of no kind that files have, or no camera that has a name is on the link from which it is seen."""
+    if not isinstance(seen, (*kinds().values(),)):
+        raise BadRequest(f"observation {seen.leg!r}", type(seen).__name__, list(kinds()))
     link = str(seen.seen_from) if isinstance(seen, Inclination) else seen.link
     own = {"joint": seen.joint} if isinstance(seen, Encoder) else {"link": link}
     found = {**({} if seen.by_segment else {"kind": seen.kind}), "leg": seen.leg, **own}
