@@ -215,8 +215,8 @@ class CriticalPoints(Value):
     @property
     def words(self) -> str:
         """What was done, and how well it covers."""
-        return (f"found from {self.starts:,} random starts, {self.late} of {len(self.isolated)} configurations first in "
-                "the second half of these")
+        return (f"found from {self.starts:,} random starts, {self.late} of {len(self.isolated)} configurations first "
+                "in the second half of these")
 
 
 def starts(system: RestSystem, homes: Array, seed: int = 0, setting: ObservedRobot | None = None) -> Iterator[Array]:
