@@ -184,6 +184,19 @@ def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[
     np.testing.assert_allclose(point.camera.pose, parse_camera(cameras[0]).pose)
 
 
+def test_names_with_slashes_and_equals_signs_are_asked_for() -> None:
+    """As in MJCF that is put together of parts, arm/link: a slash was taken for the start of an axis."""
+    name = "arm/left=1/link"
+    for text, link, at, axis in ((f"eye=line:{name}@1,2,3/0,0,1", name, (1, 2, 3), (0, 0, 1)),
+                                 (f"point:{name}@1,2,3", name, (1, 2, 3), None),
+                                 (f"eye=direction:{name}/0,0,1", name, None, (0, 0, 1)),
+                                 (f"inclination:{name}", name, None, None),
+                                 (f"inclination:{name}/0,0,1", name, None, (0, 0, 1)),
+                                 (f"encoder:{name}", name, None, None)):
+        spec = parse_see(text, [])
+        assert (spec.link, spec.at, spec.axis, spec.camera) == (link, at, axis, "eye" if "eye" in text else None)
+
+
 def test_what_a_file_lists_is_watched_and_can_be_chosen(tmp_path: Path) -> None:
     file = tmp_path / "body.urdf"
     points = "\n".join(f'<observe kind="point" camera="eye" link="object" at="{x}"/>' for x in ("1 0 0", "0 1 0"))

@@ -100,13 +100,18 @@ def _eye(mechanism: Mechanism, seen: Observation) -> str | None:
 
 def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
     """What a word of ``--see`` says; without a name, of the one camera in ``cameras`` where there is one."""
-    camera, _, rest = text.rpartition("=")
-    kind, given, place = rest.partition(":")
+    head, given, place = text.partition(":")
+    camera, _, kind = head.rpartition("=")
     if not given:
         raise BadRequest("--see", text, SEE)
     needs = _needs(kind)
-    place, *more = place.split("/")
-    link, _, at = place.rpartition("@") if "at" in needs else (place, "", "")
+    # names of links and joints may have slashes: numbers follow the last @, or have commas
+    if "at" in needs:
+        link, _, numbers = place.rpartition("@")
+        at, *more = numbers.split("/")
+    else:
+        link, *more = re.split("/(?=[^/]*,[^/]*$)", place)
+        at = ""
     attributes = {"kind": kind, "joint" if "joint" in needs else "link": link or at}
     if "at" in needs:
         if not link:
@@ -119,7 +124,7 @@ def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
         raise BadRequest(f"--see {text}: more than the kind needs", "/".join(more), ", ".join(needs) or "nothing more")
     by_camera = issubclass(kinds()[kind], CameraObservation)
     if by_camera and not camera and len(set(cameras)) > 1:
-        raise BadRequest(f"--see {text}: by which camera", None, ", ".join(f"{name}={rest}" for name in cameras))
+        raise BadRequest(f"--see {text}: by which camera", None, ", ".join(f"{name}={text}" for name in cameras))
     camera = camera or (cameras[0] if by_camera and cameras else "")
     try:
         found = spec_of(attributes | ({"camera": camera} if camera else {}))
