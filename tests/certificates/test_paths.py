@@ -96,6 +96,13 @@ def test_one_aspect_is_not_told_to_be_two():
         checker.verify(sealed(false))
 
 
+def test_legs_of_two_robots_separate_nothing():
+    record = json.loads(separated())
+    record["legs"][1][0]["rod"] = str(Fraction(record["legs"][1][0]["rod"]) * Fraction(1001, 1000))
+    with pytest.raises(checker.PathNotAccepted, match="not the same"):
+        checker.verify(sealed(record))
+
+
 def spoil(record, rng) -> str:
     """A change that leaves no proof."""
     node = rng.choice(record["path"])

@@ -237,6 +237,8 @@ def path(record: Any) -> str:
     need(record["ends"] == [record["path"][0], record["path"][-1]], "the ends of another path")
     if record["verdict"] == "separated":
         need(len(poses) == len(legs) == 2, "two poses, each in its working modes")
+        fixed = [[{**leg, "mode": None} for leg in each] for each in legs]
+        need(fixed[0] == fixed[1], "legs that are not the same at both poses")
         one, other = (sign(condition(record, each, [interval(x) for x in p], [interval(x) for x in q]))
                       for (p, q), each in zip(poses, legs, strict=True))
         need(one != other, "the condition has one sign at both poses")
