@@ -80,7 +80,7 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
         entries += MapPlane.of(grid.axes, found.setting.motion, 0.4, 1.6).robot(figure, found.setting.everything.start)
     plots.legend(figure, entries, paper)
     heading(figure, f"{found.setting.robot.name}, legs {', '.join(found.setting.labels)} observed: where each start "
-            f"ends\ngoal {plots.pose_words(found.goal)}; starts: ", grid.fixed, "")
+            f"ends\ngoal {plots.pose_words(found.goal)}{'; starts: ' if grid.fixed else ''}", grid.fixed, "")
     return printed(figure, paper)
 
 
