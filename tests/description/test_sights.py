@@ -6,6 +6,7 @@ import json
 import re
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -182,6 +183,12 @@ def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[
     assert isinstance(point, CameraObservation)
     assert point.camera is not None
     np.testing.assert_allclose(point.camera.pose, parse_camera(cameras[0]).pose)
+
+
+@pytest.mark.parametrize("asked", [{"see": 5}, {"see": [3]}, {"camera": 4}])
+def test_what_is_no_text_is_refused(asked: dict[str, Any]) -> None:
+    with pytest.raises(BadRequest, match="cameras and what they see, found"):
+        ObservedRobot.of("gough_stewart", **asked)
 
 
 def test_names_with_slashes_and_equals_signs_are_asked_for() -> None:

@@ -270,7 +270,8 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
 
 def as_texts(given: str | Iterable[str] | None) -> tuple[str, ...]:
     """One text or several; raises ``BadRequest`` for what is none."""
-    every = () if given is None else (given,) if isinstance(given, str) else tuple(given)
+    every = () if given is None else tuple(given) if isinstance(given, Iterable) and not isinstance(given, str) else (
+        given,)
     if not all(isinstance(each, str) for each in every):
         raise BadRequest("cameras and what they see", given, f"texts such as {SEE}, or {CAMERA}")
     return every
