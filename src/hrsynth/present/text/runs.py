@@ -63,7 +63,7 @@ def servo(found: Servo) -> str:
     if track.passages == ():
         met = least["smallest"] is not None and least["smallest"] < DAMPED
         rows.append(("", "a Type 2 singularity met and left again on the same side" if met
-                     else "no singularity crossed"))
+                     else "no singularity of the hidden robot crossed"))
     return listing(rows)
 
 
