@@ -66,10 +66,8 @@ class DeclaredCommand:
             found, plain = parser.parse_known_args(joined)
         except ArgumentError as error:
             option, _ = flags[str(error.argument_name)]
-            if option.kind is bool:
-                value = next(each for each in joined if each.startswith(f"{error.argument_name}=")).partition("=")[2]
-                raise BadRequest(f"{error.argument_name} takes no value", value) from None
-            raise BadRequest(f"{error.argument_name} needs a value", None, option.value) from None
+            allowed = None if option.kind is bool else option.value
+            raise BadRequest(f"{error.argument_name}: {error.message}", None, allowed) from None
         for name in (word.partition("=")[0] for word in plain if word.startswith("-") and word != "-"):
             from difflib import get_close_matches
 
@@ -86,9 +84,6 @@ class DeclaredCommand:
         # Python 3.11 and 3.12 make [] of the value "--"
         read = {each: [each.read("--" if value == [] else value) for value in given[each.name]]
                 for each in self.options if each.name in given}
-        for each, values in read.items():
-            if not each.several and each.kind is not bool and any(value != values[-1] for value in values):
-                warn(f"{each.names[0]} is given {len(values)} times; the last counts, {values[-1]}")
         if plain:
             raise BadRequest(f"{self.name} takes no more words", " ".join(plain))
         missing = [each.shown for each in self.options if each.default is NEEDED and each not in read]
