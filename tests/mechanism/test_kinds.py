@@ -32,24 +32,28 @@ def random_pose(rng: Rng) -> Array:
 
 
 def drawn(kind: type[Observation], rng: Rng, side: int = 1) -> Observation:
-    """An observation of link l by a camera on link c, with a small radius where it has one."""
+    """An observation of link l by a camera on link c, with a small radius where it has one (but a circle in the image: its
+    size would hardly be seen)."""
     if issubclass(kind, CameraObservation):
         camera = NamedCamera("eye", "c", random_pose(rng))
         axis = random_direction(rng) if "axis" in kind.needs else None
-        radius = side * rng.uniform(0.05, 0.1) if "radius" in kind.needs else None
+        widest = 1.0 if kind.kind == "image_circle" else 0.1
+        radius = side * widest * rng.uniform(0.5, 1.0) if "radius" in kind.needs else None
         return kind("p", "l", at=rng.normal(size=3), axis=axis, radius=radius, camera=camera)
     return kind("p", "l", random_direction(rng), seen_from="c")  # type: ignore[call-arg]
 
 
 def far(rng: Rng, kind: type[Observation], side: int = 1) -> tuple[Observation, Array, Array]:
-    """An observation and the poses of both links, no point or line near the camera's centre, nothing on an axis."""
+    """An observation and the poses of both links, no point or line near the camera's centre, nothing on an axis, and
+    the centre not near the plane of a circle that is seen as a conic, where that loses rank."""
     while True:
         seen, X_c, X = drawn(kind, rng, side), random_pose(rng), random_pose(rng)
         if not isinstance(seen, CameraObservation):
             return seen, X_c, X
         at = seen.sighting(X_c, X)
         line = np.linalg.norm(np.cross(at.B - at.C, at.d)) if seen.axis is not None else 1.0
-        if line > 0.4 and np.linalg.norm(at.B - at.C) > 0.4:
+        flat = abs(np.dot(at.B - at.C, at.d)) if seen.kind == "image_circle" else 1.0
+        if line > 0.4 and np.linalg.norm(at.B - at.C) > 0.4 and flat > 0.1:
             return seen, X_c, X
 
 
