@@ -32,8 +32,8 @@ def random_pose(rng: Rng) -> Array:
 
 
 def drawn(kind: type[Observation], rng: Rng, side: int = 1) -> Observation:
-    """An observation of link l by a camera on link c, with a small radius where it has one (but a circle in the image: its
-    size would hardly be seen)."""
+    """An observation of link l by a camera on link c, with a small radius where it has one; not of a
+    circle in the image, whose size would hardly be seen."""
     if issubclass(kind, CameraObservation):
         camera = NamedCamera("eye", "c", random_pose(rng))
         axis = random_direction(rng) if "axis" in kind.needs else None
