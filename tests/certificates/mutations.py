@@ -78,6 +78,16 @@ def wrong_count(record: Record, rng: random.Random) -> None:
     record[rng.choice(("real", "complex"))] += rng.choice((-2, -1, 1, 2))
 
 
+def uncounted(record: Record, rng: random.Random) -> None:
+    """A pose that says besides that it misses a leg, and is left out of the count of complex ones."""
+    _, box = a_box(record, rng)
+    if "pose" not in box:
+        return wrong_count(record, rng)
+    box["misses"] = 0
+    record["complex"] -= 1
+    return None
+
+
 def wrong_pose(record: Record, rng: random.Random) -> None:
     _, box = a_box(record, rng)
     if "pose" not in box:
@@ -103,6 +113,25 @@ def wrong_caps(record: Record, rng: random.Random) -> None:
         return wrong_count(record, rng)
     for group in bound["groups"]:
         group[1] = rng.choice((0, 1, 13, -1, 2.5, "3"))
+    return None
+
+
+def other_far(record: Record, rng: random.Random) -> None:
+    """Another vector above the caps, one less, or one twice."""
+    bounds = [system["bound"] for system in record["systems"] if system["bound"].get("far")]
+    if not bounds:
+        return wrong_count(record, rng)
+    far = rng.choice(bounds)["far"]
+    k = rng.randrange(len(far))
+    match rng.randrange(3):
+        case 0:
+            far.pop(k)
+        case 1:
+            far.append(far[k])
+        case 2:
+            used = [j for j, c in enumerate(far[k]) if int(c, 16)]
+            j = rng.choice(used)
+            far[k][j] = hex(int(far[k][j], 16) + rng.choice((-1, 1)))
     return None
 
 
@@ -202,8 +231,8 @@ def wrong_type(record: Record, rng: random.Random) -> None:
 
 FALSE: tuple[Callable[[Record, random.Random], None], ...] = (
     drop_box, double_box, repeat_box, move_box, turn_complex, wrong_radius, wrong_inverse, wrong_count, wrong_pose,
-    forget_pose, wrong_caps, other_geometry, open_joint, lost_link, other_measurement, other_place, other_joint,
-    missing_key, wrong_type)
+    uncounted, forget_pose, wrong_caps, other_far, other_geometry, open_joint, lost_link, other_measurement,
+    other_place, other_joint, missing_key, wrong_type)
 
 
 def false(record: Record, rng: random.Random) -> tuple[str, Record]:

@@ -33,7 +33,7 @@ def bar(length: object = 1, centre: object = 1, legs: Sequence[tuple[object, Rec
     tips = [[0, 0], [length, 0], *([at, 0] for at, _ in legs)]
     reaches = [{"point": text([[0, 0]])}, {"circle": text([[centre, 0], [1, 0], [0, 1]])}, *(each for _, each in legs)]
     return {"kind": "planar", "square": 2, "tips": text(tips), "reaches": reaches,
-            "bound": {"kind": "rank", "groups": [[[0], 2]]}}
+            "bound": {"kind": "rank", "groups": [[[0], 2, 0]]}}
 
 
 def line(height: object, along: object = 1) -> Record:
@@ -124,6 +124,20 @@ def vague_pose() -> Record:
     return certificate(2, 2, posed(sound(), 1.0, 2.0, within=3))
 
 
+def poses_that_miss_a_leg() -> Record:
+    """Each real pose says besides that it misses a leg: none counts as complex."""
+    system = sound()
+    for box in system["boxes"]:
+        box["misses"] = 0
+    return certificate(2, 0, system)
+
+
+def a_box_with_another_word() -> Record:
+    system = sound()
+    system["boxes"][0]["far"] = 1
+    return certificate(2, 2, system)
+
+
 def system_twice() -> Record:
     return certificate(4, 4, sound(), sound())
 
@@ -184,6 +198,14 @@ def tips_out_of_the_plane() -> Record:
     return certificate(0, 2, boxed(system | {"tips": text([[0, 0, 0], [1, 0, 10]])}, 1j, -1j))
 
 
+def called_far() -> Record:
+    """In units so small that all poses are 10^9 of them away."""
+    large = 10 ** 9
+    system = bar(large, large)
+    system["reaches"][1] = {"circle": text([[large, 0], [large, 0], [0, large]])}
+    return certificate(0, 0, boxed(system, ROOT, -ROOT))
+
+
 def another_name() -> Record:
     """The rank of one number, told as that of a stack of two matrices."""
     return sealed({"format": "hrsynth-certificate-1", "claim": "ranks", "matrices": {"A; X": [[1]]},
@@ -192,8 +214,8 @@ def another_name() -> Record:
 
 FORGED: tuple[Callable[[], Record], ...] = (
     ignored_tips, no_tips_compared, tips_called_arrows, vague_pose, system_twice, no_system, poses_called_infinite,
-    short_normal, tiny_units, large_sphere, fits_beside_the_solution, complex_poses_forgotten,
-    normal_taken_for_a_direction, tips_out_of_the_plane, another_name)
+    short_normal, tiny_units, large_sphere, fits_beside_the_solution, complex_poses_forgotten, called_far,
+    normal_taken_for_a_direction, tips_out_of_the_plane, another_name, poses_that_miss_a_leg, a_box_with_another_word)
 
 
 @pytest.mark.parametrize("forged", FORGED, ids=lambda each: each.__name__)
@@ -212,7 +234,7 @@ def test_a_chart_is_four_independent_rows_of_integers(chart):
         checker.pose(record, [[Fraction(0)] * 3])
 
 
-@pytest.mark.parametrize("groups", [[[[k], 12] for k in range(4)], [[[0, 1, 2, 3], 2], *[[[], 1]] * 10 ** 6]])
+@pytest.mark.parametrize("groups", [[[[k], 12, 0] for k in range(4)], [[[0, 1, 2, 3], 2, 0], *[[[], 1, 0]] * 10 ** 6]])
 def test_a_bound_is_found_at_once(groups):
     """Caps of 12 are 28,561 monomials; groups of nothing have no end."""
     with pytest.raises(checker.NotAccepted):

@@ -8,10 +8,9 @@ solution is refined and enclosed, and the smallest bound that proves the count i
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
-from itertools import product
 from typing import Any
 
 import numpy as np
@@ -31,48 +30,23 @@ from ..geometry.vectors import Array, cross, unit
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
 from ..tolerances import NO_POSE_START
+from .bounds import bound
 from .closures import ClosedRobot, written
-from .verify_certificate import (
-    KINDS,
-    PRIME,
-    NotAccepted,
-    digest,
-    dot,
-    integral,
-    poses,
-    rank,
-    rational,
-    slope,
-    told,
-    value,
-    verify,
-)
+from .poses import regular
+from .refining import Polynomial, Refining
+from .verify_certificate import KINDS, NotAccepted, digest, dot, integral, rational, told, value, verify
 
-BITS = 320
-"""Bits with which solutions are refined."""
 RADIUS = Fraction(1, 1 << 80)
 """Radius of the boxes (unknowns of size one)."""
-STEPS = 7
-"""Newton's steps from about the solution."""
-GRAIN = 1 << 140
-"""Middles of boxes are multiples of one over this."""
-CAPS = 6
-"""Largest cap of the monomials of a rank bound."""
-COLUMNS = 220
-"""The largest number of monomials."""
-PATIENCE = 3
-"""After so many bounds that are no better the search for one ends."""
 WITHIN = tuple(Fraction(1, 10 ** k) for k in range(13, 5, -1))
 """How far the tips of a pose may be from where its box puts them (sizes): the first that is proved."""
-
-Polynomial = Mapping[tuple[int, ...], Any]
 
 
 def certificate(found: AssemblyModes) -> dict[str, Any]:
     """The certificate of a list of modes, accepted by the checker; raises ``NoCertificate`` where the list is not
     complete or no bound of the checker proves the count."""
     about = {"robot": found.setting.robot.name, "kind": found.kind, "at": found.pose.to_dict(),
-             "observed": [[o.leg, o.link] for o in found.setting.observed]}
+             "observed": [[o.leg, o.link if o.by_segment else o.leg] for o in found.setting.observed]}
     if found.found.complete and not found.found.solved and found.confined is not None:  # a copy: solved again
         found = modes(found.setting, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
     try:
@@ -102,11 +76,10 @@ def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     parts: dict[str, Any] = {part: tuple(value) if part == "rpy" else value
                              for part, value in record["at"].items() if value is not None}
     at = Pose(**parts)
-    if record["kind"] == "real":
-        return certificate(modes(robot, at=at, real=True))
-    setting = ObservedRobot.of(robot, [link for _, link in record["observed"]])
+    real = record["kind"] == "real"
+    setting = ObservedRobot.of(robot, None if real else [link for _, link in record["observed"]])
     start = setting.motion.pose(setting.everything.start.pose(setting.motion.link))
-    return certificate(modes(setting, at=None if start == at else at))
+    return certificate(modes(setting, at=None if start == at else at, real=real))
 
 
 def _system(solved: Solved, robot: ClosedRobot | None) -> dict[str, Any]:
@@ -115,9 +88,9 @@ def _system(solved: Solved, robot: ClosedRobot | None) -> dict[str, Any]:
     equations, halves, points, legs = KINDS[record["kind"]][0](record, rational(record["tips"]))
     equations = [integral(p) for p in equations]
     real = iter(zip(placed, solved.kept, solved.modes, strict=True))
-    record["boxes"] = []
+    record["boxes"], refining = [], Refining(equations)
     for start, is_real_ in [*starts, *((each, None) for each in _no_poses(equations, halves))]:
-        middle, inverse = _refined(equations, start, bool(is_real_))
+        middle, inverse = refining.box(start, bool(is_real_))
         box = {"middle": written(middle), "radius": str(RADIUS), "inverse": written(inverse)}
         pose, kept, mode = next(real) if is_real_ else (np.empty(0), False, None)
         if kept:
@@ -134,7 +107,7 @@ def _system(solved: Solved, robot: ClosedRobot | None) -> dict[str, Any]:
         elif is_real_ or (legs and is_real_ is not None):
             box["misses"] = _missed(legs, middle)
         record["boxes"].append(box)
-    record["bound"] = _bound(record, equations, halves)
+    record["bound"] = bound(record, equations, halves)
     return record
 
 
@@ -159,7 +132,7 @@ def _pose(record: dict[str, Any], box: dict[str, Any], points: Any, placed: Arra
     raise NotAccepted("a pose that its box does not put where it was told")
 
 
-def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool]], list[Array]]:
+def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
     """A system in rational numbers without boxes and bound; about where its solutions are, and whether they are real;
     the real ones' poses, as the checker is told them."""
     system, part, roots = solved.system, solved.part, solved.roots
@@ -195,9 +168,10 @@ def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], 
     return record, list(zip(starts, real, strict=True)), [_shifted(mode.pose, frame, origin) for mode in solved.modes]
 
 
-def _starts(roots: Roots) -> tuple[list[list[complex]], list[bool]]:
-    """About where the solutions are, and which of them are real."""
-    return [[complex(v) for v in each] for each in roots.values], [is_real(each) for each in roots.values]
+def _starts(roots: Roots) -> tuple[list[list[complex]], list[bool | None]]:
+    """About where the solutions are, and which of them are real; None for those that are too far to be poses."""
+    return ([[complex(v) for v in each] for each in (*roots.values, *roots.distant)],
+            [*map(is_real, roots.values), *(None for _ in roots.distant)])
 
 
 def _placed(X: Array, frame: WorkingFrame, d: int) -> Array:
@@ -210,7 +184,7 @@ def _shifted(X: Array, frame: WorkingFrame, origin: Array) -> Array:
     return np.column_stack([np.eye(3), frame.vector(X[:3, 3] - origin)])
 
 
-def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool]], list[Array]]:
+def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
     """As :func:`_written`, for tips on surfaces too, solved for in the pose's own coordinates."""
     system, part = solved.system, solved.part
     assert isinstance(part, PoseSystem)
@@ -223,7 +197,8 @@ def _pose_system(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[comple
                   "arrows": sum(k >= len(system.points) for k in part.legs),
                   "hub": written(_rounded(frame.point(system.hub))),
                   "chart": [[str(round(x)) for x in row] for row in part.chart.study[:4, :4]]}
-        return record, list(zip(values, real, strict=True)), [_placed(mode.pose, frame, 3) for mode in solved.modes]
+        poses = [_placed(mode.pose, frame, 3) for mode in solved.modes]
+        return *regular(record, list(zip(values, real, strict=True))), poses
     if not isinstance(system, Articulated):
         raise NotAccepted("tips on surfaces of another platform than the checker knows")
     turn = TURNS[0]
@@ -307,91 +282,6 @@ def _spokes(circle: Circle, frame: WorkingFrame, turn: float) -> list[list[Fract
     s = _rounded(circle.radius / frame.size) / (w * w + x * x + y * y + z * z)
     return [[s * (w * w + x * x - y * y - z * z), 2 * s * (x * y + w * z), 2 * s * (x * z - w * y)],
             [2 * s * (x * y - w * z), s * (w * w - x * x + y * y - z * z), 2 * s * (y * z + w * x)]]
-
-
-def _refined(equations: Sequence[Polynomial], start: Sequence[complex], real: bool) -> tuple[Any, Any]:
-    """A solution near a start, as pairs of fractions, and about the inverse of the equations' derivatives there (each
-    equation over the power of two that the checker takes)."""
-    from flint import acb, acb_mat, ctx
-
-    n = len(equations)
-    scales = [Fraction(1, 2 ** max(map(abs, p.values())).bit_length()) for p in equations]
-    flat = [{e: c * s for e, c in p.items()} for p, s in zip(equations, scales, strict=True)]
-    slopes = [[slope(p, k) for k in range(n)] for p in flat]
-    with ctx.workprec(BITS):
-        x = [acb(z.real) if real else acb(z.real, z.imag) for z in start]
-        for _ in range(STEPS):
-            J = acb_mat([[_value(d, x) for d in row] for row in slopes])
-            try:
-                step = J.solve(acb_mat(n, 1, [_value(p, x) for p in flat]))
-            except ZeroDivisionError:
-                raise NotAccepted("a solution at which the equations are not independent") from None
-            x = [(v - s).mid() for v, s in zip(x, step.entries(), strict=True)]
-        inverse = np.linalg.inv(np.array([[complex(_value(d, x)) for d in row] for row in slopes]))
-        middle = [[_fraction(v.real), Fraction(0) if real else _fraction(v.imag)] for v in x]
-    return middle, [[[Fraction(float(v.real)), Fraction(float(v.imag))] for v in row] for row in inverse]
-
-
-def _value(p: Polynomial, x: Sequence[Any]) -> Any:
-    """A polynomial with rational coefficients at balls."""
-    from flint import acb, fmpq
-
-    total = acb(0)
-    for e, c in p.items():
-        term = acb(fmpq(c.numerator, c.denominator))
-        for v, k in zip(x, e, strict=True):
-            term *= v ** k
-        total += term
-    return total
-
-
-def _fraction(ball: Any) -> Fraction:
-    """The middle of a real ball, to one over ``GRAIN``."""
-    mantissa, exponent = ball.mid().man_exp()
-    exact = Fraction(int(mantissa)) * Fraction(2) ** int(exponent)
-    return Fraction(round(exact * GRAIN), GRAIN)
-
-
-def _bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Sequence[bool]) -> dict[str, Any]:
-    """The first bound of the checker that is the number of boxes."""
-    count, least, worse = len(record["boxes"]), math.inf, 0
-    if record["kind"] == "pose":
-        if poses(equations, halves, record) == count:
-            return {"kind": "poses"}
-        raise NotAccepted(f"{count} solutions are enclosed, but there may be more, for all that the checker knows")
-    for bound in _bounds(halves):
-        try:
-            most = rank(equations, halves, {"bound": bound}, _ranks)
-        except NotAccepted:
-            continue
-        if most == count:
-            return bound
-        worse = 0 if most < least else worse + 1
-        least = min(least, most)
-        if worse == PATIENCE:
-            break
-    raise NotAccepted(f"{count} solutions are enclosed, but " + (f"there may be {least}" if least < math.inf else
-                                                             "no bound of their number is known"))
-
-
-def _bounds(halves: Sequence[bool]) -> Iterator[dict[str, Any]]:
-    """The ranks that may bound the number of solutions, those with small caps first."""
-    n = len(halves)
-    groups = [[k for k in range(n) if not halves[k]], *([k] for k in range(n) if halves[k])]
-    groups = [group for group in groups if group]
-    for caps in sorted(product(range(2, CAPS + 1), repeat=len(groups)), key=sum):
-        if math.prod(math.comb(len(group) + cap, cap) for group, cap in zip(groups, caps, strict=True)) <= COLUMNS:
-            yield {"kind": "rank", "groups": [list(each) for each in zip(groups, caps, strict=True)]}
-
-
-def _ranks(rows: Sequence[Sequence[int]], first: int) -> tuple[int, int]:
-    """As the checker computes them, fast."""
-    from flint import nmod_mat
-
-    columns = len(rows[0]) if rows else 0
-    one, two = (int(nmod_mat(len(rows), width, [c for row in rows for c in row[:width]], PRIME).rank())
-                for width in (min(first, columns), columns))
-    return one, two
 
 
 def _no_poses(equations: Sequence[Polynomial], halves: Sequence[bool]) -> list[list[complex]]:

@@ -16,8 +16,9 @@ from .verify_certificate import PRIME, digest, verify
 
 
 def certificate(found: Derivation) -> dict[str, Any]:
-    """A: what all joints and loops ask of the joints' rates, X: the platform's twist, Y: the rates of the observed
-    directions, at one random rational instance of the architecture, and the ranks of A, [A; X], [A; Y], [A; Y; X].
+    """A: what all joints and loops ask of the joints' rates, X: the platform's twist (of a formation the twists of all
+    bodies), Y: the rates of what is observed, at one random rational instance of the architecture, and the ranks of A,
+    [A; X], [A; Y], [A; Y; X].
 
     The legs see rank [A; X] + rank [A; Y] − rank [A; Y; X] − rank A of the platform's freedoms. Raises
     ``NoCertificate`` where there are no instances."""
@@ -27,8 +28,8 @@ def certificate(found: Derivation) -> dict[str, Any]:
     except NotRecognised as reason:
         raise NoCertificate(name, str(reason)) from None
     places = [i for i, o in enumerate(exact.observations) if o.key in {each.key for each in found.setting.observed}]
-    if not all(each.by_segment for each in found.setting.observed):
-        raise NoCertificate(name, "not all that is measured is a direction")
+    if len(places) < len(found.setting.observed):
+        raise NoCertificate(name, "not all that is measured is rational")
     matrices = {"A": at.loops, "X": at.rows[0], "Y": np.vstack([at.rows[1 + i] for i in places])}
     whole = {key: [[int(c) for c in row] for row in rows] for key, rows in matrices.items()}
     record = {"format": "hrsynth-certificate-1", "claim": "ranks", "robot": name,
@@ -51,7 +52,8 @@ def seen(record: dict[str, Any]) -> str:
 
 def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     """The certificate of the same question about a robot."""
-    return certificate(derive(robot, [link for _, link in record["observed"]]))
+    others = {each.leg for each in robot.observations if not each.by_segment}
+    return certificate(derive(robot, [leg if leg in others else link for leg, link in record["observed"]]))
 
 
 def _stack(of: Sequence[str], matrices: dict[str, list[list[int]]]) -> dict[str, Any]:

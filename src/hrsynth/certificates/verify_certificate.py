@@ -5,14 +5,14 @@
 * At least: Krawczyk. Each solution has a complex box |x_k - m_k| <= r. With any matrix Y, the derivatives J at m and
   H what they change by in the box, |Y F(m)| + (|1 - Y J| + |Y| H) r < r makes x - Y F(x) a contraction of the box: it
   holds one solution and no other. Where m is real the box is its own conjugate, and so is the solution.
-* At most, *rank*: columns are the monomials up to the caps, B those below, S the others; rows all multiples of the
-  equations within the caps. If the columns S have full rank, B spans all modulo the equations: |B| + |S| - rank zeros,
-  and modulo a prime ranks are no larger. The tangent of half an angle has its own cap: a zero at infinity, which is a
-  pose, would be a vector on S that all rows annul.
+* At most, *rank*: columns are monomials, B below the caps, S at and H above them; rows multiples of the equations.
+  Where they annul f independent vectors on H (zeros at infinity), rank H <= |H| - f. If the rank of H and S is no less
+  than |H| - f + |S|, B spans all modulo the equations: |B| + |S| + |H| - f - rank zeros; modulo a prime ranks are no
+  larger. The tangent of half an angle has its own cap, no H: a pose where it is infinite would be such a vector on S.
 * At most, *poses*: conditions *on a sphere*, *on a plane* on points of a rigid body are linear in 17 coordinates in
   which poses have dimension 6 and degree 40 (Gallet, Nawratil, Schicho, J. Geom. 106, 2015): of six at most 40 zeros,
-  and no curve besides 40. With a tip at rest, or on six planes, three quadrics of the quaternion remain: 8; three rods
-  in one ball put it in two places: 16.
+  at infinity too, and no curve besides 40. With a tip at rest, or on six planes, three quadrics of the quaternion
+  remain: 8; three rods in one ball put it in two places: 16.
 * A real pose puts each tip where its box does, to the distance told. With more legs than needed, the others miss one,
   poses fit to 1e-9. Systems (branches of legs) are counted one by one. The robot *closes* where places of its links are
   told: its joints fit, tips are in place, and what is measured is as told once for all poses.
@@ -27,7 +27,7 @@ import sys
 from fractions import Fraction
 from itertools import combinations, product
 
-PRIME, FIT, WITHIN = 2147483647, Fraction(1, 10 ** 9), Fraction(1, 10 ** 6)
+PRIME, FIT, WITHIN, FAR = 2147483647, Fraction(1, 10 ** 9), Fraction(1, 10 ** 6), 10 ** 7
 
 class NotAccepted(Exception):
     """Why a certificate is not accepted."""
@@ -52,16 +52,13 @@ def sub(u, v): return [a - b for a, b in zip(u, v, strict=True)]
 def size(z): return abs(z[0]) + abs(z[1])  # at least |z|, at most twice that
 def formal(p, w): return dict.fromkeys(w, Fraction(0)) | p  # p times w: w has its degree in half-angle tangents
 def slope(p, k): return {(*e[:k], e[k] - 1, *e[k + 1:]): c * e[k] for e, c in p.items() if e[k]}
-
 def integral(p):  # with integer coefficients that have no common divisor
     need(any(p.values()), "an equation vanishes")
     below = math.lcm(*(c.denominator for c in p.values()))
     common = math.gcd(*(int(c * below) for c in p.values()))
     return {e: int(c * below) // common for e, c in p.items()}
-
 def cross(u, v, mul=lambda a, b: a * b, minus=lambda a, b: a - b):
     return [minus(mul(u[i], v[j]), mul(u[j], v[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
-
 def rational(value):
     if isinstance(value, list):
         return list(map(rational, value))
@@ -87,18 +84,15 @@ def running(reach, k, n):  # N / w, a curve's point, Q / w its square, at x_k: t
         return N, add(times(dot(c, c) + dot(a, a), w), times(2 * dot(c, a), u), times(4 * dot(c, b), t)), w
     N = [add(term(x, n), times(d, t)) for x, d in zip(c, rest[0] if rest else [0] * len(c))]
     return N, inner(N, N), one
-
 def apart(one, other, squared):  # |P1 - P2|^2 = squared
     (N, Q, w), (M, P, v) = one, other
     return add(mul(Q, v), mul(P, w), times(-2, inner(N, M)), times(-squared, mul(w, v)))
-
 def on_plane(point, normal, centre):
     N, _, w = point
     return add(*(times(c, p) for c, p in zip(normal, N)), times(-dot(normal, centre), w))
 def on_sphere(point, centre, squared):
     N, Q, w = point
     return add(Q, *(times(-2 * c, p) for c, p in zip(centre, N)), times(dot(centre, centre) - squared, w))
-
 def conditions(point, reach):  # planes and spheres that a point is on: (equation, normal or squared radius)
     kind, (c, *rest) = reach
     axes = [[Fraction(int(i == k)) for i in range(3)] for k in range(3)]
@@ -111,10 +105,8 @@ def conditions(point, reach):  # planes and spheres that a point is on: (equatio
         first = cross(rest[0], min(axes, key=lambda axis: abs(dot(rest[0], axis))))
         rest = [first, cross(rest[0], first)]
     return [(on_plane(point, n, c), n) for n in rest or axes]
-
 def misfits(equations):  # by how much lengths miss: over a plane's normal, over the squared radius of small spheres
     return [times(1 / (max(map(abs, n)) if len(n) > 1 else min(n[0], 1)), p) for p, n in equations]
-
 def tips_on(reaches):  # points of curves, each with an unknown; for each unknown whether it is a half-angle tangent
     need({kind for kind, _ in reaches} <= {"point", "line", "circle"}, "tips on surfaces need another kind")
     moving = [k for k, (kind, _) in enumerate(reaches) if kind != "point"]
@@ -186,25 +178,25 @@ def shifting(system, tips):
     return found, [False] * 3 + [slide[0] == "circle" for _ in range(3, n)], points, all_[system["square"]:]
 
 def pose(system, tips):
-    """Study's coordinates: a quaternion e, linear in (1, x1, x2, x3), and g = (x4 .. x7), e.g = 0; |e|^2 tip =
+    """Study's coordinates: a quaternion e = E (1, x1, x2, x3), g = E (0, x5, x6, x7), |e|^2 x4 = (e.g)^2; |e|^2 tip =
     2 vec(g e*) + |e|^2 R b. The last ``arrows`` of the tips only turn, about ``hub``."""
     n, E, arrows = 7, [[int(c) for c in row] for row in system["chart"]], system["arrows"]
     need([*map(len, E)] == [4] * 4 and modular([[c % PRIME for c in row] for row in E], 4)[1] == 4, "dependent rows")
-    x = [term(1, n), *(term(1, n, k) for k in range(n))]
-    e, g, hub = [add(*map(times, row, x)) for row in E], x[4:], rational(system["hub"])
+    x, hub = [term(1, n), *(term(1, n, k) for k in range(n))], rational(system["hub"])
+    e, g = [add(*map(times, row, x)) for row in E], [add(*map(times, row, ({}, *x[5:]))) for row in E]
     need(len(hub) == 3 and arrows in range(len(tips)), "a hub, and tips that are no arrows")
-    w, s = inner(e, e), [[mul(a, b) for b in e] for a in e]
+    w, gg, s = inner(e, e), minus(inner(g, g), x[4]), [[mul(a, b) for b in e] for a in e]
     R = [[add(s[0][0], times(2, s[i][i]), *(times(-1, s[k][k]) for k in (1, 2, 3))) if i == j else
           times(2, add(s[i][j], times(1 if (i - j) % 3 == 1 else -1, s[0][6 - i - j]))) for j in (1, 2, 3)]
          for i in (1, 2, 3)]
     there, back = ([times(2, add(mul(e[0], g[k]), times(-1, mul(e[k], g[0])), times(sign, minus(
         mul(e[k % 3 + 1], g[(k + 1) % 3 + 1]), mul(e[(k + 1) % 3 + 1], g[k % 3 + 1]))))) for k in (1, 2, 3)]
         for sign in (1, -1))
-    found, points = [inner(e, g)], []
+    found, points = [minus(mul(x[4], w), mul(inner(e, g), inner(e, g)))], []
     for k, (b, reach) in enumerate(zip(tips, map(reach_of, system["reaches"]), strict=True)):
         N = [add(*map(times, b, row)) for row in R]
         if k < len(tips) - arrows:
-            Q = add(times(4, inner(g, g)), *(times(2 * c, p) for c, p in zip(b, back)), times(dot(b, b), w))
+            Q = add(times(4, gg), *(times(2 * c, p) for c, p in zip(b, back)), times(dot(b, b), w))
             points.append(([add(p, q) for p, q in zip(there, N)], Q, w))
         else:
             need(reach[0] == "plane", "an arrow keeps to a plane")
@@ -226,10 +218,10 @@ def value(p, x):  # at complex numbers, pairs of fractions
 
 def most(p, far): return sum(abs(c) * math.prod(map(pow, far, e)) for e, c in p.items())  # of |p| where |x_k| <= far_k
 def change(p, m, r): return r * sum(most(slope(p, k), [size(z) + r for z in m]) for k in range(len(m)))  # in a box
+def most_of(p, m, r): return size(value(p, m)) + change(p, m, r)
 def least(p, m, r): return size(value(p, m)) / 2 - change(p, m, r)  # of |p| in a box
 def along(y, z):
     return [sum(a * c - b * d for (a, b), (c, d) in zip(y, z)), sum(a * d + b * c for (a, b), (c, d) in zip(y, z))]
-
 def enclosed(equations, m, r, Y):  # Krawczyk's condition; see above
     n = len(m)
     need(r > 0 and len(Y) == n and all(len(row) == n for row in Y), "a box without radius or inverse")
@@ -241,24 +233,30 @@ def enclosed(equations, m, r, Y):  # Krawczyk's condition; see above
         wide += sum(size(z) * h for z, h in zip(y, H))
         need(size(along(y, F)) + wide * r < r, "a box in which no solution is proved")
 
-def rank(equations, halves, system, ranks_of=None):
-    n, groups = len(halves), system["bound"]["groups"]
-    need(n <= 4 and sorted(k for group, _ in groups for k in group) == list(range(n)), "each unknown is in one group")
-    need(all(cap in range(1, 13) and (len(group) == 1 or (group and not any(halves[k] for k in group)))
-             for group, cap in groups), "caps from 1 to 12, and one for each half-angle tangent")
-    below = {e: min(cap - sum(e[k] for k in group) for group, cap in groups) for e in product(range(13), repeat=n)}
-    columns = sorted((e for e in below if below[e] >= 0), key=lambda e: below[e] > 0)
+def multiples(equations, halves, groups):  # monomials above, at, below the caps, how many; all multiples within
+    n = len(halves)
+    need(n <= 4 and sorted(k for group, _, _ in groups for k in group) == [*range(n)], "each unknown in one group")
+    need(all(group and cap in range(1, 13) and more in range(13) and (not any(halves[k] for k in group) or (
+        len(group) == 1 and more == 0)) for group, cap, more in groups), "caps of 1 to 12, one for each half-angle")
+    below = {e: min(cap - sum(e[k] for k in group) for group, cap, _ in groups) for e in product(range(13), repeat=n)
+             if all(sum(e[k] for k in group) <= cap + more for group, cap, more in groups)}
+    columns = sorted(below, key=lambda e: min(max(below[e], -1), 1))
     need(len(columns) <= 300, "more than 300 monomials")
-    edge = sum(below[e] == 0 for e in columns)
-    moved = [{tuple(map(sum, zip(e, shift))): c % PRIME for e, c in p.items()} for p in equations for shift in columns]
-    rows = [[row.get(e, 0) for e in columns] for row in moved if all(below.get(e, -1) >= 0 for e in row)]
-    sharp, whole = (ranks_of or modular)(rows, edge)
-    need(sharp == edge, "monomials at the caps are not those of lower ones")
-    return len(columns) - whole
+    moved = [{tuple(map(sum, zip(e, shift))): c for e, c in p.items()} for p in equations for shift in columns]
+    rows = [[row.get(e, 0) for e in columns] for row in moved if all(e in below for e in row)]
+    return rows, *(sum(below[e] < least for e in columns) for least in (0, 1, 99))
 
+def rank(equations, halves, system, ranks_of=None):
+    rows, above, edge, every = multiples(equations, halves, system["bound"]["groups"])
+    far = [[int(c, 16) for c in v] for v in system["bound"].get("far", ())]
+    need(all(len(v) == above and not any(sum(map(int.__mul__, row, v)) for row in rows) for v in far)
+         and modular(far, 0)[1] == len(far), "vectors above the caps that depend on others, or are not annulled")
+    sharp, whole = (ranks_of or modular)(rows, edge)
+    need(sharp == edge - len(far), "monomials at the caps are not those of lower ones")
+    return every - whole - len(far)
 def modular(rows, first):  # the ranks modulo the prime of the first columns and of all: where echelons begin
     echelon = {}
-    for row in rows:
+    for row in ([c % PRIME for c in row] for row in rows):
         for k in range(len(row)):
             if row[k] and k not in echelon:
                 over = pow(row[k], -1, PRIME)
@@ -266,7 +264,6 @@ def modular(rows, first):  # the ranks modulo the prime of the first columns and
                 break
             row = [(a - row[k] * b) % PRIME for a, b in zip(row, echelon[k])] if row[k] else row
     return sum(k < first for k in echelon), len(echelon)
-
 def poses(equations, halves, system):
     need(system["kind"] == "pose" and len(equations) == 7, "six conditions on a pose")
     reaches, tips = [reach_of(each) for each in system["reaches"]], rational(system["tips"])
@@ -275,10 +272,10 @@ def poses(equations, halves, system):
     return 8 if "point" in kinds or kinds <= {"line", "plane"} else 16 if kinds == {"sphere"} and together > 2 else 40
 
 def modes(record):
-    seen, real, complex_, whole = [], 0, 0, 0
+    seen, real, complex_, whole, apart = [], 0, 0, 0, 0
     for system in record["systems"]:
         tips = rational(system["tips"])
-        fair(system, tips, 2 if system["kind"] == "planar" else 3)
+        far = FAR * fair(system, tips, 2 if system["kind"] == "planar" else 3)
         equations, halves, points, legs = KINDS[system["kind"]][0](system, tips)
         equations = [integral(p) for p in equations]
         need((equations, legs) not in seen, "a system that is told twice")
@@ -290,36 +287,42 @@ def modes(record):
         for each in system["boxes"]:
             m, r = rational(each["middle"]), rational(each["radius"])
             need(len(m) == len(halves) and all(len(z) == 2 for z in m), "a box without its unknowns")
+            one = "misses" if "misses" in each else "pose within links"  # what a box says, and nothing else
+            need(each.keys() <= {*f"middle radius inverse {one}".split()}, "another key of a box")
             enclosed(flat, m, r, rational(each["inverse"]))
             boxes.append((m, r))
             finite = all(least(w, m, r) > 0 for _, _, w in points)
+            away = far > 0 and any(least(p, m, r) > far * most_of(w, m, r) for N, _, w in points for p in N)
             if "pose" in each:
-                need(all(size(value(p, m)) + change(p, m, r) < FIT for leg in legs for p in leg), "a leg that misses")
-                need(finite and all(v == 0 for _, v in m), "a real pose with a complex box")
+                need(all(most_of(p, m, r) < FIT for leg in legs for p in leg), "a leg that misses")
+                need(finite and not away and all(v == 0 for _, v in m), "a real pose with a complex or far box")
                 told(system, each, points, tips, m, r)
                 whole += "links" in each and closes(record["assembly"], each["links"])
             elif "misses" in each:
                 need(any(least(p, m, r) > 0 for p in legs[each["misses"]]), "a leg that may not miss")
+            elif away:
+                need(finite or bound == 40 or system["kind"] != "pose", "a box that may be told twice")
+                apart += any(map(any, (value(p, m) for p in equations))) or all(any(value(w, m)) for _, _, w in points)
             else:
                 need(any(abs(v) > r for _, v in m), "a box that may be real has no pose")
-                need(not legs if finite else not any(map(any, (value(p, m) for p in equations))) and not all(
-                    any(value(w, m)) for _, _, w in points), "a box that may be a pose, or none")
-            real, complex_ = real + ("pose" in each), complex_ + (finite and "misses" not in each)
+                need(finite and not legs, "a box that may be a pose, or none")
+            real, complex_ = real + ("pose" in each), complex_ + (not away and "misses" not in each)
         for (m, r), (k, s) in combinations(boxes, 2):
             need(any(max(abs(a - c), abs(b - d)) > r + s for (a, b), (c, d) in zip(m, k)), "two boxes touch")
     need(seen and record["real"] == real and record["complex"] == complex_, f"{real} real of {complex_} are proved")
     more = " (more legs than needed fit)" * any(legs for _, legs in seen) + f" ({len(seen)} systems)" * (len(seen) > 1)
+    more += f" nearer than 10^7 of its sizes ({apart} solutions are farther)" * (apart > 0)
     more += f"; the robot closes at {whole} of the real ones, to 1e-9" * ("assembly" in record)
     return f"{real} real of {complex_} complex poses, and no other{more}"
-
 def fair(system, tips, d):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
     need(system.keys() <= {*f"kind reaches tips boxes bound places {KINDS[system['kind']][1]}".split()}, "another key")
     need(len(tips) < 50 and all(len(b) == d for b in tips), "tips of another dimension, or too many")
     reaches = [reach_of(each, d) for each in system["reaches"]]
-    spans = [v[1] for kind, v in reaches if kind in ("circle", "sphere")] or [[int(system["kind"] == "shifting")]]
-    spans += [sub(b, places[0]) for places in (tips, [v[0] for _, v in reaches]) for b in places]
-    need(max(abs(x) for span in spans for x in span) > Fraction(1, 1000), "lengths in other units than its size")
-
+    radii = [v[1] for kind, v in reaches if kind in ("circle", "sphere")]
+    spans = [sub(b, places[0]) for places in (tips, [v[0] for _, v in reaches]) for b in places]
+    extent = max(abs(x) for span in radii + spans for x in span)
+    need(extent > Fraction(1, 1000) or (system["kind"] == "shifting" and not radii), "lengths in units not of its size")
+    return extent
 def moved(D, x): return [dot(row, x) for row in D]  # a point (x, y, z, 1) or direction (x, y, z, 0) of a link
 def turn_of(P, d):  # the rotation of a pose in space or in a plane
     need(len(P) == d and all(len(row) == d + 1 for row in P), "a pose of another form")
@@ -327,7 +330,6 @@ def turn_of(P, d):  # the rotation of a pose in space or in a plane
     need(all(abs(dot(turn[i], turn[j]) - int(i == j)) < FIT for i in range(d) for j in range(d))
          and (dot(cross(*turn[:2]), turn[2]) if d == 3 else cross(*([*row, 0] for row in turn))[2]) > 0, "no turn")
     return turn
-
 def closes(robot, links):  # its joints fit to 1e-9 with links displaced since zero, and what is held is as told
     D, off = {name: rational(rows) for name, rows in links.items()}, []
     turns = {name: turn_of(rows, 3) for name, rows in D.items()}
@@ -344,7 +346,6 @@ def closes(robot, links):  # its joints fit to 1e-9 with links displaced since z
         off += sub([dot(column, at) for column in zip(*turns[other])], rational(seen))
     need(robot["held"] and robot["joints"] and all(abs(x) < FIT for x in off), "an open joint, or another measurement")
     return True
-
 def told(system, each, points, tips, m, r):  # whether the pose puts the tips where the box does
     P, within, d = rational(each["pose"]), rational(each["within"]), len(points[0][0])
     turn = turn_of(P, d)
@@ -362,7 +363,6 @@ def told(system, each, points, tips, m, r):  # whether the pose puts the tips wh
             need(x[3] in ("0", "1") and all(abs(dot(u, v) - (u is v)) < FIT for u in rows for v in rows) and all(
                 abs(v - dot(row, there) / unit - (x[3] == "0") * c) + off <= WITHIN
                 for v, row, c in zip(at, rows, start, strict=True)), "a tip that is not on its link")
-
 def ranks(record):
     need(record["stacks"] and record["matrices"].keys() <= {"A", "X", "Y"}, "no stack, or a matrix of another name")
     for each in record["stacks"]:
@@ -382,11 +382,11 @@ def digest(record):
 def once(pairs):  # an object of JSON; of two keys a reader may see one, Python the other
     need(len(dict(pairs)) == len(pairs), "a key that is told twice")
     return dict(pairs)
-
 def verify(record):  # what a certificate proves, in words; raises NotAccepted
     try:
         need(isinstance(record, dict) and record.get("format") == "hrsynth-certificate-1", "this is no certificate")
         need(record["sha256"] == digest(record), "the file was changed: another digest")
+        need(record["claim"] != "path", "it is of a path, which verify_path.py checks")
         return {"modes": modes, "ranks": ranks}[record["claim"]](record)
     except Exception as error:
         raise error if isinstance(error, NotAccepted) else NotAccepted(f"no certificate: {error!r}") from None
