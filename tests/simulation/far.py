@@ -2,9 +2,9 @@
 rests that are listed for the goal.
 
 ``python -m simulation.far 100 3rpr_m1 delta --random 40`` (from ``tests/``) runs so many pairs of each robot with all
-legs watched, and so many with random sets of legs; without names those of all controllable robots. A line of the log a
-run: what is broken off goes on. The tables of what is in the log are printed; ``-o FILE`` writes them between the marks
-of a page.
+legs watched, and so many with random sets of legs; without names those of all controllable robots. Robots that differ
+in their motors alone are run once. A line of the log a run: what is broken off goes on. The tables of what is in the
+log are printed; ``-o FILE`` writes them between the marks of a page.
 """
 
 from __future__ import annotations
@@ -14,6 +14,9 @@ import json
 import sys
 from collections import Counter
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from functools import cache
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -21,10 +24,12 @@ import numpy as np
 
 from hrsynth.analysis.aspects.path import SEPARATED, Aspects
 from hrsynth.budgets import RUN_AWAY
+from hrsynth.description import load
 from hrsynth.geometry.vectors import hat, rotation_from_rpy
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import interaction
 from hrsynth.kinematics.relation import relation
+from hrsynth.mechanism.model import Mechanism
 from hrsynth.present.readme import replaced
 from hrsynth.simulation.ending import ANTIPODAL, BOUNDARY, ENDINGS, GOAL, MINIMUM, MODE
 from hrsynth.simulation.law import FixedDirections, Law, directions
@@ -32,12 +37,14 @@ from hrsynth.simulation.result import Servo
 from hrsynth.simulation.servo import Conditions, ServoTask
 from kinematics.robots import state_of
 from oracle import Oracle
-from simulation.listed import MEMBER, Listed, random_sets
+from simulation.listed import MEMBER, Listed, Lists, random_sets
 from simulation.scenes import CONTROLLABLE, Legs, far_pairs, setting
 
 START, MEMBERS = "<!-- generated: endings -->", "<!-- generated: members -->"
 OF_ONE_SET = 3
 """Runs with one random set of legs."""
+AT_ONCE = 25
+"""Goals whose lists are made at once."""
 KEY = ("robot", "watched", "seed", "pair")
 Key = tuple[Any, ...]
 VANISHED, THERE, CLOSED = 1e-9, 1e-6, 1e-9
@@ -125,24 +132,38 @@ def untold(found: Servo, aspects: Aspects) -> Iterator[str]:
 
 def runs(name: str, watched: Legs | None, seed: int, count: int, known: set[Key]) -> Iterator[dict[str, Any]]:
     """Records of so many runs of a robot, without those that are known."""
-    aspects = Aspects.of(setting(name, watched))
     keys = [(name, None if watched is None else ",".join(watched), seed, pair) for pair in range(1, count + 1)]
     if known.issuperset(keys):
         return
-    for key, (start, goal) in zip(keys, far_pairs(name, seed, count, watched), strict=False):
-        if key in known:
-            continue
-        found = run_between(name, start, goal, watched=watched)
-        member = Listed.of(found)
-        wrong = [*untrue(found), *untold(found, aspects), *member.untrue(found)]
-        yield {**dict(zip(KEY, key, strict=True)), "start": str(found.start), "goal": str(found.goal),
-               "ended": found.ended, "untrue": wrong, **member.to_dict()}
+    aspects, lists = Aspects.of(setting(name, watched)), Lists(setting(name, watched))
+    drawn = zip(keys, far_pairs(name, seed, count, watched), strict=False)
+    while block := list(islice(((key, *ends) for key, ends in drawn if key not in known), AT_ONCE)):
+        first = len(lists.every)
+        lists.add([goal for _, _, goal in block])
+        for number, (key, start, goal) in enumerate(block, first):
+            found = run_between(name, start, goal, watched=watched)
+            member = Listed.of(found, lists, number)
+            wrong = [*untrue(found), *untold(found, aspects), *member.untrue(found)]
+            yield {**dict(zip(KEY, key, strict=True)), "start": str(found.start), "goal": str(found.goal),
+                   "ended": found.ended, "untrue": wrong, **member.to_dict()}
 
 
 def with_random_sets(name: str, count: int, known: set[Key]) -> Iterator[dict[str, Any]]:
     """Records of so many runs with random sets of legs, or of some more."""
     for seed, legs in enumerate(random_sets(name, -(-count // OF_ONE_SET)), 5):
         yield from runs(name, legs, seed, OF_ONE_SET, known)
+
+
+@cache
+def same_question(name: str) -> tuple[str, ...]:
+    """The controllable robots that differ from one in their names and motors alone: the loop, which commands velocities
+    of joints, is the same."""
+    def still(name: str) -> Mechanism:
+        mechanism = load(name)
+        return replace(mechanism, name="", joints={k: replace(joint, motor=None)
+                                                   for k, joint in mechanism.joints.items()})
+
+    return tuple(each for each in CONTROLLABLE if still(each) == still(name))
 
 
 def tables(records: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str, str]:
@@ -153,7 +174,8 @@ def tables(records: Sequence[dict[str, Any]], names: Sequence[str]) -> dict[str,
         heads = ("robot", "pairs", *kinds, *(("untrue",) if mark == START else ()))
         found[mark] = row(*heads) + row("---", *["---:"] * (len(heads) - 1))
         for name in names:
-            for watched, what in ((False, f"`{name}`"), (True, f"`{name}`, random sets")):
+            of = ", ".join(f"`{each}`" for each in same_question(name))
+            for watched, what in ((False, of), (True, f"{of}, random sets")):
                 own = [each for each in records if each["robot"] == name and (each["watched"] is not None) == watched]
                 if own and not (watched and mark == START):
                     counted = Counter(each[field] for each in own)
@@ -175,7 +197,7 @@ def main() -> None:
     parser.add_argument("--log", type=Path, required=True, help="the file to which each run is written")
     parser.add_argument("-o", dest="page", type=Path, help="the page whose tables are written")
     asked = parser.parse_args()
-    names = asked.names or CONTROLLABLE
+    names = list(dict.fromkeys(same_question(name)[0] for name in asked.names or CONTROLLABLE))
     records = [json.loads(each) for each in asked.log.read_text().splitlines()] if asked.log.exists() else []
     known = {tuple(each[part] for part in KEY) for each in records}
     ways = [way for name in names for way in (runs(name, None, 4, asked.count, known),

@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, MissingExtra, NotRendered
 from hrsynth.geometry.vectors import Array, unit
+from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.simulation import pictures
 from hrsynth.simulation.camera import Camera, Edges, cylinders, edges, placed, rebuilt, sensitivity
 from hrsynth.simulation.law import directions
-from hrsynth.simulation.noise import PERIOD, Cones, Noise, Shocks
+from hrsynth.simulation.noise import PERIOD, Noise, Sensors, Shocks
 from hrsynth.simulation.servo import servo
 from simulation.scenes import home
 
@@ -91,10 +92,16 @@ def test_the_noise_of_rebuilt_directions_grows_with_that_of_pixels_and_is_bounde
         assert wrong(0.01)[:, number].max() <= 1.1 * sensitivity(ends, rod.radius) * 0.01 / camera.focal
 
 
+def cones(half_angle: float, count: int, horizon: float, seed: int) -> Sensors:
+    """Sensors of directions that are wrong inside of cones."""
+    every = [Direction(str(i), "l", np.array([0.0, 0, 1])) for i in range(count)]
+    return Sensors.of(every, Noise((("rad", half_angle),)), horizon, seed, 1.0)
+
+
 @given(st.floats(1e-4, 0.2), st.integers(0, 1000), st.floats(0, 3))
 def test_measured_directions_lie_in_their_cones(half_angle: float, seed: int, time: float):
     u = np.array([[0.0, 0.0, 1.0], unit([1, 2, 3])])
-    seen = Cones(half_angle, Shocks.drawn(2, 3, seed))(time, lambda link: np.eye(4), u)
+    seen = np.array(cones(half_angle, 2, 3, seed)(time, lambda link: np.eye(4), u))
     angles = np.arccos(np.clip(np.sum(seen * u, axis=1), -1, 1))
     assert np.all(angles <= half_angle + 1e-7)
     assert np.linalg.norm(seen, axis=1) == pytest.approx([1, 1])
@@ -102,19 +109,20 @@ def test_measured_directions_lie_in_their_cones(half_angle: float, seed: int, ti
 
 def test_cones_are_filled():
     u = np.array([[0.0, 0.0, 1.0]])
-    sense = Cones(0.1, Shocks.drawn(1, 4000 * PERIOD, 0))
-    angles = [float(np.linalg.norm(np.cross(sense(n * PERIOD, lambda link: np.eye(4), u), u))) for n in range(4000)]
+    sense = cones(0.1, 1, 4000 * PERIOD, 0)
+    angles = [float(np.linalg.norm(np.cross(sense(n * PERIOD, lambda link: np.eye(4), u)[0], u))) for n in range(4000)]
     assert max(angles) > 0.095
     assert 0.03 < float(np.mean(angles)) < 0.07
 
 
-@pytest.mark.parametrize(("text", "value", "pixels"), [("0.1deg", math.radians(0.1), False), ("0.002", 0.002, False),
-                                                       ("0.3px", 0.3, True)])
-def test_amounts(text: str, value: float, pixels: bool):
-    assert (Noise.parse(text).value, Noise.parse(text).pixels) == (pytest.approx(value), pixels)
+@pytest.mark.parametrize(("text", "value", "unit"), [("0.1deg", math.radians(0.1), "rad"), ("0.002", 0.002, "rad"),
+                                                     ("0.3px", 0.3, "px"), ("2mm", 0.002, "m"), ("0.1m", 0.1, "m"),
+                                                     ("0.3px, 1mm", 1e-3, "m"), ("0.3px,1mm", 0.3, "px")])
+def test_amounts(text: str, value: float, unit: str):
+    assert Noise.parse(text).of(unit) == pytest.approx(value)
 
 
-@pytest.mark.parametrize("text", ["", "deg", "much", "-1deg", "0px", "90deg", "nan", "inf"])
+@pytest.mark.parametrize("text", ["", "deg", "much", "-1deg", "0px", "90deg", "nan", "inf", "1px,", "1px,2px", "1km"])
 def test_amounts_that_are_none(text: str):
     with pytest.raises(BadRequest):
         Noise.parse(text)

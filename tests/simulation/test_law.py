@@ -60,7 +60,7 @@ def test_the_error_falls_as_its_projection_says(name: str):
         return np.cross(seen(ClosedConfiguration.of(twin, q), law), desired).ravel()
 
     rate = (error(1.0) - error(-1.0)) / (2 * step)
-    e = command.error.ravel()
+    e = np.concatenate(command.error)
     kernel, _ = start.kernel()
     L = np.vstack([-hat(u) @ r for u, r in zip(desired, directions(start, law.question)[1], strict=True)]) @ kernel
     assert rate == pytest.approx(-law.gain * L @ np.linalg.pinv(L, rcond=1e-9) @ e, abs=1e-5)

@@ -23,7 +23,7 @@ from ..kinematics.relation import relation
 from ..mechanism import Mechanism
 from ..progress import tell
 from ..tolerances import BENCH_SETTLED, BENCH_STEADY
-from .law import Command, Poses
+from .law import Command, Measures, Poses
 from .mockup import STEP, coordinates, mockup
 from .run import OPEN, SERVED_AT, TIME, Loop, Run
 
@@ -124,11 +124,13 @@ class Bench:
 
         seen = np.array([each.value(pose(reference), pose(each.link)) for each in question.observations])
 
-        def sensed(time: float, poses: Poses, directions: Array) -> Array:
+        def sensed(time: float, poses: Poses, values: Measures) -> Measures:
             return seen if loop.sensed is None else loop.sensed(time, pose, seen)
 
         command = loop.law.at(at, loop.desired(time), sensed, time)
-        return replace(command, error=np.cross(seen, loop.desired(time)[0]), directions=seen)
+        wanted = loop.desired(time)[0]
+        true = tuple(o.error(s, w) for o, s, w in zip(question.observations, seen, wanted, strict=True))
+        return replace(command, error=true, true=tuple(seen))
 
 
 def encoded(start: ClosedConfiguration, at: ClosedConfiguration, places: list[int], moved: Array

@@ -19,7 +19,7 @@ from ..mechanism.observation import Observation
 from ..mechanism.observations.direction import Direction
 from ..results import Value
 from ..tolerances import NUDGE
-from .law import Poses
+from .law import Measures, Poses
 from .mockup import RADIUS
 from .noise import Shocks
 
@@ -112,7 +112,7 @@ class Edges(Value):
     pixels: float
     shocks: Shocks
 
-    def __call__(self, time: float, poses: Poses, directions: Array) -> Array:
+    def __call__(self, time: float, poses: Poses, directions: Measures) -> Array:
         """The measured directions (k, 3) in the reference link's frame."""
         shock = self.shocks.at(time) * self.pixels / self.camera.focal
         found = []

@@ -1,5 +1,5 @@
 """Where a run ended, in the words of docs/pages/theory.md, section 11: goal, mode, antipodal, local minimum, boundary,
-time; or undecided."""
+lost from sight, time; or undecided."""
 
 from __future__ import annotations
 
@@ -15,14 +15,15 @@ from ..errors import HrsynthError
 from ..geometry.vectors import Array, pose_difference
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.limits import margins
+from ..mechanism.observations.direction import SeenAxis
 from ..results import Value
 from ..tolerances import DAMPED, SAME_RELATION
-from .law import Command
-from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, SERVED_AT, Run
+from .law import Command, Measures
+from .run import AWAY, EFFORT, LIMIT, LOST, OPEN, POISED, REST, SERVED_AT, UNMEASURED, UNSEEN, Run
 
 GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME = "goal", "mode", "antipodal", "local minimum", "boundary", "time"
-UNDECIDED = "undecided"
-ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, TIME, UNDECIDED)
+SIGHT, UNDECIDED = "lost from sight", "undecided"
+ENDINGS = (GOAL, MODE, ANTIPODAL, MINIMUM, BOUNDARY, SIGHT, TIME, UNDECIDED)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -38,17 +39,17 @@ class Ending(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EndingClassifier(Value):
-    """Names endings by the goal's configuration and directions (k, 3)."""
+    """Names endings by the goal's configuration and measured values."""
 
     setting: ObservedRobot
     goal: ClosedConfiguration
-    directions: Array
+    wanted: Measures
 
-    def classify(self, run: Run, directions: Array) -> Ending:
-        """The ending of a run whose last directions are (k, 3)."""
+    def classify(self, run: Run, values: Measures) -> Ending:
+        """The ending of a run at whose end these values are measured."""
         last = run.commands[-1]
         if run.stopped == SERVED_AT:
-            return self._served(run.last, directions)
+            return self._served(run.last, values)
         if run.stopped in (REST, POISED):
             ending = rest(self.setting, run.last, last)
             loose = "" if run.stopped == REST else "; that this rest draws the state to itself was not found"
@@ -56,6 +57,11 @@ class EndingClassifier(Value):
         if run.stopped == LIMIT:
             joint, _ = min(margins(run.last.twin, run.last.q).items(), key=lambda item: item[1])
             return Ending(BOUNDARY, f"joint {joint} is at its limit")
+        if run.stopped == UNSEEN:
+            return Ending(SIGHT, f"{self._unseen(run.last)}: the loop has nothing to go on")
+        if run.stopped == UNMEASURED:
+            return Ending(SIGHT, "a point or line comes to the camera's centre, or the camera into a cylinder: what is "
+                                 "measured has no value there")
         if run.stopped == OPEN:
             return Ending(BOUNDARY, "the loops lose their rank here, and the integrator could not continue")
         if run.stopped == LOST:
@@ -66,25 +72,33 @@ class EndingClassifier(Value):
                 else "the time was over")
         return Ending(TIME, f"{over}, with ‖e‖ = {last.size:.3g}")
 
-    def _served(self, at: ClosedConfiguration, directions: Array) -> Ending:
-        opposite = np.sum(directions * self.directions, axis=1) < 0
-        if opposite.any():
+    def _unseen(self, at: ClosedConfiguration) -> str:
+        """What a camera has lost."""
+        reference = self.setting.mechanism.reference
+        first = min(self.setting.observed, key=lambda o: o.in_front(at.pose(o.seen_from or reference), at.pose(o.link)))
+        return f"{first.kind} {first.leg} leaves the camera's sight"
+
+    def _served(self, at: ClosedConfiguration, values: Measures) -> Ending:
+        opposite = [float(value @ wanted) < 0 for o, value, wanted in
+                    zip(self.setting.observed, values, self.wanted, strict=True) if isinstance(o, SeenAxis)]
+        word = "directions" if len(opposite) == len(self.setting.observed) else "measurements"
+        if any(opposite):
             there = "; the pose is the goal's" if self.same_pose(at, self.goal.pose(self.setting.motion.link)) else ""
-            return Ending(ANTIPODAL, f"{int(opposite.sum())} of {len(opposite)} directions end opposite to the desired "
+            return Ending(ANTIPODAL, f"{sum(opposite)} of {len(opposite)} directions end opposite to the desired "
                                      f"ones, where the error vanishes as well{there}")
         if self.same_pose(at, self.goal.pose(self.setting.motion.link)):
-            return Ending(GOAL, "the directions and the pose are those of the goal")
+            return Ending(GOAL, f"the {word} and the pose are those of the goal")
         try:
             motion = self.setting.motion
             listed = modes(self.setting, at=motion.pose(self.goal.pose(motion.link)))
         except HrsynthError as error:
-            return Ending(MODE, f"the directions are the goal's, the pose is not; modes not listed: {error}")
+            return Ending(MODE, f"the {word} are the goal's, the pose is not; modes not listed: {error}")
         for number, mode in enumerate(listed.modes, 1):
             bodies = mode.bodies or {}
             if bodies and all(self._alike(at.pose(body), X, None) for body, X in bodies.items()):
-                return Ending(MODE, f"the directions are the goal's, the pose is its assembly mode {number} of "
+                return Ending(MODE, f"the {word} are the goal's, the pose is its assembly mode {number} of "
                                     f"{len(listed.modes)}", number, listed)
-        return Ending(MODE, "the directions are the goal's, the pose is none of the assembly modes that were listed",
+        return Ending(MODE, f"the {word} are the goal's, the pose is none of the assembly modes that were listed",
                       None, listed)
 
     def same_pose(self, at: ClosedConfiguration, X: Array) -> bool:
@@ -109,8 +123,12 @@ def rest(setting: ObservedRobot, at: ClosedConfiguration, last: Command) -> Endi
         return Ending(MINIMUM, f"{where} at a Type 2 singularity of the hidden robot")
     if (far.type1 is not None and far.type1 < DAMPED) or far.type2 is None:
         return Ending(MINIMUM, f"{where} at a Type 1 singularity of the hidden robot")
-    if weak:
+    if weak and any(isinstance(each, SeenAxis) for each in setting.observed):
         return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: a direction is perpendicular "
                                "to the desired one")
-    return Ending(MINIMUM, f"{where} off the singularities of the hidden robot: more is watched than the robot "
-                           "has freedoms")
+    off = f"{where} off the singularities of the hidden robot"
+    if weak:
+        return Ending(MINIMUM, f"{off}: the law's own rows, with the depths that it supposes, lose rank there")
+    if sum(each.rank for each in setting.observed) > len(last.values):
+        return Ending(MINIMUM, f"{off}: more is measured than the robot has freedoms")
+    return Ending(MINIMUM, off)

@@ -1,50 +1,58 @@
-"""The control law that servoes leg directions (MMT 2.3.2, eqs. 9-12), for any robot and any observed legs; and the
-desired directions in time: those of the goal at once, or led along the straight way of poses.
+"""The control law that servoes what is measured (MMT 2.3.2, eqs. 9-12), for any robot and any observations; and the
+desired values in time: those of the goal at once, or led along the straight way of poses.
 
-e_i = u_i × u_di, L_iᵀ = −[u_di]ₓ M_iᵀ, τ = −λ L^{T+} e and q̇ = J_inv τ are solved at once on the tangent space of the
-closed loops: with B a basis of it and U B the rates of the directions, q̇ = −λ B (L U B)⁺ e, where L stacks −[u_di]ₓ.
+Each kind of observation gives its error e_i and ∂e_i/∂y_i: of directions e_i = u_i × u_di and −[u_di]ₓ, L_iᵀ = −[u_di]ₓ
+M_iᵀ. Then τ = −λ L^{T+} e and q̇ = J_inv τ are solved at once on the tangent space of the closed loops: with B a basis
+of it and U B the rates of the values, q̇ = −λ B (L U B)⁺ e, where L stacks the ∂e_i/∂y_i. The rates of what is seen in
+an image need its depth, which the law may only suppose: ``planes``.
 Where the robot sees all of its platform's twist this is the same velocity of least norm; and it stays finite where Mᵀ
 does not exist because a watched leg is stretched (Type 1), as the motion through such a pose is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ..errors import PoseNotReached
-from ..geometry.vectors import Array, cross, hat
+from ..budgets import FARTHEST_POSE
+from ..errors import BadRequest, PoseNotReached
+from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration, measure
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..kinematics.relation import Measurement
 from ..kinematics.steps import nearest, track
+from ..mechanism.observations.direction import SeenAxis
+from ..mechanism.sights import CameraObservation, depth_plane
 from ..results import Value
 from ..tolerances import DAMPED, NEAREST
 
-Desired = Callable[[float], tuple[Array, Array]]
-"""Desired directions (k, 3) and their rates (k, 3) at a time."""
+Measures = Sequence[Array] | Array
+"""The values (size,) of each observation, lengths in characteristic lengths; of directions also as (k, 3)."""
+Desired = Callable[[float], tuple[Measures, Measures]]
+"""Desired values and their rates at a time."""
 Poses = Callable[[str], Array]
 """The pose X_BL (4, 4) of each link."""
-Sense = Callable[[float, Poses, Array], Array]
-"""What is measured (k, 3) at a time where the links are at their poses and the true directions are (k, 3)."""
+Sense = Callable[[float, Poses, Measures], Measures]
+"""What is measured at a time where the links are at their poses and the true values are given."""
 POSES = 24
-"""Poses between start and goal at which the directions of a trajectory are taken."""
+"""Poses between start and goal at which the values of a trajectory are taken."""
+SUPPOSED = "exact, desired or constant:METRES"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Command(Value):
-    """What the law commands at a configuration: joint velocities (nv,), the true error and directions, the measured
-    directions (k, 3), and the singular values of the rows that it inverts, as many as the platform has freedoms,
-    largest first."""
+    """What the law commands at a configuration: joint velocities (nv,), of each observation the true error, the true
+    value and the measured one, and the singular values of the rows that it inverts, as many as the platform has
+    freedoms, largest first."""
 
     velocity: Array
-    error: Array
-    directions: Array
-    seen: Array
+    error: tuple[Array, ...]
+    true: tuple[Array, ...]
+    seen: tuple[Array, ...]
     values: Array
     weak: Array
     """The joint velocity (nv,), of unit norm, that the measured errors show least."""
@@ -54,7 +62,7 @@ class Command(Value):
     @property
     def size(self) -> float:
         """‖e‖ of the true error."""
-        return float(np.linalg.norm(self.error))
+        return float(np.linalg.norm(np.concatenate(self.error)))
 
     @property
     def speed(self) -> float:
@@ -64,28 +72,80 @@ class Command(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Law(Value):
-    """The law of one robot: ``question`` holds what is observed, ``dof`` its platform's freedoms, ``gain`` is λ."""
+    """The law of one robot: ``question`` holds what is observed, ``dof`` its platform's freedoms, ``gain`` is λ.
+
+    ``planes`` are those (3,) in which what is seen in images is supposed to lie, None of one that is known; None where
+    all are.
+    """
 
     question: Measurement
     dof: int
     gain: float
+    planes: tuple[Array | None, ...] | None = None
 
-    def at(self, configuration: ClosedConfiguration, desired: tuple[Array, Array], sensed: Sense | None = None,
+    def at(self, configuration: ClosedConfiguration, desired: tuple[Measures, Measures], sensed: Sense | None = None,
            time: float = 0.0) -> Command:
         """The command at a configuration (of the joint velocities of its twin)."""
-        u, rates = directions(configuration, self.question)
+        every = self.question.observations
+        y, exact = measured(configuration, self.question)
         wanted, moving = desired
-        true = cross(u.T, wanted.T, axis=-2).T
-        seen = u if sensed is None else sensed(time, configuration.pose, u)
-        error = true if sensed is None else cross(seen, wanted)
+        true = tuple(o.error(value, w) for o, value, w in zip(every, y, wanted, strict=True))
+        seen = y if sensed is None else tuple(sensed(time, configuration.pose, y))
+        error = true if sensed is None else tuple(o.error(s, w) for o, s, w in zip(every, seen, wanted, strict=True))
         kernel, _ = configuration.kernel()
-        rows = np.vstack([-hat(w) @ r for w, r in zip(wanted, rates, strict=True)]) @ kernel
+        rates = self._supposed(configuration, exact)
+        rows = np.vstack([o.error_slope(s, w) @ r for o, s, w, r in zip(every, seen, wanted, rates, strict=True)])
+        rows = rows @ kernel
         left, values, right = np.linalg.svd(rows, full_matrices=False)
         left, values, right = left[:, : self.dof], values[: self.dof], right[: self.dof]
-        asked = self.gain * error.ravel() + cross(seen, moving).ravel()
+        drift = [o.error_slope(w, s) @ m if m.any() else 0 * e
+                 for o, s, w, m, e in zip(every, seen, wanted, moving, error, strict=True)]
+        e = np.concatenate(error)
+        asked = self.gain * e - np.concatenate(drift)
         velocity = -kernel @ (right.T @ (inverted(values) * (left.T @ asked)))
-        pull = float(np.linalg.norm(rows.T @ error.ravel()))
-        return Command(velocity, true, u, seen, values, kernel @ right[-1], pull)
+        pull = float(np.linalg.norm(rows.T @ e))
+        return Command(velocity, true, y, seen, values, kernel @ right[-1], pull)
+
+    def _supposed(self, at: ClosedConfiguration, rates: Sequence[Array]) -> Sequence[Array]:
+        """The rates with those that hold for the ``planes``."""
+        if self.planes is None:
+            return rates
+        found = list(rates)
+        length = at.twin.length
+        metric = np.repeat([length, 1.0], 3)[:, None]
+        for i, (seen, plane) in enumerate(zip(self.question.observations, self.planes, strict=True)):
+            if plane is not None and isinstance(seen, CameraObservation):
+                links = (seen.seen_from or self.question.reference, seen.link)
+                poses, moves = ([each(link) for link in links] for each in (at.pose, at.velocity))
+                found[i] = seen.supposed_rate(plane, *poses, *(metric * V for V in moves))
+                found[i] = found[i] / (length ** np.broadcast_to(seen.dimension, seen.size))[:, None]
+        return found
+
+    def in_front(self, at: ClosedConfiguration) -> float:
+        """The least of :meth:`Observation.in_front`."""
+        return min((o.in_front(at.pose(o.seen_from or self.question.reference), at.pose(o.link))
+                    for o in self.question.observations), default=np.inf)
+
+
+def supposed_planes(text: str, goal: ClosedConfiguration, question: Measurement) -> tuple[Array | None, ...] | None:
+    """The planes of what is seen in images that ``exact``, ``desired`` (those at the goal) or ``constant:0.5`` (that
+    depth) means; raises ``BadRequest``."""
+    word, _, number = text.partition(":")
+    if text == "exact":
+        return None
+    try:
+        depth = None if text == "desired" else float(number)
+    except ValueError:
+        depth = np.nan
+    if depth is not None and not (word == "constant" and 0 < depth <= FARTHEST_POSE):
+        raise BadRequest("depth", text, f"{SUPPOSED}, more than 0 and at most {FARTHEST_POSE:g}")
+    found: list[Array | None] = []
+    for seen in question.observations:
+        plane = None
+        if isinstance(seen, CameraObservation):
+            plane = seen.plane_at(goal.pose(seen.seen_from or question.reference), goal.pose(seen.link))
+        found.append(plane if plane is None or depth is None else depth_plane(np.array([depth])))
+    return tuple(found)
 
 
 def inverted(values: Array) -> Array:
@@ -95,28 +155,37 @@ def inverted(values: Array) -> Array:
     return np.asarray(values / (values**2 + damping))
 
 
-def directions(configuration: ClosedConfiguration, question: Measurement) -> tuple[Array, list[Array]]:
-    """The observed directions (k, 3) and, of each, the rates (3, nv)."""
+def measured(configuration: ClosedConfiguration, question: Measurement) -> tuple[tuple[Array, ...], list[Array]]:
+    """Of each observation the value (size,) and the rates (size, nv)."""
     _, _, values, rates = measure(configuration.twin, configuration.q, question.reference, question.observations)
+    return tuple(values), rates
+
+
+def directions(configuration: ClosedConfiguration, question: Measurement) -> tuple[Array, list[Array]]:
+    """The same where all are directions, (k, 3) and (3, nv)."""
+    values, rates = measured(configuration, question)
     return np.array(values), rates
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class FixedDirections(Value):
-    """The directions (k, 3) of the goal from the first moment on."""
+    """The values of the goal from the first moment on."""
 
-    goal: Array
+    goal: Measures
 
-    def __call__(self, time: float) -> tuple[Array, Array]:
-        return self.goal, np.zeros_like(self.goal)
+    def __call__(self, time: float) -> tuple[Measures, Measures]:
+        return self.goal, [np.zeros_like(each) for each in self.goal]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Trajectory(Value):
-    """Directions through ``marks`` (n, k, 3) in ``duration`` (s), at rest at both ends, then those of the last mark."""
+    """Values through ``marks`` (n, rows) in ``duration`` (s), at rest at both ends, then those of the last mark;
+    ``sizes`` are the rows of each observation, ``units`` says which are unit vectors."""
 
     marks: Array
     duration: float
+    sizes: tuple[int, ...]
+    units: tuple[bool, ...]
 
     @cached_property
     def _curve(self) -> tuple[Any, Any]:
@@ -125,34 +194,44 @@ class Trajectory(Value):
         curve = CubicSpline(np.linspace(0, 1, len(self.marks)), self.marks)
         return curve, curve.derivative()
 
-    def __call__(self, time: float) -> tuple[Array, Array]:
+    def __call__(self, time: float) -> tuple[Measures, Measures]:
         if time >= self.duration:
-            return self.marks[-1], np.zeros_like(self.marks[-1])
+            return self._each(self.marks[-1]), self._each(np.zeros_like(self.marks[-1]))
         x = time / self.duration
         part = x**3 * (10 - 15 * x + 6 * x**2)
         speed = 30 * x**2 * (1 - x) ** 2 / self.duration
         curve, slope = self._curve
-        raw = curve(part)
-        size = np.linalg.norm(raw, axis=1, keepdims=True)
-        u, moving = raw / size, speed * slope(part) / size
-        return u, moving - np.sum(u * moving, axis=1, keepdims=True) * u
+        values, moving = self._each(curve(part)), self._each(speed * slope(part))
+        for i, unit in enumerate(self.units):
+            if unit:
+                size = float(np.linalg.norm(values[i]))
+                values[i], moving[i] = values[i] / size, moving[i] / size
+                moving[i] = moving[i] - (values[i] @ moving[i]) * values[i]
+        return values, moving
+
+    def _each(self, rows: Array) -> list[Array]:
+        return np.split(rows, np.cumsum(self.sizes)[:-1])
 
 
 def straight(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, question: Measurement,
              duration: float) -> tuple[Trajectory, ClosedConfiguration]:
-    """The trajectory of the directions on the straight way from ``start`` to a goal of the whole pose (where parts of
+    """The trajectory of the values on the straight way from ``start`` to a goal of the whole pose (where parts of
     the pose depend on each other, along the poses nearest to it), and the configuration at its end; raises
     ``PoseNotReached`` where the way is blocked."""
     X = start.pose(motion.link)
-    here, marks = start, [directions(start, question)[0]]
+    every = question.observations
+    here, marks = start, [measured(start, question)[0]]
     for fraction in np.linspace(0, 1, POSES + 1)[1:]:
         here, came = _towards(here, motion, goal.towards(X, float(fraction)), last=fraction == 1)
         if not came:
             at = motion.pose(here.pose(motion.link))
             raise PoseNotReached(start.twin.mechanism.name, str(motion.pose(goal_pose(goal))), float(fraction), str(at),
                                  origin="the start")
-        marks.append(directions(here, question)[0])
-    return Trajectory(np.array(marks), duration), here
+        # an angle goes on where it passes half a turn
+        now = measured(here, question)[0]
+        marks.append(tuple(last + o.apart(value, last) for o, value, last in zip(every, now, marks[-1], strict=True)))
+    units = tuple(isinstance(o, SeenAxis) for o in every)
+    return Trajectory(np.array([np.concatenate(each) for each in marks]), duration, question.sizes, units), here
 
 
 def _towards(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last: bool

@@ -1,10 +1,10 @@
-"""Errors of measured directions, seeded: inside a cone about each true direction (MMT A.1); from picture to picture,
-or the same all along a run (a bias, as of a lens whose distortion is not corrected)."""
+"""Errors of what is measured, seeded: of directions inside a cone about each true one (MMT A.1); of other kinds as each
+says; from picture to picture, or the same all along a run (a bias, as of a lens whose distortion is not corrected)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,42 +12,53 @@ import numpy as np
 from ..budgets import WIDEST_NOISE
 from ..errors import BadRequest
 from ..geometry.vectors import Array
+from ..mechanism.observation import Observation
+from ..mechanism.sights import CameraObservation
 from ..results import Value
 
 PERIOD = 0.04
 """Seconds between two independent errors (25 pictures a second); in between they change linearly."""
 
-EXAMPLE = "0.1deg or 0.002 (radians), with edges a number of pixels such as 0.3px"
+EXAMPLE = "0.1deg or 0.002 (radians), 0.3px in a picture, 1mm of lengths; several with commas"
+UNITS = {"px": ("px", 1.0), "deg": ("rad", math.radians(1)), "mm": ("m", 1e-3), "m": ("m", 1.0), "": ("rad", 1.0)}
+"""Endings of amounts, the longer ones first: what they are told in, and how much of it one is."""
+MOST = {"px": WIDEST_NOISE, "rad": math.pi / 2, "m": math.inf}
 
 
 @dataclass(frozen=True)
 class Noise:
-    """How large errors are: the half-angle of a cone (radians) or an error of edges in the picture (pixels); of a
-    ``bias`` each error stays the same all along a run."""
+    """How large errors are, by what they are told in: half-angles of cones (``rad``), errors in the picture (``px``),
+    of lengths (``m``); of a ``bias`` each error stays the same all along a run."""
 
-    value: float
-    pixels: bool = False
+    amounts: tuple[tuple[str, float], ...]
     bias: bool = False
 
     @classmethod
     def parse(cls, text: str) -> Noise:
-        """The amount that ``0.1deg``, ``0.002`` or ``0.3px`` says; raises ``BadRequest``."""
-        cleaned = text.strip()
-        pixels, degrees = cleaned.endswith("px"), cleaned.endswith("deg")
-        digits = cleaned.removesuffix("px").removesuffix("deg").strip()
-        try:
-            value = float(digits)
-        except ValueError:
-            raise BadRequest("noise: not a number", text, EXAMPLE) from None
-        value = math.radians(value) if degrees else value
-        if not 0 < value < (WIDEST_NOISE if pixels else math.pi / 2):
-            raise BadRequest("noise", text, "more than zero; cones of less than 90deg, edges less than "
-                                            f"{WIDEST_NOISE:g}px")
-        return cls(value, pixels)
+        """The amounts that ``0.1deg``, ``0.002``, ``0.3px`` or ``0.3px,1mm`` says; raises ``BadRequest``."""
+        found: dict[str, float] = {}
+        for word in map(str.strip, text.split(",")):
+            ending = next(each for each in UNITS if word.endswith(each))
+            unit, one = UNITS[ending]
+            try:
+                value = float(word.removesuffix(ending)) * one
+            except ValueError:
+                raise BadRequest("noise: not a number", text, EXAMPLE) from None
+            if not 0 < value < MOST[unit] or unit in found:
+                raise BadRequest("noise", text, "each unit once, more than zero; cones of less than 90deg, less than "
+                                                f"{WIDEST_NOISE:g}px")
+            found[unit] = value
+        return cls(tuple(found.items()))
+
+    def of(self, unit: str) -> float:
+        """The amount in a unit, 0 where none is."""
+        return dict(self.amounts).get(unit, 0.0)
 
     def __str__(self) -> str:
-        return ((f"{self.value:g}px" if self.pixels else f"{math.degrees(self.value):.4g}deg")
-                + (", constant over time" if self.bias else ""))
+        words = {"px": "{:g}px", "m": "{:g}m"}
+        every = [f"{math.degrees(value):.4g}deg" if unit == "rad" else words[unit].format(value)
+                 for unit, value in self.amounts]
+        return ", ".join(every) + (", constant over time" if self.bias else "")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -74,15 +85,44 @@ class Shocks(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Cones(Value):
-    """Measured directions inside cones of the given half-angle (rad) about the true ones."""
+class Sensors(Value):
+    """Simulated sensors of some observations, each with the noise that its kind has; ``length`` (m) is the unit of
+    the values' lengths."""
 
-    half_angle: float
+    observations: tuple[Observation, ...]
+    amounts: Mapping[str, float]
     shocks: Shocks
+    length: float
 
-    def __call__(self, time: float, poses: Callable[[str], Array], directions: Array) -> Array:
-        """The measured directions (k, 3) where the true ones are ``directions`` (k, 3)."""
-        shock = self.shocks.at(time)
-        across = shock - np.sum(shock * directions, axis=1, keepdims=True) * directions
-        tilted = directions + math.tan(self.half_angle) * across
-        return np.asarray(tilted / np.linalg.norm(tilted, axis=1, keepdims=True))
+    @classmethod
+    def of(cls, observations: Sequence[Observation], noise: Noise, horizon: float, seed: int, length: float) -> Sensors:
+        """Of a seed, until ``horizon`` (s); raises ``BadRequest`` for noise that none of them has, and for pixels of a
+        camera without a focal length."""
+        known = frozenset().union(*(each.found_by for each in observations))
+        for unit, _ in noise.amounts:
+            if unit not in known:
+                raise BadRequest(f"noise of what is observed in {unit}", str(noise), sorted(known))
+        amounts = dict(noise.amounts)
+        for each in observations:
+            if "px" in amounts and "px" in each.found_by and not (
+                    isinstance(each, CameraObservation) and each.camera and each.camera.focal):
+                raise BadRequest(f"noise in pixels: the focal length of the camera of {each.kind} {each.leg}", "none",
+                                 "a camera with one (--camera NAME=LINK@x,y,z/r,p,y/FOCAL)")
+        count = sum(_vectors(each) for each in observations)
+        return cls(tuple(observations), amounts, Shocks.drawn(count, horizon, seed, noise.bias), length)
+
+    def __call__(self, time: float, poses: Callable[[str], Array], values: Sequence[Array] | Array) -> list[Array]:
+        """What is measured where the true values are these."""
+        shocks, first, found = self.shocks.at(time), 0, []
+        for each, value in zip(self.observations, values, strict=True):
+            own = shocks[first : first + _vectors(each)]
+            first += len(own)
+            unit = self.length ** np.broadcast_to(each.dimension, each.size)
+            noisy = each.found_by & self.amounts.keys()
+            found.append(each.sensed(value * unit, own, self.amounts) / unit if noisy else value)
+        return found
+
+
+def _vectors(seen: Observation) -> int:
+    """How many random vectors an observation's noise takes."""
+    return 1 if seen.size <= 3 else 2

@@ -16,7 +16,7 @@ from ..geometry.vectors import Array, inverse, unit
 from ..mechanism import Mechanism
 from .bench import simulator
 from .camera import Camera, Cylinder, rebuilt
-from .law import Poses
+from .law import Measures, Poses
 from .mockup import RADIUS, rods
 from .noise import PERIOD
 
@@ -132,9 +132,10 @@ class Pictures:
     stage: LegRenderer
     _held: dict[int, Array] = field(default_factory=dict)
 
-    def __call__(self, time: float, poses: Poses, directions: Array) -> Array:
+    def __call__(self, time: float, poses: Poses, values: Measures) -> Array:
         """The measured directions (k, 3) in the reference link's frame; a leg of which too little is seen keeps its
         true one."""
+        directions = np.array(values)
         sample = int(time / PERIOD + 1e-9)
         if sample not in self._held:
             self._held[sample] = self._measured(poses, directions) - directions

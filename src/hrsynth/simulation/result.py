@@ -15,6 +15,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism.pose import Pose
 from ..results import Result
 from .ending import Ending
+from .law import Measures
 from .noise import Noise
 from .run import Run
 from .track import Track
@@ -60,13 +61,14 @@ class Servo(Result, shown_as="servo"):
     setting: ObservedRobot
     start: Pose
     goal: Pose
-    desired: Array
+    desired: Measures
     gain: float
     sense: str
     noise: Noise | None
     run: Run
     track: Track
     ending: Ending
+    depth: str
     settled: ClosedConfiguration
     target: ClosedConfiguration
     """The goal's configuration."""
@@ -96,7 +98,7 @@ class Servo(Result, shown_as="servo"):
     @property
     def errors(self) -> Array:
         """‖e_i‖ of the true errors, (n, k)."""
-        return np.array([np.linalg.norm(command.error, axis=1) for command in self.run.commands])
+        return np.array([[np.linalg.norm(e) for e in command.error] for command in self.run.commands])
 
     @property
     def way(self) -> Array:
@@ -131,7 +133,7 @@ class Servo(Result, shown_as="servo"):
         """The record of the command line, without the command's own fields."""
         found = self.ending
         return {**self.setting.to_dict(), "from": self.start.to_dict(), "to": self.goal.to_dict(), "gain": self.gain,
-                "sense": self.sense, "noise": None if self.noise is None else str(self.noise),
+                "depth": self.depth, "sense": self.sense, "noise": None if self.noise is None else str(self.noise),
                 "ended": self.ended, "reason": found.reason, "pose": self.pose.to_dict(), "matched_mode": found.matched,
                 "modes": None if found.modes is None else [each.to_dict() for each in found.modes.modes],
                 "type2": self.track.to_dict(self.run.times.tolist()),

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..budgets import RUN_AWAY, RUN_EVALUATIONS, WIDEST_CHART
-from ..errors import LoopsNotClosed
+from ..errors import LoopsNotClosed, NotMeasured
 from ..geometry.vectors import Array
 from ..kinematics.chart import TangentChart
 from ..kinematics.configuration import ClosedConfiguration
@@ -33,6 +33,7 @@ from ..tolerances import (
     REST_SLOPE,
     RESTED,
     RUN_SHORTEST_STEP,
+    SEEN_ABOVE,
     SERVED,
     STRETCH_END,
 )
@@ -41,10 +42,11 @@ from .noise import PERIOD
 
 State = tuple[ClosedConfiguration, Command]
 
-SERVED_AT, REST, POISED, LIMIT, OPEN = "served", "rest", "poised", "limit", "open"
+SERVED_AT, REST, POISED, LIMIT, UNSEEN, OPEN = "served", "rest", "poised", "limit", "unseen", "open"
+UNMEASURED = "unmeasured"
 AWAY, TIME, EFFORT, LOST = "away", "time", "effort", "lost"
 HALVINGS = 40
-"""Bisections that find the moment at which a joint meets its limit."""
+"""Bisections that find the moment at which a joint meets its limit, or sight is lost."""
 NEWTON_STEPS = 8
 """Steps in which a rest is found."""
 PERSISTS = 0.9
@@ -55,9 +57,9 @@ PERSISTS = 0.9
 class Run(Value):
     """What happened: times (n,), the configurations and commands at them, and why it stopped: the error vanished
     (``served``), a stable rest was reached (``rest``), the command vanished where none was found (``poised``), a joint
-    met its limit (``limit``), the loops' rank falls (``open``), the platform ran away (``away``), the time was over
-    (``time``), the integrator's ``RUN_EVALUATIONS`` configurations were (``effort``), or it could not go on
-    (``lost``)."""
+    met its limit (``limit``), what is observed left a camera's sight (``unseen``), the loops' rank falls (``open``),
+    the platform ran away (``away``), the time was over (``time``), the integrator's ``RUN_EVALUATIONS`` configurations
+    were (``effort``), or it could not go on (``lost``)."""
 
     times: Array
     configurations: tuple[ClosedConfiguration, ...]
@@ -94,7 +96,7 @@ class Loop(Value):
             left = stretch.left
             times += reached
             found += states
-            if stopped == LOST and longest * self.law.gain > RUN_SHORTEST_STEP:
+            if stopped in (LOST, UNMEASURED) and longest * self.law.gain > RUN_SHORTEST_STEP:
                 # the step was too long for the loops to follow, or for the chart: another chart, shorter steps
                 longest, stopped = min(longest, 1 / self.law.gain) / 8, None
             elif stopped == LOST and _loose(found[-1][0], start):
@@ -163,12 +165,13 @@ class _Stretch:
                 if solver.status == "failed":
                     return times, states, LOST
                 time, state = float(solver.t), self.state(float(solver.t), solver.y)
-                if clearance(state[0]) < min(0.0, self.margin):
+                met = self._met(state[0])
+                if met:
                     time, state = self._at_limit(solver)
                 times.append(time)
                 states.append(state)
-                if time < solver.t:
-                    return times, states, LIMIT
+                if met:
+                    return times, states, met
                 if settling and (end := self._end(time, solver.y, state)):
                     states[-1] = end[1]
                     return times, states, end[0]
@@ -178,6 +181,8 @@ class _Stretch:
                     return times, states, None
         except LoopsNotClosed:
             return times, states, LOST
+        except NotMeasured:
+            return times, states, UNMEASURED
         return times, states, TIME if until == horizon else None
 
     def _end(self, time: float, y: Array, state: State) -> tuple[str, State] | None:
@@ -197,12 +202,18 @@ class _Stretch:
             return None
         return self.state(time, found.y)
 
+    def _met(self, at: ClosedConfiguration) -> str | None:
+        """What ends a run at a configuration: a joint beyond its limit, something that no camera sees."""
+        if clearance(at) < min(0.0, self.margin):
+            return LIMIT
+        return UNSEEN if self.loop.law.in_front(at) < SEEN_ABOVE else None
+
     def _at_limit(self, solver: Any) -> tuple[float, State]:
-        """Time and state in the solver's last step at which a joint meets its limit."""
+        """Time and state in the solver's last step up to which nothing ends the run."""
         inside, outside, curve = float(solver.t_old), float(solver.t), solver.dense_output()
         for _ in range(HALVINGS):
             middle = (inside + outside) / 2
-            met = clearance(self.state(middle, curve(middle))[0]) < 0
+            met = self._met(self.state(middle, curve(middle))[0]) is not None
             inside, outside = (inside, middle) if met else (middle, outside)
         return inside, self.state(inside, curve(inside))
 

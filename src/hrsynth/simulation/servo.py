@@ -1,15 +1,15 @@
-"""The simulated servo run: from one pose towards the directions of another, and where it ended (MMT 2.3, 5.1.3)."""
+"""The simulated servo run: from one pose to what is measured at another, and where it ended (MMT 2.3, 5.1.3)."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..analysis.asked import configurations_at
-from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike
+from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
 from ..analysis.question import question
 from ..analysis.verdict import verdict_of
@@ -18,15 +18,18 @@ from ..errors import BadRequest, RankUndecided
 from ..geometry.so3 import angle_of
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
+from ..mechanism.observation import Observation
+from ..mechanism.observations.direction import SeenAxis
+from ..mechanism.observations.point import ImagePoint
 from ..mechanism.pose import PoseLike, asked_pose
 from ..progress import tell
 from ..results import by_name
-from ..tolerances import RANK_GAP
+from ..tolerances import RANK_GAP, SEEN_ABOVE
 from .bench import Bench
 from .camera import Camera, Edges, cylinders, placed
 from .ending import EndingClassifier
-from .law import FixedDirections, Law, Sense, Trajectory, directions, straight, whole
-from .noise import Cones, Noise, Shocks
+from .law import FixedDirections, Law, Sense, Trajectory, measured, straight, supposed_planes, whole
+from .noise import Noise, Sensors, Shocks
 from .pictures import LegRenderer, Pictures, drawing, vision
 from .result import Scatter, Servo
 from .run import EFFORT, Loop, Run
@@ -42,6 +45,10 @@ EXACT, EDGES, PICTURES = "exact", "edges", "pictures"
 ALLOWED_NOISE = {EXACT: "an angle, such as 0.1deg", EDGES: "pixels, such as 0.3px",
                  PICTURES: "none: the pictures have their own"}
 """How directions are measured, and the noise of each."""
+DIRECTIONS, ANGLES, PIXELS = ("directions", " degrees"), ("angles", " degrees"), ("image points", " px")
+LENGTHS, VALUES = ("lengths", " mm"), ("values", "")
+"""What is wrong by noise, and its unit."""
+CURES = "a pose from which all is seen, or a camera whose z axis points at it"
 
 
 @dataclass(frozen=True)
@@ -51,10 +58,12 @@ class Conditions:
     gain: float = GAIN
     """λ of the control law (1/s)."""
     sense: str = EXACT
-    """How the directions are measured: ``exact`` (or with ``noise`` in a cone about the true ones), ``edges`` (from the
-    edges of the legs before a camera, their ends wrong by ``noise``) or ``pictures`` (from rendered ones)."""
+    """How what is observed is measured: ``exact`` (or with ``noise``, of directions in a cone about the true ones), of
+    legs also ``edges`` (from those of the legs before a camera, their ends wrong by ``noise``) or ``pictures`` (from
+    rendered ones)."""
     noise: Noise | str | None = None
-    """How wrong they are, as ``0.1deg``, of edges as ``0.3px``."""
+    """How wrong it is: angles as ``0.1deg``, what is found in a picture as ``0.3px``, lengths as ``1mm``; or several,
+    as ``0.3px,1mm``."""
     bias: bool = False
     """Whether the errors of ``noise`` stay as they are at first."""
     lens: Camera | None = None
@@ -62,8 +71,11 @@ class Conditions:
     well)."""
     physics: bool = False
     """Whether a mock-up in MuJoCo is driven, with dynamics."""
+    depth: str = "exact"
+    """The depth of what is seen in images, as the law supposes it: ``exact``, ``desired`` (that at the goal) or
+    ``constant:0.5`` (m)."""
     duration: float | None = None
-    """Leads the desired directions along the straight way of poses in so many seconds instead of at once."""
+    """Leads the desired values along the straight way of poses in so many seconds instead of at once."""
     time: float | None = None
     """Longest run (s)."""
 
@@ -76,7 +88,8 @@ class Conditions:
         object.__setattr__(self, "noise", noise)
         if self.sense not in ALLOWED_NOISE:
             raise BadRequest("sense", self.sense, tuple(ALLOWED_NOISE))
-        if noise is not None and (self.sense == PICTURES or noise.pixels != (self.sense == EDGES)):
+        units = () if noise is None else tuple(unit for unit, _ in noise.amounts)
+        if noise is not None and (self.sense == PICTURES or (self.sense == EDGES and units != ("px",))):
             raise BadRequest(f"noise with sense {self.sense}", str(noise), ALLOWED_NOISE[self.sense])
         for what, value in (("gain", self.gain), ("duration", self.duration)):
             if value is not None and not 0 < value < math.inf:
@@ -109,20 +122,23 @@ class Conditions:
 
 @question()
 @by_name(Conditions, "conditions")
-def servo(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
+def servo(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
           start: PoseLike, goal: PoseLike, conditions: Conditions, seed: int = 0) -> Servo:
-    """The servo loop of MMT 2.3 from the pose ``start`` towards the directions at ``goal``.
+    """The servo loop of MMT 2.3 from the pose ``start`` towards what is measured at ``goal``.
 
-    ``observe`` and ``camera`` as for ``derive``. The fields of :class:`Conditions` can be given by their names:
-    ``gain``, ``sense``, ``noise``, ``bias``, ``lens``, ``physics``, ``duration``, ``time``.
+    ``observe``, ``camera`` and ``see`` as for ``derive``; each kind of observation has its error. The fields of
+    :class:`Conditions` can be given by their names: ``gain``, ``sense``, ``noise``, ``bias``, ``lens``, ``physics``,
+    ``depth``, ``duration``, ``time``.
 
-    Raises ``BadRequest`` for names that there are not, legs that do not see the platform, singular poses;
-    ``PoseNotReached`` for poses out of reach; ``MissingExtra``.
+    Raises ``BadRequest`` for names that there are not, observations that do not see the platform, singular poses and
+    those at which something is behind its camera; ``PoseNotReached`` for poses out of reach; ``MissingExtra``.
 
     >>> hrsynth.servo("3rrr_m1", start="x=0,y=0,phi=0", goal="x=0.02,y=0,phi=0", gain=0.8)
     <Servo: 3rrr_m1, watching 1, 2, 3: ended at x=0.02,y=0,z=0,phi=0, goal>
     """
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("servo")
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    if conditions.physics or conditions.sense != EXACT:
+        setting.by_segments(f"servo with {'physics' if conditions.physics else f'sense {conditions.sense}'}")
     task = ServoTask.of(setting, start=start, goal=goal, conditions=conditions, seed=seed)
     tell("run")
     return task.run()
@@ -156,20 +172,28 @@ class ServoTask:
         """The same between two configurations."""
         require_seen(setting)
         motion, ends = setting.motion, [start, goal]
-        law = Law(setting.samples.question, setting.dof, conditions.gain)
-        desired: FixedDirections | Trajectory = FixedDirections(directions(ends[1], law.question)[0])
+        question = setting.samples.question
+        law = Law(question, setting.dof, conditions.gain, supposed_planes(conditions.depth, goal, question))
+        for name, at in _named(ends):
+            require_sight(setting, law, name, at)
+        desired: FixedDirections | Trajectory = FixedDirections(measured(ends[1], question)[0])
         if conditions.duration is not None:
             goal_pose = whole(motion, ends[1].pose(motion.link))
-            desired, ends[1] = straight(ends[0], motion, goal_pose, law.question, conditions.duration)
+            desired, ends[1] = straight(ends[0], motion, goal_pose, question, conditions.duration)
         analysis = ConfigurationAnalysis.of(setting)
-        for name, at in zip(("start", "goal"), ends, strict=True):
+        for name, at in _named(ends):
             require_regular(analysis, name, at)
         return cls(setting, ends[0], ends[1], law, desired, conditions, seed)
 
     @property
+    def wanted(self) -> tuple[Array, ...]:
+        """The values of the goal."""
+        return measured(self.goal, self.law.question)[0]
+
+    @property
     def directions(self) -> Array:
-        """The directions (k, 3) of the goal."""
-        return directions(self.goal, self.law.question)[0]
+        """The same where all are directions, (k, 3)."""
+        return np.array(self.wanted)
 
     def run(self) -> Servo:
         """What comes of it."""
@@ -186,18 +210,18 @@ class ServoTask:
                     smooth)
 
     def sense(self) -> Sense:
-        """What measures the directions, and how wrong."""
+        """What measures, and how wrong."""
         given, question = self.conditions, self.law.question
         noise = given.amount
         if given.sense == EXACT and noise is not None:
-            return Cones(noise.value, Shocks.drawn(len(self.directions), given.horizon, self.seed, noise.bias))
+            return Sensors.of(question.observations, noise, given.horizon, self.seed, self.goal.twin.length)
         mechanism = self.setting.mechanism
         rods = cylinders(mechanism, question.observations)
         eye = given.lens or placed(rods, question.reference, (self.start.pose, self.goal.pose))
         if given.sense == EDGES:
-            edge = noise or Noise(0.0, pixels=True)
+            edge = noise or Noise(())
             shocks = Shocks.drawn(2 * len(rods), given.horizon, self.seed, edge.bias)
-            return Edges(eye, question.reference, rods, edge.value, shocks)
+            return Edges(eye, question.reference, rods, edge.of("px"), shocks)
         drawing()
         vision()
         return Pictures(LegRenderer(mechanism, eye, question.reference, rods))
@@ -208,14 +232,14 @@ class ServoTask:
         still = run
         if given.noisy or simulated is not None:
             # where the loop without noise and dynamics goes on to: its ending is the one that is told
-            still = Loop(self.law, setting.everything.question, FixedDirections(self.directions)).simulate(
+            still = Loop(self.law, setting.everything.question, FixedDirections(self.wanted)).simulate(
                 run.last, LASTS / self.law.gain)
-        classifier = EndingClassifier(setting, self.goal, self.directions)
-        ending = classifier.classify(still, directions(still.last, self.law.question)[0])
+        classifier = EndingClassifier(setting, self.goal, self.wanted)
+        ending = classifier.classify(still, measured(still.last, self.law.question)[0])
         track = tracked(run.configurations, self.law.question, setting.everything.question, setting.dof)
         return Servo(setting, motion.pose(self.start.pose(motion.link)), motion.pose(self.goal.pose(motion.link)),
-                     self.directions, self.law.gain, given.sense, given.amount, run, track, ending, still.last,
-                     self.goal, self._scatter(run, still.last) if given.noisy else None,
+                     self.wanted, self.law.gain, given.sense, given.amount, run, track, ending, given.depth,
+                     still.last, self.goal, self._scatter(run, still.last) if given.noisy else None,
                      tuple(self._notes(run, still, simulated)))
 
     def _notes(self, run: Run, still: Run, simulated: Array | None) -> Iterator[str]:
@@ -223,15 +247,25 @@ class ServoTask:
         if run.stopped == EFFORT:
             yield f"the run was stopped after {RUN_EVALUATIONS:,} configurations, at {run.times[-1]:.3g} s"
         if self.conditions.noisy:
-            angles = np.degrees(np.array([np.arccos(np.clip(np.sum(each.directions * each.seen, axis=1), -1, 1))
-                                          for each in run.commands]))
-            rms = ", ".join(f"{value:.2g}" for value in np.sqrt(np.mean(angles**2, axis=0)))
-            yield f"measured directions were wrong by {rms} degrees root mean square, at most {angles.max():.2g}"
+            yield from self._wrong(run)
         if simulated is not None:
             motion, X = self.setting.motion, simulated @ self.start.pose(self.setting.motion.link)
             there = still.last.pose(motion.link)
             apart = 1e3 * float(np.linalg.norm(motion.position(X) - motion.position(there)))
             yield f"the simulated platform stopped {apart:.2g} mm from there"
+
+    def _wrong(self, run: Run) -> Iterator[str]:
+        """By how much measured values were wrong, in units in which noise is given; of lines and circles their errors.
+        """
+        every, amount = self.setting.observed, self.conditions.amount
+        units = [_unit(o, None if amount is None else dict(amount.amounts).keys()) for o in every]
+        for kind in dict.fromkeys(unit for unit in units if unit is not None):
+            chosen = [i for i, unit in enumerate(units) if unit == kind]
+            off = np.array([[_off(kind, every[i], each.seen[i], each.true[i]) for i in chosen]
+                            for each in run.commands]) * (self.goal.twin.length if kind == LENGTHS else 1.0)
+            rms = ", ".join(f"{value:.2g}" for value in np.sqrt(np.mean(off**2, axis=0)))
+            word, unit = kind
+            yield f"measured {word} were wrong by {rms}{unit} root mean square, at most {off.max():.2g}{unit}"
 
     def _scatter(self, run: Run, settled: ClosedConfiguration) -> Scatter:
         motion = self.setting.motion
@@ -253,11 +287,52 @@ def require_seen(setting: ObservedRobot) -> None:
     verdict = verdict_of(setting, setting.labels, setting.samples)
     if verdict.lost:
         lost = "; ".join(freedom.name for freedom in verdict.lost)
-        raise BadRequest(f"{robot}: the legs do not see {lost}", name,
-                         "legs that make it controllable (hrsynth legs lists them)")
+        what, cure = (("the legs do", "legs that make") if all(each.by_segment for each in setting.observed) else
+                      ("what is observed does", "observations that make"))
+        raise BadRequest(f"{robot}: {what} not see {lost}", name, f"{cure} it controllable (hrsynth legs lists them)")
     if any(member.relation.RI for member in setting.samples.members):
         raise BadRequest(f"{robot}: observed links move while the platform rests, there is no interaction matrix", name,
                          "other legs")
+
+
+def _unit(seen: Observation, noise: Set[str] | None) -> tuple[str, str] | None:
+    """In what it is told how wrong a measured value is; None where it is exact."""
+    own = seen.found_by if noise is None else seen.found_by & noise
+    if not own:
+        return None
+    if isinstance(seen, ImagePoint) and "px" in own:
+        return PIXELS
+    if isinstance(seen, SeenAxis):
+        return DIRECTIONS
+    if np.ndim(seen.dimension) == 0 and seen.dimension == 1:
+        return LENGTHS
+    return ANGLES if own == {"rad"} and seen.angular and seen.size in (1, 3) else VALUES
+
+
+def _off(kind: tuple[str, str], seen: Observation, value: Array, true: Array) -> float:
+    """How far a measured value is off the true one, lengths over a characteristic length."""
+    if kind in (DIRECTIONS, ANGLES) and seen.size == 3:
+        return math.degrees(np.arccos(np.clip(value @ true, -1, 1)))
+    off = float(np.linalg.norm(seen.error(value, true)))
+    if kind == PIXELS:
+        assert isinstance(seen, ImagePoint)
+        return off / seen.pixels({"px": 1.0})
+    return {ANGLES: math.degrees(off), LENGTHS: 1e3 * off}.get(kind, off)
+
+
+def _named(ends: Sequence[ClosedConfiguration]) -> list[tuple[str, ClosedConfiguration]]:
+    """The start and the goal with their names; the goal alone where both are one."""
+    return list(zip(("start", "goal"), ends, strict=True))[ends[0] is ends[1]:]
+
+
+def require_sight(setting: ObservedRobot, law: Law, name: str, at: ClosedConfiguration) -> None:
+    """Raise ``BadRequest`` where something that a camera is to see is behind it, or outside of its picture."""
+    for seen in setting.observed:
+        X = at.pose(seen.seen_from or law.question.reference)
+        if seen.in_front(X, at.pose(seen.link)) < SEEN_ABOVE:
+            pose = setting.motion.pose(at.pose(setting.motion.link))
+            raise BadRequest(f"{setting.robot.name}: {seen.kind} {seen.leg} is not in front of its camera at the "
+                             f"{name}", str(pose), CURES)
 
 
 def require_regular(analysis: ConfigurationAnalysis, name: str, at: ClosedConfiguration) -> None:

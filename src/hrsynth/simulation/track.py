@@ -76,7 +76,7 @@ class _Mark:
     def smallest(self, dof: int) -> float:
         """The smallest singular value of Mᵀ."""
         left, values, _ = np.linalg.svd(self.twists, full_matrices=False)
-        if values[dof - 1] <= INVERTED * values[0]:
+        if len(values) < dof or values[dof - 1] <= INVERTED * values[0]:
             return np.nan
         inverse = np.linalg.pinv(self.twists, rcond=INVERTED) @ left[:, :dof]
         return float(np.linalg.svd(self.rates @ inverse, compute_uv=False)[dof - 1])

@@ -18,7 +18,8 @@ import numpy as np
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.observations.direction import Direction
-from hrsynth.simulation.endings.endings import Endings, endings
+from hrsynth.simulation.endings.endings import endings
+from hrsynth.simulation.endings.rests import Endings
 from oracle import Oracle
 
 EPS = 1e-13

@@ -7,7 +7,8 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from hrsynth.simulation.endings.endings import RestPoint, RestSearch
+from hrsynth.simulation.endings.endings import RestSearch
+from hrsynth.simulation.endings.rests import RestPoint
 from hrsynth.simulation.endings.search import starts
 from simulation.scenes import far_pairs, setting
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import io
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,10 +12,16 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import hrsynth
+from hrsynth.analysis.asked import configurations_at
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.errors import BadRequest, PlaneNotMet
 from hrsynth.geometry.screws import point_velocity
+from hrsynth.geometry.vectors import rotation_from_rpy
+from hrsynth.mechanism.pose import asked_pose
+from hrsynth.present.basins import MARKS, SHADES, picture
 from hrsynth.present.outputs import OUTPUTS
+from hrsynth.present.paper import PNG
+from hrsynth.simulation.ending import ENDINGS
 from hrsynth.simulation.endings import basins as module
 from hrsynth.simulation.endings.abreast import Abreast, Runs
 from hrsynth.simulation.endings.flow import Flow
@@ -25,9 +32,9 @@ HORIZON = 60.0
 
 
 @cache
-def task(name: str, legs: str | None = None) -> tuple[ServoTask, Flow]:
+def task(name: str, legs: str | None = None, to: str | None = None) -> tuple[ServoTask, Flow]:
     setting = ObservedRobot.of(name, legs)
-    goal = setting.everything.start
+    goal = setting.everything.start if to is None else configurations_at(setting, [asked_pose(to)])[0]
     made = ServoTask.between(setting, goal, goal)
     return made, Flow(setting.placer, tuple(setting.labels), made.directions)
 
@@ -73,9 +80,9 @@ def test_the_law_abreast_is_the_law(name: str, legs: str | None, singular: list[
         assert size == pytest.approx(command.size, abs=1e-9)
 
 
-def ends_agree(name: str, legs: str | None, X: np.ndarray) -> int:
+def ends_agree(name: str, legs: str | None, X: np.ndarray, to: str | None = None) -> int:
     """Hold runs abreast against single ones; how many."""
-    made, flow = task(name, legs)
+    made, flow = task(name, legs, to)
     found = runs(flow, X)
     link, count = made.setting.motion.link, 0
     for i, at in enumerate(flow.configurations(X, none(flow, len(X)))):
@@ -98,6 +105,17 @@ def test_runs_abreast_end_where_single_runs_end():
 def test_runs_of_all_robots_abreast_end_where_single_runs_end(name: str, legs: str | None):
     X = poses(task(name, legs)[1], 6, 7, 0.7)
     assert ends_agree(name, legs, X) == len(X) > 2
+
+
+@pytest.mark.slow
+def test_a_leg_is_passed_at_whose_limit_the_law_changes_abruptly():
+    legs, to = "2,4,5", "x=0.226256,y=0.0454127,z=-0.583372,rpy=0.850469/-0.102548/-0.554838"
+    motion = task("hexa", legs, to)[0].setting.motion
+    start = asked_pose("x=0.342403,y=0.0901673,z=-0.353974,rpy=-0.481852/-0.152309/-0.40517")
+    X = motion.home.copy()
+    X[:3, :3] = rotation_from_rpy(*start.rpy)
+    X[:3, 3] = np.array([start.x, start.y, start.z]) - X[:3, :3] @ motion.point
+    assert ends_agree("hexa", legs, X[None], to) == 1
 
 
 def test_a_stretched_leg_that_is_not_watched_holds_the_platform():
@@ -288,6 +306,46 @@ def test_other_robots_are_simulated_one_by_one():
 def test_what_cannot_be_asked_is_refused(asked: dict[str, str], word: str):
     with pytest.raises(BadRequest, match=word):
         hrsynth.basins("quattro", "1,4", to="z=-0.7", **asked)
+
+
+def test_every_ending_has_its_colours_and_its_mark():
+    assert set(ENDINGS) == set(SHADES) == set(MARKS)
+
+
+def test_a_servo_run_takes_the_example_of_each_end_and_ends_there():
+    """The platform's turn follows from x and y: an example that says another one is refused."""
+    found = hrsynth.basins("rrrrr_m1", to="x=0.02,y=0.15", grid="x=-0.01:0.24:2,y=-0.08:0.1:2", jobs=1)
+    assert len(found.ends) > 2
+    for each in found.ends:
+        run = hrsynth.servo("rrrrr_m1", start=str(each.example), goal="x=0.02,y=0.15")
+        assert run.ended == each.ending.name
+        assert str(run.pose) == str(each.pose)
+        assert run.start.rpy != (0, 0, 0)
+
+
+POINTS = ("point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,-0.1,0")
+
+
+def test_a_goal_behind_the_camera_is_told_to_be_the_goal():
+    seen = hrsynth.observe("gough_stewart", camera="eye=base@0,0,1.5", see=POINTS)
+    with pytest.raises(BadRequest, match="camera at the goal"):
+        hrsynth.basins(seen, to="z=0.33", grid="x=0:0.1:2")
+
+
+def test_why_runs_are_simulated_one_by_one_is_told():
+    seen = hrsynth.observe("gough_stewart", camera="eye=base@0,0,-0.6", see=POINTS)
+    assert module.hindrances(seen) == ("observations of kind point are fed back",)
+    assert module.hindrances(ObservedRobot.of("rrrrr_m1")) == ("a leg is no closed form",)
+    assert module.hindrances(ObservedRobot.of("3rrr_m1")) == ()
+
+
+@pytest.mark.parametrize(("grid", "hollow"), [("x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0", False),
+                                              ("x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0.1", True),
+                                              ("x=-0.02:0.02:2,y=0,phi=0.1", True)])
+def test_hollow_marks_are_in_the_legend_where_there_is_one(grid: str, hollow: bool):
+    found = hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid=grid, jobs=1)
+    drawn = picture(found, replace(PNG, ending=".svg")).decode()
+    assert ("hollow: at another" in drawn) == hollow
 
 
 def test_starts_out_of_reach_are_refused():

@@ -4,17 +4,23 @@ from __future__ import annotations
 
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 
 import numpy as np
 import pytest
+from scipy.linalg import null_space
 
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.geometry.affine import AffineForms
 from hrsynth.kinematics.chart import TangentChart
 from hrsynth.kinematics.configuration import ClosedConfiguration
-from hrsynth.simulation.endings.enclosure import enclosed
-from hrsynth.simulation.endings.endings import Endings, RestPoint, RestSearch, _ways, endings, stability
-from hrsynth.simulation.endings.search import CriticalPoint
+from hrsynth.kinematics.locked import joint_at
+from hrsynth.simulation.endings.completeness import Covers
+from hrsynth.simulation.endings.enclosure import _rates, enclosed
+from hrsynth.simulation.endings.endings import RestSearch, _ways, endings
+from hrsynth.simulation.endings.rests import Endings, RestPoint, stability
+from hrsynth.simulation.endings.search import CriticalPoint, descend, starts
 from hrsynth.simulation.law import FixedDirections
 from hrsynth.simulation.run import Loop
 from simulation.endings.count import Descent, counted
@@ -76,10 +82,108 @@ def test_lists_of_modes_are_among_the_rests() -> None:
     assert found.rests[0].kind == "goal"
     for signs in found.lists:
         own = [each for each in found.rests if each.kind != "critical" and each.reversed == signs.reversed]
+        assert signs.boxes == len(own)
+        if not own:
+            assert signs.empty
+            continue
         again = modes(found.setting, at=own[0].configuration)
         assert signs.complete == again.found.complete
         assert len(own) == sum(each.configuration is not None for each in again.modes)
         assert all(each.stable for each in own)
+
+
+def test_every_choice_of_signs_is_told() -> None:
+    """The list of each set of reversed legs, those without a pose as well."""
+    found = listed()
+    assert {signs.reversed for signs in found.lists} == {(), ("1",), ("2",), ("1", "2")}
+    assert sum(signs.boxes or 0 for signs in found.lists) == sum(each.error < 1e-8 for each in found.rests)
+
+
+def test_the_sides_of_rests_are_those_of_the_condition() -> None:
+    """With the distal links held in direction the five-bar's end moves as its cranks' ends do: it loses a freedom where
+    the cranks are parallel."""
+    found = listed()
+
+    def sine(at: ClosedConfiguration) -> float:
+        ends = [[joint_at(at, at.twin.mechanism.joints[name])[0] for name in leg.joints[:2]]
+                for leg in found.setting.anatomy.legs]
+        one, other = ((b - a) / np.linalg.norm(b - a) for a, b in ends)
+        return float(np.cross(one, other)[2])
+
+    side = np.sign(sine(found.goal))
+    assert {each.side for each in found.rests} == {"goal", "other", None}
+    for each in found.rests:
+        value = sine(each.configuration)
+        told = {None: 0.0, "goal": side, "other": -side}[each.side]
+        assert told == (np.sign(value) if abs(value) > 1e-4 else 0.0)
+
+
+def test_eigenvalues_are_enclosed() -> None:
+    """Those of H and JᵀJ along the kernel of DG, held coordinates left out, by another way."""
+    rng = np.random.default_rng(0)
+    size, count = 6, 3
+    for trial in range(20):
+        H, J, DG = rng.normal(size=(size, size)), rng.normal(size=(5, size)), rng.normal(size=(count, size))
+        free = np.ones(size)
+        free[0] = trial % 2
+        K, gram = np.zeros((size + count,) * 2), J.T @ J * np.outer(free, free)
+        K[:size, :size] = (H + H.T) * np.outer(free, free) + np.diag(1 - free)
+        K[size:, :size] = DG * free
+        K[:size, size:] = K[size:, :size].T
+        one, other = (AffineForms(each[None, None], np.full((1, *each.shape), 1e-12)) for each in (K, gram))
+        (told,) = _rates(one, other, free[None], count)
+        Z = null_space(DG[:, free > 0])
+        kept = np.ix_(free > 0, free > 0)
+        wanted = np.sort(np.linalg.eigvals(np.linalg.solve(Z.T @ gram[kept] @ Z, Z.T @ K[:size, :size][kept] @ Z)).real)
+        assert len(told) == len(wanted) == size - count - (free[0] == 0)
+        assert all(low <= value <= high < low + 1e-2 * max(1, abs(value))
+                   for (low, high), value in zip(told, wanted, strict=True))
+
+
+@pytest.mark.slow
+def test_rates_are_those_of_the_law() -> None:
+    """About rests where the error does not vanish, differences of the velocity that the law commands."""
+    setting = ObservedRobot.of("quattro_rigid")
+    goal = setting.configurations[3]
+    search = RestSearch.of(setting, goal)
+    seen = setting.samples.members[0].relation
+    idle = seen.mobility - seen.dimension
+    (q,) = islice(starts(search.system, np.array([search.system.system.read(goal.pose)])), 1)
+    ends = [each for each in descend(search.system, q[:60], np.ones(60, dtype=np.intp), idle) if each.value > 1e-3]
+    own = [(box.rates, at) for box, each in zip(enclosed(search.system, ends, idle), ends, strict=True)
+           if box is not None and box.rates and (at := search._placed(each.q)) is not None][:4]
+    assert own
+    for rates, at in own:
+        chart = TangentChart.around(at, setting.everything.question)
+        back = np.linalg.pinv(chart.basis)
+        A = []
+        for way in 1e-5 * np.eye(chart.basis.shape[1]):
+            pair = [back @ search.law.at(chart.at(sign * way, at.q), FixedDirections(search.desired)(0.0)).velocity
+                    for sign in (1, -1)]
+            A.append((pair[0] - pair[1]) / 2e-5)
+        # idle motions are not commanded: as many eigenvalues vanish
+        values = np.sort(-np.linalg.eigvals(np.array(A).T).real)
+        values = sorted(sorted(values, key=abs)[len(values) - len(rates):])
+        assert values == pytest.approx([(low + high) / 2 for low, high in rates], rel=1e-3, abs=1e-3)
+
+
+@pytest.mark.parametrize("name", ["prrrp_m1", pytest.param("rrrrr_m1", marks=pytest.mark.slow),
+                                  pytest.param("3prr_m1", marks=pytest.mark.slow)])
+def test_what_is_said_to_be_all_is_what_boxes_prove(name: str) -> None:
+    """Each proved critical pose is a rest of the list, and each rest one of them; of a shorter list it is not said."""
+    setting = ObservedRobot.of(name)
+    search = RestSearch.of(setting, setting.everything.start)
+    found = search.answer(complete=True)
+    assert found.complete
+    assert found.cover is not None
+    assert len(found.rests) == len(found.cover.cover.found)
+    covers = Covers(search.system, search.law.question, found.cover.cover, found.cover.cover)
+    short = covers.judged(found.rests[1:])
+    assert short is not None
+    assert (short.unmet, short.complete) == (1, False)
+    twice = covers.judged([*found.rests, replace(found.rests[0], configuration=nearby(found, found.rests[0]))])
+    assert twice is not None
+    assert (twice.strangers, twice.complete) == (1, False)
 
 
 def test_of_one_pose_the_enclosed_rest_is_told() -> None:

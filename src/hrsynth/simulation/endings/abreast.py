@@ -190,16 +190,22 @@ class Abreast:
 
     def _crossed(self, runs: Places, leg: Places, margin: Array, velocity: Array) -> Flags:
         """Give runs the other working mode of a leg, and move them on to where it is stretched as little again: √margin
-        goes through zero at a steady pace. Which of them are on their way there."""
+        goes through zero at a steady pace. Runs that are on their way from there keep their mode, and are moved on to
+        twice the margin, from where a step is felt. Which of them move at all."""
         flow, own = self.flow, np.arange(len(runs))
         rate = np.einsum("nd,nd->n", flow.slopes(self.X[runs], self.flipped[runs])[own, leg], velocity)
-        came = rate < 0
-        runs, leg, velocity = runs[came], leg[came], velocity[came]
-        self.flipped[runs, leg] ^= True
-        time = -2 * margin[came] / rate[came]
-        after = np.where(flow.points[leg][:, None], velocity, self._at(runs).velocity)
-        self.X[runs] = flow.moved(self.X[runs], time[:, None] * (velocity + after))
+        came = rate != 0
+        runs, leg, velocity, time = runs[came], leg[came], velocity[came], margin[came] / rate[came]
+        through = time < 0
+        self.flipped[runs[through], leg[through]] ^= True
+        after = np.where((flow.points[leg] | ~through)[:, None], velocity, self._at(runs).velocity)
+        time = np.where(through, -2 * time, time)
+        self.X[runs] = flow.moved(self.X[runs], time[:, None] * (velocity + after) / np.where(through, 1, 2)[:, None])
         self.steps[runs] = np.where(flow.points[leg], self.steps[runs], 2 * FLOW_SHORTEST_STEP)
+        stretched = np.arange(len(flow.legs)) == leg[:, None]
+        short = np.any(stretched & (flow.margins(self.X[runs], self.flipped[runs]) <= 0), axis=1) & ~flow.points[leg]
+        runs, stretched, least = runs[short], stretched[short], margin[came][short]
+        self.X[runs] = self._on_wall(self.X[runs], self.flipped[runs], stretched, least[:, None])
         return came
 
     def _weakened(self, live: Places, here: Commanded, good: Flags) -> Flags:
@@ -223,10 +229,10 @@ class Abreast:
         self.steps[live[some]] = np.minimum(self.steps[live[some]], FLOW_SHORTEST_STEP * 2)
         return np.asarray(some)
 
-    def _on_wall(self, X: Array, flipped: Flags, active: Flags) -> Array:
-        """The poses next to X (n, 4, 4) where the active legs' margins are ``FLOW_WALL`` (two Newton steps)."""
+    def _on_wall(self, X: Array, flipped: Flags, active: Flags, margin: float | Array = FLOW_WALL) -> Array:
+        """The poses next to X (n, 4, 4) where the active legs have a ``margin`` (n, 1) (two Newton steps)."""
         for _ in range(2):
-            miss = np.where(active, FLOW_WALL - self.flow.margins(X, flipped), 0.0)
+            miss = np.where(active, margin - self.flow.margins(X, flipped), 0.0)
             N = np.where(active[:, :, None], self.flow.slopes(X, flipped), 0.0)
             X = self.flow.moved(X, (np.linalg.pinv(N, rcond=1e-6) @ miss[:, :, None])[..., 0])
         return X

@@ -21,6 +21,7 @@ from ...batch.grids import poses_over
 from ...batch.reach import sweep
 from ...budgets import (
     FLOW_CHECKED,
+    FLOW_EXAMPLES,
     FLOW_FOLLOWED,
     FLOW_NAMED,
     FLOW_PART,
@@ -29,7 +30,7 @@ from ...budgets import (
     FLOW_STARTS_ONE_BY_ONE,
     RUN_AWAY,
 )
-from ...errors import BadRequest, PlaneNotMet
+from ...errors import BadRequest, HrsynthError, PlaneNotMet
 from ...geometry.so3 import turn_about
 from ...geometry.vectors import Array, pose_difference
 from ...kinematics.configuration import ClosedConfiguration
@@ -38,15 +39,16 @@ from ...mechanism.pose import Grid, Pose, PoseLike, as_pose, asked_pose
 from ...progress import tell
 from ...results import Result, Value
 from ...tolerances import RUNS_ALIKE
-from ..ending import BOUNDARY, ENDINGS, GOAL, TIME, UNDECIDED, Ending, EndingClassifier
+from ..ending import ENDINGS, GOAL, TIME, UNDECIDED, Ending, EndingClassifier
 from ..law import directions
 from ..run import AWAY, EFFORT, LOST, POISED, REST, SERVED_AT
 from ..run import TIME as OVER
 from ..servo import ServoTask
 from .abreast import Abreast, Runs
-from .endings import Endings
 from .flow import Flags, Flow, Places
+from .outcomes import Found, Outcome, Outcomes
 from .radius import CertifiedRadius, certified_radius
+from .rests import Endings
 
 SIDE, SIDE_ONE_BY_ONE = 100, 15
 """Starts along each side of a plane, abreast and one by one."""
@@ -62,7 +64,8 @@ NOT_REACHED = -1
 @dataclass(frozen=True, eq=False, repr=False)
 class BasinEnd(Value):
     """Where runs end: the ``ending`` of one of them, simulated one by one; the platform's pose X (4, 4) and ‖e‖ where
-    they come to rest at one; how many starts, and what part of all, end there; ``example`` is one of them."""
+    they come to rest at one; how many starts, and what part of all, end there; ``example`` is the pose of one of them,
+    as ``servo`` takes it."""
 
     ending: Ending
     pose: Pose | None
@@ -184,23 +187,6 @@ def basins(robot: RobotLike, observe: LegsLike = None, camera: str | None = None
     return search.over(Grid.parse(grid, FLOW_STARTS) if grid else search.plane(plane, steps), seed)
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Outcome(Value):
-    """How a run ended that was simulated one by one; where it came to rest the platform's pose X (4, 4) and ‖e‖."""
-
-    ending: Ending
-    X: Array | None = None
-    size: float = np.inf
-
-    def alike(self, other: Outcome, length: float) -> bool:
-        """Whether two runs end alike: at one pose, or for one reason."""
-        if self.X is None or other.X is None or self.ending.name != other.ending.name:
-            said = [(each.ending.name, each.ending.reason if each.ending.name == BOUNDARY else "", each.X is None)
-                    for each in (self, other)]
-            return said[0] == said[1]
-        return pose_difference(self.X, other.X, length) <= RUNS_ALIKE
-
-
 @dataclass(frozen=True, eq=False)
 class BasinSearch:
     """A goal and the loop that leads to it, of which many starts are followed, in so many processes (``jobs``)."""
@@ -212,10 +198,9 @@ class BasinSearch:
 
     @cached_property
     def flow(self) -> Flow | None:
-        """The law abreast; None where a leg is no closed form, a joint has limits, or something else is watched than
-        the legs' own segments."""
-        setting, own = self.setting, set(map(id, self.setting.segments))
-        if setting.placer is None or setting.mechanism.limited or not all(id(o) in own for o in setting.observed):
+        """The law abreast; None where something hinders it."""
+        setting = self.setting
+        if setting.placer is None or hindrances(setting):
             return None
         return Flow(setting.placer, tuple(setting.labels), self.task.directions)
 
@@ -238,7 +223,7 @@ class BasinSearch:
             how = "" if self.flow else ", which are simulated one by one"
             raise BadRequest(f"{name}: number of starts{how}", count, f"at most {most:,}")
         X, possible = poses_over(motion, grid, name, grid.places())
-        found = self._abreast(X, possible, seed) if self.flow else self._one_by_one(grid)
+        found = self._abreast(X, possible, seed) if self.flow else self._one_by_one(X, grid)
         if not len(found.outcomes):
             raise PlaneNotMet(name, f"the grid {grid}", f"none of {count} is")
         counts = np.bincount(found.cells[found.cells != NOT_REACHED], minlength=len(found.outcomes))
@@ -247,13 +232,28 @@ class BasinSearch:
         for number, i in enumerate(order):
             outcome, here = found.outcomes[i], np.flatnonzero(found.cells == i)
             cells[here] = number
-            away = X[here, :3, 3] - np.median(X[here, :3, 3], axis=0)
-            middle = here[np.argmin(np.linalg.norm(away, axis=1))]
+            example = self._example(found.X[here])
             ends.append(BasinEnd(outcome.ending, None if outcome.X is None else motion.pose(outcome.X), outcome.X,
-                                 outcome.size, len(here), len(here) / counts.sum(), motion.pose(X[middle])))
+                                 outcome.size, len(here), len(here) / counts.sum(), example))
         return Basins(self.setting, motion.pose(self.goal.pose(motion.link)), self.goal, grid, tuple(ends),
                       cells.reshape(grid.shape), found.damped.reshape(grid.shape), self.flow is not None,
                       found.followed, found.checked, found.agreed, certified_radius(self.setting, self.goal))
+
+    def _example(self, X: Array) -> Pose:
+        """Of the starts X (n, 4, 4) that end alike the one nearest to their middle, if small steps lead there from the
+        zero configuration; else the nearest to which they do, of the first few."""
+        away = np.linalg.norm(X[:, :3, 3] - np.median(X[:, :3, 3], axis=0), axis=1)
+        near = [self.setting.motion.pose(each) for each in X[np.argsort(away, kind="stable")[:FLOW_EXAMPLES]]]
+        return next(filter(self._starts, near), near[0])
+
+    def _starts(self, pose: Pose) -> bool:
+        """Whether a single run can start at a pose as it is printed."""
+        try:
+            (at,) = configurations_at(self.setting, [Pose.parse(str(pose))])
+            ServoTask.between(self.setting, at, self.goal)
+        except HrsynthError:
+            return False
+        return True
 
     def _abreast(self, X: Array, possible: Flags, seed: int) -> Found:
         """The outcomes of starts X (n, 4, 4) that the batch follows, all abreast."""
@@ -262,7 +262,7 @@ class BasinSearch:
         starts = np.flatnonzero(possible & flow.batch.reached(X))
         cells, damped = np.full(len(X), NOT_REACHED), np.zeros(len(X), dtype=bool)
         if not len(starts):
-            return Found([], cells, damped)
+            return Found([], cells, damped, X)
         horizon = self.task.conditions.horizon * self.task.law.gain
         parts = [X[starts[k : k + FLOW_PART]] for k in range(0, len(starts), FLOW_PART)]
         runs = Runs.joined(self._done(partial(_followed, flow.bare(), horizon, RUN_AWAY * length), parts))
@@ -291,17 +291,20 @@ class BasinSearch:
                 for run, outcome in zip(checked, rest[len(followed):], strict=True)]
         numbers[numbers < 0] = outcomes.number(Outcome(Ending(UNDECIDED, "not followed to an end")))
         cells[starts] = numbers
-        return Found(outcomes.all, cells, damped, len(followed), len(same), sum(same))
+        return Found(outcomes.all, cells, damped, X, len(followed), len(same), sum(same))
 
-    def _one_by_one(self, grid: Grid) -> Found:
-        """The outcomes of the starts of a grid, each simulated."""
+    def _one_by_one(self, X: Array, grid: Grid) -> Found:
+        """The outcomes of the starts of a grid, each simulated; X (n, 4, 4) are its poses with free parts as at home.
+        """
         everything = self.setting.everything
         at = sweep(everything.start, everything.question, grid, self.setting.motion, self.setting.placer)
         starts = np.array([i for i, each in enumerate(at) if each is not None], dtype=int)
         cells, outcomes = np.full(len(at), NOT_REACHED), Outcomes(self.goal.twin.length)
         for i, outcome in zip(starts, self._simulated([at[i] for i in starts]), strict=True):
             cells[i] = outcomes.number(outcome)
-        return Found(outcomes.all, cells, np.zeros(len(at), dtype=bool), len(starts))
+        reached = np.array([there if each is None else each.pose(self.setting.motion.link)
+                            for each, there in zip(at, X, strict=True)])
+        return Found(outcomes.all, cells, np.zeros(len(at), dtype=bool), reached, len(starts))
 
     def _simulated(self, starts: Sequence[ClosedConfiguration | None]) -> list[Outcome]:
         """The outcomes of single runs; undecided where there is no start."""
@@ -322,32 +325,15 @@ class BasinSearch:
         return found
 
 
-@dataclass(frozen=True, eq=False)
-class Found:
-    """The outcomes of starts (n,) by their numbers."""
-
-    outcomes: list[Outcome]
-    cells: Places
-    damped: Flags
-    followed: int = 0
-    checked: int = 0
-    agreed: int = 0
-
-
-class Outcomes:
-    """Outcomes that are told apart."""
-
-    def __init__(self, length: float) -> None:
-        self.all: list[Outcome] = []
-        self.length = length
-
-    def number(self, outcome: Outcome) -> int:
-        """The number of an outcome, a new one if need be."""
-        for number, each in enumerate(self.all):
-            if each.alike(outcome, self.length):
-                return number
-        self.all.append(outcome)
-        return len(self.all) - 1
+def hindrances(setting: ObservedRobot) -> tuple[str, ...]:
+    """Why runs of a robot cannot be integrated abreast."""
+    own = set(map(id, setting.segments))
+    kinds = dict.fromkeys("" if each.by_segment else each.kind for each in setting.observed if id(each) not in own)
+    found = [f"observations of kind {kind} are fed back" if kind else "other links are watched than by default"
+             for kind in kinds]
+    if setting.mechanism.limited:
+        found.append("a joint has limits")
+    return tuple(found) or (("a leg is no closed form",) if setting.placer is None else ())
 
 
 def place_of(motion: PlatformMotion, X: Array, names: Sequence[str]) -> Array:

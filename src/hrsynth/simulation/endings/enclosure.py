@@ -7,6 +7,10 @@ Methods for Systems of Equations, 1990, section 5.1). VᵀKV, V about the eigenv
 (Sylvester), which is that of H along the motions of the loops beside m positive and m negative ones; its diagonal tells
 it where it outweighs the rest of each row (Gershgorin).
 
+The loop, linearised without damping, is ṡ = −λ (JᵀJ)⁻¹ H s along the motions of the loops, J the rates of e. The
+eigenvalues μ of (JᵀJ)⁻¹ H below σ are as many as negative ones of H − σ JᵀJ along these motions where JᵀJ is positive
+definite there, which the inertia of K − σ [[JᵀJ, 0], [0, 0]] tells as well: so each μ is enclosed between two σ.
+
 The equations of the loops that are not among G hold where they follow from these (:func:`unexplained_rows`).
 """
 
@@ -16,6 +20,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ...analysis.branch.redundant import dependent_rows
 from ...budgets import TUBE_RADII, TUBE_WIDER
@@ -26,17 +31,23 @@ from ...tolerances import AFFINE_ROUNDING, THINNEST_TUBE
 from .error import RestEquations, RestSystem
 from .search import CriticalPoint, Tangents
 
+RATE_WIDTHS = (1e-9, 1e-7, 1e-5, 1e-3, 1e-1)
+"""Distances, relative ones where an eigenvalue is above 1, at which bounds of it are tried."""
+
 
 @dataclass(frozen=True, eq=False, repr=False)
 class EnclosedPoint(Value):
     """A box |q − q₀| ≤ r (N,) that holds exactly one critical point with its idle coordinates held; ``index`` is the
     number of negative eigenvalues of the Hessian along the motions of the loops, the others positive, None where that
-    was not proved. Loops ``measured`` have equations that were left out and do not follow from the others."""
+    was not proved. Loops ``measured`` have equations that were left out and do not follow from the others. ``rates``
+    enclose the eigenvalues of (JᵀJ)⁻¹ H, ascending: −1/λ times those of the linearised loop, without damping; empty
+    where that was not proved."""
 
     q: Array
     radius: Array
     index: int | None
     measured: tuple[str, ...] = ()
+    rates: tuple[tuple[float, float], ...] = ()
 
     def signs(self, count: int) -> Array:
         """The signs (count,) of the eigenvalues, ascending."""
@@ -63,7 +74,7 @@ def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | N
     # over held coordinates the identity
     mask = np.concatenate([free, np.ones((len(q), count))], axis=-1)
 
-    def evaluated(radius: Array) -> tuple[AffineForms, AffineForms]:
+    def evaluated(radius: Array) -> tuple[AffineForms, AffineForms, RestEquations]:
         """F (c, n) and K (c, n, n) over boxes of radii (c, n), n = N + m."""
         forms = [affine(q[:, i], np.zeros((len(q), 0)), radius[:, i]) for i in range(size)]
         held = affine(mu, np.zeros((*mu.shape, 0)), radius[:, size:])
@@ -79,18 +90,20 @@ def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | N
         K.r[..., :size, size:] = np.swapaxes(DG.r, -1, -2)
         both = mask[:, :, None] * mask[:, None, :]
         held_one = (1 - mask)[..., None] * np.eye(mask.shape[-1])
-        return AffineForms(F.v * mask, F.r * mask), AffineForms(K.v * both + held_one, K.r * both)
+        K = AffineForms(K.v * both, K.r * both)
+        K.v[0] += held_one
+        return AffineForms(F.v * mask, F.r * mask), K, at
 
     still = np.zeros(mask.shape)
     with np.errstate(all="ignore"):
-        F, K = evaluated(still)
+        F, K, _ = evaluated(still)
         Y = np.linalg.inv(K.v[0] + _lost(K.v[0]))
         e = combined(Y, F).size
         radius = TUBE_WIDER * e + THINNEST_TUBE
         done, found = np.zeros(len(q), dtype=bool), still.copy()
         inertia = np.full(len(q), -1)
         for _ in range(TUBE_RADII):
-            _, K = evaluated(radius)
+            _, K, _ = evaluated(radius)
             M = (np.eye(mask.shape[-1]) - combined(Y, K)).size
             wanted = e + (M @ radius[..., None])[..., 0]
             fits = np.all(wanted * (1 + AFFINE_ROUNDING) < radius, axis=-1) & ~done
@@ -100,9 +113,56 @@ def _enclosed(system: RestSystem, q: Array, idle: int) -> list[EnclosedPoint | N
             if done.all():
                 break
             radius = np.where(done[:, None], radius, TUBE_WIDER * np.maximum(wanted, radius))
+        _, K, at = evaluated(found)
+        gram, inside = at.gram(), free[:, :, None] * free[:, None, :]
+        rates = _rates(K, AffineForms(gram.v * inside, gram.r * inside), free, count)
     measured = unexplained_rows(system)
     return [EnclosedPoint(q[k], found[k, :size] * free[k], None if inertia[k] < 0 else int(inertia[k]) - count,
-                          measured) if done[k] else None for k in range(len(q))]
+                          measured, rates[k]) if done[k] else None for k in range(len(q))]
+
+
+def _rates(K: AffineForms, gram: AffineForms, free: Array, count: int) -> list[tuple[tuple[float, float], ...]]:
+    """Enclosures of the eigenvalues of JᵀJ (c, N, N) and H along the motions of the loops; ``free`` coordinates (c, N),
+    ``count`` equations of the loops and K as :func:`_enclosed` has them."""
+    size, freedoms = gram.r.shape[-1], int(free[0].sum()) - count
+    M = AffineForms(np.zeros((len(gram.v), *K.r.shape)), np.zeros(K.r.shape))
+    M.v[..., :size, :size], M.r[:, :size, :size] = gram.v, gram.r
+    # with JᵀJ in the place of H
+    flat = AffineForms(K.v.copy(), K.r.copy())
+    flat.v[..., :size, :size], flat.r[:, :size, :size] = gram.v, gram.r
+    flat.v[0, :, :size, :size] += (1 - free)[..., None] * np.eye(size)
+    definite = _negative(flat) == count
+    about = np.array([_eigenvalues(k[:size, :size], g, k[size:, :size], np.flatnonzero(own), freedoms)
+                      for k, g, own in zip(K.v[0], gram.v[0], free, strict=True)])
+    bounds = np.full((2, *about.shape), np.nan)
+    for k in range(freedoms):
+        for side, sign in enumerate((-1.0, 1.0)):
+            for width in RATE_WIDTHS:
+                sigma = about[:, k] + sign * width * np.maximum(1.0, np.abs(about[:, k]))
+                below = _negative(K - M * np.nan_to_num(sigma)[:, None, None])
+                proved = (below >= 0) & ((below - count <= k) if side == 0 else (below - count > k))
+                new = proved & np.isnan(bounds[side, :, k])
+                bounds[side, new, k] = sigma[new]
+                if not np.any(np.isnan(bounds[side, definite, k])):
+                    break
+    known = definite & np.isfinite(bounds).all(axis=(0, 2))
+    return [tuple(zip(low, high, strict=True)) if good else () for good, low, high in
+            zip(known, bounds[0].tolist(), bounds[1].tolist(), strict=True)]
+
+
+def _eigenvalues(H: Array, gram: Array, DG: Array, free: NDArray[np.intp], count: int) -> Array:
+    """Those of gram⁻¹ H on the kernel of DG, about; no numbers where gram is singular there."""
+    from scipy.linalg import LinAlgError, eigh
+
+    if not (np.isfinite(H).all() and np.isfinite(gram).all() and np.isfinite(DG).all()):
+        return np.full(count, np.nan)
+    Z = np.linalg.svd(DG[:, free])[2][len(DG):].T if len(DG) else np.eye(len(free))
+    part = np.ix_(free, free)
+    try:
+        values = eigh(Z.T @ H[part] @ Z, Z.T @ gram[part] @ Z, eigvals_only=True)
+    except LinAlgError:
+        return np.full(count, np.nan)
+    return np.asarray(values) if len(values) == count else np.full(count, np.nan)
 
 
 def _lost(K: Array) -> Array:

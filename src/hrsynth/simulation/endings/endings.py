@@ -6,192 +6,50 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
-from typing import Any
 
 import numpy as np
 
 from ...analysis.asked import configurations_at
 from ...analysis.aspects.leg_forms import LegPattern, pattern
+from ...analysis.aspects.path import CLEAR
 from ...analysis.aspects.path_segments import path_coordinates
 from ...analysis.aspects.vector_expressions import NoLegForm
+from ...analysis.measured import MeasuredRobot
 from ...analysis.modes.modes import AssemblyModes, modes
 from ...analysis.observed import LegsLike, ObservedRobot, RobotLike
 from ...analysis.posture import ConfigurationAnalysis
 from ...analysis.question import question
-from ...constraints.pattern import attached
+from ...constraints.condition import Condition
+from ...constraints.pattern import ConstraintPattern, attached
 from ...errors import HrsynthError, LoopsNotClosed
 from ...geometry.affine import affine
 from ...geometry.vectors import Array, pose_difference, transform
-from ...kinematics.assembly import ASSEMBLED, BEYOND, of_links
+from ...kinematics.assembly import of_links
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
-from ...mechanism.pose import Pose, PoseLike, asked_pose
+from ...mechanism.pose import PoseLike, asked_pose
 from ...progress import tell
-from ...results import Result, Value
 from ...tolerances import DAMPED, SAME_ENDING, VANISHED
 from ..ending import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
 from ..law import FixedDirections, Law, directions
 from ..servo import require_regular, require_seen
 from .carried import SweptChains
+from .completeness import Covers
 from .enclosure import EnclosedPoint, enclosed
 from .error import RestSystem
-from .search import NEARBY, Critical, CriticalPoints, critical_points, descend, in_mode, walked
-
-CRITICAL = "critical"
-STABLE, SADDLE, UNSTABLE, UNDECIDED = "stable", "saddle", "unstable", "undecided"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class RestPoint:
-    """A pose at which the loop rests: ``kind`` goal, mode, antipodal or critical (‖e‖ = ``error`` > 0 and no command),
-    ``stability`` stable (it attracts), saddle, unstable (nothing is drawn to it) or undecided; ``curvatures`` are the
-    eigenvalues of the Hessian of ½ ‖e‖² along the motions of the loops (characteristic lengths, radians), ascending.
-
-    Exactly one rest lies within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite where it was only found;
-    ``decided``: whether the signs of the curvatures are proved. ``reversed``
-    names legs whose direction is opposite to the desired one, ``across`` those at right angles to it. ``singular`` says
-    why fewer velocities are seen there than at other poses, None where all are; ``boundary`` whether that is a leg's
-    reach. ``assembly`` is ``beyond limits`` where joints (``beyond``) are outside their limits, else ``yes``;
-    ``other_legs`` are in another working mode than at the goal (None where that is not known); in so many working
-    modes (``ways``) it was found, from so many starts (``met``).
-    """
-
-    pose: Pose
-    kind: str
-    stability: str
-    error: float
-    curvatures: tuple[float, ...]
-    configuration: ClosedConfiguration
-    shift: float = np.inf
-    turn: float = np.inf
-    decided: bool = False
-    reversed: tuple[str, ...] = ()
-    across: tuple[str, ...] = ()
-    singular: str | None = None
-    boundary: bool = False
-    beyond: tuple[str, ...] = ()
-    other_legs: tuple[str, ...] | None = None
-    met: int = 0
-    ways: int = 1
-
-    @property
-    def proved(self) -> bool:
-        """Whether it is enclosed."""
-        return bool(np.isfinite(self.shift))
-
-    @property
-    def assembly(self) -> str:
-        """Whether the whole robot can be there."""
-        return BEYOND if self.beyond else ASSEMBLED
-
-    @property
-    def stable(self) -> bool | None:
-        """Whether it attracts; None where that is not decided."""
-        return None if self.stability == UNDECIDED else self.stability == STABLE
-
-    def __repr__(self) -> str:
-        return f"<{type(self).__name__}: {self.kind}, {self.stability}, {self.pose}>"
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        return {"pose": self.pose.to_dict(), "kind": self.kind, "stable": self.stable, "stability": self.stability,
-                "error": self.error, "curvatures": list(self.curvatures), "proved": self.proved,
-                "decided": self.decided,
-                "radius_m": self.shift if self.proved else None, "radius_rad": self.turn if self.proved else None,
-                "reversed": list(self.reversed), "across": list(self.across), "singular": self.singular,
-                "boundary": self.boundary, "assembly": self.assembly, "beyond": list(self.beyond),
-                "other_legs": None if self.other_legs is None else list(self.other_legs), "met": self.met,
-                "ways": self.ways}
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class SignedModes(Value):
-    """The poses at which the error vanishes with the directions of the legs ``reversed`` opposite to the desired ones:
-    the list of all modes with these, None where it could not be made."""
-
-    reversed: tuple[str, ...]
-    listed: AssemblyModes | None
-
-    @property
-    def complete(self) -> bool:
-        """Whether the list is proved to be all."""
-        return self.listed is not None and self.listed.found.complete
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line."""
-        known = self.listed
-        return {"reversed": list(self.reversed), "modes": None if known is None else len(known.modes),
-                "complex": None if known is None or known.found.continuum else known.found.complex,
-                "complete": self.complete}
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class Endings(Result, shown_as="endings"):
-    """All that was found of where the loop can rest with the directions of one pose, the goal: ``rests`` one by one,
-    the goal first, then those that attract; ``continua``: one rest each of those that fill curves or surfaces.
-    ``lists`` are those of the modes and of the antipodal poses of each combination of signs that was met; equations of
-    the loops ``measured`` are met as well as numbers tell and not enclosed; ``search`` says how rests were sought.
-    """
-
-    setting: ObservedRobot
-    goal: ClosedConfiguration
-    pose: Pose
-    desired: Array
-    rests: tuple[RestPoint, ...]
-    continua: tuple[RestPoint, ...]
-    lists: tuple[SignedModes, ...]
-    measured: tuple[str, ...]
-    search: CriticalPoints
-
-    @property
-    def complete(self) -> bool:
-        """Whether these are proved to be all: never yet."""
-        return False
-
-    @property
-    def starts(self) -> int:
-        """How many starts were led to rests."""
-        return self.search.starts
-
-    @property
-    def endings(self) -> tuple[RestPoint, ...]:
-        """The rests at which all velocities are seen."""
-        return tuple(each for each in self.rests if each.singular is None)
-
-    @property
-    def singular(self) -> tuple[RestPoint, ...]:
-        """The rests of the damped law at which fewer are: there the law without damping is not continuous."""
-        return tuple(each for each in self.rests if each.singular is not None)
-
-    @property
-    def attracting(self) -> tuple[RestPoint, ...]:
-        """The rests that attract."""
-        return tuple(each for each in self.rests if each.stable)
-
-    def headline(self) -> str:
-        """The robot and how many rests there are."""
-        return (f"{self.setting.headline()}: {len(self.rests)} poses at which the loop to {self.pose} can rest, "
-                f"{len(self.attracting)} of them attract")
-
-    def to_dict(self) -> dict[str, Any]:
-        """The record of the command line, without the command's own fields."""
-        return {"at": self.pose.to_dict(), **self.setting.to_dict(), "complex": self.lists[0].to_dict()["complex"],
-                "complete": self.complete, "signs": [each.to_dict() for each in self.lists],
-                "proof": self.search.words, "starts": self.starts, "attracting": len(self.attracting),
-                "measured": list(self.measured),
-                "endings": [each.to_dict() for each in self.endings],
-                "singular": [each.to_dict() for each in self.singular],
-                "continua": [each.to_dict() for each in self.continua]}
+from .rests import CRITICAL, Endings, RestPoint, SignedModes, stability
+from .search import NEARBY, Critical, critical_points, descend, in_mode, walked
 
 
 @question()
-def endings(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *, at: PoseLike, seed: int = 0
-            ) -> Endings:
+def endings(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *, at: PoseLike,
+            complete: bool = False, seed: int = 0) -> Endings:
     """All poses at which the loop can rest that servoes the directions which are observed at ``at``: the goal, modes
     and antipodal poses, where the error vanishes, and critical poses, where it does not; which of them attract.
 
     ``observe`` and ``camera`` as for ``derive``. The law rests exactly at the critical points of ½ ‖e‖² on the closed
-    loops (theory.md 11). These are sought from random walks on the branch of the zero configuration.
+    loops (theory.md 11). These are sought from random walks on the branch of the zero configuration. ``complete``:
+    prove that they are all, by subdivision of a box of platform poses (seconds to minutes), as far as that goes.
 
     Raises ``BadRequest`` for names that there are not, legs that do not see the platform, a singular goal;
     ``PoseNotReached`` for a pose out of reach.
@@ -206,7 +64,7 @@ def endings(robot: RobotLike, observe: LegsLike = None, camera: str | None = Non
     (goal,) = configurations_at(setting, [asked])
     require_regular(ConfigurationAnalysis.of(setting), "goal", goal)
     tell("rests")
-    return RestSearch.of(setting, goal).answer(seed)
+    return RestSearch.of(setting, goal).answer(seed, complete=complete)
 
 
 @dataclass(frozen=True, eq=False)
@@ -226,12 +84,17 @@ class RestSearch:
         system = RestSystem.of(goal, question, setting.configurations)
         return cls(setting, goal, system, Law(question, setting.dof, 1.0), directions(goal, question)[0])
 
-    def answer(self, seed: int = 0, *, minima: bool = False, rounds: Iterable[Array] | None = None) -> Endings:
+    def answer(self, seed: int = 0, *, minima: bool = False, rounds: Iterable[Array] | None = None,
+               complete: bool = False) -> Endings:
         """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`, of minima alone neither
-        lists nor enclosures."""
+        lists nor enclosures; ``complete``: whether it is to be proved that they are all."""
         setting, motion = self.setting, self.setting.motion
         found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds)
         isolated = self._in_mode(found.isolated)
+        covers = None if minima else Covers.of(setting, self.goal, self.system, self.law.question, complete)
+        if covers is not None:
+            places = [(at, each.point.q) for each in isolated if (at := self._placed(each.point.q)) is not None]
+            isolated += covers.missed([at for at, _ in places], np.array([q for _, q in places]), found.idle)
         lists = [] if minima else self._lists(isolated)
         isolated += [each for one in lists for each in self._listed(one, isolated, found.idle)]
         tell("enclosures")
@@ -243,8 +106,11 @@ class RestSearch:
         measured = tuple(dict.fromkeys(name for box in boxes if box for name in box.measured))
         order = {GOAL: 0, MODE: 1, ANTIPODAL: 2, CRITICAL: 3}
         rests.sort(key=lambda each: (order[each.kind], not each.stable, each.error))
+        if covers is not None:
+            lists = covers.signed(lists, self.desired)
         return Endings(setting, self.goal, motion.pose(self.goal.pose(motion.link)), self.desired, tuple(rests),
-                       tuple(continua), tuple(lists), measured, found)
+                       tuple(continua), tuple(lists), measured, found,
+                       None if covers is None else covers.judged(rests))
 
     def _lists(self, found: Sequence[Critical]) -> list[SignedModes]:
         """The lists of modes of those combinations of signs at which the error was found to vanish, that of the goal
@@ -297,7 +163,7 @@ class RestSearch:
         command = self.law.at(at, FixedDirections(self.desired)(0.0))
         if command.pull > SAME_ENDING:
             return None
-        u = command.directions
+        u = np.array(command.true)
         cosines = np.sum(u * self.desired, axis=1)
         labels = [o.leg for o in self.law.question.observations]
         error = command.size
@@ -313,10 +179,10 @@ class RestSearch:
         shift, turn = (np.inf, np.inf) if box is None else self._radius(box, X)
         state = stability(point.curvatures if box is None or box.index is None else box.signs(len(point.curvatures)))
         return RestPoint(motion.pose(X), kind, state, error, tuple(map(float, point.curvatures)), at, shift, turn,
-                         box is not None and box.index is not None, reversed=reversed_, across=across,
-                         singular=singular,
-                         boundary=boundary, beyond=tuple(outside(at.twin, at.q)),
-                         other_legs=self._other_legs(at), met=found.met)
+                         box is not None and box.index is not None,
+                         () if box is None or singular is not None else box.rates, self._side(at), reversed_, across,
+                         singular,
+                         boundary, tuple(outside(at.twin, at.q)), self._other_legs(at), found.met)
 
     def _radius(self, box: EnclosedPoint, X: Array) -> tuple[float, float]:
         """How far the platform can be from its pose X (4, 4) over a box (m, rad)."""
@@ -330,6 +196,25 @@ class RestSearch:
         off = [float(np.linalg.norm((each.value - at).size)) for each, at in zip(vectors, told, strict=True)]
         # |ΔR| = 2 √2 sin(θ / 2) ≥ 2 √2 θ / π
         return off[0] * loops.length, float(np.pi / np.sqrt(8) * np.linalg.norm(off[1:])) if motion.body else 0.0
+
+    @cached_property
+    def _condition(self) -> tuple[ConstraintPattern, Condition] | None:
+        """The pattern of the held legs and the Type 2 condition, where that has a sign."""
+        seen = MeasuredRobot.watched(self.setting)
+        try:
+            return (seen.pattern, seen.condition) if seen.condition.signed else None
+        except HrsynthError:
+            return None
+
+    def _side(self, at: ClosedConfiguration) -> str | None:
+        """On which side of the Type 2 locus a configuration is, seen from the goal; None where that is not known."""
+        if self._condition is None:
+            return None
+        found, condition = self._condition
+        here, home = condition.expressed(found.values_at([at, self.goal]))
+        if not min(abs(here), abs(home)) > CLEAR:
+            return None
+        return "goal" if here * home > 0 else "other"
 
     @cached_property
     def _forms(self) -> LegPattern | None:
@@ -383,11 +268,3 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
             for group in groups]
     return [replace(rests[k], ways=len(group), met=sum(rests[i].met for i in group))
             for k, group in zip(best, groups, strict=True)]
-
-
-def stability(curvatures: Sequence[float] | Array) -> str:
-    """What the eigenvalues of a Hessian say."""
-    values = np.asarray(curvatures)
-    if np.any(values < -SAME_ENDING):
-        return SADDLE if np.any(values > SAME_ENDING) else UNSTABLE
-    return STABLE if np.all(values > SAME_ENDING) else UNDECIDED

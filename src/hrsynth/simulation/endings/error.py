@@ -18,7 +18,7 @@ import numpy as np
 from ...analysis.branch.loops import GearEquation, JointLoop, LoopRow, LoopSystem, loop_system
 from ...analysis.branch.part import whole
 from ...errors import BadRequest
-from ...geometry.affine import AffineForms
+from ...geometry.affine import AffineForms, crossed
 from ...geometry.so3 import exponential
 from ...geometry.vectors import Array, cross, transform
 from ...kinematics.configuration import ClosedConfiguration, measure
@@ -42,19 +42,22 @@ class ErrorTerm(Protocol):
 
 @dataclass(eq=False)
 class ErrorSums:
-    """E (c,), ∇E (c, N) and, where it is asked for, ∇²E (c, N, N)."""
+    """E (c,), ∇E (c, N) and, where they are asked for, ∇²E (c, N, N), and JᵀJ (c, N, N), J the rates of e."""
 
     value: Any
     slope: Total
-    bend: Total | None
+    bend: Total | None = None
+    gram: Total | None = None
 
     def add_square(self, e: Any, slope: Any, bends: Sequence[tuple[Product, Any]] = ()) -> None:
         """Add ½ e², for e with the gradient ``slope`` (c, N) and the Hessian that is the sum of those of products, each
         with its weight (c,)."""
         self.value = self.value + e * e * 0.5
         self.slope.add((slice(None),), slope * e[..., None])
+        column = slope[..., :, None]
+        if self.gram is not None:
+            self.gram.add((slice(None), slice(None)), outer(column, column))
         if self.bend is not None:
-            column = slope[..., :, None]
             self.bend.add((slice(None), slice(None)), outer(column, column))
             for product, weight in bends:
                 add_bend(self.bend, product, weight * e)
@@ -81,8 +84,12 @@ class DirectionTerm(Value):
         slope = gradient(product, sums)
         sums.value = sums.value + (1.0 - c * c) * 0.5
         sums.slope.add((slice(None),), slope * -c[..., None])
+        column = slope[..., :, None]
+        if sums.gram is not None:
+            # ė · ė' = u̇ · u̇' − (u̇ · u_d) (u̇' · u_d), u̇ seen from what carries u_d
+            rates = seen_rates(product, sums)
+            sums.gram.add((slice(None), slice(None)), outer(rates, rates) - outer(column, column))
         if sums.bend is not None:
-            column = slope[..., :, None]
             sums.bend.add((slice(None), slice(None)), -outer(column, column))
             add_bend(sums.bend, product, -c)
 
@@ -131,6 +138,17 @@ def gradient(product: Product, sums: ErrorSums) -> Any:
     """∇(x · y), (c, N)."""
     total = Total(sums.value, sums.slope.shape)
     add_slope(total, product)
+    return total.sum
+
+
+def seen_rates(product: Product, sums: ErrorSums) -> Any:
+    """The rates (c, N, 3) of a direction x, seen from what carries y."""
+    total = Total(sums.value, (*sums.slope.shape, 3))
+    x = product.x.value
+    for part in product.x.parts:
+        total.add((part.places, slice(None)), part.columns * part.sign)
+    for part in product.y.parts:
+        total.add((part.places, slice(None)), crossed(part.axes, x[..., None, :]) * -part.sign)
     return total.sum
 
 
@@ -209,22 +227,29 @@ class RestEquations:
             for i, rate in ((gear.second, 1.0), (gear.first, -gear.ratio)):
                 rates.add((k, i), rate)
         self.G, self.DG = closing.sum, rates.sum
-        sums = self._error(False)
+        sums = self._error()
         self.E, self.slope = sums.value, sums.slope.sum
 
-    def _error(self, bend: bool) -> ErrorSums:
+    def _error(self, **asked: bool) -> ErrorSums:
         size = self.system.size[0]
-        sums = ErrorSums(self.like, Total(self.like, (size,)), Total(self.like, (size, size)) if bend else None)
+        sums = ErrorSums(self.like, Total(self.like, (size,)), **{
+            each: Total(self.like, (size, size)) for each in asked})
         for each in self.system.terms:
             each.add(self.carrier, sums)
         return sums
 
     def bend(self, multipliers: Any) -> Any:
         """The Hessian (c, N, N) of E + μ · G for multipliers μ (c, m)."""
-        total = self._error(True).bend
+        total = self._error(bend=True).bend
         assert total is not None
         for k, product in enumerate(self.products):
             add_bend(total, product, multipliers[..., k])
+        return total.sum
+
+    def gram(self) -> Any:
+        """JᵀJ (c, N, N), J the rates of e."""
+        total = self._error(gram=True).gram
+        assert total is not None
         return total.sum
 
     def pull(self, multipliers: Any) -> Any:

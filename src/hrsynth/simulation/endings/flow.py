@@ -114,7 +114,7 @@ class Flow(Value):
         n, d = len(X), self.batch.span.shape[1]
         steps = FLOW_SLOPE * np.concatenate([np.eye(d), -np.eye(d)])
         around = self.margins(self.moved(np.tile(X, (2 * d, 1, 1)), np.repeat(steps, n, axis=0)),
-                              np.tile(flipped, (2 * d, 1))).reshape(2, d, n, -1)
+                              np.tile(flipped, (2 * d, 1))).reshape(2, d, n, len(self.legs))
         return np.asarray((around[0] - around[1]).transpose(1, 2, 0) / (2 * FLOW_SLOPE))
 
     def moved(self, X: Array, y: Array) -> Array:

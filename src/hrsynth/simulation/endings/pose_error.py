@@ -17,13 +17,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...analysis.aspects.leg_forms import LegPattern, pattern
-from ...analysis.aspects.path_segments import path_coordinates
+from ...analysis.aspects.path_segments import PathCoordinates, path_coordinates
 from ...analysis.aspects.vector_expressions import NoLegForm
 from ...analysis.observed import ObservedRobot
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRod, SlidingRod
 from ...closed_forms.platform_points import PlatformPoint, platform_point
 from ...constraints.named_vectors import BodyVector, poses_at
-from ...geometry.components import Components, cross, dot, minus, plus, scaled, sqrt, transformed
+from ...geometry.components import Components, cayley, cross, dot, minus, plus, scaled, spin, sqrt, transformed
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
@@ -31,6 +31,7 @@ from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import Direction
 from ...results import Value
 from ...tolerances import FOLLOWED
+from .leg_chart import LegChart, combination
 
 Number = Callable[[Any], Any]
 Place = tuple[Components, Components]
@@ -40,6 +41,16 @@ Place = tuple[Components, Components]
 def _plain(value: Any) -> Any:
     """A number of the robot, as it is."""
     return value
+
+
+@dataclass(frozen=True, eq=False)
+class Twist:
+    """Velocity of the platform's point, its angular velocity (None where it never turns), and that of the rod of a held
+    limb."""
+
+    v: Components
+    w: Components | None
+    own: Components | None = None
 
 
 class NotEnclosed(Exception):
@@ -129,6 +140,10 @@ class PoseError(Value):
     goal: tuple[Array, Array] | None = None
     """The goal's pose, in whose working modes ``wanted`` the limbs are there; None where these are its own."""
     wanted: tuple[float, ...] = ()
+    coordinates: PathCoordinates | None = None
+    """What reads poses of configurations."""
+    held: LegChart | None = None
+    """Coordinates of a limb in the place of the shifts."""
 
     @classmethod
     def of(cls, setting: ObservedRobot, goal: ClosedConfiguration) -> PoseError:
@@ -155,7 +170,7 @@ class PoseError(Value):
             rules = tuple(f"direction of leg {o.leg}" for o in seen if o.rule is not None)
             return cls(each.length, each.motion, p[0], R[0], each.motion.translations,
                        each.motion.rotations if each.turning else np.zeros((3, 0)), limbs, seen,
-                       (*known.fitted, *rules), (*mechanism.limited, *mechanism.wrists))
+                       (*known.fitted, *rules), (*mechanism.limited, *mechanism.wrists), coordinates=each)
         raise NotEnclosed(reason)
 
     def elsewhere(self, p: Array, R: Array, modes: Sequence[float]) -> PoseError:
@@ -164,6 +179,13 @@ class PoseError(Value):
         return replace(self, p=p, R=R, limbs=limbs, goal=self.goal or (self.p, self.R),
                        wanted=self.wanted or tuple(limb.mode for limb in self.limbs))
 
+    def modes_at(self, x: Array) -> tuple[float, ...]:
+        """The limbs' working modes at coordinates (n,)."""
+        held = self.held
+        own = None if held is None else held.mode(x[: self.shifts.shape[1]].tolist())
+        return tuple(limb.mode if held is None or own is None or i != held.limb else own
+                     for i, limb in enumerate(self.limbs))
+
     @property
     def size(self) -> int:
         """The number of coordinates."""
@@ -171,38 +193,27 @@ class PoseError(Value):
 
     def pose(self, x: Components, number: Number) -> tuple[Components, Components]:
         """p (3) and R (9, by rows) at coordinates x."""
-        k = self.shifts.shape[1]
-        p: Components = number(self.p)
-        for each, axis in zip(x[:k], self.shifts.T, strict=True):
-            p = plus(p, scaled(each, number(axis)))
-        R = number(self.R.ravel())
-        if not self.turns.shape[1]:
-            return p, R
-        # Q = 1 + 2 ([γ]ₓ + [γ]ₓ²) / (1 + γ·γ), column by column
-        gamma = self._gamma(x[k:], number)
-        share = 2.0 / (dot(gamma, gamma) + 1.0)
-        columns = []
-        for j in range(3):
-            v = [R[3 * i + j] for i in range(3)]
-            w = cross(gamma, v)
-            columns.append(plus(v, scaled(share, plus(w, cross(gamma, w)))))
-        return p, [columns[j][i] for i in range(3) for j in range(3)]
-
-    def _gamma(self, y: Components, number: Number) -> Components:
-        first, *others = [scaled(each, number(axis)) for each, axis in zip(y, self.turns.T, strict=True)]
-        for each in others:
-            first = plus(first, each)
-        return first
+        k, R = self.shifts.shape[1], number(self.R.ravel())
+        if self.turns.shape[1]:
+            gamma = combination(x[k:], self.turns, number)
+            columns = [cayley(gamma, [R[3 * i + j] for i in range(3)]) for j in range(3)]
+            R = [columns[j][i] for i in range(3) for j in range(3)]
+        if self.held is not None:
+            limb = self.limbs[self.held.limb]
+            none, _ = self._tip(limb, [0.0, 0.0, 0.0], R, number)
+            return minus(self.held.tip(x[:k], number), none), R
+        return plus(number(self.p), combination(x[:k], self.shifts, number)), R
 
     def at(self, x: Components, directions: Sequence[Components], number: Number) -> ErrorRates:
         """What the error does at coordinates x, and along directions of the coordinates."""
         p, R = self.pose(x, number)
         place, turn = self.goal or (self.p, self.R)
         goal = number(place), number(turn.ravel())
-        k = self.shifts.shape[1]
-        twists = [self._twist(x[k:], each, number) for each in directions]
-        margins = [limb.at(self._tip(limb, p, R, number)[0], number, limb.mode)[0] for limb in self.limbs]
-        return ErrorRates(margins, [self._turning(each, (p, R), goal, twists, number) for each in self.seen])
+        twists = [self._twist(x, R, each, number) for each in directions]
+        # a held limb is where its coordinates put it
+        margins = [1.0 if self.held is not None and self.held.limb == i else
+                   limb.at(self._tip(limb, p, R, number)[0], number, limb.mode)[0] for i, limb in enumerate(self.limbs)]
+        return ErrorRates(margins, [self._turning(each, (p, R), x, goal, twists, number) for each in self.seen])
 
     def levels(self, x: Array) -> tuple[NDArray[np.bool_], Array]:
         """Whether all legs reach, and E, (n,), at coordinates (n, size)."""
@@ -222,34 +233,44 @@ class PoseError(Value):
                      for j in range(len(directions))]
         return np.array(e).T, np.array(rates).transpose(2, 1, 0)
 
-    def _twist(self, y: Components, rates: Components, number: Number) -> tuple[Components, Components]:
-        """Velocity of the point and angular velocity 2 (γ̇ + γ × γ̇) / (1 + γ·γ) along rates of the coordinates."""
+    def _twist(self, x: Components, R: Components, rates: Components, number: Number) -> Twist:
+        """What rates of the coordinates move."""
         k = self.shifts.shape[1]
-        v: Components = [0.0, 0.0, 0.0]
-        for each, axis in zip(rates[:k], self.shifts.T, strict=True):
-            v = plus(scaled(each, number(axis)), v)
-        if not self.turns.shape[1]:
-            return v, [0.0, 0.0, 0.0]
-        gamma, rate = self._gamma(y, number), self._gamma(rates[k:], number)
-        turned = rate if self.turns.shape[1] == 1 else plus(rate, cross(gamma, rate))
-        return v, scaled(2.0 / (dot(gamma, gamma) + 1.0), turned)
+        w: Components | None = None
+        if self.turns.shape[1]:
+            gamma, rate = (combination(each[k:], self.turns, number) for each in (x, rates))
+            w = spin(gamma, rate, self.turns.shape[1] == 1)
+        if self.held is None:
+            return Twist(combination(rates[:k], self.shifts, number), w)
+        v, turn = self.held.rates(x[:k], rates[:k], number)
+        if w is not None:
+            v = minus(v, cross(w, self._tip(self.limbs[self.held.limb], v, R, number)[1]))
+        return Twist(v, w, turn)
 
     def _tip(self, limb: ClosedFormLeg, p: Components, R: Components, number: Number) -> tuple[Components, Components]:
         """A limb's tip, and the tip from the point."""
         arm: Components = transformed(R, number(limb.tip.turned)) if np.any(limb.tip.turned) else [0.0, 0.0, 0.0]
         return plus(plus(p, number(limb.tip.constant)), arm), arm
 
-    def _turning(self, seen: SeenDirection, here: Place, goal: Place, twists: Sequence[tuple[Components, Components]],
+    def _turning(self, seen: SeenDirection, here: Place, x: Components, goal: Place, twists: Sequence[Twist],
                  number: Number) -> Turning:
         """An observed direction, and how it changes with twists of the platform's point."""
         own = None if seen.limb is None or not self.wanted else self.wanted[seen.limb]
-        u, wanted = self._direction(seen, *here, number), self._direction(seen, *goal, number, own)
+        wanted, held = self._direction(seen, *goal, number, own), self.held
+        if held is not None and seen.limb == held.limb:
+            limb = self.limbs[held.limb]
+            assert isinstance(limb, OnRod)
+            u: Components = scaled(seen.sense / number(limb.rod), held.along(x[: self.shifts.shape[1]], number))
+            plain = [cross(each.own, u) for each in twists if each.own is not None]
+            return Turning(u, wanted, plain, [0.0] * len(twists), u, 1.0)
+        u = self._direction(seen, *here, number)
         if seen.limb is None:
-            return Turning(u, wanted, [cross(w, u) for _, w in twists], [0.0] * len(twists), u, 1.0)
+            plain = [[0.0, 0.0, 0.0] if each.w is None else cross(each.w, u) for each in twists]
+            return Turning(u, wanted, plain, [0.0] * len(twists), u, 1.0)
         limb = self.limbs[seen.limb]
         tip, arm = self._tip(limb, *here, number)
         margin, carried = limb.at(tip, number, limb.mode)
-        tips = [plus(v, cross(w, arm)) if self.turns.shape[1] else v for v, w in twists]
+        tips = [each.v if each.w is None else plus(each.v, cross(each.w, arm)) for each in twists]
         if isinstance(limb, OnRod):
             gain, axis = seen.sense / number(limb.rod), number(limb.axis)
             slip = cross(axis, minus(carried, number(limb.centre))) if isinstance(limb, OnCrank) else axis

@@ -1,0 +1,124 @@
+"""Whether the rests that were found are all: what boxes of platform poses prove, beside the list (:mod:`.cover`)."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+
+from ...analysis.observed import ObservedRobot
+from ...budgets import COVER_BOXES, SIGN_BOXES, SIGN_CHOICES
+from ...geometry.vectors import Array, transform
+from ...kinematics.configuration import ClosedConfiguration
+from ...kinematics.relation import Measurement
+from ...mechanism.observations.direction import SeenAxis
+from ...progress import tell
+from ...results import Value
+from ...tolerances import COVER_REACH, FOLLOWED
+from ..law import directions
+from .carried import SweptChains
+from .cover import Cover, cover
+from .error import RestEquations, RestSystem
+from .rests import RestCover, RestPoint, SignedModes
+from .search import Critical, descend
+from .subdivision import CriticalBox
+
+TRIES = 6
+"""Configurations, the nearest first, from which one at a proved pose is sought."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Covers(Value):
+    """Boxes of platform poses: those at which the error vanishes, and (None where that was not asked) all critical
+    ones."""
+
+    system: RestSystem
+    question: Measurement
+    vanishing: Cover
+    every: Cover | None
+
+    @classmethod
+    def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, system: RestSystem, question: Measurement,
+           complete: bool) -> Covers:
+        """Those of a goal."""
+        tell("boxes")
+        budget = COVER_BOXES if complete else SIGN_BOXES if setting.dof <= 3 else 0
+        found = cover(setting, goal, every_mode=True, vanishing=True, budget=budget)
+        return cls(system, question, found, cover(setting, goal, every_mode=True) if complete else None)
+
+    def missed(self, known: Sequence[ClosedConfiguration], q: Array, idle: int) -> list[Critical]:
+        """The proved critical points that none of the configurations (with coordinates q (c, N)) is at, as far as the
+        robot is closed there."""
+        found: list[Critical] = []
+        seen = [directions(at, self.question)[0] for at in known]
+        for each in (self.vanishing, self.every):
+            if each is None:
+                continue
+            met = {each.place(at, u) for at, u in zip(known, seen, strict=True)}
+            for k, box in enumerate(each.found):
+                if k not in met and (at := self._closed(each, box, q)) is not None:
+                    index = np.array([box.falling or 0])
+                    found += [Critical(point, 0) for point in descend(self.system, at[None], index, idle)]
+        return found
+
+    def _closed(self, told: Cover, box: CriticalBox, q: Array) -> Array | None:
+        """Coordinates at which the platform and the observed directions are where a box has them."""
+        from scipy.optimize import least_squares
+
+        loops, coordinates = self.system.system, None if told.error is None else told.error.coordinates
+        if coordinates is None:
+            return None
+        links, motion = loops.mechanism.links, coordinates.motion
+        chain, zero = loops.way(loops.body[motion.link]), links[motion.link].pose
+        turned = coordinates.turning
+
+        def off(values: Array) -> Array:
+            x = list(np.atleast_2d(values).T)
+            carrier = SweptChains(loops, x)
+            parts = [RestEquations(self.system, x).G,
+                     carrier.point(chain, transform(zero, motion.point) / loops.length).value - box.p / loops.length]
+            if turned:
+                parts += [carrier.direction(chain, axis).value - column for axis, column in
+                          zip(zero[:3, :3].T, box.R.T, strict=True)]
+            for seen, u in zip(self.question.observations, box.directions, strict=True):
+                if isinstance(seen, SeenAxis):
+                    way = loops.way(loops.body[seen.link])
+                    parts.append(carrier.direction(way, links[seen.link].pose[:3, :3] @ seen.direction).value - u)
+            return np.concatenate([np.ravel(each) for each in parts])
+
+        nearest = sorted(q, key=lambda each: float(np.linalg.norm(off(each))))
+        for start in nearest[:TRIES]:
+            found = least_squares(off, start, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+            if np.abs(found.fun).max() < FOLLOWED:
+                return np.asarray(found.x)
+        return None
+
+    def signed(self, lists: Sequence[SignedModes], desired: Array) -> list[SignedModes]:
+        """The lists of modes with what boxes prove, and those of all other choices of signs."""
+        labels = [each.leg for each in self.question.observations]
+        if 2 ** len(labels) > SIGN_CHOICES:
+            return list(lists)
+        known = self.vanishing
+        counts: Counter[tuple[str, ...]] | None = None
+        if known.complete and known.bounded:
+            counts = Counter(tuple(leg for leg, u, w in zip(labels, each.directions, desired, strict=True) if u @ w < 0)
+                             for each in known.found)
+        met = {each.reversed: each for each in lists}
+        every = [tuple(leg for leg, sign in zip(labels, signs, strict=True) if sign)
+                 for signs in product((False, True), repeat=len(labels))]
+        return [SignedModes(each, met[each].listed if each in met else None, None if counts is None else counts[each])
+                for each in sorted(every, key=lambda each: each not in met)]
+
+    def judged(self, rests: Sequence[RestPoint]) -> RestCover | None:
+        """Whether the rests are all."""
+        if self.every is None:
+            return None
+        told = self.every
+        places = [told.place(each.configuration, directions(each.configuration, self.question)[0]) for each in rests]
+        strangers = sum(place is None and told.holds(each.configuration)
+                        for place, each in zip(places, rests, strict=True))
+        within = None if told.bounded or told.error is None else COVER_REACH * told.error.length
+        return RestCover(told, len(told.found) - len(set(places) - {None}), strangers, within)

@@ -1,0 +1,243 @@
+"""What is told of the poses at which a loop can rest."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...analysis.modes.modes import AssemblyModes
+from ...analysis.observed import ObservedRobot
+from ...geometry.vectors import Array
+from ...kinematics.assembly import ASSEMBLED, BEYOND
+from ...kinematics.configuration import ClosedConfiguration
+from ...mechanism.pose import Pose
+from ...results import Result, Value
+from ...tolerances import SAME_ENDING
+from .cover import Cover
+from .search import CriticalPoints
+
+CRITICAL = "critical"
+STABLE, SADDLE, UNSTABLE, UNDECIDED = "stable", "saddle", "unstable", "undecided"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RestPoint:
+    """A pose at which the loop rests: ``kind`` goal, mode, antipodal or critical (‖e‖ = ``error`` > 0 and no command),
+    ``stability`` stable (it attracts), saddle, unstable (nothing is drawn to it) or undecided; ``curvatures`` are the
+    eigenvalues of the Hessian of ½ ‖e‖² along the motions of the loops (characteristic lengths, radians), ascending.
+
+    Exactly one rest lies within ``shift`` (m) and ``turn`` (rad) of ``pose``, infinite where it was only found;
+    ``decided``: whether the signs of the curvatures are proved. ``reversed``
+    names legs whose direction is opposite to the desired one, ``across`` those at right angles to it. ``singular`` says
+    why fewer velocities are seen there than at other poses, None where all are; ``boundary`` whether that is a leg's
+    reach. Linearised, the loop without damping has the eigenvalues −gain · ``rates``, each enclosed, 1 at all poses
+    where the error vanishes (empty where that is not proved, or fewer velocities are seen). ``side`` says on which side
+    of the Type 2 locus of the hidden robot the pose lies, ``goal`` on that of the goal, ``other`` in another aspect,
+    None where the condition has no sign, or vanishes.
+
+    ``assembly`` is ``beyond limits`` where joints (``beyond``) are outside their limits, else ``yes``;
+    ``other_legs`` are in another working mode than at the goal (None where that is not known); in so many working
+    modes (``ways``) it was found, from so many starts (``met``).
+    """
+
+    pose: Pose
+    kind: str
+    stability: str
+    error: float
+    curvatures: tuple[float, ...]
+    configuration: ClosedConfiguration
+    shift: float = np.inf
+    turn: float = np.inf
+    decided: bool = False
+    rates: tuple[tuple[float, float], ...] = ()
+    side: str | None = None
+    reversed: tuple[str, ...] = ()
+    across: tuple[str, ...] = ()
+    singular: str | None = None
+    boundary: bool = False
+    beyond: tuple[str, ...] = ()
+    other_legs: tuple[str, ...] | None = None
+    met: int = 0
+    ways: int = 1
+
+    @property
+    def proved(self) -> bool:
+        """Whether it is enclosed."""
+        return bool(np.isfinite(self.shift))
+
+    @property
+    def assembly(self) -> str:
+        """Whether the whole robot can be there."""
+        return BEYOND if self.beyond else ASSEMBLED
+
+    @property
+    def stable(self) -> bool | None:
+        """Whether it attracts; None where that is not decided."""
+        return None if self.stability == UNDECIDED else self.stability == STABLE
+
+    def __repr__(self) -> str:
+        return f"<{type(self).__name__}: {self.kind}, {self.stability}, {self.pose}>"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"pose": self.pose.to_dict(), "kind": self.kind, "stable": self.stable, "stability": self.stability,
+                "error": self.error, "curvatures": list(self.curvatures), "proved": self.proved,
+                "decided": self.decided, "rates": [list(each) for each in self.rates], "side": self.side,
+                "radius_m": self.shift if self.proved else None, "radius_rad": self.turn if self.proved else None,
+                "reversed": list(self.reversed), "across": list(self.across), "singular": self.singular,
+                "boundary": self.boundary, "assembly": self.assembly, "beyond": list(self.beyond),
+                "other_legs": None if self.other_legs is None else list(self.other_legs), "met": self.met,
+                "ways": self.ways}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SignedModes(Value):
+    """The poses at which the error vanishes with the directions of the legs ``reversed`` opposite to the desired ones:
+    the list of all modes with these, None where it could not be made or none was met; ``boxes``: how many poses boxes
+    prove there to be, None where they prove nothing."""
+
+    reversed: tuple[str, ...]
+    listed: AssemblyModes | None
+    boxes: int | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the list is proved to be all."""
+        return self.boxes is not None or (self.listed is not None and self.listed.found.complete)
+
+    @property
+    def empty(self) -> bool:
+        """Whether it is proved that there is no such pose."""
+        return self.boxes == 0
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        known = self.listed
+        return {"reversed": list(self.reversed), "modes": self.boxes if known is None else len(known.modes),
+                "complex": None if known is None or known.found.continuum else known.found.complex,
+                "boxes": self.boxes, "complete": self.complete}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class RestCover(Value):
+    """Whether the rests are all, by boxes of platform poses: what subdivision found (:class:`Cover`), how many of its
+    critical points are no rest of the list (``unmet``), and how many isolated rests in its box are none of its critical
+    points (``strangers``); ``within`` (m) is how far the box reaches from the goal where legs do not end it, else None.
+    """
+
+    cover: Cover
+    unmet: int
+    strangers: int
+    within: float | None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the list holds all rests in the box."""
+        return self.cover.complete and not self.unmet and not self.strangers
+
+    @property
+    def reason(self) -> str:
+        """Why it does not, as far as is known."""
+        cover = self.cover
+        if cover.reason:
+            return cover.reason
+        if cover.unwatched:
+            return f"at the limits of legs that are not watched ({', '.join(cover.unwatched)}) nothing is proved"
+        if cover.open:
+            return f"{len(cover.open):,} boxes, {cover.share:.2g} of all, are left open{self._where()}"
+        if self.unmet or self.strangers:
+            return (f"{self.unmet} poses that boxes prove are not in the list, {self.strangers} of the list are not "
+                    "among those that boxes prove")
+        return ""
+
+    def _where(self) -> str:
+        """Where the open boxes lie."""
+        cover = self.cover
+        if cover.error is None:
+            return ""
+        k = cover.error.shifts.shape[1]
+        middle, half = (np.array(each)[:, :k] for each in zip(*cover.open, strict=True))
+        corners = np.stack([(middle - half).min(axis=0), (middle + half).max(axis=0)])
+        about = cover.error.length * (cover.error.p + cover.error.shifts @ corners.mean(axis=0))
+        size = cover.error.length * float(np.ptp(corners, axis=0).max())
+        return f", in {size:.3g} m about ({', '.join(f'{x:.3g}' for x in about)})"
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        cover = self.cover
+        return {"complete": self.complete, "proved": len(cover.found), "boxes": cover.boxes, "open": len(cover.open),
+                "share": cover.share, "within_m": self.within, "unmet": self.unmet, "strangers": self.strangers,
+                "reason": self.reason or None}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Endings(Result, shown_as="endings"):
+    """All that was found of where the loop can rest with the directions of one pose, the goal: ``rests`` one by one,
+    the goal first, then those that attract; ``continua``: one rest each of those that fill curves or surfaces.
+    ``lists`` are those of the modes and of the antipodal poses of each combination of signs, those first that were
+    met; equations of the loops ``measured`` are met as well as numbers tell and not enclosed; ``search`` says how rests
+    were sought, ``cover`` whether they are all (None where that was not asked).
+    """
+
+    setting: ObservedRobot
+    goal: ClosedConfiguration
+    pose: Pose
+    desired: Array
+    rests: tuple[RestPoint, ...]
+    continua: tuple[RestPoint, ...]
+    lists: tuple[SignedModes, ...]
+    measured: tuple[str, ...]
+    search: CriticalPoints
+    cover: RestCover | None = None
+
+    @property
+    def complete(self) -> bool:
+        """Whether these are proved to be all: in all working modes of the watched legs, within ``cover``'s box."""
+        return self.cover is not None and self.cover.complete
+
+    @property
+    def starts(self) -> int:
+        """How many starts were led to rests."""
+        return self.search.starts
+
+    @property
+    def endings(self) -> tuple[RestPoint, ...]:
+        """The rests at which all velocities are seen."""
+        return tuple(each for each in self.rests if each.singular is None)
+
+    @property
+    def singular(self) -> tuple[RestPoint, ...]:
+        """The rests of the damped law at which fewer are: there the law without damping is not continuous."""
+        return tuple(each for each in self.rests if each.singular is not None)
+
+    @property
+    def attracting(self) -> tuple[RestPoint, ...]:
+        """The rests that attract."""
+        return tuple(each for each in self.rests if each.stable)
+
+    def headline(self) -> str:
+        """The robot and how many rests there are."""
+        return (f"{self.setting.headline()}: {len(self.rests)} poses at which the loop to {self.pose} can rest, "
+                f"{len(self.attracting)} of them attract")
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line, without the command's own fields."""
+        return {"at": self.pose.to_dict(), **self.setting.to_dict(), "complex": self.lists[0].to_dict()["complex"],
+                "complete": self.complete, "cover": None if self.cover is None else self.cover.to_dict(),
+                "signs": [each.to_dict() for each in self.lists],
+                "proof": self.search.words, "starts": self.starts, "attracting": len(self.attracting),
+                "measured": list(self.measured),
+                "endings": [each.to_dict() for each in self.endings],
+                "singular": [each.to_dict() for each in self.singular],
+                "continua": [each.to_dict() for each in self.continua]}
+
+
+def stability(curvatures: Sequence[float] | Array) -> str:
+    """What the eigenvalues of a Hessian say."""
+    values = np.asarray(curvatures)
+    if np.any(values < -SAME_ENDING):
+        return SADDLE if np.any(values > SAME_ENDING) else UNSTABLE
+    return STABLE if np.all(values > SAME_ENDING) else UNDECIDED
