@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import pytest
-from hypothesis import given
+from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from hrsynth.description import load, shipped
@@ -26,6 +26,7 @@ def test_what_is_printed_is_parsed_back(text: str) -> None:
     assert parse(found.unicode) == found
 
 
+@settings(suppress_health_check=[HealthCheck.too_slow])
 @given(st.lists(words, min_size=1, max_size=5))
 def test_sums_of_random_legs_survive_both_styles(legs: list[Word]) -> None:
     architecture = Architecture.of(legs)

@@ -11,6 +11,7 @@ from ..errors import BadRequest, HrsynthError, PoseNotReached
 from ..kinematics.assembly import of_links
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezero
+from ..mechanism.model import Mechanism
 from ..mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
 from ..results import spelled
 from ..tolerances import AS_PRINTED
@@ -48,12 +49,21 @@ def observe(robot: RobotLike, legs: LegsLike = None, camera: CameraLike = None, 
     if isinstance(robot, ObservedRobot):
         raise BadRequest(f"{robot.headline()}: what is watched is asked twice", str(at),
                          "nothing besides an observed robot")
+    require_platform(robot, at)
     asked = asked_pose(at)
     if isinstance(asked, Pose):
         start = _started(ObservedRobot.of(robot, seed=seed), asked)
     else:
         (start,) = configurations_at(ObservedRobot.of(robot, legs, camera, see=see, seed=seed), [asked])
     return ObservedRobot.of(replace(rezero(start), file=robot.file), legs, camera, see=see, samples=samples, seed=seed)
+
+
+def require_platform(robot: Mechanism, where: object) -> None:
+    """Refuses the pose or grid ``where`` of a formation: it would be that of its first body, the others staying."""
+    if robot.formation:
+        raise BadRequest(f"{robot.name}: a pose is that of one platform, and this is a formation", str(where),
+                         f"nothing: {', '.join(robot.bodies)} stand where the file has them (--platform LINK makes one "
+                         "the platform)")
 
 
 def _started(setting: ObservedRobot, wanted: Pose) -> ClosedConfiguration:
@@ -80,6 +90,8 @@ def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber]
     """
     from .modes.modes import modes
 
+    if poses:
+        require_platform(setting.robot, poses[0])
     everything, motion = setting.everything, setting.motion
     reached: dict[Pose, ClosedConfiguration] = {}
     refused: list[tuple[Pose, PoseNotReached]] = []

@@ -13,7 +13,7 @@ from ..errors import HrsynthError, PlaneNotMet
 from ..mechanism.pose import SCALARS, Grid, PoseLike, asked_poses
 from ..progress import tell
 from ..results import Result, Value
-from .asked import configurations_at
+from .asked import configurations_at, require_platform
 from .classes import Redundancy, listed
 from .observed import CameraLike, LegsLike, Mobility, ObservedRobot, RobotLike, SeeLike
 from .posture import ConfigurationAnalysis, Posture
@@ -91,7 +91,7 @@ class Check(Result, shown_as="check"):
                 "grid": self.grid and self.grid.to_dict()}
 
 
-@question()
+@question(formations=True)
 def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
           at: PoseLike | Iterable[PoseLike] = (), grid: Grid | str | None = None, seed: int = 0) -> Check:
     """Mobility, ranks with gaps, Type 1, 2, 3, Zlatanov's six, constraint singularities and redundant constraints
@@ -117,6 +117,7 @@ def check(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     postures = tuple(map(examiner.examine, configurations))
     swept = None
     if cells is not None:
+        require_platform(setting.robot, cells)
         found = sweep(start, question, cells, motion, setting.placer)
         if not any(found):
             raise PlaneNotMet(setting.robot.name, f"the grid {cells}", f"none of {len(found)} is")

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import combinations
+from math import comb
 from typing import TYPE_CHECKING, Any
 
+from ..kinematics.sampling import Samples
 from ..mechanism.observation import labels_of
 from ..mechanism.pose import PoseLike, asked_pose
 from ..progress import tell
@@ -20,7 +23,11 @@ if TYPE_CHECKING:
     pass
 
 LARGEST_COMPLETE = 10
-"""Number of legs up to which all sets are tried; beyond, sets of up to three legs and the whole."""
+"""Number of legs up to which all sets are listed; beyond, sets of up to three, the smallest and the whole."""
+LARGEST_FORMATION = 6
+"""The same of a formation's observations; beyond, single ones, the smallest sets and the whole."""
+MOST_TRIED = 1024
+"""Sets of one size above which the smallest are not sought but one set of which none can be left out."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -35,8 +42,10 @@ class Legs(Result, shown_as="legs"):
     exact: tuple[ExactVerdict, ...]
     """What generic geometry of the same architecture sees, for each of ``sets``."""
     complete: bool
-    """Whether all sets were tried."""
+    """Whether all sets are listed."""
     minimal: tuple[tuple[str, ...], ...] = field(default=())
+    minimal_complete: bool = True
+    """Whether ``minimal`` has all smallest sets; else it has one of which none can be left out."""
     where: str = "the zero configuration"
     """What took the place of the zero configuration, as it was asked for."""
 
@@ -55,10 +64,38 @@ class Legs(Result, shown_as="legs"):
                 "sets": [{**each.to_dict(), "exact": exact.exact, "architecture": exact.to_dict()}
                          for each, exact in zip(self.sets, self.exact, strict=True)], "complete": self.complete,
                 "watched": self.setting.watched_dict(), "minimal": [list(each) for each in self.minimal],
+                "minimal_complete": self.minimal_complete,
                 **self.setting.modes_dict()}
 
 
-@question()
+def _smallest(labels: tuple[str, ...], rank: Callable[[tuple[str, ...]], int]) -> tuple[list[tuple[str, ...]], bool]:
+    """The smallest sets of the rank of all, and whether these are all of them.
+
+    A set sees no more than one that holds it: whatever cannot be left out of all is in each set of that rank.
+    """
+    whole = rank(labels)
+
+    def without(held: tuple[str, ...], label: str) -> tuple[str, ...]:
+        return tuple(each for each in held if each != label)
+
+    needed = {label for label in labels if len(labels) == 1 or rank(without(labels, label)) < whole}
+    others, kept = [label for label in labels if label not in needed], labels
+    for label in others:
+        fewer = without(kept, label)
+        if fewer and rank(fewer) == whole:
+            kept = fewer
+    for size in range(max(1, len(needed)), len(kept) + 1):
+        more = size - len(needed)
+        if comb(len(others), more) > MOST_TRIED:
+            return [kept], False
+        sets = [tuple(label for label in labels if label in needed or label in chosen)
+                for chosen in combinations(others, more)]
+        if found := [each for each in sets if rank(each) == whole]:
+            return found, True
+    return [kept], True
+
+
+@question(formations=True)
 def legs(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = None, see: SeeLike = None,
          at: PoseLike | None = None, seed: int = 0) -> Legs:
     """The verdict of every set of legs (theory.md 6), on the branch of the zero configuration, or of the pose ``at``
@@ -75,17 +112,29 @@ def legs(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = Non
     labels = labels_of(segments)
     sets, exact = list[Verdict](), list[ExactVerdict]()
     generic = architecture(setting)
-    complete = len(labels) <= LARGEST_COMPLETE
-    for size in range(1, len(labels) + 1):
-        if not complete and 3 < size < len(labels):
-            continue
-        for chosen in combinations(labels, size):
-            samples = restricted(setting.everything, [each for each in segments if each.leg in chosen])
-            sets.append(verdict_of(setting, chosen, samples))
-            exact.append(generic.verdict(samples.question.observations))
-            tell("sets of legs")
+    formation = setting.mechanism.formation
+    complete = len(labels) <= (LARGEST_FORMATION if formation else LARGEST_COMPLETE)
+    few = 1 if formation else 3
+
+    def samples_of(chosen: tuple[str, ...]) -> Samples:
+        return restricted(setting.everything, [each for each in segments if each.leg in chosen])
+
+    def rank(chosen: tuple[str, ...]) -> int:
+        return max(member.relation.rank for member in samples_of(chosen).members)
+
+    tried = [chosen for size in range(1, len(labels) + 1) if complete or size <= few or size == len(labels)
+             for chosen in combinations(labels, size)]
+    known = True
+    if not complete:
+        found, known = _smallest(labels, rank)
+        tried = sorted({*tried, *found}, key=lambda each: (len(each), [labels.index(label) for label in each]))
+    for chosen in tried:
+        samples = samples_of(chosen)
+        sets.append(verdict_of(setting, chosen, samples))
+        exact.append(generic.verdict(samples.question.observations))
+        tell("sets of legs")
     best = max(each.rank for each in sets)
     smallest = min(len(each.legs) for each in sets if each.rank == best)
     minimal = tuple(each.legs for each in sets if each.rank == best and len(each.legs) == smallest)
     return Legs(setting, setting.robot.name, anatomy.architecture().ascii, setting.dof, tuple(sets), tuple(exact),
-                complete, minimal, **({} if at is None else {"where": str(asked_pose(at))}))
+                complete, minimal, known, **({} if at is None else {"where": str(asked_pose(at))}))

@@ -112,6 +112,7 @@ class Derivation(Result, shown_as="derive"):
             "verdict": self.verdict.verdict,
             "lost": [freedom.to_dict() for freedom in self.verdict.lost],
             "rank": self.verdict.rank, "margin": self.verdict.margin,
+            **({} if self.verdict.formation is None else {"formation": self.verdict.formation.to_dict()}),
             "point_platform": self.setting.anatomy.point is not None,
             "has_interaction_matrix": self.verdict.has_interaction_matrix,
             "interaction_matrix": self.verdict.has_interaction_matrix,
@@ -123,7 +124,7 @@ class Derivation(Result, shown_as="derive"):
         }
 
 
-@question()
+@question(formations=True)
 def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
            at: PoseLike | None = None, form: str = "simplified", paper: bool = True, seed: int = 0) -> Derivation:
     """The certified hidden robot of a robot and the legs that are watched (MMT 3.2; docs/pages/theory.md, sections 3
@@ -173,12 +174,13 @@ def derive(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
 
 
 def finished(setting: ObservedRobot, state: State) -> Mechanism:
-    """The hidden robot as a file writes it: a spanning tree, names of its own, its observations."""
+    """The hidden robot as a file writes it: a spanning tree, names of its own, its observations; of a formation, whose
+    bodies are joined now, the first one is the platform."""
     mechanism = state.mechanism
     observations = tuple(o for o in setting.observed if {o.link, o.seen_from or o.link} <= mechanism.links.keys())
     cameras = tuple(camera for camera in mechanism.cameras if camera.link in mechanism.links)
     return spanning(replace(mechanism, name=f"{setting.robot.name}_hidden", observations=observations, cameras=cameras,
-                            file=None))
+                            file=None, formation=False))
 
 
 def _check(samples: Samples, count: int | None) -> Check:

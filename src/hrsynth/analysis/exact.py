@@ -25,6 +25,8 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+import numpy as np
+
 from ..batch.platform_coordinates import frames_at
 from ..budgets import LARGEST_RANDOM
 from ..kinematics.configuration import ClosedConfiguration
@@ -37,7 +39,9 @@ from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.relations import Relations, recognise
 from ..results import Compared
 from ..tolerances import CLOSED
-from .instances import Instance, NotRecognised, draw, instance, ranks_at
+from .formation import PLACES, following, sensed
+from .formation import word as formation_word
+from .instances import Instance, NotRecognised, draw, instance, kernel, random_numbers, rank, ranks_at
 from .kept import degree, kept
 from .observed import ObservedRobot, selected
 from .sensor_rows import DEGREE, SensorPlaces, has_exact_rates
@@ -93,12 +97,15 @@ class ExactVerdict(Compared):
     proved: bool = False
     chance: float = 0.0
     basis: Basis | None = None
+    trivial: int | None = None
+    """Of a formation: how many independent unseen motions are trivial."""
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"verdict": self.verdict, "exact": self.exact, "rank": self.rank, "instances": self.instances,
                 "reason": self.reason, "proved": self.proved, "chance": self.chance,
-                "relations": self.basis and self.basis.to_dict()}
+                "relations": self.basis and self.basis.to_dict(),
+                **({} if self.trivial is None else {"trivial": self.trivial})}
 
 
 class ExactArchitecture:
@@ -146,12 +153,13 @@ class ExactArchitecture:
         """The verdict for some of the observations."""
         legs = labels_of(observed)
         try:
-            rank, instances = self._rank(observed)
+            seen, instances = self._rank(observed)
             basis = self.basis
-            chance = self._chance(observed) if rank == self.dof and not basis.observed else 0.0
+            trivial = self._trivial(observed) if self.mechanism.formation else None
+            chance = self._chance(observed) if seen == self.dof and not basis.observed else 0.0
         except NotRecognised as error:
             return ExactVerdict(legs, None, None, self.dof, False, 0, str(error))
-        proved = rank == self.dof and not basis.observed
+        proved = seen == self.dof and not basis.observed
         random = f"exact at {instances} random instance" + "s" * (instances > 1)
         reason = "proved in exact arithmetic" if proved else random
         if chance:
@@ -159,7 +167,23 @@ class ExactArchitecture:
         if basis.observed:
             reason += f" of geometry with {len(basis.observed)} relations observed at samples ({basis.observed[0]})"
         reason += basis.nearly
-        return ExactVerdict(legs, word(rank, self.dof), rank, self.dof, True, instances, reason, proved, chance, basis)
+        said = word(seen, self.dof) if trivial is None else formation_word(self.dof - seen - trivial)
+        return ExactVerdict(legs, said, seen, self.dof, True, instances, reason, proved, chance, basis, trivial)
+
+    def _trivial(self, observed: Sequence[Observation]) -> int:
+        """How many independent trivial motions there are: the least of several instances."""
+        return min(self._followed(self.instance(i), [self._places[o.key] for o in observed]) for i in range(INSTANCES))
+
+    def _followed(self, found: Instance, places: Sequence[int]) -> int:
+        """How many independent similarities take along all that is sensed, at an instance, in motions not seen."""
+        draws = [(random_numbers(3, self._random), random_numbers(3, self._random)) for _ in range(PLACES)]
+        parts = [part for i in places if (at := found.sightings[i]) is not None
+                 for part in sensed(self.observations[i], self.mechanism.reference, at, draws)]
+        if not parts:
+            return 0
+        unseen = kernel(np.vstack([found.rates[i] for i in places]))
+        motions, common = following(parts, {link: twist @ unseen for link, twist in found.twists().items()})
+        return rank(motions) + rank(common) - rank(np.hstack([motions, common]))
 
     @cached_property
     def basis(self) -> Basis:

@@ -42,9 +42,9 @@ def name_freedoms(twists: Array, anatomy: LegDecomposition, labels: tuple[str, .
     found: list[Freedom] = []
     free, _ = kernel_basis(twists[3:], 1.0)
     translations = range_basis(twists[:3] @ free, 1.0)[0] if free.shape[1] else np.zeros((3, 0))
-    for direction in _nice_directions(translations, anatomy):
+    for direction in directions_in(translations, anatomy):
         twist = np.concatenate([direction, np.zeros(3)])
-        found.append(Freedom(twist, f"translation along {_name(direction, anatomy)}"))
+        found.append(Freedom(twist, f"translation along {direction_name(direction, anatomy)}"))
     for point, direction, name in _lines(anatomy, labels) if position is None else ():
         if len(found) == twists.shape[1]:
             break
@@ -91,7 +91,7 @@ def _spanned(twist: Array, found: list[Freedom]) -> bool:
     return bool(np.linalg.norm(_without(twist / np.linalg.norm(twist), found)) < NAMED)
 
 
-def _nice_directions(basis: Array, anatomy: LegDecomposition) -> list[Array]:
+def directions_in(basis: Array, anatomy: LegDecomposition) -> list[Array]:
     """Directions that span ``basis`` (3, k): base axes first, then P axes of the robot, then whatever is left."""
     candidates = [*np.eye(3)]
     candidates += [j.axis for j in anatomy.mechanism.joints.values() if j.type is JointType.PRISMATIC]
@@ -106,7 +106,7 @@ def _nice_directions(basis: Array, anatomy: LegDecomposition) -> list[Array]:
     return chosen
 
 
-def _name(direction: Array, anatomy: LegDecomposition) -> str:
+def direction_name(direction: Array, anatomy: LegDecomposition) -> str:
     for i in range(3):
         if abs(abs(direction[i]) - 1) < NAMED:
             return _AXES[i]

@@ -25,8 +25,9 @@ from ..mechanism import Joint, Mechanism, Observation, graphs
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.relations import DirectionSource, Relations
 from ..mechanism.screws import allowed
+from ..mechanism.sights import Sighting
 from ..tolerances import RANK_CUTOFF, RANK_GAP
-from .sensor_rows import SensorPlaces, rates
+from .sensor_rows import SensorPlaces, rates, sighting
 
 if TYPE_CHECKING:
     from flint import fmpz_mat
@@ -48,9 +49,9 @@ class Geometry:
 
 @dataclass(frozen=True, eq=False)
 class Instance:
-    """Exact maps on a basis of ker A, the velocities that all joints allow: the platform's twist (twist rows,
-    mobility), u × (ω − ω of the reference) for each observed direction (3, mobility), and what
-    :func:`.sensor_rows.rates` gives for other observations."""
+    """Exact maps on a basis of ker A, the velocities that all joints allow: the platform's twist, of a formation those
+    of all bodies (twist rows, mobility), u × (ω − ω of the reference) for each observed direction (3, mobility), and
+    what :func:`.sensor_rows.rates` gives for other observations."""
 
     geometry: Geometry
     twist: Numbers
@@ -63,6 +64,8 @@ class Instance:
     """A: what the loops ask of the joints' rates (rows, rates)."""
     rows: tuple[Numbers, ...]
     """The twist and the rates for each joint's rates, before they are taken on ker A."""
+    sightings: tuple[Sighting | None, ...]
+    """Of each observation, where camera and link are; None of an encoder."""
 
     @property
     def idle(self) -> int:
@@ -97,7 +100,7 @@ def draw(relations: Relations, rng: random.Random) -> Geometry:
     directions, ranks = _directions(relations, rng)
     n = relations.count
     basis = kernel(_centre_rows(relations, directions))
-    centres = np.asarray((basis @ _numbers(basis.shape[1], rng)).reshape(n, 3))
+    centres = np.asarray((basis @ random_numbers(basis.shape[1], rng)).reshape(n, 3))
     return Geometry(tuple(np.array([fmpq(x) for x in each], dtype=object) for each in directions), centres,
                     (*ranks, 3 * n - basis.shape[1]))
 
@@ -129,20 +132,22 @@ def instance(mechanism: Mechanism, relations: Relations, observations: Sequence[
     sights = iter(relations.sights)
     directions = {o.key: seen(next(sights), drawn) for o in observations if isinstance(o, SeenAxis)}
     further = [seen(sight, drawn) for sight in sights]
-    t = velocities[mechanism.platform]
+    t = np.vstack([velocities[body] for body in mechanism.bodies])
     if relations.point is not None:
         point, scale = scaled(drawn.centres[relations.point])
         t = scale * t[:3] + cross(t[3:], point[:, None], axis=-2)
-    parts = [t]
+    parts, sightings = [t], list[Sighting | None]()
     for observation in observations:
+        sightings.append(sighting(observation, places, relations, drawn.centres, further, mechanism,
+                                  directions.get(observation.key)))
         if observation.key in directions:
             turn = velocities[observation.link] - velocities[observation.seen_from or mechanism.reference]
             parts.append(cross(scaled(directions[observation.key])[0][:, None], turn[3:], axis=-2))
         else:
-            parts.append(rates(observation, places, relations, drawn.centres, further, mechanism, velocities, columns))
+            parts.append(rates(observation, sightings[-1], mechanism, velocities, columns))
     free, _ = _reduced(loops)
     t, *moving = np.split(_times(np.vstack(parts), free), np.cumsum([len(part) for part in parts[:-1]]))
-    return Instance(drawn, t, tuple(moving), velocities, free, loops, tuple(parts))
+    return Instance(drawn, t, tuple(moving), velocities, free, loops, tuple(parts), tuple(sightings))
 
 
 def _screws(joint: Joint, relations: Relations, drawn: Geometry) -> Numbers:
@@ -189,7 +194,7 @@ def _directions(relations: Relations, rng: random.Random) -> tuple[tuple[Numbers
         if basis.shape[1] == 0:
             raise NotRecognised("no random direction fits all that is parallel, perpendicular or in one plane: "
                                 + relations.members(number))
-        found.append(_whole(basis @ _numbers(basis.shape[1], rng)))
+        found.append(_whole(basis @ random_numbers(basis.shape[1], rng)))
         ranks.append(3 - basis.shape[1])
     return tuple(found), ranks
 
@@ -238,7 +243,8 @@ def seen(sight: DirectionSource, drawn: Geometry) -> Numbers:
             return between if sight.kind == "between" else cross(axes[0], cross(between, axes[0]))
 
 
-def _numbers(count: int, rng: random.Random) -> Numbers:
+def random_numbers(count: int, rng: random.Random) -> Numbers:
+    """Random whole numbers, as rational ones."""
     from flint import fmpq
 
     return np.array([fmpq(rng.choice((-1, 1)) * rng.randint(1, LARGEST_RANDOM)) for _ in range(count)], dtype=object)

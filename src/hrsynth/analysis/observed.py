@@ -72,7 +72,8 @@ class ObservedRobot(Value):
            samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
         """What a question is asked of: an observed robot itself, or a robot with what is watched of it, as
         :func:`.asked.observe`."""
-        robot, names = as_robot(robot), as_names(observe)
+        robot = as_robot(robot)
+        names = legs_asked(robot, observe, see)
         if isinstance(robot, ObservedRobot):
             if (observe, camera, see) != (None, None, None):
                 raise BadRequest(f"{robot.headline()}: what is watched is asked twice", observe or camera or see,
@@ -112,7 +113,8 @@ class ObservedRobot(Value):
         for each in self.observed:
             if not each.by_segment:
                 raise BadRequest(f"{self.robot.name}: {what} knows directions of segments only",
-                                 f"{each.kind} {each.leg}", "legs to watch (derive, legs, check, advise know all)")
+                                 f"{each.kind} {each.leg}",
+                                 "legs to watch (advise, check, derive, legs, modes, servo, singular, view know all)")
         return self
 
     @property
@@ -256,7 +258,7 @@ def as_robot(given: RobotLike) -> Mechanism | ObservedRobot:
 
 
 def as_names(given: LegsLike) -> tuple[str, ...] | None:
-    """The legs or links that are given, None for all (None, ``all``); raises ``BadRequest``."""
+    """The legs or links that are given, ``("all",)`` for all legs, None where nothing is; raises ``BadRequest``."""
     if given is None:
         return None
     every: Any = given.split(",") if isinstance(given, str) else given if isinstance(given, Iterable) else [given]
@@ -264,8 +266,14 @@ def as_names(given: LegsLike) -> tuple[str, ...] | None:
     if not all(isinstance(each, str | Integral) and not isinstance(each, bool) for each in every):
         raise BadRequest("legs to watch", given, "a label or a link such as 1 or 'rod_1a', several in a list or in a "
                          "text with commas, or 'all'")
-    names = tuple(str(each).strip() for each in every)
-    return None if names == ("all",) else names
+    return tuple(str(each).strip() for each in every)
+
+
+def legs_asked(robot: Mechanism | ObservedRobot, observe: LegsLike, see: SeeLike = None) -> tuple[str, ...] | None:
+    """:func:`as_names`, None also for all legs where nothing but segments is watched: one question, told in one way."""
+    names = as_names(observe)
+    other = see is not None or (isinstance(robot, Mechanism) and not all(o.by_segment for o in robot.observations))
+    return None if names == ("all",) and not other else names
 
 
 def as_texts(given: str | Iterable[str] | None) -> tuple[str, ...]:
@@ -298,8 +306,9 @@ def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...]
     observed = (*chosen, *(o for o in anatomy.mechanism.observations if o.leg in asked))
     known = {o.key for o in defaults.values()}
     extra = tuple(o for o in observed if o.key not in known)
-    question = Measurement(normal.mechanism.platform, anatomy.point, normal.mechanism.reference,
-                           (*defaults.values(), *extra))
+    first, *others = normal.mechanism.bodies
+    question = Measurement(first, None if others else anatomy.point, normal.mechanism.reference,
+                           (*defaults.values(), *extra), others=tuple(others))
     drawn = sample(PinocchioModel(normal.mechanism), question, samples, seed, led_by=observed)
     return ObservedRobot(robot, normal, anatomy, observed, drawn, len(defaults))
 

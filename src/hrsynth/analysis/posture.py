@@ -29,6 +29,7 @@ from .classes import (
     surplus,
     usual_rows,
 )
+from .formation import Formation, formation_at, special_at
 from .freedoms import Freedom, name_freedoms
 from .observed import Mobility, ObservedRobot
 
@@ -106,6 +107,8 @@ class Posture(Value):
     """At a constraint singularity: the freedoms that the platform has here and not in general."""
     redundant: tuple[Redundancy, ...] = ()
     """Loop constraints that are redundant only here."""
+    formation: Formation | None = None
+    """Of a formation: what is not seen here; ``pose`` is that of its first body."""
 
     @property
     def gap(self) -> float:
@@ -131,7 +134,8 @@ class Posture(Value):
                 "constraint": {"singular": self.constraint_singular,
                                "rank_lost": None if self.hidden.classes is None else self.hidden.classes.IIM,
                                "gained": [freedom.to_dict() for freedom in self.gained]},
-                "redundant": [each.to_dict() for each in self.redundant], "distances": self.distances.to_dict()}
+                "redundant": [each.to_dict() for each in self.redundant], "distances": self.distances.to_dict(),
+                **({} if self.formation is None else {"formation": self.formation.to_dict()})}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -161,6 +165,11 @@ class ConfigurationAnalysis(Value):
         """The redundant rows of each loop in general."""
         return usual_rows(self.setting.configurations)
 
+    @cached_property
+    def _usually_special(self) -> bool:
+        """Whether all that is sensed of a formation lies in a line or plane everywhere."""
+        return all(special_at(at, self.setting.samples.question) for at in self.setting.configurations)
+
     def _real(self, at: ClosedConfiguration) -> Relation:
         return relation_of(at, self.setting.samples.question, np.eye(at.twin.nv)[at.twin.actuated()])
 
@@ -179,6 +188,12 @@ class ConfigurationAnalysis(Value):
         posture = self.classify(at)
         hidden, real = posture.hidden, posture.real
         found = relation(at, self.setting.samples.question)
+        if self.setting.mechanism.formation:
+            here = formation_at(at, self.setting.samples.question, found, self.setting.anatomy)
+            if (special := special_at(at, self.setting.samples.question)) and not self._usually_special:
+                here = replace(here, special=special)
+            extra = surplus(redundant_rows(at), self.redundant)
+            return replace(posture, formation=here if hidden.classes else None, redundant=listed(extra, generic=False))
         hidden = replace(hidden, lost=self._named(at, found.unobserved_twists) if hidden.classes else ())
         if real is not None and real.classes:
             real = replace(real, lost=self._named(at, self._real(at).unobserved_twists))
@@ -204,7 +219,7 @@ class ConfigurationAnalysis(Value):
             return Distances(0.0, 1 / largest if largest else None, constraints, None, None, None)
         weakest = float(values[rank - 1])
         moved = found.twists @ right[rank - 1] / weakest
-        if not all(each.angular for each in self.setting.observed):
+        if found.twist_rows > 6 or not all(each.angular for each in self.setting.observed):
             return Distances(weakest, 1 / largest, constraints, largest / weakest, None, None)
         return Distances(weakest, 1 / largest, constraints, largest / weakest,
                          1e3 * at.twin.length * float(np.linalg.norm(moved[:3])) * float(np.radians(1)),

@@ -11,10 +11,10 @@ from threading import Lock
 from typing import Any, ParamSpec, TypeVar
 
 from ..budgets import REMEMBERED_ANSWERS, REMEMBERED_GRIDS
-from ..errors import MissingExtra
+from ..errors import BadRequest, MissingExtra
 from ..mechanism import Mechanism
 from ..results import content, require_keywords
-from .observed import as_names, as_robot, forget_robots
+from .observed import as_robot, forget_robots, legs_asked
 
 P = ParamSpec("P")
 R = TypeVar("R")
@@ -61,10 +61,10 @@ def forget_answers() -> None:
         memory.kept.clear()
 
 
-def question(**old: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
+def question(*, formations: bool = False, **old: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
     """A function of a robot whose answers are frozen values: the robot is also taken by its name or path, and what was
     asked before is not computed again. ``old`` names of options, each with the one that it has now, are taken for one
-    version more.
+    version more. ``formations``: whether it can be asked of several bodies; else these are refused.
 
     The same question is one with equal arguments about an equal robot, read from the same file.
     """
@@ -86,13 +86,16 @@ def question(**old: str) -> Callable[[Callable[P, R]], Callable[P, R]]:
             except TypeError as error:
                 raise TypeError(f"{function.__name__}: {error}; it takes {', '.join(known.parameters)}") from None
             robot = bound.arguments["robot"] = as_robot(bound.arguments["robot"])
+            source = robot if isinstance(robot, Mechanism) else robot.robot
+            if source.formation and not formations:
+                raise BadRequest(f"{source.name}: {function.__name__} asks about one platform, and this is a formation",
+                                 ", ".join(source.bodies), "a file with a <platform>, or derive, legs, check")
             if given.get("seconds") is not None:
                 return function(*bound.args, **bound.kwargs)
-            source = robot if isinstance(robot, Mechanism) else robot.robot
             every = known.bind(*args, **given)
             every.apply_defaults()
             if "observe" in every.arguments:
-                every.arguments["observe"] = as_names(every.arguments["observe"])
+                every.arguments["observe"] = legs_asked(robot, every.arguments["observe"], every.arguments.get("see"))
             options = [(name, content(value)) for name, value in every.arguments.items() if name != "robot"]
             key = (function.__qualname__, robot, source.file, source.notes, *options)
             try:

@@ -55,26 +55,37 @@ def has_exact_rates(seen: Observation) -> bool:
     return isinstance(seen, SeenAxis | Encoder) or (isinstance(seen, CameraObservation) and seen.rational)
 
 
-def rates(seen: Observation, places: SensorPlaces, relations: Relations, centres: Numbers, sights: Sequence[Numbers],
-          mechanism: Mechanism, velocities: Mapping[str, Numbers], columns: Mapping[str, slice]) -> Numbers:
-    """The rates of an observation for each joint's rate, whole numbers (rows, rates); ``centres`` are rational, the
-    ``sights`` the directions of ``places``, ``columns`` those of each joint."""
+def sighting(seen: Observation, places: SensorPlaces, relations: Relations, centres: Numbers, sights: Sequence[Numbers],
+             mechanism: Mechanism, direction: Numbers | None) -> Sighting | None:
+    """Where camera and link of an observation are at a rational instance; ``centres`` are rational, the ``sights`` the
+    directions of ``places``, ``direction`` is that of an observed axis. None of an encoder."""
     from flint import fmpq
 
+    nothing = np.array([fmpq(0)] * 3, dtype=object)
+    if isinstance(seen, SeenAxis):
+        assert direction is not None
+        return Sighting(nothing, nothing, nothing, np.array([fmpq(x) for x in direction], dtype=object))
+    if not isinstance(seen, CameraObservation):
+        return None
+    B, C = (centres[relations.count - len(places.points) + places.points.index(point)]
+            for point in _points(seen, mechanism))
+    axes = [sights[places.directions.index(axis)] for axis in _directions(seen, mechanism)]
+    return Sighting(C, axes[-1] if axes else nothing, B, axes[0] if seen.axis is not None else nothing)
+
+
+def rates(seen: Observation, at: Sighting | None, mechanism: Mechanism, velocities: Mapping[str, Numbers],
+          columns: Mapping[str, slice]) -> Numbers:
+    """The rates of an observation for each joint's rate, whole numbers (rows, rates); ``columns`` are those of each
+    joint."""
     total = next(iter(velocities.values())).shape[1]
     if isinstance(seen, Encoder):
         row = np.zeros((1, total), dtype=object)
         row[0, columns[seen.joint].start + _coordinate(seen, mechanism)] = 1
         return row
     assert isinstance(seen, CameraObservation)
-    B, C = (centres[relations.count - len(places.points) + places.points.index(point)]
-            for point in _points(seen, mechanism))
-    axes = [sights[places.directions.index(axis)] for axis in _directions(seen, mechanism)]
-    nothing = np.array([fmpq(0)] * 3, dtype=object)
-    d = axes[0] if seen.axis is not None else nothing
+    assert at is not None
     turn = velocities[seen.link] - velocities[seen.seen_from or mechanism.reference]
-    wrenches = seen.wrenches(Sighting(C, axes[-1] if axes else nothing, B, d))
-    return np.vstack([_whole(wrench) @ turn for wrench in wrenches])
+    return np.vstack([_whole(wrench) @ turn for wrench in seen.wrenches(at)])
 
 
 def _whole(wrench: Numbers) -> Numbers:

@@ -12,6 +12,7 @@ from ..kinematics.relation import relation
 from ..kinematics.sampling import Samples
 from ..results import Result
 from ..tolerances import RANK_CUTOFF, RANK_GAP, SURELY_SOMETHING, SURELY_ZERO
+from .formation import Formation, formation_at
 from .freedoms import Freedom, name_freedoms, point_text
 from .observed import ObservedRobot
 
@@ -40,6 +41,8 @@ class Verdict(Result, shown_as="verdict"):
     single samples may lie near a singularity, whatever the dimensions."""
     dropped: float = 0.0
     """The largest that does not, at the sample where it is least."""
+    formation: Formation | None = None
+    """Of a formation: what is not seen, trivial motions and flexes; ``dof`` are the freedoms of all bodies."""
 
     @property
     def near(self) -> bool:
@@ -55,7 +58,8 @@ class Verdict(Result, shown_as="verdict"):
         return {"legs": list(self.legs), "verdict": self.verdict, "rank": self.rank,
                 "lost": [freedom.to_dict() for freedom in self.lost], "gap": self.gap,
                 "has_interaction_matrix": self.has_interaction_matrix,
-                "interaction_matrix": self.has_interaction_matrix, "margin": self.margin}
+                "interaction_matrix": self.has_interaction_matrix, "margin": self.margin,
+                **({} if self.formation is None else {"formation": self.formation.to_dict()})}
 
     @property
     def margin(self) -> dict[str, float]:
@@ -78,12 +82,25 @@ def verdict_of(setting: ObservedRobot, legs: Sequence[str], samples: Samples) ->
     gap = min(min(each.gap, each.RO.gap) for each in found)
     Rank(rank, gap).decided(what)
     dof = setting.dof
-    lost: tuple[Freedom, ...] = ()
-    if rank < dof:
+    lost, formation = tuple[Freedom, ...](), None
+    if setting.mechanism.formation:
+        formation = _formation(setting, samples, dof - rank)
+    elif rank < dof:
         lost = _lost(setting, samples, tuple(legs), dof - rank)
     graph = not any(each.RI for each in found)
-    return Verdict(tuple(legs), word(rank, dof), dof, rank, lost, gap, graph,
-                   max(each.seen.weakest for each in found), min(each.seen.dropped for each in found))
+    said = word(rank, dof) if formation is None else formation.verdict
+    return Verdict(tuple(legs), said, dof, rank, lost, gap, graph, max(each.seen.weakest for each in found),
+                   min(each.seen.dropped for each in found), formation)
+
+
+def _formation(setting: ObservedRobot, samples: Samples, count: int) -> Formation:
+    """What is not seen of a formation, at the zero configuration where it is as at a sample, else there."""
+    member, start = samples.members[0], relation(samples.start, samples.question)
+    usual = formation_at(member.configuration, samples.question, member.relation, setting.anatomy)
+    if start.unobserved_twists.shape[1] != count or start.gap < RANK_GAP:
+        return usual
+    found = formation_at(samples.start, samples.question, start, setting.anatomy)
+    return found if len(found.trivial) == len(usual.trivial) else usual
 
 
 def _lost(setting: ObservedRobot, samples: Samples, legs: tuple[str, ...], count: int) -> tuple[Freedom, ...]:

@@ -18,8 +18,10 @@ from ..kinematics.locked import interaction
 from ..kinematics.relation import Measurement
 from ..results import Value
 from ..tolerances import SAME_RELATION
+from .locked_legs import LockedLeg, forbidden, projectors, stopped_turns
+from .mixtures import closed_form
 from .named_vectors import BodyVector, NamedVector, Tangent
-from .pattern import ConstraintPattern, LockedLeg, PatternValues, forbidden, projectors
+from .pattern import TURNING_MOTIONS, ConstraintPattern, PatternValues
 from .vector_algebra import evaluate, products, vector
 
 Values = Mapping[str, Array]
@@ -40,6 +42,8 @@ class Condition(Value):
     never: bool = False
     where: Mapping[str, str] = field(default_factory=dict)
     """What each symbol means."""
+    parts: tuple[tuple[Any, str], ...] = ()
+    """Factors of the expression, which vanishes where one of them does, each with what that means."""
 
     def rows(self, here: PatternValues) -> Array:
         """The rows (n, rows, d) that have a kernel exactly where a freedom is lost."""
@@ -97,6 +101,9 @@ def rows(pattern: ConstraintPattern, values: Values) -> Array:
             case _:
                 J = np.concatenate([eye, -hat(values[leg.tip.symbol])], axis=2)
         blocks.append(forbidden(leg, values) @ J)
+        turns = stopped_turns(leg, values) if pattern.motion in TURNING_MOTIONS else None
+        if turns is not None:
+            blocks.append(np.concatenate([np.zeros_like(turns), turns], axis=2))
     if pattern.motion == "planar":
         n = values[_symbol(pattern.plane)]
         blocks.append(np.concatenate([n[:, None, :], np.zeros((len(n), 1, 3))], axis=2))
@@ -119,6 +126,11 @@ def condition(pattern: ConstraintPattern, question: Measurement) -> Condition:
     lines = [leg for leg in pattern.legs if leg.line is not None]
     if pattern.motion == "translations":
         return _translations(pattern, lines)
+    if pattern.motion == "spatial" and (form := closed_form(pattern.legs)) is not None:
+        return _named(pattern, form.words, form.expression, True, parts=form.parts)
+    if pattern.motion in TURNING_MOTIONS and any(
+            leg.virtual and (leg.turning is not None or pattern.motion == "planar") for leg in pattern.legs):
+        return _gram(pattern)
     normals = [leg for leg in pattern.legs if leg.normal is not None]
     fixed = [leg for leg in pattern.legs if leg.fixed]
     if pattern.motion == "spatial" and len(normals) == len(pattern.legs) == 6:
@@ -128,8 +140,6 @@ def condition(pattern: ConstraintPattern, question: Measurement) -> Condition:
     if len(lines) == len(pattern.legs):
         if pattern.motion == "planar" and len(lines) == 3:
             return _planar(pattern, lines)
-        if pattern.motion == "spatial" and len(lines) == 3:
-            return _spatial(pattern, lines)
         if pattern.motion == "bodies" and len(lines) == 2 and lines[0].body != lines[1].body:
             return _bodies(pattern, lines)
     return _gram(pattern)
@@ -198,22 +208,6 @@ def _planar(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition
     return _named(pattern, words, expression, True)
 
 
-def _spatial(pattern: ConstraintPattern, lines: Sequence[LockedLeg]) -> Condition:
-    """The tips' speeds along their lines that keep |B_i B_j|: a 3 × 3 determinant."""
-    dot, _, _ = products()
-    line = [vector(_symbol(leg.line)) for leg in lines]
-    tips = [vector(leg.tip.symbol) for leg in lines]
-    sides = [tips[(i + 1) % 3] - tips[i] for i in range(3)]
-    forth = back = _number(1)
-    for i in range(3):
-        forth *= dot(line[i], sides[i])
-        back *= dot(line[(i + 1) % 3], sides[i])
-    names = [leg.tip.symbol for leg in lines]
-    words = (f"the planes through {', '.join(names)} {_kinds(lines, 'normal to')}, and the plane {''.join(names)}, "
-             "meet in a point (which may lie at infinity)")
-    return _named(pattern, words, forth - back, True)
-
-
 def _pivot(pattern: ConstraintPattern, line: LockedLeg, fixed: LockedLeg) -> Condition:
     """One tip rests: the platform turns about it where the other tip's line is the path of that turn."""
     dot, _, _ = products()
@@ -251,6 +245,13 @@ def _gram(pattern: ConstraintPattern) -> Condition:
     matrices = []
     for leg in pattern.legs:
         label, moving = leg.tip.symbol[1:], leg.line or leg.normal
+        if leg.turning is not None and pattern.motion in TURNING_MOTIONS:
+            P, name = sympy.MatrixSymbol(f"P{label}", 6, 6), _symbol(leg.turning)
+            total += P
+            across = f"I - {name} {name}^T" if leg.about is not None else f"{name} {name}^T"
+            matrices.append((P.name, f"diag(0, {across})"))
+        if leg.free:
+            continue
         J, N = sympy.MatrixSymbol(f"J{label}", 3, size), sympy.MatrixSymbol(f"N{label}", 3, 3)
         total += J.T * N * J
         slides = "[I, e]" if leg.body in pattern.bodies[1:] else "[I, 0]"
@@ -260,22 +261,24 @@ def _gram(pattern: ConstraintPattern) -> Condition:
         matrices.append((N.name, across))
     moves = _moves(pattern.legs)
     if pattern.motion == "bodies":
-        words = f"the platform's halves can translate, one along e relative to the other, and move {moves}"
+        halves = "the platform's halves can translate, one along e relative to the other"
+        words = f"{halves}, and {moves.replace('moves', 'move', 1)}"
     else:
-        words = f"some motion of the platform moves {moves}"
+        words = f"some motion of the platform {moves}{_cylinders(pattern.legs)}"
     return _named(pattern, words, sympy.Determinant(total), False, matrices=dict(matrices))
 
 
 def _named(pattern: ConstraintPattern, words: str, expression: Any, signed: bool, *, never: bool = False,
-           matrices: Mapping[str, str] | None = None) -> Named:
+           matrices: Mapping[str, str] | None = None, parts: tuple[tuple[Any, str], ...] = ()) -> Named:
     """A condition with the meaning of its symbols and the factors that were split off."""
     import sympy
 
     expression = sympy.sympify(expression)
-    used = {str(symbol) for symbol in expression.free_symbols}
+    used = {str(symbol) for each in (expression, *(part for part, _ in parts)) for symbol in each.free_symbols}
+    used |= {leg.eye.symbol for leg in pattern.legs if leg.eye is not None}
     named = {f.symbol: f.meaning for f in pattern.features if f.symbol in used or matrices}
     return Named(words.replace("tau", "τ"), expression, signed, tuple(_lengths(pattern.legs)), never,
-                 {**(matrices or {}), **dict(sorted(named.items()))}, pattern=pattern)
+                 {**(matrices or {}), **dict(sorted(named.items()))}, parts, pattern=pattern)
 
 
 def _general(question: Measurement) -> General:
@@ -294,12 +297,23 @@ def always(pattern: ConstraintPattern, lost: Sequence[str]) -> str:
     """Words for a robot that loses a freedom everywhere."""
     text = f"always: {'; '.join(lost)} {'is' if len(lost) == 1 else 'are'} never seen"
     lines = [leg for leg in pattern.legs if leg.line is not None]
+    if pattern.motion == "spatial" and (names := _on_one_line(pattern.legs)):
+        return f"{text}, because {names} are on one line, about which the platform can turn"
     if pattern.motion != "planar" and len(lines) == len(pattern.legs) > 0:
         constant = all(isinstance(leg.line, BodyVector) and leg.line.link == pattern.base for leg in lines)
         parallel = constant and all(_parallel(lines[0].line, leg.line) for leg in lines)
         if parallel and len(lines) > 1:
             return f"{text}, because {_listed(leg.line for leg in lines)} are parallel"
     return text
+
+
+def _on_one_line(legs: Sequence[LockedLeg]) -> str:
+    """The tips where these, two at least, are on one line in one link, and nothing else is held; else empty."""
+    if len(legs) < 2 or len({leg.tip.link for leg in legs}) > 1 or any(leg.turning is not None for leg in legs):
+        return ""
+    arms = np.array([leg.tip.place - legs[0].tip.place for leg in legs[1:]])
+    flat = np.linalg.svd(arms, compute_uv=False)
+    return ", ".join(leg.tip.symbol for leg in legs) if flat[1:].sum() <= SAME_RELATION * flat[0] else ""
 
 
 def _parallel(a: NamedVector | None, b: NamedVector | None) -> bool:
@@ -320,12 +334,29 @@ _KINDS = {"u": "watched directions", "p": "P axes", "t": "tangents", "a": "axes"
 
 
 def _moves(legs: Sequence[LockedLeg]) -> str:
-    """What all tips do: ``every tip Bi along ui (i = 1, 2, 3)`` where they are alike."""
-    alike = {(leg.tip.symbol[0], _allowed(leg).replace(leg.tip.symbol[1:], "i")) for leg in legs}
-    if len(alike) > 1:
-        return _and([f"{leg.tip.symbol} {_allowed(leg)}" for leg in legs])
-    tip, allowed = next(iter(alike))
-    return f"every tip {tip}i {allowed} (i = {', '.join(leg.tip.symbol[1:] for leg in legs)})"
+    """What all tips do, and how the body turns: ``moves every tip Bi along ui (i = 1, 2, 3)`` where they are alike."""
+    tips = [leg for leg in legs if not leg.free]
+    alike = {(leg.tip.symbol[0], _allowed(leg).replace(leg.tip.symbol[1:], "i")) for leg in tips}
+    parts = []
+    if len(alike) > 1 or len(tips) == 1:
+        still = [leg.tip.symbol for leg in tips if leg.fixed]
+        moved = [f"{leg.tip.symbol} {_allowed(leg)}" for leg in tips if not leg.fixed]
+        parts = [*([f"leaves {_and(still)} at rest"] if still else []), *([f"moves {_and(moved)}"] if moved else [])]
+    elif alike:
+        tip, allowed = next(iter(alike))
+        parts = [f"moves every tip {tip}i {allowed} (i = {', '.join(leg.tip.symbol[1:] for leg in tips)})"]
+    turns = [f"about {'' if leg.about is not None else 'a normal of '}{_symbol(leg.turning)}" for leg in legs
+             if leg.turning is not None]
+    return " and ".join([*parts, *([f"turns it {_and(turns)}"] if turns else [])])
+
+
+def _cylinders(legs: Sequence[LockedLeg]) -> str:
+    """What is so besides where more than three image points of one camera lose a freedom."""
+    rays = [leg for leg in legs if leg.eye is not None and leg.line is not None and leg.turning is None]
+    eyes = {leg.eye.symbol for leg in rays if leg.eye is not None}
+    if len(rays) < 4 or len(eyes) > 1:
+        return ""
+    return f"; {eyes.pop()} is then on the danger cylinders of all threes of points that are not on one line"
 
 
 def _allowed(leg: LockedLeg) -> str:
@@ -345,7 +376,7 @@ def _kinds(lines: Sequence[LockedLeg], relation: str) -> str:
 def _lengths(lines: Sequence[LockedLeg]) -> list[str]:
     """Factors that vanish only where a crank has no length: none for unit vectors that are fixed in a link."""
     return [f"|{leg.line.meaning.removeprefix('tangent ')}|" for leg in lines
-            if leg.line is not None and not isinstance(leg.line, BodyVector)]
+            if leg.line is not None and not isinstance(leg.line, BodyVector) and not leg.virtual]
 
 
 def _symbol(feature: NamedVector | None) -> str:

@@ -14,6 +14,7 @@ import numpy as np
 from ..geometry.vectors import Array, frozen, inverse
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Joint, Mechanism
+from ..mechanism.observations.edge import tangent
 from ..results import Value
 
 Poses = Mapping[str, Array]
@@ -97,6 +98,40 @@ class Segment(NamedVector):
 
     def value(self, poses: Poses) -> Array:
         return unit_rows(self.end.value(poses) - self.start.value(poses))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class CrossProduct(NamedVector):
+    """The unit vector along the cross product of two."""
+
+    one: NamedVector
+    other: NamedVector
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        return (*self.one.links, *self.other.links)
+
+    def value(self, poses: Poses) -> Array:
+        return unit_rows(np.cross(self.one.value(poses), self.other.value(poses)))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class TangentNormal(NamedVector):
+    """The normal of the plane through a point that touches a cylinder; its radius in characteristic lengths, whose sign
+    says which of the two planes."""
+
+    start: BodyPoint
+    on_axis: BodyPoint
+    axis: BodyVector
+    radius: float
+
+    @property
+    def links(self) -> tuple[str, ...]:
+        return (*self.start.links, *self.on_axis.links, *self.axis.links)
+
+    def value(self, poses: Poses) -> Array:
+        out = self.on_axis.value(poses) - self.start.value(poses)
+        return tangent(out, self.axis.value(poses), np.array([self.radius]))
 
 
 def unit_rows(vectors: Array) -> Array:

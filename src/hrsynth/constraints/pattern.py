@@ -6,7 +6,7 @@ whole platform can still do must be in all of them (theory.md 7). This module fi
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import combinations
@@ -23,36 +23,12 @@ from ..mechanism.legs import Leg, LegDecomposition
 from ..mechanism.observations.direction import Direction
 from ..results import Value
 from ..tolerances import SAME_RELATION
+from .locked_legs import LockedLeg, forbidden, sights, stopped_turns, virtual_legs
 from .named_vectors import BodyPoint, BodyVector, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at
 
+TURNING_MOTIONS = ("planar", "spatial")
+"""Motions of a platform of which turns are a part."""
 TURNING = (JointType.REVOLUTE, JointType.UNIVERSAL, JointType.CYLINDRICAL)
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class LockedLeg(Value):
-    """A leg with its measurements held.
-
-    Its end ``tip`` on ``body`` may move along ``line``, or in the plane with this ``normal``, or not at all where
-    ``fixed``; ``turns`` is the number of independent rotations about axes through the tip.
-    """
-
-    label: str
-    body: str
-    tip: BodyPoint
-    line: NamedVector | None
-    normal: NamedVector | None
-    fixed: bool
-    turns: int
-
-    @property
-    def free(self) -> bool:
-        """Whether the tip may move anywhere."""
-        return self.line is None and self.normal is None and not self.fixed
-
-    @property
-    def features(self) -> tuple[NamedVector, ...]:
-        """All named vectors of the leg."""
-        return tuple(f for f in (self.tip, self.line, self.normal) if f is not None)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -112,30 +88,14 @@ class PatternValues(Value):
         arms = leg.tip.value(self._poses) - self._poses[leg.body][:, :3, 3]
         across = forbidden(leg, self.values)
         blocks = np.concatenate([across, -across @ hat(arms)], axis=2)
-        if leg.turns == 0:
-            turns = np.broadcast_to(np.eye(3, 6, 3), (len(arms), 3, 6))
-            blocks = np.concatenate([blocks, turns], axis=1)
+        turns = np.broadcast_to(np.eye(3), (len(arms), 3, 3)) if leg.turns == 0 else stopped_turns(leg, self.values)
+        if turns is not None:
+            blocks = np.concatenate([blocks, np.concatenate([np.zeros_like(turns), turns], axis=2)], axis=1)
         bodies = self.pattern.bodies
         found = np.zeros((len(arms), blocks.shape[1], 6 * len(bodies)))
         start = 6 * bodies.index(leg.body)
         found[:, :, start : start + 6] = blocks
         return found
-
-
-def forbidden(leg: LockedLeg, values: Mapping[str, Array]) -> Array:
-    """N_i: the projector (n, 3, 3) on what the tip's velocity must not have."""
-    if leg.line is not None:
-        return projectors(values[leg.line.symbol])
-    if leg.normal is not None:
-        n = values[leg.normal.symbol]
-        return np.asarray(n[:, :, None] * n[:, None, :])
-    return np.broadcast_to(np.eye(3), (len(values[leg.tip.symbol]), 3, 3))
-
-
-def projectors(vectors: Array) -> Array:
-    """I − v vᵀ for unit vectors (n, 3)."""
-    projector: Array = np.eye(3) - vectors[:, :, None] * vectors[:, None, :]
-    return projector
 
 
 def attached(anatomy: LegDecomposition) -> tuple[str, ...]:
@@ -147,46 +107,65 @@ def recognise(anatomy: LegDecomposition, question: Measurement, samples: Sequenc
               ) -> ConstraintPattern:
     """The pattern at the samples; ``motion`` is ``other`` where it is none of the known ones."""
     other = ConstraintPattern("other", anatomy.mechanism.base, attached(anatomy))
-    if anatomy.mechanism.couplings:
-        return other
-    held = {leg.label: _held(anatomy, leg, question, samples) for leg in anatomy.legs}
-    watched = {o.leg for o in question.observations}
-    seen = [leg for label, leg in held.items() if label in watched]
-    if any(leg is None for leg in seen) or not seen:
-        return other
-    legs = tuple(leg for leg in seen if leg is not None)
-    other = replace(other, legs=legs)
+    base, bodies = anatomy.mechanism.base, attached(anatomy)
     motions = _motions(anatomy, question, samples)
+    by_platform = sights(question, base, bodies)
+    locks: dict[str, list[Observation]] = {leg.label: [] for leg in anatomy.legs}
+    for each in question.observations:
+        if each not in by_platform:
+            leg = _leg_of(each, anatomy, question)
+            if leg is None:
+                return other
+            locks[leg].append(each)
+    held = {leg.label: _held(anatomy, leg, locks[leg.label], question.reference, samples) for leg in anatomy.legs}
+    alone = motions.shape[1:] == (6, 6) and not any(locks.values())
+    if anatomy.mechanism.couplings and not alone:
+        return other
+    virtual = virtual_legs(by_platform, question.reference, bodies, 1 if alone else len(held) + 1, samples)
+    seen = [leg for label, leg in held.items() if locks[label]]
+    if virtual is None or None in seen or not (seen or virtual):
+        return other
+    legs = (*(leg for leg in seen if leg is not None), *virtual)
+    every = None if None in held.values() else (*(leg for leg in held.values() if leg is not None), *virtual)
+    other = replace(other, legs=legs)
     if anatomy.point is not None:
         found: ConstraintPattern | None = _translating(anatomy, legs, samples)
     elif len(other.bodies) == 1:
-        found = _one_body(anatomy, held, legs, motions, samples)
+        found = _one_body(anatomy, every, legs, motions, samples)
     else:
         found = _two_bodies(anatomy, legs, motions, samples)
     # where the turns of all legs are alike, a leg whose tip may move anywhere holds nothing
     binding = () if found is None else tuple(leg for leg in found.legs if not leg.free or (
-        found.motion == "oriented" and leg.turns < 3))
+        found.motion in TURNING_MOTIONS and leg.turning is not None) or (found.motion == "oriented" and leg.turns < 3))
     return replace(found, legs=binding) if found is not None and binding else other
 
 
-def _one_body(anatomy: LegDecomposition, held: dict[str, LockedLeg | None], legs: tuple[LockedLeg, ...], motions: Array,
-              samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
+def _leg_of(seen: Observation, anatomy: LegDecomposition, question: Measurement) -> str | None:
+    """The label of the leg of which an observation is: that it bears, or of the one in which it lies."""
+    if seen.leg in anatomy.labels:
+        return seen.leg
+    inside = {seen.link, seen.seen_from or question.reference} - {anatomy.mechanism.base, *attached(anatomy)}
+    return next((leg.label for leg in anatomy.legs if inside and inside <= set(leg.links)), None)
+
+
+def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, legs: tuple[LockedLeg, ...],
+              motions: Array, samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
+    """The pattern of one body: of the ``legs`` that are watched, or of ``every`` leg, None where one has none."""
     base, bodies = anatomy.mechanism.base, attached(anatomy)
-    every = tuple(leg for leg in held.values() if leg is not None)
     if _vanishes(motions[:, 3:]):
         return _translating(anatomy, legs, samples)
     if any(leg.turns == 0 for leg in legs):
-        return _translating(anatomy, every, samples) if len(every) == len(held) else None
+        return None if every is None else _translating(anatomy, every, samples)
     normal = _plane_of(motions)
-    if normal is not None and all(leg.line is not None for leg in legs):
+    if normal is not None and all(leg.line is not None or leg.virtual for leg in legs):
         return ConstraintPattern("planar", base, bodies, legs, plane=_normal(anatomy.mechanism, normal))
-    if len(every) == len(held) and all(leg.turns == 1 and leg.normal is None for leg in every):
+    if every is not None and all(leg.turns == 1 and leg.normal is None and not leg.virtual for leg in every):
         plane = _common_plane(anatomy.mechanism, every, samples)
         return None if plane is None else ConstraintPattern("planar", base, bodies, every, plane=plane)
-    if motions.shape[2] == 6 and all(leg.turns == 3 for leg in legs):
+    if motions.shape[2] == 6 and all(leg.turns == 3 or leg.virtual for leg in legs):
         return ConstraintPattern("spatial", base, bodies, legs)
-    if len(every) == len(held) and all(leg.turns >= 2 for leg in every):
-        motion = "spatial" if all(leg.turns == 3 for leg in every) else "oriented"
+    if every is not None and all(leg.turns >= 2 or leg.virtual for leg in every):
+        motion = "spatial" if all(leg.turns == 3 or leg.virtual for leg in every) else "oriented"
         return ConstraintPattern(motion, base, bodies, every)
     return None
 
@@ -278,12 +257,11 @@ def _normal(mechanism: Mechanism, normal: Array, meaning: str = "normal of the p
     return BodyVector("n", meaning, mechanism.base, frozen(direction))
 
 
-def _held(anatomy: LegDecomposition, leg: Leg, question: Measurement,
+def _held(anatomy: LegDecomposition, leg: Leg, locks: Sequence[Observation], reference: str,
           samples: Sequence[ClosedConfiguration]) -> LockedLeg | None:
-    """The leg's pattern, the same at all samples, or None."""
-    locks = [o for o in question.observations if o.leg == leg.label]
+    """The leg's pattern with these observations held, the same at all samples, or None."""
     try:
-        systems = [leg_twists(at, leg, locks, question.reference) for at in samples]
+        systems = [leg_twists(at, leg, locks, reference) for at in samples]
     except ValueError:
         return None
     symbol = leg.label if leg.label.isalnum() else str(anatomy.labels.index(leg.label) + 1)

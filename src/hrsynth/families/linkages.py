@@ -73,9 +73,11 @@ class Linkage:
         best, most = None, 0.0
         spans = np.hypot(self.lengths, self.offsets)
         for _ in range(LINKAGE_STARTS if 2 * spans.max() <= spans.sum() else 0):  # no link is longer than the others
-            found = self.closed(rng.uniform(-math.pi, math.pi, count))
+            start = rng.uniform(-math.pi, math.pi, count)
+            found = self.closed(start, start[1])  # the second angle held: the same closure on every machine
             if found is None:
                 continue
+            found = np.remainder(found + math.pi, 2 * math.pi) - math.pi
             *_, weakest, lost = np.linalg.svd(self.axes(found), compute_uv=False)
             away = min(weakest / (0.05 * self.lengths.max()), np.abs(np.sin(found)).min() / 0.1)
             if lost < RANK_CUTOFF and away > most:

@@ -132,8 +132,12 @@ class Assembler:
         if missing:
             return Assembly(None, tuple(missing), (), platform, tuple(misses))
         mechanism = self.anatomy.mechanism
-        base = mechanism.links[mechanism.base].pose
-        whole = PinocchioModel(zeroed_at(mechanism, {mechanism.base: base, **poses}), self.length)
+        poses[mechanism.base] = mechanism.links[mechanism.base].pose
+        while len(poses) < len(mechanism.links):  # what hangs on no leg, as fingers do, is carried along
+            carrier, link = next((one, other) for joint in mechanism.joints.values() for one, other in
+                                 (joint.links, joint.links[::-1]) if one in poses and other not in poses)
+            poses[link] = poses[carrier] @ mechanism.links[carrier].inverse @ mechanism.links[link].pose
+        whole = PinocchioModel(zeroed_at(mechanism, poses), self.length)
         return Assembly(ClosedConfiguration.of(whole, whole.q0), (), tuple(beyond), platform, (), held)
 
     def _leg(self, leg: Leg, X: Array, measured: Sequence[tuple[Observation, Array]], within: float) -> _Closing:

@@ -44,7 +44,7 @@ class Coordinates(Value):
     def of(cls, start: ClosedConfiguration, question: Measurement, motion: PlatformMotion) -> Coordinates:
         """Those of a configuration that tell its neighbours apart well, positions before turns; where it has other
         freedoms than the platform generically has, those of the generic motion."""
-        twists = relation(start, replace(question, observations=(), bodies=())).twists
+        twists = relation(start, question.of_platform).twists
         if twists.shape[1] != motion.dof:
             twists = motion.twists
         if motion.rotations.shape[1] == 1:

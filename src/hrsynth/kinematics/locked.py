@@ -52,12 +52,13 @@ class _Bodies:
         return V
 
     def rates(self, observations: Sequence[Observation], reference: str) -> Array:
-        """The rates of observations, stacked."""
-        found = [np.zeros((0, self.A.shape[1]))]
+        """The rates of observations, stacked, lengths in them in characteristic lengths."""
+        found, length = [np.zeros((0, self.A.shape[1]))], self.at.twin.length
+        metric = np.repeat([length, 1.0], 3)[:, None]
         for each in observations:
-            seen = each.seen_from or reference
-            poses, velocities = map(self.pose, (seen, each.link)), map(self.velocity, (seen, each.link))
-            found.append(each.rate(*poses, *velocities))
+            links = each.seen_from or reference, each.link
+            rate = each.rate(*map(self.at.pose, links), *(metric * self.velocity(link) for link in links))
+            found.append((rate.T / length ** np.asarray(each.dimension)).T)
         return np.vstack(found)
 
 

@@ -119,7 +119,7 @@ class PlatformMotion(Value):
     @classmethod
     def of(cls, configurations: Iterable[ClosedConfiguration], question: Measurement) -> PlatformMotion:
         """The motion that generic configurations show."""
-        asked = replace(question, observations=(), bodies=())
+        asked = question.of_platform
         point = np.zeros(3) if question.point is None else question.point
         columns = []
         for at in configurations:

@@ -23,7 +23,8 @@ from .tasks import Target
 @dataclass(frozen=True, eq=False, repr=False)
 class Measurement(Value):
     """What is asked of a mechanism: the twist t of ``platform`` and the rates of ``observations`` seen from
-    ``reference``; ``bodies`` are further links whose twists count too.
+    ``reference``; ``bodies`` are further links whose twists count too. In a formation t is the twists of the platform
+    and of ``others``, one below the other.
 
     Where ``point`` is given, t is the velocity of that point alone, in the platform's frame (a point body).
     """
@@ -33,11 +34,17 @@ class Measurement(Value):
     reference: str
     observations: tuple[Observation, ...]
     bodies: tuple[str, ...] = ()
+    others: tuple[str, ...] = ()
 
     @property
     def twist_rows(self) -> int:
-        """Rows of t: 3 for a point body, else 6."""
-        return 6 if self.point is None else 3
+        """Rows of t: 3 for a point body, else 6 for each link."""
+        return 6 * (1 + len(self.others)) if self.point is None else 3
+
+    @property
+    def of_platform(self) -> Measurement:
+        """The platform's own twist alone, nothing observed."""
+        return replace(self, observations=(), bodies=(), others=())
 
     def target(self, at: ClosedConfiguration) -> Target:
         """The platform pose and the measured values of a configuration."""
@@ -49,11 +56,12 @@ class Measurement(Value):
         """The map from joint rates to (t, measured rates, twists of ``bodies``), shape (rows, nv); links in ``blind``
         are not in the mechanism, their rates are zero."""
         seen = tuple(o for o in self.observations if o.link not in blind)
-        X, V, _, rates = measure(at.twin, at.q, self.reference, seen, (self.platform, *self.bodies))
-        found = iter(rates)
-        parts = [V[0] if self.point is None else point_velocity(V[0], X[0][:3, :3] @ self.point / at.twin.length)]
+        X, V, _, rates = measure(at.twin, at.q, self.reference, seen, (self.platform, *self.others, *self.bodies))
+        found, own = iter(rates), 1 + len(self.others)
+        parts = ([*V[:own]] if self.point is None else
+                 [point_velocity(V[0], X[0][:3, :3] @ self.point / at.twin.length)])
         parts += [np.zeros((o.size, at.twin.nv)) if o.link in blind else next(found) for o in self.observations]
-        return np.vstack([*parts, *V[1:]])
+        return np.vstack([*parts, *V[own:]])
 
     @property
     def sizes(self) -> tuple[int, ...]:

@@ -198,6 +198,9 @@ class Mechanism(Result, shown_as="robot"):
     """What reading the file had to settle."""
     cameras: tuple[NamedCamera, ...] = ()
     """The cameras that have a name: what observations of their own reference see from."""
+    formation: bool = False
+    """Whether no platform is named: all bodies of :attr:`bodies` are what is controlled, up to the motions that no
+    observation could tell; ``platform`` is then only the first of them."""
 
     def headline(self) -> str:
         """The name, and how much there is of it."""
@@ -243,6 +246,17 @@ class Mechanism(Result, shown_as="robot"):
     def reference(self) -> str:
         """The reference link: observed directions are relative to it."""
         return self.base if self.camera is None else self.camera
+
+    @property
+    def bodies(self) -> tuple[str, ...]:
+        """What is controlled: the platform; of a formation all links that are observed, carry what observes, or end a
+        chain, the base left out, in the order of the links but for the platform, which is first."""
+        if not self.formation:
+            return (self.platform,)
+        told = {self.base: False} | {link: len(self._joints_of[link]) == 1 for link in self.links if link != self.base}
+        for seen in self.observations:
+            told |= dict.fromkeys({seen.link, seen.seen_from or self.reference} - {self.base}, True)
+        return (self.platform, *(link for link in self.links if told[link] and link != self.platform))
 
     @cached_property
     def graph(self) -> nx.MultiGraph[str]:
@@ -336,7 +350,7 @@ class Mechanism(Result, shown_as="robot"):
             if not gap <= tolerance:
                 found.append(f"{what}: differs by {gap:.3g}")
 
-        for role in ("base", "platform", "reference", "couplings"):
+        for role in ("base", "platform", "formation", "reference", "couplings"):
             compare(role, getattr(self, role), getattr(other, role))
         compare("links", set(self.links), set(other.links))
         compare("joints", set(self.joints), set(other.joints))

@@ -12,6 +12,14 @@ from ..geometry.vectors import Array
 from ..results import Value
 
 
+@dataclass(frozen=True, eq=False)
+class Drawn:
+    """Polylines (n, 3) and polygons (n, 3)."""
+
+    lines: tuple[Array, ...] = ()
+    areas: tuple[Array, ...] = ()
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Observation(Value):
     """A measurement of one link, seen from a reference link.
@@ -29,6 +37,8 @@ class Observation(Value):
     """The attributes of ``<observe>`` that it needs besides ``link``; one with ``?`` at its end can be left out."""
     size: ClassVar[int]
     """Rows of the measured value."""
+    rank: ClassVar[int]
+    """Independent numbers that are measured."""
     dimension: ClassVar[int | Array] = 0
     """Power of length in the measured value, one for all rows or one for each: 0 for pure numbers and angles, 1 for
     lengths; who compares values of different observations divides by that power of a characteristic length."""
@@ -37,6 +47,10 @@ class Observation(Value):
 
     angular: ClassVar[bool] = False
     """Whether its errors are angles: unit vectors and turns."""
+    fed_back: ClassVar[str] = "y − y*"
+    """The error that a servo loop drives to zero, for the table of all kinds."""
+    found_by: ClassVar[frozenset[str]] = frozenset()
+    """Units of the noise that its simulated sensor has: ``px``, ``m``, ``rad``."""
 
     leg: str
     link: str
@@ -65,6 +79,33 @@ class Observation(Value):
     def apart(self, value: Array, wanted: Array) -> Array:
         """By how much a measured value is off a wanted one."""
         return value - wanted
+
+    def error(self, value: Array, wanted: Array) -> Array:
+        """What a servo loop drives to zero (rows,), of a value (size,): by default y − y*."""
+        return self.apart(value, wanted)
+
+    def error_slope(self, value: Array, wanted: Array) -> Array:
+        """∂error/∂value, (rows, size). Errors change their sign where value and wanted value change places, so
+        ∂error/∂wanted is −error_slope(wanted, value)."""
+        return np.eye(self.size)
+
+    def in_front(self, X_reference: Array, X_link: Array) -> float:
+        """How far what is seen is inside the half-space in front of the camera (and its picture, where its size is
+        known): the sine of an angle, negative behind it; infinite where nothing can be lost from sight."""
+        return np.inf
+
+    def drawn(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
+        """How it is drawn in space, in the base frame; ``size`` (m) of what has none of its own."""
+        return Drawn()
+
+    def image(self, X_reference: Array, X_link: Array, size: float) -> list[Array]:
+        """What a camera shows of it: polylines (n, 2) in the plane z = 1 of its frame, a point alone (1, 2)."""
+        return []
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        """The value (size,) that a simulated sensor gives: ``noise`` by its unit (m, rad, px), ``shocks`` (2, 3) in the
+        unit ball."""
+        return value
 
     @classmethod
     def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,

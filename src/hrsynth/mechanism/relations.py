@@ -10,8 +10,9 @@ direction, or normal to one.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from itertools import combinations
 from typing import Literal
 
@@ -98,6 +99,10 @@ def recognise(mechanism: Mechanism, poses: Mapping[str, Array], observations: Se
     for name, numbers in axes.items():
         for number, link in zip(numbers, mechanism.joints[name].links, strict=False):
             fixed[number].append(link)
+    for link, normal in drawn.planes():
+        if not any(np.max(np.abs(cross(normal, each))) < SAME_DIRECTION for each in classes):
+            classes = np.concatenate([classes, normal[None]])
+            fixed.append([link])
     sights: list[DirectionSource] = []
     for observation in observations:
         u = drawn.turned(observation)
@@ -209,11 +214,30 @@ class _Drawing:
     def _at(self, link: str, point: Array) -> Array:
         return np.asarray(self.turns[link] @ point + self.shifts[link])
 
+    @cached_property
+    def sliding(self) -> list[set[str]]:
+        """The sets of links that only slide along each other."""
+        return list(graphs.components(graphs.adjacency(self.mechanism.links, (
+            joint.links for joint in self.mechanism.joints.values() if joint.type is JointType.PRISMATIC))))
+
+    def planes(self) -> Iterator[tuple[str, Array]]:
+        """A link, and the normal (configurations, 3), of each plane in which links slide along each other: it is a
+        direction of its own, to which what joins their points is normal."""
+        for body in self.sliding:
+            slides = [self.directions[self.axes[joint.name][0]] for joint in self.mechanism.joints.values()
+                      if joint.type is JointType.PRISMATIC and joint.predecessor in body]
+            for u in slides[1:]:
+                normal = cross(slides[0], u)
+                size = np.linalg.norm(normal, axis=1, keepdims=True)
+                if np.min(size) > SAME_PLANE:
+                    normal = normal / size
+                    if all(np.max(np.abs(dot(normal, each))) < SAME_DIRECTION for each in slides):
+                        yield next(link for link in self.mechanism.links if link in body), normal
+                    break
+
     def together(self) -> NDArray[np.bool_]:
         """Which centres lie on one link, or on links that only slide along each other (n, n)."""
-        slides = graphs.adjacency(self.mechanism.links, (j.links for j in self.mechanism.joints.values()
-                                                         if j.type is JointType.PRISMATIC))
-        bodies = list(graphs.components(slides))
+        bodies = self.sliding
         on = np.array([[not body.isdisjoint(links) for body in bodies] for links in self.hosts], dtype=bool)
         return np.asarray(on @ on.T) if len(on) else np.zeros((0, 0), dtype=bool)
 

@@ -14,12 +14,14 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import BadMechanism, NotMeasured
-from ..geometry.vectors import Array, Numbers, frozen, hat, inverse, perpendicular, transform, unit
+from ..geometry.vectors import Array, Numbers, dot, frozen, hat, inverse, perpendicular, transform, unit
 from ..results import Value
-from ..tolerances import SAME_POINT
-from .observation import Observation
+from ..tolerances import NEAREST_SEEN, SAME_POINT
+from .observation import Drawn, Observation
 
 AT_CENTRE = frozen(np.eye(4))
+RING = 48
+"""Sides of a polygon by which a circle is drawn."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -80,6 +82,36 @@ class Sighting:
         return np.asarray(self.B - ((self.B - self.C) @ self.d) * self.d)
 
 
+@dataclass(frozen=True, eq=False)
+class HeldPlace:
+    """What a held value leaves of a point of the link at ``place`` (3,), or with ``turns`` of a direction of it.
+
+    A point stays in the planes ``through`` (3,) with these ``normals`` (k, 3) and, where ``radius`` is given, on the
+    sphere about ``through``; a direction keeps its angles with the normals. All in the frame of the :class:`Sighting`.
+    """
+
+    place: Array
+    normals: Array
+    through: Array
+    radius: float | None = None
+    turns: bool = False
+
+
+def kept_in(place: Array, through: Array, *across: Array) -> HeldPlace:
+    """A point in planes with these normals, of any length: three hold it, two leave it a line."""
+    return HeldPlace(place, np.array([unit(n) for n in across]), through)
+
+
+def turned_across(d: Array, *across: Array) -> HeldPlace:
+    """A direction that keeps its angles with these vectors, of any length."""
+    return HeldPlace(d, np.array([unit(n) for n in across]), np.zeros(3), turns=True)
+
+
+def in_plane(at: Sighting, n: Array) -> tuple[HeldPlace, ...]:
+    """The line (B, d) in the plane with this normal."""
+    return kept_in(at.B, at.B, n), turned_across(at.d, n)
+
+
 def gimbal(at: Array, turned: Array, far: Array | None, actuated: bool = False) -> VirtualJoint:
     """A U at a point that turns a direction any way: its first axis e₁ far from it, its second normal to both."""
     first = perpendicular(turned) if far is None else far
@@ -94,18 +126,50 @@ def across(at: Sighting, normal: Array, out: Array, actuated: int) -> tuple[Virt
     return tuple(replace(joint, actuated=number < actuated) for number, joint in enumerate(joints))
 
 
+def stretch(p: Array, d: Array, size: float) -> Array:
+    """The piece (2, 3) of a line about p."""
+    return np.array([p - size * d, p + size * d])
+
+
+def ring(p: Array, d: Array, r: float) -> Array:
+    """A circle as a polyline (n, 3)."""
+    one = perpendicular(d)
+    turns = np.linspace(0, 2 * np.pi, RING + 1)
+    return np.asarray(p + abs(r) * (np.outer(np.cos(turns), one) + np.outer(np.sin(turns), np.cross(d, one))))
+
+
+def before_camera(points: Array) -> Array:
+    """The piece of a polyline (n, 3) that is in front of the camera; of a segment that part, else whole or nothing."""
+    ahead = points[:, 2] > NEAREST_SEEN
+    if len(points) == 2 and ahead.sum() == 1:
+        a, b = points[ahead][0], points[~ahead][0]
+        return np.array([a, a + (a[2] - NEAREST_SEEN) / (a[2] - b[2]) * (b - a)])
+    return points if ahead.all() else points[:0]
+
+
+def depth_plane(z: Numbers) -> Array:
+    """g of the planes (…, 3) parallel to the picture at depths z (…, 1)."""
+    return np.asarray(np.eye(3)[2] / z)
+
+
+def line_plane(p: Array, d: Array) -> Array:
+    """g of the plane through a line (p, d) that is normal to that of C and the line: f/‖f‖², f the foot of C."""
+    foot = p - dot(p, d)[..., None] * d
+    return np.asarray(foot / dot(foot, foot)[..., None])
+
+
+def on_plane(n: Array, g: Array) -> Array:
+    """The point nearest to C of the line in which the plane of normal n through C meets that of g."""
+    inside = g - dot(g, n)[..., None] * n
+    return np.asarray(inside / dot(inside, inside)[..., None])
+
+
 def apart(at: Sighting, from_: Array, least: float, what: str, limit: str) -> float:
     """The distance of C from a point; raises ``BadMechanism`` where it is not larger than ``least``."""
     distance = float(np.linalg.norm(from_ - at.C))
     if not distance > least + SAME_POINT * (1 + least):
         raise BadMechanism(f"{what}: distance from the camera's centre (m)", distance, limit)
     return distance
-
-
-
-def _aside(direction: Array) -> Array:
-    """A unit vector normal to a direction."""
-    return unit(np.cross(direction, np.eye(3)[np.argmin(np.abs(direction))]))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -120,10 +184,12 @@ class CameraObservation(Observation):
     """The wrenches that it transmits when it is held, for the table of all kinds."""
     rational: ClassVar[bool] = True
     """Whether its wrenches are polynomials of C, B, d and z."""
+    whole: ClassVar[bool] = True
+    """Whether its rates vanish for just those motions against which its wrenches do no work, wherever it has one."""
     along_z: ClassVar[bool] = False
     """Whether the camera's z axis matters."""
-    rank: ClassVar[int]
-    """Independent numbers that are measured."""
+    spot: ClassVar[bool] = True
+    """Whether B itself is in the image, and not any point of a line."""
 
     at: Array = field(default_factory=lambda: frozen(np.zeros(3)), kw_only=True)
     axis: Array | None = field(default=None, kw_only=True)
@@ -159,6 +225,17 @@ class CameraObservation(Observation):
         """∂value/∂p and ∂value/∂d, (…, size, 3) each, None where it is zero."""
         raise NotImplementedError
 
+    @staticmethod
+    def plane(p: Array, d: Array, r: Array) -> Array | None:
+        """g (…, 3) of a plane g · x = 1 in the camera's frame in which what is seen lies: all that an image does not
+        tell of its depth. None where the value tells it."""
+        return None
+
+    @staticmethod
+    def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
+        """The p and d of the same value that a controller takes for true which supposes the plane g."""
+        return p, d
+
     def wrenches(self, at: Sighting) -> list[Numbers]:
         """The wrenches transmitted when the value is held, on the link's twist relative to the reference link."""
         raise NotImplementedError
@@ -168,10 +245,69 @@ class CameraObservation(Observation):
         (a point in the camera's centre)."""
         raise NotImplementedError
 
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        """What the link's points and directions can do while the value keeps but for the sense of lines, planes and
+        axes; none where that is none of these."""
+        return ()
+
     def pointing(self, values: Array) -> Array | None:
         """Of values (n, size), what the chain's first U turns (n, 3), in the camera's frame; None where that is not
         among them."""
         return values[:, :3]
+
+    @staticmethod
+    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
+        """How it is drawn in the camera's frame, of the point p (3,), the axis d (3,) and the radius r: by default the
+        ray."""
+        return Drawn((np.array([0 * p, p]),))
+
+    @staticmethod
+    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+        """What a picture shows, as polylines (n, 3) in the camera's frame: by default the point."""
+        return (p[None],)
+
+    def drawn(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
+        X = X_reference @ self.view
+        found = self.outline(*self._placed(X, X_link), size)
+        lines, areas = ([each @ X[:3, :3].T + X[:3, 3] for each in every] for every in (found.lines, found.areas))
+        return Drawn(tuple(lines), tuple(areas))
+
+    def image(self, X_reference: Array, X_link: Array, size: float) -> list[Array]:
+        every = self.shown(*self._placed(X_reference @ self.view, X_link), size)
+        return [each[:, :2] / each[:, 2:] for each in map(before_camera, every) if len(each)]
+
+    def _placed(self, X_camera: Array, X_link: Array) -> tuple[Array, Array, float]:
+        """p and d in the camera's frame, and r."""
+        X = inverse(X_camera) @ X_link
+        axis = np.zeros(3) if self.axis is None else X[:3, :3] @ self.axis
+        return transform(X, self.at), axis, self.radius or 0.0
+
+    def ahead(self, X_reference: Array, X_link: Array) -> float:
+        """The sine of the angle by which the ray to B is in front of the focal plane; where the size of the picture is
+        known, the least of the sines by which it is inside of its four sides."""
+        p = transform(inverse(X_reference @ self.view), transform(X_link, self.at))
+        camera, sides = self.camera, [np.array([0.0, 0.0, 1.0])]
+        if camera is not None and camera.focal and camera.width and camera.height:
+            halves = np.array([camera.width, camera.height]) / (2 * camera.focal)
+            sides = [unit([*(sign * np.eye(2)[i]), half]) for i, half in enumerate(halves) for sign in (-1, 1)]
+        return float(np.min(np.array(sides) @ p) / max(float(np.linalg.norm(p)), SAME_POINT))
+
+    def plane_at(self, X_reference: Array, X_link: Array) -> Array | None:
+        """:meth:`plane` where camera and link are, (3,)."""
+        X = inverse(X_reference @ self.view) @ X_link
+        d = X[:3, :3] @ self.axis if self.axis is not None else np.zeros(3)
+        return self.plane(transform(X, self.at), d, np.array([self.radius or 0.0]))
+
+    def pixels(self, noise: Mapping[str, float]) -> float:
+        """Noise of so many pixels in the picture's plane z = 1."""
+        focal = None if self.camera is None else self.camera.focal
+        assert focal is not None
+        return noise["px"] / focal
+
+    def supposed_rate(self, plane: Array, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array
+                      ) -> Array:
+        """The rate (size, n) of the value if what is seen lay in the ``plane`` (3,), and moved as the link does."""
+        return self._together((self,), X_reference, X_link[None], V_reference, V_link[None], plane[None])[1]
 
     def sighting(self, X_reference: Array, X_link: Array, far: Array | None = None) -> Sighting:
         """Where camera and link are, in the base frame."""
@@ -190,11 +326,20 @@ class CameraObservation(Observation):
     @classmethod
     def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
                  V_links: Array) -> tuple[Array, Array]:
+        return cls._together(observations, X_reference, X_links, V_reference, V_links)
+
+    @classmethod
+    def _together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
+                  V_links: Array, planes: Array | None = None) -> tuple[Array, Array]:
+        """The same, where ``planes`` (k, 3) are given of what is supposed to lie in them."""
         at, axes, radii, views = _stacked(tuple(observations))
         X = X_reference @ views
         seen = X[:, :3, :3].transpose(0, 2, 1)
         B = (X_links[:, :3, :3] @ at)[:, :, 0] + X_links[:, :3, 3]
         p, d = ((seen @ each[:, :, None])[:, :, 0] for each in (B - X[:, :3, 3], (X_links[:, :3, :3] @ axes)[:, :, 0]))
+        if planes is not None:
+            p, d = cls.supposed(p, d, radii, planes)
+            B = (X[:, :3, :3] @ p[:, :, None])[:, :, 0] + X[:, :3, 3]
         values, (by_p, by_d) = cls.measured(p, d, radii), cls.partials(p, d, radii)
         turn = V_links[:, 3:] - V_reference[3:]
         rates = np.zeros((len(at), cls.size, V_links.shape[2]))

@@ -17,7 +17,8 @@ from analysis.singularity.test_conditions import CASES, HEAVY
 from hrsynth.analysis.singularity.agreement import Agreement, agreement
 from hrsynth.analysis.singularity.singular import Singularity, singular
 from hrsynth.constraints.condition import Condition, condition
-from hrsynth.constraints.pattern import ConstraintPattern, LockedLeg
+from hrsynth.constraints.locked_legs import LockedLeg
+from hrsynth.constraints.pattern import ConstraintPattern
 from hrsynth.description import load, shipped
 from hrsynth.errors import BadRequest, Disagreement
 from hrsynth.mechanism import Mechanism

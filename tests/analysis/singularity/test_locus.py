@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -19,7 +20,8 @@ from hrsynth.geometry.vectors import unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.platform_motion import PlatformMotion
 from hrsynth.mechanism.pose import Pose
-from hrsynth.present.maps import locus_map
+from hrsynth.present.maps import _boundary, locus_map
+from hrsynth.present.plots import MapPlane
 
 STEPS = 15
 
@@ -93,6 +95,21 @@ def test_the_picture_shows_the_loci() -> None:
     assert min(pixels.shape[:2]) > 300
     for colour in ((0.86, 0.08, 0.24), (0.25, 0.41, 0.88)):
         assert np.sum(np.all(np.abs(pixels - colour) < 0.06, axis=2)) > 100
+
+
+def test_the_edge_of_the_map_is_no_limit_of_reach() -> None:
+    """Of a part of the plane that is all reached nothing is marked."""
+    from matplotlib.figure import Figure
+
+    locus = planar()
+    some = slice(6, 9)
+    part = replace(locus, real=None, grid=replace(locus.grid, axes=tuple((n, v[some]) for n, v in locus.grid.axes)),
+                   hidden=replace(locus.hidden, value=locus.hidden.value[some, some],
+                                  type2=locus.hidden.type2[some, some], type1=locus.hidden.type1[some, some]))
+    assert part.reached == 9
+    for each, marked in ((part, False), (locus, True)):
+        plane = MapPlane.of(each.grid.axes, found("3rrr_m1").setting.motion, 0.4, 1.6)
+        assert bool(_boundary(Figure().subplots(), plane, each)) == marked
 
 
 @pytest.mark.slow

@@ -31,6 +31,8 @@ class Model(Value):
     system: System
     bodies: Callable[[Array], dict[str, Array]]
     home: Array
+    back: bool = False
+    """Whether the system's pose is that of the base, as the platform sees it."""
 
 
 def model(confined: TipLoci) -> Model:
@@ -67,7 +69,9 @@ def _rigid(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -
     else:
         system = Planar(curves, tips[:, :2], X_goal)
     home = np.array([*p, 0.0, 0.0, 0.0]) if n is None else np.zeros(3)
-    return Model(system, partial(_carried, system, {body: back @ X for body, X in at.items()}), home)
+    carry = partial(_carried_back, system, X_goal, at) if confined.back else partial(
+        _carried, system, {body: back @ X for body, X in at.items()})
+    return Model(system, carry, home, confined.back)
 
 
 def _articulated(confined: TipLoci, at: dict[str, Array], curves: tuple[Reach, ...]) -> Model:
@@ -89,6 +93,12 @@ def _shifted(at: dict[str, Array], p: Array, q: Array) -> dict[str, Array]:
 def _carried(system: Spatial | Planar, at: dict[str, Array], q: Array) -> dict[str, Array]:
     """Bodies in the frame that the system's coordinates place."""
     return {body: system.pose(q) @ X for body, X in at.items()}
+
+
+def _carried_back(system: Spatial | Planar, X_goal: Array, at: dict[str, Array], q: Array) -> dict[str, Array]:
+    """Bodies from which the base is seen displaced as the system's frame is from where it is at the goal."""
+    D = X_goal @ inverse(system.pose(q))
+    return {body: D @ X for body, X in at.items()}
 
 
 def _on_circle(X_one: Array, X_other: Array, one: str, other: str, slide: Circle | Line, q: Array) -> dict[str, Array]:

@@ -14,28 +14,29 @@ from ...batch.reach import reach
 from ...budgets import EFFORT
 from ...constraints.pattern import attached
 from ...errors import BadRequest, MissingExtra, NotConfined, TooLarge, Unsolved
-from ...geometry.ranks import range_basis
 from ...geometry.vectors import Array, pose_difference
 from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly
 from ...kinematics.closures import Miss
-from ...kinematics.configuration import ClosedConfiguration, measure
+from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement
-from ...kinematics.tasks import Task, system
+from ...kinematics.tasks import Task
 from ...mechanism.pose import Pose, PoseLike, as_pose
 from ...progress import tell
 from ...results import Result
-from ...tolerances import CHAIN_ROUNDING, MOVED, SAME_RELATION
+from ...tolerances import SAME_RELATION
 from ..measured import MeasuredRobot
-from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike
+from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from ..singularity.agreement import weakest
 from .branches import Model, solve_all
+from .drift import drift
 from .motions import SelfMotion, self_motion
 from .posed import PosedPlatform, most_posed, solve_posed
 from .search import FoundMode, leaves_free, search
+from .sighted import all_loci, behind, opposite, sights
 from .solve import SystemMode, SystemModes, continuum
-from .tips import TipLoci, tip_loci
+from .tips import TipLoci
 
 WITHIN = {"translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
           "planar": "poses in the plane of motion", "spatial": "poses in space", "oriented": "poses in space"}
@@ -81,6 +82,10 @@ class AssemblyMode:
     """The robot's characteristic length (m)."""
     bodies: dict[str, Array] | None = None
     """Poses (4, 4) of the bodies on which legs end."""
+    opposite: tuple[str, ...] = ()
+    """What is seen there as the opposite value: then it is *antipodal* and no mode."""
+    behind: tuple[str, ...] | None = None
+    """What is not in front of the camera by which it is seen; None where no camera with a name sees a point."""
 
     def __repr__(self) -> str:
         said = "the pose itself" if self.goal else f"assembled: {self.assembly}"
@@ -102,7 +107,8 @@ class AssemblyMode:
                 "reasons": [{"leg": leg, **miss.to_dict()} for leg, miss in self.misses],
                 "type2_distance": self.type2_distance,
                 "multiplicity": self.multiplicity, "proved": self.proved, "rounded": self.rounded,
-                "fits": self.fits}
+                "fits": self.fits, "opposite": list(self.opposite),
+                "behind": None if self.behind is None else list(self.behind)}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -125,6 +131,8 @@ class AssemblyModes(Result, shown_as="modes"):
     confined: TipLoci | None = None
     model: Model | None = None
     motions: tuple[SelfMotion, ...] = ()
+    antipodal: tuple[AssemblyMode, ...] = ()
+    """Solutions of the same equations at which something is seen as the opposite value."""
 
     @property
     def within(self) -> str | None:
@@ -151,7 +159,9 @@ class AssemblyModes(Result, shown_as="modes"):
         if self.motions:
             return (f"{len(self.motions)} self-motion{'s' * (len(self.motions) > 1)}, and {len(self.modes)} real that "
                     f"{'lies' if len(self.modes) == 1 else 'lie'} on none")
-        return f"{len(self.modes)} real" + ("" if self.found.complex is None else f" of {self.found.complex} complex")
+        other = f" and {len(self.antipodal)} antipodal" if self.antipodal else ""
+        return f"{len(self.modes)} real{other}" + (
+            "" if self.found.complex is None else f" of {self.found.complex} complex")
 
     def pose_of(self, motion: SelfMotion) -> Pose:
         """A pose on a self-motion, from which it was followed."""
@@ -165,21 +175,22 @@ class AssemblyModes(Result, shown_as="modes"):
                 "complex": None if found.continuum else found.complex, "complete": found.complete,
                 "bound": found.bound, "proof": found.proof,
                 "modes": [each.to_dict() for each in self.modes], "near": [each.to_dict() for each in self.near],
+                "antipodal": [each.to_dict() for each in self.antipodal],
                 "degenerate": found.degenerate, "continuum": found.continuum,
                 "motions": [{"pose": self.pose_of(each).to_dict(), **each.to_dict()} for each in self.motions],
                 "meant": [each.to_dict(self.labels) for each in found.meant]}
 
 
 @question()
-def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
+def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
           at: PoseLike | ClosedConfiguration | None = None, real: bool = False, as_written: bool = False,
           effort: float = EFFORT, seed: int = 0) -> AssemblyModes:
-    """All poses with the directions that are observed at ``at`` (default: the zero configuration), or with ``real`` the
-    motors' coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).
+    """All poses with what is observed at ``at`` (default: the zero configuration), or with ``real`` the motors'
+    coordinates: complex solutions counted, real ones enclosed (theory.md 8; MMT 3.3, 4.1.2, 4.2).
 
     A Π counts as a parallelogram throughout, never crossed; where legs or measurements keep the platform from turning,
-    poses that are turned all the same (another operation mode) are not looked for. ``observe`` and ``camera`` as for
-    ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide, and
+    poses that are turned all the same (another operation mode) are not looked for. ``observe``, ``camera`` and ``see``
+    as for ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide and
     solutions nearly at infinity, are taken to be so where that is clearly meant, unless ``as_written`` is true.
     ``effort``: seconds of one core that a list may need, told by its size before it starts.
 
@@ -194,9 +205,10 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     >>> hrsynth.modes("3rrr_m1", at="x=0,y=0,phi=0")
     <AssemblyModes: 3rrr_m1, watching 1, 2, 3: 2 real of 6 complex (hidden robot) at x=0,y=0,z=0,phi=0>
     """
-    if real and observe not in (None, "all", ["all"]):
-        raise BadRequest("the motors are held instead of directions", f"real with observe {observe}", "one of the two")
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("modes")
+    if real and (observe not in (None, "all", ["all"]) or see is not None):
+        raise BadRequest("the motors are held instead of what is observed", f"real with {observe or see}",
+                         "one of the two")
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     asked = None if at is None or isinstance(at, ClosedConfiguration) else as_pose(at)
     setting = setting if asked is None else setting.telling([asked])
     motion, wanted = setting.motion, None
@@ -209,7 +221,7 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     kind = "real" if real else "hidden"
     free = setting.dof - measured.rank
     if free:
-        text = f"the {'motors' if real else 'directions'} leave {free} of the platform's freedoms undetermined"
+        text = f"the {'motors' if real else 'measurements'} leave {free} of the platform's freedoms undetermined"
         own = self_motion(goal, measured.question, attached(setting.anatomy), goal=True)
         return AssemblyModes(setting, kind, goal, pose, continuum(f"{text}: a continuum of dimension {free}", free),
                              (), (), motions=() if own is None else (own,))
@@ -255,7 +267,7 @@ def _closed(setting: ObservedRobot, question: Measurement, mode: FoundMode, goal
     found = Assembly(at, (), beyond)
     return AssemblyMode(motion.pose(at.pose(motion.link)), np.inf, np.pi, mode.residual, goal, found.reachable,
                         weakest(at, question), found.verdict, (), beyond, (), at, length=at.twin.length,
-                        bodies=mode.bodies)
+                        bodies=mode.bodies, behind=behind(question.observations, at.pose))
 
 
 def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfiguration, wanted: Task | None,
@@ -280,17 +292,19 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     reader = _ModeReader(setting, measured.question, goal, made)
     at_goal = min(found.modes, key=reader.away, default=None)
     ordered = sorted(found.modes, key=lambda mode: mode is not at_goal)
-    return AssemblyModes(setting, kind, goal, pose, found,
-                         tuple(reader.read(mode, mode is at_goal) for mode in ordered),
-                         tuple(reader.read(mode, False) for mode in found.near), confined, made)
+    read = [reader.read(mode, mode is at_goal) for mode in ordered]
+    near = [reader.read(mode, False) for mode in found.near]
+    return AssemblyModes(setting, kind, goal, pose, found, tuple(mode for mode in read if not mode.opposite),
+                         tuple(mode for mode in near if not mode.opposite), confined, made,
+                         antipodal=tuple(mode for mode in read if mode.opposite))
 
 
 def _of_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, as_written: bool,
              effort: float) -> tuple[TipLoci, Model, SystemModes]:
-    confined = tip_loci(measured.setting.anatomy, measured.question, measured.pattern, goal)
+    confined, seen = all_loci(measured, goal)
     # a curve that was fitted to a leg's moves is not known to hold its exact tip
     fitted = confined.doubt is not None or any(tip.doubt is not None for tip in confined.tips)
-    confined = replace(confined, error=np.inf if fitted else exact
+    confined = replace(confined, error=np.inf if fitted else max([exact, *(each.error(exact, goal) for each in seen)])
                        + max([*(tip.moved for tip in confined.tips), *(angle.moved for angle in confined.angles)]),
                        as_written=as_written)
     return confined, *solve_all(confined, effort=effort)
@@ -315,8 +329,7 @@ def counted(measured: MeasuredRobot, at: ClosedConfiguration) -> SystemModes:
     found = None
     if measured.pattern.motion != "oriented":
         with suppress(NotConfined, Unsolved, TooLarge, MissingExtra):
-            confined = tip_loci(measured.setting.anatomy, measured.question, measured.pattern, at)
-            found = solve_all(confined, near=False)[1]
+            found = solve_all(all_loci(measured, at)[0], near=False)[1]
     if found is not None and found.complete:
         return found
     try:
@@ -333,8 +346,9 @@ class _ModeReader:
     def __init__(self, setting: ObservedRobot, question: Measurement, goal: ClosedConfiguration, made: Model) -> None:
         self.question, self.motion, self.made, self.goal = question, setting.motion, made, goal
         self.assembler = Assembler(setting.anatomy, goal.twin.length, question.reference)
-        values = measure(goal.twin, goal.q, question.reference, question.observations)[2]
-        self.measured = tuple(zip(question.observations, values, strict=True))
+        rest, self.seen = sights(setting.anatomy, question, goal)
+        self.measured = tuple((each, each.value(goal.pose(each.seen_from or question.reference), goal.pose(each.link)))
+                              for each in rest.observations)
 
     def away(self, mode: SystemMode) -> float:
         """How far a mode is from the goal (characteristic lengths, differences of rotation matrices)."""
@@ -348,8 +362,13 @@ class _ModeReader:
         near = mode.near
         held = () if near else self.measured
         scale = self.made.system.size / size
+        base = self.goal.twin.mechanism.base
+        pose = {base: self.goal.pose(base), **bodies}.__getitem__
+        antipodal = opposite(self.seen, self.goal, self.question.reference, pose)
         found = Assembly(self.goal)
-        if not at_goal or near or outside(self.goal.twin, self.goal.q):
+        if antipodal:  # no mode: whether the robot can be assembled is not asked
+            found = Assembly(None, platform=self.assembler.platform(bodies))
+        elif not at_goal or near or outside(self.goal.twin, self.goal.q):
             found = self.assembler.at(bodies, held, 0.0 if near else self.known(mode))
         X = self.goal.pose(self.motion.link) if found.platform is None else found.platform[self.motion.link]
         shift, turn = self.radius(mode, bodies, X)
@@ -358,7 +377,8 @@ class _ModeReader:
             None if found.configuration is None else weakest(found.configuration, self.question),
             found.verdict, found.open, found.beyond, found.misses, found.configuration, mode.multiplicity,
             mode.proved, mode.rounded, mode.residual * scale if mode.fits else None,
-            () if self.motion.link in bodies else tuple(bodies), size, bodies)
+            () if self.motion.link in bodies else tuple(bodies), size, bodies,
+            antipodal, behind([each.seen for each in self.seen], pose))
 
     def known(self, mode: SystemMode) -> float:
         """How far the bodies' exact poses can be from the system's (characteristic lengths, radians); 0 where nothing
@@ -376,44 +396,7 @@ class _ModeReader:
         if told is None:
             return shift, turn
         lever = float(np.linalg.norm(told[:3, 3] - first[:3, 3]))
+        if self.made.back:  # the base's turn, as the platform sees it, is about a point of the platform
+            lever += float(np.linalg.norm(told[:3, 3] - self.goal.pose(self.motion.link)[:3, 3]))
         return (shift + turn * lever + float(np.linalg.norm(X[:3, 3] - told[:3, 3])),
                 turn + float(np.linalg.norm(X[:3, :3] - told[:3, :3])))
-
-
-LEVER = 2.0
-"""Least lever (characteristic lengths) of a turn: directions are compared with the size of the tips' curves."""
-
-
-def drift(goal: ClosedConfiguration, pose: Task | None = None, moved: float = 0.0) -> float:
-    """How far a point of a link can be from where it is at the exact goal (m), within the robot's extent; infinite
-    where that is not proved. ``moved``: how far axes and centres are from those of the file (m), all together.
-
-    Newton and Kantorovich: with σ the smallest singular value of the rows J that count and L a Lipschitz constant of J,
-    L ‖F‖ ≤ σ²/2 gives an exact goal within 2 ‖J⁺ F‖. Rows that depend on the others are taken as consistent.
-    """
-    twin = goal.twin
-    F, J = system(twin, goal.q, pose)
-    links = tuple(twin.mechanism.links)
-    mechanism, V = twin.mechanism, twin.frames(goal.q, links)[1]
-    points = [*(mechanism.links[link].pose[:3, 3] for link in links), *(j.point for j in mechanism.joints.values())]
-    extent = 1.0 + float(np.ptp(np.array(points), axis=0).max()) / twin.length
-    miss = float(np.linalg.norm(F)) + CHAIN_ROUNDING * extent + MOVED * moved / twin.length
-    if not len(J):
-        return twin.length * miss
-    rank = range_basis(J, 1.0)[1].value
-    left, values, right = np.linalg.svd(J, full_matrices=False)
-    sigma, bends = float(values[rank - 1]) if rank else np.inf, twin.nv * extent
-    if bends * miss > sigma ** 2 / 2:
-        return float("inf")
-    inverse: Array = right[:rank].T / values[:rank] @ left[:, :rank].T
-    return MOVED * moved + 2.0 * twin.length * miss * max(
-        float(np.linalg.norm(moved[:3], 2) + _lever(goal, link) * np.linalg.norm(moved[3:], 2))
-        for link, moved in zip(links, V @ inverse, strict=True))
-
-
-def _lever(goal: ClosedConfiguration, link: str) -> float:
-    """How far a link's joint centres are from its origin (characteristic lengths)."""
-    mechanism = goal.twin.mechanism
-    origin = mechanism.links[link].pose[:3, 3]
-    return max([LEVER, *(float(np.linalg.norm(joint.point - origin)) / goal.twin.length
-                         for joint in mechanism.joints.values() if link in joint.links)])

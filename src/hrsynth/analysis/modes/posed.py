@@ -26,6 +26,7 @@ from .leg_conditions import Branches, Middle, leg_conditions
 from .pose_bound import bound
 from .pose_boxes import PoseBox, enclosed, excluded_by
 from .pose_forms import Poses, SquareForms, proposals
+from .sighted import Sight, conditions, sights
 from .solve import SystemMode, SystemModes
 from .systems import System
 
@@ -38,6 +39,9 @@ class PosedPlatform(System):
     conditions: tuple[PoseCondition, ...]
     middle: Middle
     poses: Poses
+    back: bool = False
+    """Whether the pose is that of the base, as the platform sees it."""
+    seen: tuple[Sight, ...] = ()
 
     freedoms = 6
 
@@ -80,19 +84,24 @@ def posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[PosedPlatf
         raise NotConfined(name, "its platform is not one rigid body whose pose the legs decide")
     middle = Middle(goal.pose(bodies[0])[:3, 3], goal.twin.length)
     motion, normal = measured.moving
-    found = [leg_conditions(anatomy, leg, measured.question, goal, middle, normal, motion == "translations")
+    rest, seen = sights(anatomy, measured.question, goal)
+    found = [leg_conditions(anatomy, leg, rest, goal, middle, normal, motion == "translations")
              for leg in anatomy.legs]
+    moved = MOVED * sum(each for _, each in found)
+    held = any(branch for branches, _ in found for branch in branches)
+    ways = [(turned, conditions(seen, middle, turned)) for turned in ((False,) if held else (False, True))]
+    turned, own = min(ways, key=lambda way: sum(c.degree for c in way[1]))
+    found.append(([own], 0.0))
     legs: list[Branches] = [branches for branches, _ in found]
     if prod(map(len, legs)) > BRANCH_CHOICES:
         raise NotConfined(name, f"its legs have {prod(map(len, legs))} choices of branches")
     if any(abs(float(c.value(c.b, c.c, np.asarray))) > SAME_RELATION * (1.0 + float(np.abs(getattr(c, "f", 0.0)).max()))
            for branches in legs for c in branches[0]):
         raise NotConfined(name, "the conditions of its legs are not met at the pose itself")
-    moved = MOVED * sum(each for _, each in found)
     poses = (Poses.translating() if motion == "translations" else
              Poses.spatial() if normal is None else Poses.planar(normal))
     return [PosedPlatform((), np.zeros((0, 3)), tuple(c for branch in chosen for c in branch), middle, poses,
-                          error=moved) for chosen in product(*legs)]
+                          turned, seen, error=moved) for chosen in product(*legs)]
 
 
 def most_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
@@ -103,7 +112,8 @@ def most_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
 def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float = 0.0) -> tuple[Model, SystemModes]:
     """All modes, with the goal known to ``error`` (m). Raises ``NotConfined``, and ``Unsolved`` where not all poses are
     enclosed that there may be."""
-    systems = [replace(each, error=each.error + error) for each in posed(measured, goal)]
+    systems = [replace(each, error=each.error + max([error, *(sight.error(error, goal) for sight in each.seen)]))
+               for each in posed(measured, goal)]
     if len(systems) > 1:
         raise NotConfined(measured.setting.robot.name, f"its legs have {len(systems)} choices of branches")
     if not np.isfinite(error):
@@ -111,7 +121,8 @@ def solve_posed(measured: MeasuredRobot, goal: ClosedConfiguration, error: float
     (body,) = attached(measured.setting.anatomy)
     first = systems[0]
     X, back = goal.pose(body), inverse(pose(first.middle.origin))
-    made = Model(first, lambda q: {body: first.pose(q) @ back @ X}, first.home)
+    made = Model(first, lambda q: {body: (inverse if first.back else np.asarray)(first.pose(q) @ back) @ X},
+                 first.home, first.back)
     found = _judged(first, _forms(measured, first))
     if not found.complete:
         raise Unsolved("the conditions on the pose", found.proof)

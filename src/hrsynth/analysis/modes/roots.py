@@ -88,6 +88,8 @@ class Roots:
     """How many solutions at infinity are enclosed, apart from each other."""
     values: tuple[Sequence[Any], ...] = ()
     """Balls of the unknowns of all."""
+    distant: tuple[Sequence[Any], ...] = ()
+    """The same of the ``far`` ones."""
     turn: float = 0.0
     """Where circles are counted from (rad), besides each unknown's own origin."""
 
@@ -276,9 +278,12 @@ class Enclosing(ABC):
             real = tuple(self._enclosed([v.real for v in values], m) for values, m in resolved if is_real(values))
             real += tuple(self._middle(values) for values, _ in resolved if _almost_real(values))
         count, values = sum(m for _, m in resolved), tuple(values for values, _ in resolved)
+        near = set(map(id, values))
+        distant = tuple(values for values, _ in solutions if id(values) not in near)
         proved = all(root.real and (root.unique or root.multiplicity > 1) for root in real)
         return Roots(count, real, degree - far, complete=count == degree - far and proved and not undecided,
-                     closest=_closest(values), method=self.method, far=far, undecided=undecided, values=values)
+                     closest=_closest(values), method=self.method, far=far, undecided=undecided, values=values,
+                     distant=distant)
 
     def _enclosed(self, start: Sequence[Any], multiplicity: int) -> Root:
         """The box of a real solution: for the exact input where that can be proved, else for the rounded one."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...budgets import SEARCH_ITERATIONS, SEARCH_MOTIONS, SEARCH_QUIET, SEARCH_STARTS
+from ...errors import NotMeasured
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
@@ -78,7 +79,10 @@ def search(goal: ClosedConfiguration, question: Measurement, bodies: Sequence[st
         tell("starts")
         far = np.pi if number % 2 else rng.uniform(0.0, np.pi)
         start = twin.moved(twin.q0, rng.uniform(-far, far, twin.nv))
-        q, residual = solve(twin, start, held, tolerance=SOLVED, iterations=SEARCH_ITERATIONS)
+        try:
+            q, residual = solve(twin, start, held, tolerance=SOLVED, iterations=SEARCH_ITERATIONS)
+        except NotMeasured:  # on the way a point came to a camera's centre
+            continue
         if residual > CLOSED:
             continue
         closed, quiet = closed + 1, quiet + 1

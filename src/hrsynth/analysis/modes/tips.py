@@ -15,8 +15,9 @@ from itertools import combinations
 
 import numpy as np
 
+from ...constraints.locked_legs import LockedLeg
 from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector, Tangent, poses_at
-from ...constraints.pattern import ConstraintPattern, LockedLeg
+from ...constraints.pattern import ConstraintPattern
 from ...errors import NotConfined
 from ...geometry.ranks import kernel_basis
 from ...geometry.vectors import Array, transform
@@ -96,6 +97,8 @@ class TipLoci(Value):
     doubt: str | None = None
     as_written: bool = False
     """Whether the numbers count as they are, and no special geometry is meant."""
+    back: bool = False
+    """Whether it is the base that is seen from the platform: tips are points of the base as if that moved."""
 
 
 def tip_loci(anatomy: LegDecomposition, question: Measurement, pattern: ConstraintPattern,

@@ -116,9 +116,7 @@ def enclosed(part: PoseSystem, proposed: Proposed, most: Bound | None = None, ba
             part.chart, thick, [root.parameters for root in found.real],
             [values for values in found.values if not is_real(values)])
     if found.far and apart:
-        near = {id(values) for values in found.values}
-        apart = part.chart.study is None and _far_apart(part, [each for each, _ in proposed.solutions
-                                                              if id(each) not in near])
+        apart = part.chart.study is None and _far_apart(part, found.distant)
     with ctx.workprec(PRECISION):
         wanted = most.most - found.complex if most is not None and most.law == "degree" and apart else 0
         away = 0

@@ -16,16 +16,17 @@ from ...batch.placing import Placer
 from ...budgets import WEAKEST_STARTS
 from ...constraints.condition import Condition, Named
 from ...constraints.pattern import ConstraintPattern, PatternValues
-from ...errors import Disagreement
+from ...errors import Disagreement, NotMeasured
 from ...geometry.ranks import kernel_basis, range_basis
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.relation import Measurement, platform_motions, relation
 from ...kinematics.sampling import WEAKEST, random_walk
 from ...kinematics.tasks import solve
+from ...mechanism.sights import CameraObservation
 from ...progress import tell
 from ...results import Value
-from ...tolerances import CLOSED, FOLLOWED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT, SHARP
+from ...tolerances import CLOSED, FOLLOWED, INVERTED, NUDGE, RANK_CUTOFF, RANK_GAP, SAME_RELATION, SAME_SPOT, SHARP
 from .batch_spectrum import SPOTS, Quick
 
 CHUNK = 250
@@ -78,7 +79,10 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
     parts: list[tuple[float, ClosedConfiguration]] = []
     quick = Quick.of(placer, question)
     walks = random_walk(start, count, seed) if quick is None else quick.placer.random_walk(count, seed)
-    for number, chunk in enumerate(_chunks(walks)):
+    for number, drawn in enumerate(_chunks(walks)):
+        chunk = _measurable(drawn, question)
+        if not chunk:
+            continue
         here = pattern.values_at(chunk)
         if quick is None:
             ranks, apart = _weakest(here, question, condition)
@@ -86,16 +90,19 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
             ranks, _ = quick.spectrum(chunk, spectrum, seed + number)
             apart = _weakest(pattern.values_at(chunk[:: CHUNK // SPOTS]), question, condition)[1]
         matrices = condition.rows(here)
-        rows, values = smallest_of(matrices), condition.expressed(here)
+        spectra, values = np.linalg.svd(matrices, compute_uv=False), condition.expressed(here)
+        rows, others = spectra[:, -1].astype(float), spectra[:, :-1].prod(axis=1)
         angle = max(angle, apart)
         smallest = min(smallest, float(ranks.min()))
-        wrong += int(np.sum(_differ(ranks, rows, np.abs(values))))
+        # the expression is of the size of all singular values' product
+        scaled: Array = np.abs(values) / np.clip(others, INVERTED, 1.0)
+        wrong += int(np.sum(_differ(ranks, rows, scaled)))
         positive, negative = positive + int(np.sum(values > 0)), negative + int(np.sum(values < 0))
         met += len(chunk)
         if condition.signed:
             walk += chunk
             signs += list(np.sign(values))
-            sizes += zip(np.abs(values), _volumes(matrices), strict=True)
+            sizes += zip(np.abs(values), spectra.prod(axis=1), strict=True)
         low = sorted([*low, *zip(ranks.tolist(), chunk, strict=True)], key=_size)[:TRIES]
         parts.append(min(zip(ranks.tolist(), chunk, strict=True), key=_size))
         tell("random poses")
@@ -111,8 +118,8 @@ def agreement(start: ClosedConfiguration, question: Measurement, pattern: Constr
                     _descents(others, question, pattern, condition)]):
         for at in starts:
             searches += 1
-            if (at is None or at.kernel()[1].weakest < loops or relation(at, question).dof.value < freedoms
-                    or _known(at, on_locus, question)):
+            if (at is None or not _has_values(at, question) or at.kernel()[1].weakest < loops
+                    or relation(at, question).dof.value < freedoms or _known(at, on_locus, question)):
                 continue
             sigma = float(_weakest(pattern.values_at([at]), question, condition)[0][0])
             if sigma > RANK_CUTOFF:
@@ -139,9 +146,24 @@ def spectrum(configurations: Sequence[ClosedConfiguration], question: Measuremen
     return smallest, np.array([part[2] for part in parts])
 
 
-def _volumes(matrices: Array) -> Array:
-    """The products of all singular values of many matrices, (n,)."""
-    return np.asarray(np.linalg.svd(matrices, compute_uv=False).prod(axis=1))
+def _measurable(chunk: list[ClosedConfiguration], question: Measurement) -> list[ClosedConfiguration]:
+    """Those at which everything has a value: no camera is within a cylinder."""
+    if not any(isinstance(o, CameraObservation) and o.radius is not None for o in question.observations):
+        return chunk
+    return [at for at in chunk if _has_values(at, question)]
+
+
+def _has_values(at: ClosedConfiguration, question: Measurement) -> bool:
+    try:
+        question.rows(at)
+    except NotMeasured:
+        return False
+    return True
+
+
+def smallest_of(rows: Array) -> Array:
+    """The smallest singular value of each of many matrices, (n,)."""
+    return np.asarray(np.linalg.svd(rows, compute_uv=False)[:, -1], dtype=float)
 
 
 def _out_of_proportion(sizes: Array) -> int:
@@ -152,11 +174,6 @@ def _out_of_proportion(sizes: Array) -> int:
     values, volumes = sizes.T
     factor = float(values.sum() / volumes.sum()) if volumes.sum() > 0 else 0.0
     return int(np.sum(np.abs(values - factor * volumes) > SAME_RELATION * values.max()))
-
-
-def smallest_of(rows: Array) -> Array:
-    """The smallest singular value of each of many matrices, (n,)."""
-    return np.asarray(np.linalg.svd(rows, compute_uv=False)[:, -1], dtype=float)
 
 
 def _chunks(configurations: Iterator[ClosedConfiguration]) -> Iterator[list[ClosedConfiguration]]:
@@ -301,7 +318,10 @@ def descend(start: ClosedConfiguration, question: Measurement, pattern: Constrai
                       reached: Callable[[Array], ClosedConfiguration] = reached) -> Array:
             at = reached(z[:count])
             x = z[count:]
-            rows = condition.rows(pattern.values_at([at]))[0]
+            try:
+                rows = condition.rows(pattern.values_at([at]))[0]
+            except NotMeasured:
+                return np.ones(shape[0] + 1)
             if at.residual > CLOSED or rows.shape[1] != len(x):
                 return np.ones(shape[0] + 1)
             return np.append(rows @ x, x @ x - 1.0)

@@ -24,7 +24,7 @@ from ...progress import tell
 from ...results import Value
 from ...tolerances import ON_PLANE, SAME_RELATION, SAME_SPOT
 from ..measured import MeasuredRobot
-from ..observed import CameraLike, ObservedRobot
+from ..observed import CameraLike, ObservedRobot, SeeLike
 from .agreement import descend, spectrum, weakest
 from .batch_spectrum import Quick
 
@@ -76,13 +76,13 @@ def _table(values: Array) -> list[list[float | None]]:
 
 
 def locus(robot: Mechanism | ObservedRobot, observe: Sequence[str] | str | None = None, camera: CameraLike = None, *,
-          plane: Pose | str | None = None, steps: int = STEPS, seed: int = 0) -> Locus:
+          see: SeeLike = None, plane: Pose | str | None = None, steps: int = STEPS, seed: int = 0) -> Locus:
     """Where the hidden and the real robot (with its own motors) lose a freedom over a plane of poses.
 
     ``plane`` fixes parts of the pose so that two are left; a robot that is only partially controllable has no locus
     (``BadRequest``). Raises ``PlaneNotMet`` where no pose of the plane is reached.
     """
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("singular")
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     hidden = MeasuredRobot.watched(setting)
     if hidden.verdict.rank < setting.dof:
         raise BadRequest(f"{setting.robot.name} has no locus: a freedom is lost at every pose", None,

@@ -17,7 +17,7 @@ from ...results import Result, Value
 from ...tolerances import SOLVED
 from ..freedoms import Freedom, name_freedoms
 from ..measured import MeasuredRobot
-from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike
+from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from ..verdict import Verdict
 from .agreement import Agreement, agreement, weakest
@@ -46,7 +46,7 @@ class Example(Value):
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Singularity(Result, shown_as="singular"):
-    """Where a robot loses a freedom of its platform to what is measured: the watched directions, or its own motors."""
+    """Where a robot loses a freedom of its platform to what is measured: what is observed, or its own motors."""
 
     setting: ObservedRobot
     question: Measurement
@@ -71,18 +71,20 @@ class Singularity(Result, shown_as="singular"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         found = self.condition
-        measured = [o.link for o in self.question.observations]
+        seen = self.question.observations
+        kind = "motors" if self.real else "directions" if all(o.by_segment for o in seen) else "observations"
         checked = {"points": 0, "disagreements": 0} if self.checked is None else self.checked.to_dict()
         return {
-            "measured": {"kind": "motors" if self.real else "directions",
-                         "of": [getattr(o, "joint", link) for o, link in
-                                zip(self.question.observations, measured, strict=True)]},
+            "measured": {"kind": kind, "of": [o.leg if kind == "observations" else getattr(o, "joint", o.link)
+                                              for o in seen]},
             "dof": self.verdict.dof, "verdict": self.verdict.verdict,
             "lost": [freedom.to_dict() for freedom in self.verdict.lost],
             "always": self.always, "never": found is not None and found.never,
             "words": self.words, "expression": "0" if found is None else str(found.expression),
             "where": {} if found is None else dict(found.where),
             "factors": [] if found is None else list(found.factors),
+            "parts": [] if found is None else [{"expression": str(part), "meaning": meaning}
+                                               for part, meaning in found.parts],
             "characteristic_length": self.setting.mechanism.length,
             "checked": checked, "examples": [each.to_dict() for each in self.examples],
         }
@@ -90,7 +92,7 @@ class Singularity(Result, shown_as="singular"):
 
 @question()
 def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
-             real: bool = False, points: int = POINTS, seed: int = 0) -> Singularity:
+             see: SeeLike = None, real: bool = False, points: int = POINTS, seed: int = 0) -> Singularity:
     """The Type 2 condition of the hidden robot (``real``: of the real robot with its own motors), theory.md 7; MMT 3.3.
 
     Words, expression and rank are compared at ``points`` random reachable poses and at singular poses constructed from
@@ -99,7 +101,7 @@ def singular(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     >>> hrsynth.singular("rrrrr_m1", points=200)
     <Singularity: rrrrr_m1, watching 1, 2: the tangents τ1, τ2 are parallel>
     """
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("singular")
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     measured = MeasuredRobot.driven(setting) if real else MeasuredRobot.watched(setting)
     question, verdict = measured.question, measured.verdict
     tell("pattern of the legs' wrenches")

@@ -5,13 +5,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...geometry.screws import couple, force, normals
 from ...geometry.vectors import Array, Numbers, frozen
-from ..sights import CameraObservation, Sighting, VirtualJoint, apart, gimbal, normalised
+from ..images import tilted
+from ..observation import Drawn
+from ..sights import (
+    CameraObservation,
+    HeldPlace,
+    Sighting,
+    VirtualJoint,
+    apart,
+    gimbal,
+    kept_in,
+    normalised,
+    ring,
+    turned_across,
+)
 
 
 def circle_chain(at: Sighting, leg: str) -> tuple[VirtualJoint, ...]:
@@ -37,6 +51,8 @@ class SpaceCircle(CameraObservation):
     size = 6
     rank = 5
     dimension = frozen([1, 1, 1, 0, 0, 0])
+    fed_back = "y − y*: of the centre, of the normal"
+    found_by = frozenset({"m", "rad"})
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -47,11 +63,31 @@ class SpaceCircle(CameraObservation):
         one = np.broadcast_to(np.eye(3), (*p.shape, 3))
         return np.concatenate([one, 0 * one], axis=-2), np.concatenate([0 * one, one], axis=-2)
 
+    def in_front(self, X_reference: Array, X_link: Array) -> float:
+        return np.inf if self.camera is None else self.ahead(X_reference, X_link)
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        """The centre beside its place, the normal in a cone."""
+        return np.concatenate([value[:3] + noise.get("m", 0.0) * shocks[0],
+                               tilted(value[3:], shocks[1], noise.get("rad", 0.0))])
+
+    @staticmethod
+    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
+        """The ray to its centre, a circle about it and its normal."""
+        return Drawn((np.array([0 * p, p]), ring(p, d, size / 2), np.array([p, p + size / 2 * d])))
+
+    @staticmethod
+    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+        return (ring(p, d, size / 2),)
+
     def wrenches(self, at: Sighting) -> list[Numbers]:
         return circle_wrenches(at)
 
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
         return circle_chain(at, self.leg)
+
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        return (kept_in(at.B, at.B, *np.eye(3)), turned_across(at.d, *normals(at.d)))
 
     def pointing(self, values: Array) -> Array | None:
         return normalised(values[:, :3])[0]

@@ -5,13 +5,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...geometry.screws import force
 from ...geometry.vectors import Array, Numbers, perpendicular
-from ..sights import CameraObservation, Sighting, VirtualJoint
+from ..observation import Drawn
+from ..sights import CameraObservation, HeldPlace, Sighting, VirtualJoint, kept_in
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,6 +28,7 @@ class PointDepth(CameraObservation):
     rank = 1
     along_z = True
     dimension = 1
+    found_by = frozenset({"m"})
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -35,6 +38,22 @@ class PointDepth(CameraObservation):
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
         return np.broadcast_to(np.eye(3)[2:], (*p.shape[:-1], 1, 3)), None
 
+    def in_front(self, X_reference: Array, X_link: Array) -> float:
+        return np.inf if self.camera is None else self.ahead(X_reference, X_link)
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        return value + noise["m"] * shocks[0, :1]
+
+    @staticmethod
+    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
+        """Along the camera's z axis, then across to the point."""
+        foot = np.array([0, 0, p[2]])
+        return Drawn((np.array([0 * p, foot, p]),))
+
+    @staticmethod
+    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+        return ()
+
     def wrenches(self, at: Sighting) -> list[Numbers]:
         return [force(at.z, at.B)]
 
@@ -42,6 +61,9 @@ class PointDepth(CameraObservation):
         x = perpendicular(at.z)
         return (VirtualJoint("P", at.B, (at.z,), actuated=True), VirtualJoint("P", at.B, (x,)),
                 VirtualJoint("P", at.B, (np.cross(at.z, x),)), VirtualJoint("S", at.B))
+
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        return (kept_in(at.B, at.B, at.z),)
 
     def pointing(self, values: Array) -> Array | None:
         return None

@@ -14,9 +14,10 @@ import numpy as np
 
 from ...errors import BadMechanism
 from ...geometry.screws import couple, normals
-from ...geometry.vectors import Array, Numbers, frozen, hat, unit
+from ...geometry.vectors import Array, Numbers, cross, frozen, hat, unit
+from ..images import tilted
 from ..observation import Observation
-from ..sights import Sighting, VirtualJoint, gimbal, moved
+from ..sights import HeldPlace, Sighting, VirtualJoint, gimbal, moved, turned_across
 
 
 def axis_chain(at: Sighting) -> tuple[VirtualJoint, ...]:
@@ -41,6 +42,8 @@ class SeenAxis(Observation):
     rank = 2
     rational = True
     turns_only = True
+    fed_back = "u × u*"
+    found_by = frozenset({"rad"})
     direction: Array
 
     def __post_init__(self) -> None:
@@ -57,6 +60,18 @@ class SeenAxis(Observation):
         """u̇ = R_cᵀ ((ω_ℓ − ω_c) × R_ℓ d), shape (3, n)."""
         u = X_link[:3, :3] @ self.direction
         return (X_reference[:3, :3].T @ -hat(u)) @ (V_link[3:] - V_reference[3:])
+
+    def error(self, value: Array, wanted: Array) -> Array:
+        """u × u* (MMT eq. 9): it vanishes for the opposite direction too."""
+        return np.asarray(cross(value, wanted))
+
+    def error_slope(self, value: Array, wanted: Array) -> Array:
+        """−[u*]ₓ."""
+        return -hat(wanted)
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        """In a cone about u."""
+        return tilted(value, shocks[0], noise["rad"])
 
     @classmethod
     def together(cls, observations: Sequence[Observation], X_reference: Array, X_links: Array, V_reference: Array,
@@ -85,6 +100,9 @@ class SeenAxis(Observation):
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
         """PPP-U̲-R(d)."""
         return axis_chain(at)
+
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        return (turned_across(at.d, *normals(at.d)),)
 
     def pointing(self, values: Array) -> Array | None:
         """Of values (n, 3), what the chain's first U turns: all."""

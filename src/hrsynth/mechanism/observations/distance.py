@@ -5,13 +5,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
-from ...geometry.screws import force
-from ...geometry.vectors import Array, Numbers
-from ..sights import CameraObservation, Sighting, VirtualJoint, apart, gimbal, normalised
+from ...geometry.screws import force, normals
+from ...geometry.vectors import Array, Numbers, unit
+from ..observation import Drawn
+from ..sights import CameraObservation, HeldPlace, Sighting, VirtualJoint, apart, gimbal, normalised, ring
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -24,7 +26,9 @@ class PointDistance(CameraObservation):
     needs = ("at",)
     size = 1
     rank = 1
+    spot = False
     dimension = 1
+    found_by = frozenset({"m"})
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -34,12 +38,29 @@ class PointDistance(CameraObservation):
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
         return normalised(p)[0][..., None, :], None
 
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        return value + noise["m"] * shocks[0, :1]
+
+    @staticmethod
+    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
+        """The ray, and arcs of the sphere at its end."""
+        arcs = (ring(0 * p, unit(across), float(np.linalg.norm(p))) for across in normals(unit(p)))
+        near = (arc[arc @ unit(p) > np.cos(0.2) * np.linalg.norm(p)] for arc in arcs)
+        return Drawn((np.array([0 * p, p]), *(np.array(sorted(arc, key=tuple)) for arc in near if len(arc) > 1)))
+
+    @staticmethod
+    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+        return ()
+
     def wrenches(self, at: Sighting) -> list[Numbers]:
         return [force(at.B - at.C, at.B)]
 
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
         apart(at, at.B, 0.0, f"distance {self.leg!r}", "a point outside of it")
         return gimbal(at.C, at.ray, None), VirtualJoint("P", at.C, (at.ray,), actuated=True), VirtualJoint("S", at.B)
+
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        return (HeldPlace(at.B, np.zeros((0, 3)), at.C, float(np.linalg.norm(at.B - at.C))),)
 
     def pointing(self, values: Array) -> Array | None:
         return None

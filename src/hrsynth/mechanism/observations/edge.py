@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,21 @@ import numpy as np
 from ...errors import NotMeasured
 from ...geometry.screws import couple, force
 from ...geometry.vectors import Array, Numbers, cross, unit
-from ..sights import CameraObservation, Sighting, VirtualJoint, across, apart
+from ..images import line_apart, line_slope, shifted_line
+from ..observation import Drawn
+from ..sights import (
+    CameraObservation,
+    HeldPlace,
+    Sighting,
+    VirtualJoint,
+    across,
+    apart,
+    in_plane,
+    line_plane,
+    normalised,
+    on_plane,
+    stretch,
+)
 
 
 def tangent(p: Array, d: Array, r: Array) -> Array:
@@ -45,7 +60,10 @@ class CylinderEdge(CameraObservation):
     size = 3
     angular = True
     rank = 2
+    fed_back = "ρ − ρ*, θ − θ*"
+    found_by = frozenset({"px"})
     rational = False
+    spot = False
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -58,6 +76,38 @@ class CylinderEdge(CameraObservation):
     def _normal(self, at: Sighting) -> Array:
         return tangent(at.B - at.C, at.d, np.array([self.radius]))
 
+    @staticmethod
+    def plane(p: Array, d: Array, r: Array) -> Array | None:
+        """As of a line in the image, the one in which the plane touches the cylinder."""
+        return line_plane(p - r * tangent(p, d, r), d)
+
+    @staticmethod
+    def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
+        """The axis of the cylinder that is touched where the plane of the edge meets that of g."""
+        n = tangent(p, d, r)
+        foot = on_plane(n, g)
+        return foot + r * n, normalised(cross(foot, n))[0]
+
+    def error(self, value: Array, wanted: Array) -> Array:
+        return line_apart(value, wanted)
+
+    def error_slope(self, value: Array, wanted: Array) -> Array:
+        return line_slope(value)
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        """Through two image points beside the line."""
+        return shifted_line(value, shocks[0], self.pixels(noise))
+
+    @staticmethod
+    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
+        """Where the plane through C touches the cylinder, and that plane."""
+        piece = stretch(p - r * tangent(p, d, np.array([r])), d, size)
+        return Drawn((piece,), (np.vstack([0 * p, piece]),))
+
+    @staticmethod
+    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+        return CylinderEdge.outline(p, d, r, size).lines
+
     def wrenches(self, at: Sighting) -> list[Numbers]:
         n = self._normal(at)
         return [force(n, at.B), couple(cross(at.d, n))]
@@ -67,6 +117,9 @@ class CylinderEdge(CameraObservation):
         apart(at, at.foot, abs(radius), f"edge {self.leg!r}", f"more than the radius {abs(radius):g}")
         n = self._normal(at)
         return across(at, n, unit(at.foot - at.C - radius * n), 1)
+
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        return in_plane(at, self._normal(at))
 
 
 KIND = CylinderEdge

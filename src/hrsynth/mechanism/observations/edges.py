@@ -5,14 +5,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...geometry.vectors import Array, Numbers
-from ..sights import CameraObservation, Sighting, VirtualJoint, apart, normalised
-from .edge import tangent, tangent_partials
-from .line import SpaceLine, line_chain, line_wrenches
+from ..images import line_apart, line_slope, shifted_line
+from ..observation import Drawn
+from ..sights import CameraObservation, HeldPlace, Sighting, VirtualJoint, apart, normalised
+from .edge import CylinderEdge, tangent, tangent_partials
+from .line import SpaceLine, line_chain, line_loci, line_wrenches
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -26,6 +29,9 @@ class CylinderEdges(CameraObservation):
     needs = ("at", "axis", "radius")
     size = 6
     rank = 4
+    fed_back = "ρ − ρ*, θ − θ* of both"
+    found_by = frozenset({"px"})
+    spot = False
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -36,6 +42,31 @@ class CylinderEdges(CameraObservation):
         one, other = tangent_partials(p, d, r), tangent_partials(p, d, -r)
         return np.concatenate([one[0], other[0]], axis=-2), np.concatenate([one[1], other[1]], axis=-2)
 
+    def error(self, value: Array, wanted: Array) -> Array:
+        pairs = ((value[..., rows], wanted[..., rows]) for rows in (slice(3), slice(3, 6)))
+        return np.concatenate([line_apart(*pair) for pair in pairs], axis=-1)
+
+    def error_slope(self, value: Array, wanted: Array) -> Array:
+        slope = np.zeros((*value.shape[:-1], 4, 6))
+        slope[..., :2, :3], slope[..., 2:, 3:] = line_slope(value[..., :3]), line_slope(value[..., 3:])
+        return slope
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        """Each edge through two image points beside it."""
+        by = self.pixels(noise)
+        return np.concatenate([shifted_line(n, shock, by) for n, shock in zip((value[:3], value[3:]), shocks,
+                                                                             strict=True)])
+
+    @staticmethod
+    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
+        """Both tangent planes."""
+        both = [CylinderEdge.outline(p, d, sign * r, size) for sign in (1, -1)]
+        return Drawn(both[0].lines + both[1].lines, both[0].areas + both[1].areas)
+
+    @staticmethod
+    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+        return CylinderEdges.outline(p, d, r, size).lines
+
     def wrenches(self, at: Sighting) -> list[Numbers]:
         return line_wrenches(at)
 
@@ -43,6 +74,9 @@ class CylinderEdges(CameraObservation):
         radius = abs(self.radius or 0.0)
         apart(at, at.foot, radius, f"edges {self.leg!r}", f"more than the radius {radius:g}")
         return line_chain(at)
+
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        return line_loci(at)
 
     def pointing(self, values: Array) -> Array | None:
         return normalised(values[:, :3] + values[:, 3:])[0]

@@ -10,8 +10,8 @@ import numpy as np
 
 from ...geometry.screws import point_velocity
 from ...geometry.so3 import wrap_angle
-from ...geometry.vectors import Array, cross, transform
-from ..observation import Observation
+from ...geometry.vectors import Array, cross, transform, unit
+from ..observation import Drawn, Observation
 from ..sights import moved
 
 
@@ -28,6 +28,7 @@ class Encoder(Observation):
     needs = ("joint",)
     size = 1
     rank = 1
+    fed_back = "y − y*, of angles without whole turns"
     joint: str
     axis: Array
 
@@ -49,6 +50,7 @@ class AngleEncoder(Encoder):
 
     turns_only = True
     angular = True
+    found_by = frozenset({"rad"})
     mark: Array
     start: Array
 
@@ -67,6 +69,17 @@ class AngleEncoder(Encoder):
         """The difference without whole turns: at half a turn the angle is π as well as −π."""
         return np.array([wrap_angle(float(value[0] - wanted[0]))])
 
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        return value + noise["rad"] * shocks[0, :1]
+
+    def drawn(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
+        """An arc about the axis, at the link's frame, from where its mark was at zero to where it is."""
+        turn, R = float(self.value(X_reference, X_link)[0]), X_reference[:3, :3]
+        spoke = unit(self.start - (self.axis @ self.start) * self.axis)
+        turns = np.linspace(0, turn, 17)[:, None]
+        arc = np.cos(turns) * spoke + np.sin(turns) * cross(self.axis, spoke)
+        return Drawn((X_link[:3, 3] + size / 2 * np.vstack([np.zeros(3), arc, np.zeros(3)]) @ R.T,))
+
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
         """a* · (ω_ℓ − ω_c), shape (1, n); a* = (a − c m) / (1 − c²), c = a · m: dual to the axis a and the mark m."""
         axis, mark = X_reference[:3, :3] @ self.axis, X_link[:3, :3] @ self.mark
@@ -82,6 +95,7 @@ class SlideEncoder(Encoder):
     """
 
     dimension = 1
+    found_by = frozenset({"m"})
     point: Array
     start: Array
 
@@ -94,6 +108,13 @@ class SlideEncoder(Encoder):
         """The length, shape (1,), in metres."""
         arm = transform(X_link, self.point) - X_reference[:3, 3]
         return np.array([self.axis @ (X_reference[:3, :3].T @ arm - self.start)])
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        return value + noise["m"] * shocks[0, :1]
+
+    def drawn(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
+        """The way since zero."""
+        return Drawn((np.array([transform(X_reference, self.start), transform(X_link, self.point)]),))
 
     def rate(self, X_reference: Array, X_link: Array, V_reference: Array, V_link: Array) -> Array:
         """a · (velocity of the centre as one link carries it − as the other does), shape (1, n)."""

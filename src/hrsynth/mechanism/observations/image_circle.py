@@ -5,13 +5,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import BadMechanism
 from ...geometry.vectors import Array, Numbers, dot
-from ..sights import CameraObservation, Sighting, VirtualJoint
+from ..images import ellipse_image, ellipse_slope, shifted_ellipse
+from ..observation import Drawn
+from ..sights import RING, CameraObservation, Sighting, VirtualJoint, ring
 from .circle import circle_chain, circle_wrenches
 
 ROWS, COLUMNS = np.array([0, 1, 2, 1, 2, 2]), np.array([0, 1, 2, 0, 0, 1])
@@ -36,6 +39,13 @@ def _listed(Q: Array) -> Array:
     return np.asarray(Q[..., ROWS, COLUMNS] * WEIGHTS)
 
 
+def _matrix(entries: Array) -> Array:
+    """The symmetric matrices of such entries."""
+    Q = np.zeros((*entries.shape[:-1], 3, 3))
+    Q[..., ROWS, COLUMNS] = Q[..., COLUMNS, ROWS] = entries / WEIGHTS
+    return Q
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class ImageCircle(CameraObservation):
     """The cone of rays to the circle (centre B, normal d), a symmetric matrix of norm 1, p from C to B.
@@ -49,6 +59,9 @@ class ImageCircle(CameraObservation):
     needs = ("at", "axis", "radius")
     size = 6
     rank = 5
+    whole = False
+    fed_back = "centre and second moments of the ellipse"
+    found_by = frozenset({"px"})
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -72,6 +85,34 @@ class ImageCircle(CameraObservation):
             return np.asarray((J - q @ (np.swapaxes(q, -1, -2) @ J)) / norm)
 
         return rates(d, p, _both(d, d)), rates(p, d, _both(d, d))
+
+    def error(self, value: Array, wanted: Array) -> Array:
+        return ellipse_image(_matrix(value)) - ellipse_image(_matrix(wanted))
+
+    def error_slope(self, value: Array, wanted: Array) -> Array:
+        Q = _matrix(value)
+        return np.stack([ellipse_slope(Q, np.broadcast_to(_matrix(e), Q.shape)) for e in np.eye(6)], axis=-1)
+
+    def in_front(self, X_reference: Array, X_link: Array) -> float:
+        """That of its point with the smallest depth, over the distance of the centre."""
+        at = self.sighting(X_reference, X_link)
+        reach = abs(self.radius or 0.0) * np.sqrt(max(0.0, 1 - float(at.z @ at.d) ** 2))
+        return self.ahead(X_reference, X_link) - float(reach / np.linalg.norm(at.B - at.C))
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        """Through five image points beside the ellipse."""
+        entries = _listed(shifted_ellipse(_matrix(value), shocks, self.pixels(noise)))
+        return np.asarray(entries / np.linalg.norm(entries))
+
+    @staticmethod
+    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
+        """The circle, and eight rays to it."""
+        around = ring(p, d, r)
+        return Drawn((around, *(np.array([0 * p, each]) for each in around[:-1:RING // 8])))
+
+    @staticmethod
+    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+        return (ring(p, d, r),)
 
     def wrenches(self, at: Sighting) -> list[Numbers]:
         return circle_wrenches(at)

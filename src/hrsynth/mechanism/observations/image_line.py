@@ -5,13 +5,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...geometry.screws import couple, force
 from ...geometry.vectors import Array, Numbers, cross, hat, unit
-from ..sights import CameraObservation, Sighting, VirtualJoint, across, apart, normalised
+from ..images import line_apart, line_slope, shifted_line
+from ..observation import Drawn
+from ..sights import (
+    CameraObservation,
+    HeldPlace,
+    Sighting,
+    VirtualJoint,
+    across,
+    apart,
+    in_plane,
+    line_plane,
+    normalised,
+    on_plane,
+    stretch,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -25,6 +40,9 @@ class ImageLine(CameraObservation):
     size = 3
     angular = True
     rank = 2
+    fed_back = "ρ − ρ*, θ − θ*; x cos θ + y sin θ = ρ"
+    found_by = frozenset({"px"})
+    spot = False
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -35,6 +53,38 @@ class ImageLine(CameraObservation):
         turned = normalised(cross(p, d))[1]
         return -turned @ hat(d), turned @ hat(p)
 
+    @staticmethod
+    def plane(p: Array, d: Array, r: Array) -> Array | None:
+        """Through the line, normal to that of C and the line."""
+        return line_plane(p, d)
+
+    @staticmethod
+    def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
+        """Where the plane of C and the line meets that of g."""
+        n = normalised(cross(p, d))[0]
+        foot = on_plane(n, g)
+        return foot, normalised(cross(n, foot))[0]
+
+    def error(self, value: Array, wanted: Array) -> Array:
+        return line_apart(value, wanted)
+
+    def error_slope(self, value: Array, wanted: Array) -> Array:
+        return line_slope(value)
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        """Through two image points beside the line."""
+        return shifted_line(value, shocks[0], self.pixels(noise))
+
+    @staticmethod
+    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
+        """A piece of the line, and its plane with C."""
+        piece = stretch(p, d, size)
+        return Drawn((piece,), (np.vstack([0 * p, piece]),))
+
+    @staticmethod
+    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+        return (stretch(p, d, size),)
+
     def wrenches(self, at: Sighting) -> list[Numbers]:
         n = cross(at.B - at.C, at.d)
         return [force(n, at.B), couple(cross(at.d, n))]
@@ -43,6 +93,9 @@ class ImageLine(CameraObservation):
         apart(at, at.foot, 0.0, f"image_line {self.leg!r}", "a line that does not meet it")
         out = unit(at.foot - at.C)
         return across(at, np.cross(out, at.d), out, 1)
+
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        return in_plane(at, cross(at.B - at.C, at.d))
 
 
 KIND = ImageLine

@@ -7,6 +7,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from ...geometry.vectors import Array
+from ..observation import Drawn
 from .direction import SeenAxis
 
 
@@ -21,6 +25,11 @@ class Inclination(SeenAxis):
     @property
     def key(self) -> tuple[str, ...]:
         return (self.leg, str(self.seen_from), self.kind)
+
+    def drawn(self, X_reference: Array, X_link: Array, size: float) -> Drawn:
+        """The vertical, from the frame of the link with the IMU."""
+        start = X_reference[:3, 3]
+        return Drawn((np.array([start, start + size * X_link[:3, :3] @ self.direction]),))
 
 
 KIND = Inclination

@@ -5,6 +5,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,7 +13,20 @@ import numpy as np
 from ...geometry.screws import couple, force, normals
 from ...geometry.vectors import Array, Numbers, cross, frozen, hat, perpendicular, unit
 from ...tolerances import LINE_AT_CENTRE
-from ..sights import CameraObservation, Sighting, VirtualJoint, across, gimbal, normalised
+from ..images import tilted
+from ..observation import Drawn
+from ..sights import (
+    CameraObservation,
+    HeldPlace,
+    Sighting,
+    VirtualJoint,
+    across,
+    gimbal,
+    kept_in,
+    normalised,
+    stretch,
+    turned_across,
+)
 
 
 def line_chain(at: Sighting) -> tuple[VirtualJoint, ...]:
@@ -38,7 +52,10 @@ class SpaceLine(CameraObservation):
     needs = ("at", "axis")
     size = 6
     rank = 4
+    spot = False
     dimension = frozen([0, 0, 0, 1, 1, 1])
+    fed_back = "y − y*: of the direction, of the moment"
+    found_by = frozenset({"m", "rad"})
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -49,15 +66,38 @@ class SpaceLine(CameraObservation):
         one = np.broadcast_to(np.eye(3), (*d.shape, 3))
         return np.concatenate([0 * one, -hat(d)], axis=-2), np.concatenate([one, hat(p)], axis=-2)
 
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        """Its point nearest to C beside its place, its direction in a cone."""
+        d, h = value[:3], value[3:]
+        turned = tilted(d, shocks[1], noise.get("rad", 0.0))
+        return np.concatenate([turned, cross(cross(d, h) + noise.get("m", 0.0) * shocks[0], turned)])
+
+    @staticmethod
+    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
+        """A piece of the line, and the way to it from C."""
+        return Drawn((stretch(p, d, size), np.array([0 * p, p - (p @ d) * d])))
+
+    @staticmethod
+    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+        return (stretch(p, d, size),)
+
     def wrenches(self, at: Sighting) -> list[Numbers]:
         return line_wrenches(at)
 
     def chain(self, at: Sighting) -> tuple[VirtualJoint, ...]:
         return line_chain(at)
 
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        return line_loci(at)
+
     def pointing(self, values: Array) -> Array | None:
         sizes = np.linalg.norm(values[:, 3:], axis=1)
         return normalised(values[:, 3:])[0] if sizes.min() > LINE_AT_CENTRE else None
+
+
+def line_loci(at: Sighting) -> tuple[HeldPlace, ...]:
+    """A point on the line, and its direction."""
+    return kept_in(at.B, at.B, *normals(at.d)), turned_across(at.d, *normals(at.d))
 
 
 def line_wrenches(at: Sighting) -> list[Numbers]:

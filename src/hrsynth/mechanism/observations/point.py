@@ -5,11 +5,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from ...geometry.screws import force, normals
-from ...geometry.vectors import Array, Numbers
-from ..sights import CameraObservation, Sighting, VirtualJoint, apart, gimbal, normalised
+from ...geometry.vectors import Array, Numbers, dot
+from ..images import point_image, point_slope, shifted_point, tilted
+from ..sights import (
+    CameraObservation,
+    HeldPlace,
+    Sighting,
+    VirtualJoint,
+    apart,
+    depth_plane,
+    gimbal,
+    kept_in,
+    normalised,
+)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -23,6 +35,8 @@ class ImagePoint(CameraObservation):
     size = 3
     angular = True
     rank = 2
+    fed_back = "x − x*, y − y*; x = X/Z, y = Y/Z"
+    found_by = frozenset({"px", "rad"})
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -32,6 +46,31 @@ class ImagePoint(CameraObservation):
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
         return normalised(p)[1], None
 
+    @staticmethod
+    def plane(p: Array, d: Array, r: Array) -> Array | None:
+        """z = Z, parallel to the picture."""
+        return depth_plane(p[..., 2:])
+
+    @staticmethod
+    def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
+        """Where the ray meets the plane."""
+        return p / dot(g, p)[..., None], d
+
+    def error(self, value: Array, wanted: Array) -> Array:
+        return point_image(value) - point_image(wanted)
+
+    def error_slope(self, value: Array, wanted: Array) -> Array:
+        return point_slope(value)
+
+    def in_front(self, X_reference: Array, X_link: Array) -> float:
+        return self.ahead(X_reference, X_link)
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        """The image point beside its place, or the ray in a cone."""
+        if "px" in noise:
+            return shifted_point(value, shocks[0], self.pixels(noise))
+        return tilted(value, shocks[0], noise["rad"])
+
     def wrenches(self, at: Sighting) -> list[Numbers]:
         return [force(n, at.B) for n in normals(at.B - at.C)]
 
@@ -39,6 +78,9 @@ class ImagePoint(CameraObservation):
         apart(at, at.B, 0.0, f"point {self.leg!r}", "a point outside of it")
         return (gimbal(at.C, at.ray, at.far, actuated=True), VirtualJoint("P", at.C, (at.ray,)),
                 VirtualJoint("S", at.B))
+
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        return (kept_in(at.B, at.C, *normals(at.ray)),)
 
 
 KIND = ImagePoint

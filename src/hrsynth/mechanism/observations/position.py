@@ -5,13 +5,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...geometry.screws import force
 from ...geometry.vectors import Array, Numbers
-from ..sights import CameraObservation, Sighting, VirtualJoint, apart, gimbal, normalised
+from ..observation import Drawn
+from ..sights import CameraObservation, HeldPlace, Sighting, VirtualJoint, apart, gimbal, kept_in, normalised, stretch
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -25,6 +27,7 @@ class PointPosition(CameraObservation):
     size = 3
     rank = 3
     dimension = 1
+    found_by = frozenset({"m"})
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -34,6 +37,17 @@ class PointPosition(CameraObservation):
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
         return np.broadcast_to(np.eye(3), (*p.shape, 3)), None
 
+    def in_front(self, X_reference: Array, X_link: Array) -> float:
+        return np.inf if self.camera is None else self.ahead(X_reference, X_link)
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        return value + noise["m"] * shocks[0]
+
+    @staticmethod
+    def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
+        """The ray, and a cross of the camera's axes at its end."""
+        return Drawn((np.array([0 * p, p]), *(stretch(p, e, size / 4) for e in np.eye(3))))
+
     def wrenches(self, at: Sighting) -> list[Numbers]:
         return [force(e, at.B) for e in np.eye(3, dtype=int).astype(at.B.dtype)]
 
@@ -41,6 +55,9 @@ class PointPosition(CameraObservation):
         apart(at, at.B, 0.0, f"position {self.leg!r}", "a point outside of it")
         return (gimbal(at.C, at.ray, at.far, actuated=True), VirtualJoint("P", at.C, (at.ray,), actuated=True),
                 VirtualJoint("S", at.B))
+
+    def loci(self, at: Sighting) -> tuple[HeldPlace, ...]:
+        return (kept_in(at.B, at.B, *np.eye(3)),)
 
     def pointing(self, values: Array) -> Array | None:
         return normalised(values)[0]

@@ -1,0 +1,201 @@
+# %% [markdown]
+# # 12. Why three corners do not converge
+#
+# A camera that flies freely has six freedoms, and three image points give six numbers. So three corners should be
+# enough to servo by. They are not: this notebook shows the two reasons, and why a fourth corner cures both.
+
+# %%
+import tempfile
+from pathlib import Path
+
+import matplotlib.pyplot as plt
+import numpy as np
+
+import hrsynth
+
+plt.style.use("hrsynth.present.style")
+FREE = """<robot name="free_camera">
+  <link name="world"/><link name="camera"/>
+  <joint name="free" type="floating"><parent link="world"/><child link="camera"/>
+    <origin xyz="0 0 1" rpy="3.14159265358979 0 0"/></joint>
+</robot>"""
+file = Path(tempfile.mkdtemp()) / "free_camera.urdf"
+file.write_text(FREE)
+CORNERS = np.array([[0.3, 0, 0], [-0.15, 0.25, 0], [-0.15, -0.25, 0]])
+
+
+def seeing(corners):
+    """The free camera, and the corners that it sees."""
+    return hrsynth.observe(hrsynth.load(file), camera="eye=camera",
+                           see=[f"point:world@{x},{y},{z}" for x, y, z in corners])
+
+
+three = seeing(CORNERS)
+print(hrsynth.derive(three))
+
+# %% [markdown]
+# The hidden robot has three legs, from the camera to the corners, each with a driven U: where a corner is in the image
+# is where its leg points. In general three such legs hold the camera. But not everywhere.
+#
+# ## The danger cylinder
+#
+# The interaction matrix of a point has two rows (page *servo*); three points give a square matrix.
+# Its determinant vanishes where the camera's centre lies on the circular cylinder over the circle through the corners.
+
+
+# %%
+def image(C, R, corners):
+    """x, y and the depth Z of the corners: the camera's centre is C, R takes its axes to those of the world."""
+    local = (corners - C) @ R
+    return local[:, 0] / local[:, 2], local[:, 1] / local[:, 2], local[:, 2]
+
+
+def interaction(C, R, corners):
+    """The rows of all points, for the camera's velocity and angular velocity in its own axes."""
+    x, y, Z = image(C, R, corners)
+    o = 0 * x
+    rows = [[-1 / Z, o, x / Z, x * y, -(1 + x * x), y], [o, -1 / Z, y / Z, 1 + y * y, -x * y, -x]]
+    return np.transpose(rows, (2, 0, 1)).reshape(-1, 6)
+
+
+DOWN = np.diag([1.0, -1.0, -1.0])
+sides = [np.linalg.norm(CORNERS[i] - CORNERS[i - 1]) for i in range(3)]
+area = np.linalg.norm(np.cross(CORNERS[1] - CORNERS[0], CORNERS[2] - CORNERS[0])) / 2
+radius = np.prod(sides) / (4 * area)
+middle = np.array([0.3 - radius, 0, 0])  # by symmetry
+print("radius", radius.round(4), "m; from the middle to the corners",
+      np.linalg.norm(CORNERS - middle, axis=1).round(4))
+
+grid = np.linspace(-0.6, 0.6, 121)
+weakest = np.array([[np.linalg.svd(interaction(np.array([x, y, 0.9]), DOWN, CORNERS), compute_uv=False)[-1]
+                     for x in grid] for y in grid])
+figure, place = plt.subplots(figsize=(4.5, 4))
+drawn = place.pcolormesh(grid, grid, np.log10(weakest), cmap="viridis")
+figure.colorbar(drawn, label="log10 of the smallest singular value")
+turn = np.linspace(0, 2 * np.pi, 100)
+place.plot(middle[0] + radius * np.cos(turn), radius * np.sin(turn), "w--", linewidth=1)
+place.plot(*CORNERS[:, :2].T, "wo")
+place.set(xlabel="x (m)", ylabel="y (m)", aspect="equal", title="camera 0.9 m above the corners")
+plt.show()
+
+# %% [markdown]
+# The dark ring is the cylinder (dashed). Which way the camera looks does not matter: a turn multiplies the determinant
+# by a number that is not zero.
+#
+# ## Four poses, one image
+#
+# Off the cylinder, the image of three corners still does not say where the camera is. With the distances $d_i$ to the
+# corners, and $d_2 = u d_1$, $d_3 = v d_1$, the three sides of the triangle give two quadratic equations in u and v.
+# One of them is linear in u once the other is subtracted; what remains is Grunert's equation (1841), of degree four in
+# v. Each positive solution is a place from which the corners look the same.
+
+
+# %%
+def four_poses(rays, corners):
+    """All C and R at which the corners are seen along the given rays, in front of the camera."""
+    a, b, c = (np.linalg.norm(corners[i] - corners[j]) ** 2 for i, j in ((1, 2), (0, 2), (0, 1)))
+    cos_a, cos_b, cos_c = (rays[i] @ rays[j] for i, j in ((1, 2), (0, 2), (0, 1)))
+    P = np.polynomial.Polynomial
+    v = P([0, 1])
+    side = (1 - 2 * cos_b * v + v**2) / b  # 1 / d1²
+    # u² − 2 cos_c u + 1 = c side   and   u² − 2 cos_a u v + v² = a side: their difference is linear in u
+    above, below = (a - c) * side - v**2 + 1, 2 * (cos_c - cos_a * v)
+    found = []
+    for root in (above**2 - 2 * cos_c * above * below + (1 - c * side) * below**2).roots():
+        if abs(root.imag) > 1e-9 or root.real <= 0:
+            continue
+        ratio = root.real
+        first = 1 / np.sqrt(side(ratio))
+        distances = first * np.array([1, above(ratio) / below(ratio), ratio])
+        if np.all(distances > 0):
+            local = distances[:, None] * rays
+            U, _, Vt = np.linalg.svd((corners - corners.mean(0)).T @ (local - local.mean(0)))
+            R = U @ np.diag([1, 1, np.linalg.det(U @ Vt)]) @ Vt
+            found.append((corners.mean(0) - R @ local.mean(0), R))
+    return found
+
+
+GOAL = "x=0.1,y=0.05,z=0.9,rpy=180deg/0/0"
+there = np.array([0.1, 0.05, 0.9])
+x, y, _ = image(there, DOWN, CORNERS)
+rays = np.column_stack([x, y, np.ones(3)])
+rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+poses = four_poses(rays, CORNERS)
+for C, R in poses:
+    again = image(C, R, CORNERS)
+    print(C.round(4), "image differs by", max(np.abs(again[0] - x).max(), np.abs(again[1] - y).max()).round(12),
+          "depths", again[2].round(3))
+
+# %% [markdown]
+# ## Servoing by three corners
+#
+# The loop drives the image to that of the goal. It is blind to which of the poses it comes to. Whether a start lies in
+# the basin of the goal or of another pose, the image does not say:
+
+# %%
+rng = np.random.default_rng(4)
+starts = []
+while len(starts) < 8:
+    place, angles = rng.uniform([-0.6, -0.6, 0.6], [0.6, 0.6, 1.4]), rng.uniform([170, -10, -60], [190, 10, 60])
+    starts.append(f"x={place[0]:.3f},y={place[1]:.3f},z={place[2]:.3f},"
+                  f"rpy={angles[0]:.0f}deg/{angles[1]:.0f}deg/{angles[2]:.0f}deg")
+by_three = [hrsynth.servo(three, start=start, goal=GOAL) for start in starts]
+for found in by_three:
+    C = found.settled.pose("camera")[:3, 3]
+    nearest = min(np.linalg.norm(C - other) for other, _ in poses)
+    print(f"{found.ended:16}", C.round(3), "nearest of the poses above:", f"{1e3 * nearest:.3g} mm")
+
+# %% [markdown]
+# Runs that end in a *mode* came to another of the poses that Grunert's equation lists. The cylinder and the poses
+# belong together: on the cylinder, two of the poses become one.
+#
+# ## The fourth corner
+#
+# With a fourth corner in their plane the image tells the pose, and no cylinder is left: its rows fill the rank where
+# those of the other three lose it.
+
+# %%
+square = np.vstack([CORNERS, [[0.15, -0.3, 0]]])
+four = seeing(square)
+for start in starts[:4]:
+    print(hrsynth.servo(four, start=start, goal=GOAL).ended)
+on = middle + [0, radius, 0.9]
+print("on the cylinder: smallest singular value with three corners",
+      np.linalg.svd(interaction(on, DOWN, CORNERS), compute_uv=False)[-1].round(12), "with four",
+      np.linalg.svd(interaction(on, DOWN, square), compute_uv=False)[-1].round(4))
+
+# %% [markdown]
+# Four corners give eight numbers for six freedoms: the loop may also rest where the error is not zero but has no
+# component that a motion could lessen (a *local minimum*). That is rarer, and `servo` names it.
+#
+# ## Exercises
+#
+# 1. How many of the poses at the image of the goal lie inside the danger cylinder, and how many outside?
+# 2. Show on 100 random places on the cylinder, and random turns, that the matrix is singular, and on none off it.
+# 3. With three corners, does it help to know the depths at the goal only (`depth="desired"`)?
+
+# %% [markdown]
+# ## Solutions
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 1. by the distance from the axis
+print([("inside" if np.linalg.norm((C - middle)[:2]) < radius else "outside") for C, _ in poses])
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 2. the turn changes the rows of each point by a regular matrix
+least = {}
+for name, far in (("on", 1.0), ("off", 1.3)):
+    values = []
+    for _ in range(100):
+        angle, height = rng.uniform(0, 2 * np.pi), rng.uniform(0.5, 1.5)
+        C = middle + [far * radius * np.cos(angle), far * radius * np.sin(angle), height]
+        w = rng.uniform(-0.1, 0.1, 3)
+        tilt = np.linalg.qr(np.eye(3) + [[0, -w[2], w[1]], [w[2], 0, -w[0]], [-w[1], w[0], 0]])[0]
+        values.append(np.linalg.svd(interaction(C, DOWN @ (tilt * np.sign(np.diag(tilt))), CORNERS),
+                                    compute_uv=False)[-1])
+    least[name] = (min(values), max(values))
+print("on:", f"at most {least['on'][1]:.1e};", "off:", f"at least {least['off'][0]:.1e}")
+
+# %% jupyter={"source_hidden": true} tags=["solution"]
+# 3. it bends the ways; the other poses stay
+print([hrsynth.servo(three, start=start, goal=GOAL, depth="desired").ended for start in starts[:2]])

@@ -1,0 +1,233 @@
+"""What observations between bodies see of a formation: all but the motions that none of its kind could tell.
+
+A motion that changes no measured value is *trivial* where one similarity (v, ω, s) takes everything along that is
+sensed: v(x) = v + ω × x + s x for points, turns by ω, whatever the poses are. What is left are flexes
+(docs/pages/formations.md). What an observation senses of a link are the wrenches that it transmits when it is held,
+over all places of the other link: a rule for all kinds, in floating point and over the rationals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import combinations
+
+import numpy as np
+
+from ..geometry.ranks import kernel_basis, range_basis
+from ..geometry.screws import rotation, translation
+from ..geometry.vectors import Array, Numbers, hat, oriented, unit
+from ..kinematics.configuration import ClosedConfiguration
+from ..kinematics.relation import Measurement, Relation
+from ..mechanism import Observation
+from ..mechanism.legs import LegDecomposition
+from ..mechanism.observations.direction import SeenAxis
+from ..mechanism.sights import CameraObservation, Sighting
+from ..results import Value
+from ..tolerances import NAMED
+from .freedoms import direction_name, directions_in, point_text
+
+RIGID, FLEXIBLE = "rigid", "flexible"
+PLACES = 4
+"""Places of the other link at which an observation's wrenches are taken: no kind senses more than six of one link, and
+each place adds one at least."""
+AWAY = 10.0
+"""How far away these places are (characteristic lengths): outside of what is seen."""
+ALL_SETS = 8
+"""Number of bodies up to which flexes are sought in all sets of them; beyond, in sets of one, two, and in all."""
+
+
+def word(flexes: int) -> str:
+    """The verdict on a formation with so many flexes."""
+    return FLEXIBLE if flexes else RIGID
+
+
+@dataclass(frozen=True, eq=False)
+class Sensed:
+    """What one observation senses of one link: ``rows`` (k, 6), wrenches on the link's twist at the origin; a scaling
+    moves the link as its ``point`` (3,)."""
+
+    link: str
+    point: Numbers
+    rows: Numbers
+
+
+def sensed(seen: Observation, reference: str, at: Sighting, places: Sequence[tuple[Numbers, Numbers]]
+           ) -> Iterator[Sensed]:
+    """What an observation senses of its two links; nothing beyond their relative motion where it has no wrenches (an
+    encoder). ``places`` are points and directions where the other link might be."""
+    if not isinstance(seen, CameraObservation | SeenAxis):
+        return
+    for link, point, others in (
+            (seen.link, at.B, [replace(at, C=P, z=n) for P, n in places]),
+            (seen.seen_from or reference, at.C, [replace(at, B=P, d=n) for P, n in places])):
+        yield Sensed(link, point, np.array([w for each in (at, *others) for w in seen.wrenches(each)]))
+
+
+def similarities(point: Numbers) -> Numbers:
+    """The twists (6, 7) at the origin of a link at a point, of unit v, ω and s."""
+    zero = 0 * point
+    units = [np.array([zero[0] + int(i == j) for j in range(3)], dtype=point.dtype) for i in range(3)]
+    return np.array([*map(translation, units), *(rotation(each, zero) for each in units), translation(point)]).T
+
+
+def following(found: Iterable[Sensed], twists: Mapping[str, Numbers]) -> tuple[Numbers, Numbers]:
+    """Rows (n, k) and (n, 7) of what motions with these ``twists`` (6, k) at the origin, and similarities, do to what
+    is sensed; a link without twists rests."""
+    motions, common = [], []
+    columns = next(iter(twists.values())).shape[1]
+    for each in found:
+        own = twists.get(each.link)
+        motions.append(np.zeros((len(each.rows), columns), dtype=each.rows.dtype) if own is None else each.rows @ own)
+        common.append(each.rows @ similarities(each.point))
+    return np.vstack(motions), np.vstack(common)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Flex(Value):
+    """``count`` independent motions of some links while all others rest and no measured value changes."""
+
+    links: tuple[str, ...]
+    count: int
+    name: str
+
+    def to_dict(self) -> dict[str, object]:
+        """The record of the command line."""
+        return {"links": list(self.links), "count": self.count, "name": self.name}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Formation(Value):
+    """What observations do not see of a formation at a configuration: trivial motions by name, and flexes; ``special``
+    is the line or plane in which all points lie here that are sensed, and generically do not."""
+
+    bodies: tuple[str, ...]
+    trivial: tuple[str, ...]
+    flexes: tuple[Flex, ...]
+    special: str = ""
+
+    @property
+    def verdict(self) -> str:
+        """Rigid or flexible."""
+        return word(len(self.flexes))
+
+    @property
+    def count(self) -> int:
+        """How many independent flexes there are."""
+        return sum(each.count for each in self.flexes)
+
+    def to_dict(self) -> dict[str, object]:
+        """The record of the command line."""
+        return {"bodies": list(self.bodies), "trivial": list(self.trivial),
+                "flexes": [each.to_dict() for each in self.flexes], "special": self.special}
+
+
+def formation_at(at: ClosedConfiguration, question: Measurement, found: Relation, anatomy: LegDecomposition
+                 ) -> Formation:
+    """What ``found``, ρ at a configuration, leaves unseen."""
+    bodies, length = (question.platform, *question.others), at.twin.length
+    told, points = _seen(at, question)
+    centre = points.mean(axis=0) if len(points) else np.zeros(3)
+    random = np.random.default_rng(0)
+    places = [(AWAY * length * unit(random.normal(size=3)), unit(random.normal(size=3))) for _ in range(PLACES)]
+    parts = [_scaled(part, length) for each, place in told for part in sensed(
+        each, question.reference, replace(place, B=place.B - centre, C=place.C - centre), places)]
+    K = found.unobserved_twists
+    twists = {}
+    for body, twist in zip(bodies, K.reshape(len(bodies), 6, -1), strict=True):
+        arm = (at.pose(body)[:3, 3] - centre) / length
+        twists[body] = np.vstack([twist[:3] + hat(arm) @ twist[3:], twist[3:]])
+    if not parts or not K.shape[1]:
+        return Formation(bodies, (), _flexes(K, K[:, :0], bodies))
+    motions, common = following(parts, twists)
+    inert = kernel_basis(common, 1.0)[0]
+    both = kernel_basis(np.hstack([motions, -common]), 1.0)[0]
+    followed = both[K.shape[1]:]
+    followed = range_basis(followed - inert @ (inert.T @ followed), 1.0)[0]
+    idle = kernel_basis(motions, 1.0)[0]
+    moved = both[: K.shape[1]] - idle @ (idle.T @ both[: K.shape[1]])
+    trivial = range_basis(moved, 1.0)[0]
+    return Formation(bodies, _common_names(followed, points, centre, length, anatomy),
+                     _flexes(K, K @ trivial, bodies))
+
+
+def _seen(at: ClosedConfiguration, question: Measurement) -> tuple[list[tuple[Observation, Sighting]], Array]:
+    """The observations that sense anything, each with where it is, and all points that are sensed (n, 3)."""
+    found = list[tuple[Observation, Sighting]]()
+    for each in question.observations:
+        if isinstance(each, CameraObservation | SeenAxis):
+            found.append((each, each.sighting(at.pose(each.seen_from or question.reference), at.pose(each.link))))
+    points = [P for each, place in found if isinstance(each, CameraObservation) for P in (place.B, place.C)]
+    return found, np.array(points).reshape(-1, 3)
+
+
+def _scaled(part: Sensed, length: float) -> Sensed:
+    """The same in characteristic lengths, unit rows."""
+    rows = part.rows * np.repeat([length, 1.0], 3)
+    size = np.linalg.norm(rows, axis=1, keepdims=True)
+    return replace(part, point=part.point / length, rows=rows / np.where(size > 0, size, 1.0))
+
+
+def _common_names(S: Array, points: Array, centre: Array, length: float, anatomy: LegDecomposition
+                  ) -> tuple[str, ...]:
+    """Names of similarities (7, k) about ``centre``, characteristic lengths: translations, turns, a scale; where these
+    are not about any place of the sensed ``points`` (n, 3), about which."""
+    spread = range_basis((points - centre).T / length, 1.0)[0] if len(points) else np.zeros((3, 0))
+    shifts = range_basis((S @ kernel_basis(S[3:], 1.0)[0])[:3], 1.0)[0]
+    anchored = np.linalg.norm(spread - shifts @ (shifts.T @ spread)) > NAMED
+    names = [f"translation along {direction_name(each, anatomy)}" for each in directions_in(shifts, anatomy)]
+    turning = S @ kernel_basis(S[6:], 1.0)[0]
+    for axis in directions_in(range_basis(turning[3:6], 1.0)[0], anatomy):
+        v = (turning @ np.linalg.lstsq(turning[3:6], axis, rcond=None)[0])[:3]
+        v = v - shifts @ (shifts.T @ v)
+        through = "" if not anchored else f" through {point_text(centre + length * np.cross(axis, v))}"
+        names.append(f"common turn about {direction_name(axis, anatomy)}{through}")
+    if len(names) < S.shape[1]:
+        row = S[6] / (S[6] @ S[6])
+        v = S[:3] @ row
+        v = v - shifts @ (shifts.T @ v)
+        fixed = "" if not anchored else f" about {point_text(centre - length * v)}"
+        names.append(f"scale{fixed}" + (" with a turn" if np.linalg.norm(S[3:6] @ row) > NAMED else ""))
+    return tuple(names)
+
+
+def _flexes(K: Array, trivial: Array, bodies: tuple[str, ...]) -> tuple[Flex, ...]:
+    """The unseen motions K (6 bodies, k) beyond the trivial ones, by the smallest sets of bodies that move while all
+    others rest."""
+    known, found = range_basis(trivial, 1.0)[0], list[Flex]()
+    total, n = K.shape[1], len(bodies)
+    for size in range(1, n + 1):
+        if n > ALL_SETS and 2 < size < n:
+            continue
+        for chosen in combinations(range(n), size):
+            if known.shape[1] == total:
+                return tuple(found)
+            resting = np.delete(K.reshape(n, 6, -1), chosen, axis=0).reshape(-1, total)
+            alone = K @ kernel_basis(resting, 1.0)[0] if size < n else K
+            turning = alone.reshape(n, 6, -1)[:, 3:].reshape(3 * n, -1)
+            counts = []
+            for part in (alone @ kernel_basis(turning, 1.0)[0], alone):
+                more = range_basis(part - known @ (known.T @ part), 1.0)[0]
+                known = range_basis(np.hstack([known, more]), 1.0)[0]
+                counts.append(more.shape[1])
+            if sum(counts):
+                links = tuple(bodies[i] for i in chosen)
+                of_kind = zip(("translation", "turn"), counts, strict=True) if size == 1 else [("motion", sum(counts))]
+                what = [f"{count} {kind}{'s' * (count > 1)}" for kind, count in of_kind if count]
+                how = "alone" if size == 1 else "while the others rest" if size < n else "against each other"
+                found.append(Flex(links, sum(counts), f"{', '.join(links)} {how}: {', '.join(what)}"))
+    return tuple(found)
+
+
+def special_at(at: ClosedConfiguration, question: Measurement) -> str:
+    """The line or plane that holds all points that are sensed, in words; empty where they have none in common."""
+    points = _seen(at, question)[1] / at.twin.length
+    points = np.array([P for i, P in enumerate(points) if all(np.linalg.norm(P - Q) > NAMED for Q in points[:i])])
+    if len(points) < 3:
+        return ""
+    _, sizes, axes = np.linalg.svd(points - points.mean(axis=0))
+    if sizes[1] <= NAMED * sizes[0]:
+        return "all points that are sensed lie on one line"
+    if len(points) > 3 and sizes[2] <= NAMED * sizes[0]:
+        return f"all points that are sensed lie in one plane, with the normal {point_text(oriented(axes[2]))}"
+    return ""

@@ -1,0 +1,172 @@
+"""Closed Type 2 conditions of a platform of six freedoms that six independent wrenches hold, by what holds it.
+
+A *ray* lets a tip B move along a line r: an image point, a leg whose direction is watched. A *plane* lets B move in a
+plane of normal n, and the body turn about the normals of an axis e: a line in the image. An *axis* u lets the body turn
+about it alone: a direction, an inclination. Each condition is the determinant of the wrenches, up to a constant
+(docs/pages/observations.md has the derivations).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from .locked_legs import LockedLeg
+from .named_vectors import CrossProduct
+from .vector_algebra import products, vector
+
+
+@dataclass(frozen=True)
+class ClosedForm:
+    """A condition in words, the expression that vanishes just there, and its factors, each with what it means."""
+
+    words: str
+    expression: Any
+    parts: tuple[tuple[Any, str], ...] = ()
+
+
+def closed_form(legs: Sequence[LockedLeg]) -> ClosedForm | None:
+    """The condition of a mixture that has one, None else."""
+    rays = [leg for leg in legs if leg.line is not None and leg.turning is None]
+    planes = [leg for leg in legs if leg.normal is not None and leg.upright is not None]
+    axes = [leg for leg in legs if leg.free and leg.about is not None]
+    known: dict[tuple[int, int, int], Callable[..., ClosedForm]] = {
+        (3, 0, 0): _three_rays, (2, 1, 0): _two_rays_plane, (1, 2, 0): _ray_two_planes,
+        (0, 3, 0): _three_planes, (2, 0, 1): _two_rays_axis, (1, 1, 1): _ray_plane_axis}
+    if len(legs) != 3 or (form := known.get((len(rays), len(planes), len(axes)))) is None:
+        return None
+    return form(*rays, *planes, *axes)
+
+
+def _three_rays(*rays: LockedLeg) -> ClosedForm:
+    """The tips' speeds along their lines that keep |B_i B_j|: a 3 × 3 determinant."""
+    dot, _, _ = products()
+    line, tips = [_line(leg) for leg in rays], [_tip(leg) for leg in rays]
+    sides = [tips[(i + 1) % 3] - tips[i] for i in range(3)]
+    forth = dot(line[0], sides[0]) * dot(line[1], sides[1]) * dot(line[2], sides[2])
+    back = dot(line[1], sides[0]) * dot(line[2], sides[1]) * dot(line[0], sides[2])
+    if (eye := _one_eye(rays)) is not None:
+        return _danger_cylinder(eye, rays, forth - back)
+    names = [leg.tip.symbol for leg in rays]
+    normals = ", ".join(str(each) for each in line)
+    words = (f"the planes through {', '.join(names)} normal to {normals}, and the plane {''.join(names)}, meet in a "
+             "point (which may lie at infinity)")
+    return ClosedForm(words, forth - back)
+
+
+def _danger_cylinder(eye: str, rays: Sequence[LockedLeg], expression: Any) -> ClosedForm:
+    """forth − back = |n|² (ρ² − R²) / (λ₁ λ₂ λ₃) where the lines meet in C: λ_i = ‖CB_i‖, n = B₁B₂ × B₁B₃, R the
+    radius of the circle through the points, ρ the distance of C from its axis."""
+    dot, cross, det = products()
+    one, two, three = (leg.tip.symbol for leg in rays)
+    tips = [_tip(leg) for leg in rays]
+    b, c, x = tips[1] - tips[0], tips[2] - tips[0], vector(eye) - tips[0]
+    n = cross(b, c)
+    square = dot(cross(n, x), cross(n, x)) + dot(b, b) * det(x, n, c) - dot(c, c) * det(x, n, b)
+    points = f"{one}, {two}, {three}"
+    words = f"{eye} lies on the danger cylinder, the circular cylinder over the circle through {points}"
+    means = (f"|n|² (ρ² - R²), n = {one}{two} × {one}{three}, R the radius of the circle through {points}, ρ the "
+             f"distance of {eye} from its axis: |{eye}{one}| |{eye}{two}| |{eye}{three}| times the expression, "
+             "a proved identity")
+    return ClosedForm(words, expression, ((square, means),))
+
+
+def _three_planes(*planes: LockedLeg) -> ClosedForm:
+    """Forces n_i at B_i and moments e_i: a block triangular matrix, so det(n₁, n₂, n₃) det(e₁, e₂, e₃)."""
+    _, _, det = products()
+    normals, uprights = [_normal(leg) for leg in planes], [_upright(leg) for leg in planes]
+    n, e = (", ".join(map(str, each)) for each in (normals, uprights))
+    eye, lines = _one_eye(planes), ", ".join(leg.label for leg in planes)
+    if eye is None:
+        meet = f"the planes of the cameras and their lines ({n}) are parallel to one line"
+    else:
+        meet = f"the planes of {eye} and the lines ({n}) have a line in common: the images of the lines meet in a point"
+    feet = f"the perpendiculars from the cameras to their lines ({e}) are parallel to one plane"
+    feet = feet if eye is None else f"{eye} and the feet of its perpendiculars on the lines ({e}) lie in one plane"
+    fixed = eye is not None and all(isinstance(leg.normal, CrossProduct) for leg in planes)
+    more = f"; {eye} is on the ruled quadric of the lines that meet {lines}" if fixed else ""
+    both = det(*normals), det(*uprights)
+    return ClosedForm(f"{meet}, or {feet}", both[0] * both[1], ((both[0], meet + more), (both[1], feet)))
+
+
+def _two_rays_plane(one: LockedLeg, two: LockedLeg, plane: LockedLeg) -> ClosedForm:
+    """Speeds (r₂·b, r₁·b) along the rays keep |B₁B₂|, b = B₂ − B₁; then ω = (b × δ)/b² + t b, δ the difference of
+    velocities, with e·ω = 0 and n·v(B₃) = 0."""
+    dot, cross, det = products()
+    r1, r2, n, e = _line(one), _line(two), _normal(plane), _upright(plane)
+    b, c = _tip(two) - _tip(one), _tip(plane) - _tip(one)
+    turn = dot(r1, b) * det(e, b, r2) - dot(r2, b) * det(e, b, r1)
+    slip = (dot(b, b) * dot(r2, b) * dot(n, r1) + dot(r1, b) * dot(n, cross(cross(b, r2), c))
+            - dot(r2, b) * dot(n, cross(cross(b, r1), c)))
+    expression = (turn * det(n, b, c) - dot(e, b) * slip) / dot(b, b)
+    words = (f"some motion of the platform moves {one.tip.symbol} along {r1}, {two.tip.symbol} along {r2} and "
+             f"{plane.tip.symbol} normal to {n}, and turns it about a normal of {e}")
+    return ClosedForm(words, expression)
+
+
+def _ray_two_planes(ray: LockedLeg, one: LockedLeg, two: LockedLeg) -> ClosedForm:
+    """ω = s w, w = e₂ × e₃, and v(B₁) = μ r: two equations n_i·v(B_i) = 0 in (μ, s)."""
+    dot, cross, det = products()
+    r, w = _line(ray), cross(_upright(one), _upright(two))
+    arms = [det(_normal(leg), w, _tip(leg) - _tip(ray)) for leg in (one, two)]
+    expression = dot(_normal(one), r) * arms[1] - dot(_normal(two), r) * arms[0]
+    words = (f"some motion of the platform moves {ray.tip.symbol} along {r}, {one.tip.symbol} normal to "
+             f"{_normal(one)}, {two.tip.symbol} normal to {_normal(two)}, and turns it about the normal of "
+             f"{_upright(one)}, {_upright(two)}")
+    return ClosedForm(words, expression)
+
+
+def _two_rays_axis(one: LockedLeg, two: LockedLeg, axis: LockedLeg) -> ClosedForm:
+    """μ₂ r₂ − μ₁ r₁ = s u × b, b = B₂ − B₁; with one centre C of both, r₁ × r₂ is along CB₁ × b, and C is in a plane
+    that depends on u and the points alone."""
+    dot, cross, det = products()
+    r1, r2, u, b = _line(one), _line(two), _about(axis), _tip(two) - _tip(one)
+    names, eye, expression = f"{one.tip.symbol}{two.tip.symbol}", _one_eye([one, two]), det(r1, r2, cross(u, b))
+    if eye is None:
+        return ClosedForm(f"{r1}, {r2} and {u} × {names} are parallel to one plane", expression)
+    words = f"{eye} lies in the plane through {one.tip.symbol}, {two.tip.symbol} that is parallel to {u} × {names}"
+    means = (f"that plane: |{eye}{one.tip.symbol}| |{eye}{two.tip.symbol}| times the expression but for its sign, a "
+             "proved identity")
+    return ClosedForm(words, expression, ((dot(cross(b, cross(u, b)), vector(eye) - _tip(one)), means),))
+
+
+def _ray_plane_axis(ray: LockedLeg, plane: LockedLeg, axis: LockedLeg) -> ClosedForm:
+    """ω = s u with s e·u = 0, and v = μ r with μ n·r = 0."""
+    dot, _, _ = products()
+    r, n, e, u = _line(ray), _normal(plane), _upright(plane), _about(axis)
+    along, turn = f"{r} lies in the plane normal to {n}", f"{u} is normal to {e}"
+    if _one_eye([ray, plane]) is not None:
+        along = f"the image of {ray.label} lies on that of {plane.label} ({r} is normal to {n})"
+    both = dot(n, r), dot(e, u)
+    return ClosedForm(f"{along}, or {turn}", both[0] * both[1], ((both[0], along), (both[1], turn)))
+
+
+def _one_eye(legs: Sequence[LockedLeg]) -> str | None:
+    """The symbol of the one camera's centre that all have, None where they have several or none."""
+    eyes = {leg.eye.symbol if leg.eye is not None else None for leg in legs}
+    return eyes.pop() if len(eyes) == 1 else None
+
+
+def _tip(leg: LockedLeg) -> Any:
+    return vector(leg.tip.symbol)
+
+
+def _line(leg: LockedLeg) -> Any:
+    assert leg.line is not None
+    return vector(leg.line.symbol)
+
+
+def _normal(leg: LockedLeg) -> Any:
+    assert leg.normal is not None
+    return vector(leg.normal.symbol)
+
+
+def _upright(leg: LockedLeg) -> Any:
+    assert leg.upright is not None
+    return vector(leg.upright.symbol)
+
+
+def _about(leg: LockedLeg) -> Any:
+    assert leg.about is not None
+    return vector(leg.about.symbol)

@@ -1,0 +1,114 @@
+"""What a servo loop feeds back of an image, as the field writes it: coordinates x = X/Z, y = Y/Z of points, ρ and θ of
+lines, centre and second moments of ellipses (Chaumette and Hutchinson, *Visual servo control I*, 2006; Espiau,
+Chaumette and Rives, 1992), each with its derivative by what is measured; and what noise makes of an image.
+
+The picture's plane is z = 1 of the camera's frame; noise is in units of it, or in radians.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..geometry.so3 import wrap_angle
+from ..geometry.vectors import Array, cross, unit
+
+HALF_PICTURE = 1.0
+"""A line in the image is found by two points this far on each side of the one nearest to the picture's centre: at the
+edges of a picture of 90°."""
+TURNS = 2 * np.pi * np.arange(5) / 5
+"""Where on an ellipse the five points are from which its conic is found."""
+
+
+def point_image(u: Array) -> Array:
+    """x = X/Z, y = Y/Z of rays u (…, 3)."""
+    return np.asarray(u[..., :2] / u[..., 2:])
+
+
+def point_slope(u: Array) -> Array:
+    """∂(x, y)/∂u, (…, 2, 3)."""
+    slope = np.zeros((*u.shape[:-1], 2, 3))
+    slope[..., 0, 0] = slope[..., 1, 1] = 1 / u[..., 2]
+    slope[..., 2] = -u[..., :2] / u[..., 2:] ** 2
+    return slope
+
+
+def line_image(n: Array) -> Array:
+    """ρ, θ of the line x cos θ + y sin θ = ρ in the plane of normal n (…, 3) through C."""
+    return np.stack([-n[..., 2] / np.hypot(n[..., 0], n[..., 1]), np.arctan2(n[..., 1], n[..., 0])], axis=-1)
+
+
+def line_slope(n: Array) -> Array:
+    """∂(ρ, θ)/∂n, (…, 2, 3)."""
+    size = np.hypot(n[..., 0], n[..., 1])
+    slope = np.zeros((*n.shape[:-1], 2, 3))
+    slope[..., 0, :2] = n[..., 2:] * n[..., :2] / size[..., None] ** 3
+    slope[..., 0, 2] = -1 / size
+    slope[..., 1, 0], slope[..., 1, 1] = -n[..., 1] / size**2, n[..., 0] / size**2
+    return slope
+
+
+def line_apart(n: Array, wanted: Array) -> Array:
+    """The difference of ρ and θ, that of θ without whole turns."""
+    found = line_image(n) - line_image(wanted)
+    return np.array([found[0], wrap_angle(float(found[1]))])
+
+
+def ellipse_image(Q: Array) -> Array:
+    """Centre x, y and moments n₂₀, n₁₁, n₀₂ of the ellipse (x, y, 1) Q (x, y, 1)ᵀ = 0, Q (…, 3, 3) symmetric: those
+    second moments over the area, a quarter of k A⁻¹ where (x − c)ᵀ A (x − c) = k."""
+    centre, spread, _, _ = _ellipse(Q)
+    return np.concatenate([centre, spread[..., (0, 0, 1), (0, 1, 1)]], axis=-1)
+
+
+def ellipse_slope(Q: Array, along: Array) -> Array:
+    """Rates (…, 5) of the same where Q changes at the rate ``along`` (…, 3, 3)."""
+    centre, _, inverse, k = _ellipse(Q)
+    A, b = along[..., :2, :2], along[..., :2, 2]
+    moved = np.einsum("...ij,...j->...i", A, centre)
+    shift = -np.einsum("...ij,...j->...i", inverse, moved + b)
+    growth = -np.sum(centre * (moved + 2 * b), axis=-1) - along[..., 2, 2]
+    spread = (growth[..., None, None] * inverse - k[..., None, None] * (inverse @ A @ inverse)) / 4
+    return np.concatenate([shift, spread[..., (0, 0, 1), (0, 1, 1)]], axis=-1)
+
+
+def _ellipse(Q: Array) -> tuple[Array, Array, Array, Array]:
+    """Centre (…, 2), moments (…, 2, 2), A⁻¹ and k."""
+    inverse = np.asarray(np.linalg.inv(Q[..., :2, :2]), dtype=np.float64)
+    b = Q[..., :2, 2]
+    centre = np.asarray(-np.einsum("...ij,...j->...i", inverse, b))
+    k = np.asarray(-np.sum(b * centre, axis=-1) - Q[..., 2, 2])
+    return centre, np.asarray(k[..., None, None] * inverse / 4), inverse, k
+
+
+def tilted(u: Array, shock: Array, angle: float) -> Array:
+    """A unit vector (3,) inside a cone of half-angle ``angle`` about u; ``shock`` (3,) lies in the unit ball."""
+    across = shock - (shock @ u) * u
+    return unit(u + np.tan(angle) * across)
+
+
+def shifted_point(u: Array, shock: Array, by: float) -> Array:
+    """The ray (3,) of an image point that is found up to ``by`` beside its place."""
+    return unit([*(point_image(u) + by * shock[:2]), 1.0])
+
+
+def shifted_line(n: Array, shock: Array, by: float) -> Array:
+    """The normal (3,) of a line in the image of which two points are found up to ``by`` across it."""
+    across = unit(n[:2])
+    nearest, along = -n[2] / np.hypot(*n[:2]) * across, np.array([-across[1], across[0]])
+    one, other = (np.array([*(nearest + side * HALF_PICTURE * along + by * error * across), 1.0])
+                  for side, error in ((-1, shock[0]), (1, shock[1])))
+    found = unit(cross(one, other))
+    return found if found @ n > 0 else -found
+
+
+def shifted_ellipse(Q: Array, shocks: Array, by: float) -> Array:
+    """The conic (3, 3), of unknown size, through five points of an ellipse that are found up to ``by`` beside it;
+    ``shocks`` (2, 3)."""
+    centre, spread, _, _ = _ellipse(Q)
+    points = centre + 2 * np.column_stack([np.cos(TURNS), np.sin(TURNS)]) @ np.linalg.cholesky(spread).T
+    normals = (points - centre) @ np.linalg.inv(spread)
+    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
+    x, y = (points + by * shocks.ravel()[:5, None] * normals).T
+    a = np.linalg.svd(np.column_stack([x * x, y * y, np.ones(5), 2 * y, 2 * x, 2 * x * y]))[2][-1]
+    found = np.array([[a[0], a[5], a[4]], [a[5], a[1], a[3]], [a[4], a[3], a[2]]])
+    return np.asarray(found if np.sum(found * Q) > 0 else -found)

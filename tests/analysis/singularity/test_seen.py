@@ -1,0 +1,126 @@
+"""Type 2 conditions of observations of any kind: points, lines, axes, cameras that are fixed or carried."""
+
+from __future__ import annotations
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+
+from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.analysis.singularity.agreement import spectrum
+from hrsynth.analysis.singularity.singular import Singularity, singular
+from hrsynth.constraints.vector_algebra import evaluate
+from hrsynth.geometry.vectors import Array
+from hrsynth.kinematics.locked import interaction
+
+EYE = "eye=base@0.3,0.1,0"
+POINTS = ["point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,0.1,0.1",
+          "point:platform@0.1,0.1,-0.05"]
+LINES = ["image_line:platform@0.1,0.2,0/1,0.2,0.1", "image_line:platform@-0.1,0.1,0.2/0.1,1,0.3",
+         "image_line:platform@0,-0.1,0.1/0.2,0.3,1"]
+UPRIGHT = "inclination:platform"
+
+
+def seen(*see: str, camera: str | list[str] = EYE, robot: str = "gough_stewart", points: int = 60) -> Singularity:
+    return singular(robot, camera=camera, see=list(see), points=points)
+
+
+def off_the_cylinder(P: Array, C: Array) -> float:
+    """By how much C is off the circular cylinder over the circle through three points."""
+    n = np.cross(P[1] - P[0], P[2] - P[0])
+    A = np.array([P[1] - P[0], P[2] - P[0], n])
+    centre = np.linalg.solve(A, [(P[1] @ P[1] - P[0] @ P[0]) / 2, (P[2] @ P[2] - P[0] @ P[0]) / 2, n @ P[0]])
+    away = C - centre
+    return float(np.linalg.norm(away - (away @ n) / (n @ n) * n) - np.linalg.norm(P[0] - centre))
+
+
+def test_three_points_name_the_danger_cylinder() -> None:
+    found = seen(*POINTS[:3])
+    assert found.words == "C lies on the danger cylinder, the circular cylinder over the circle through B1, B2, B3"
+    assert found.checked is not None
+    assert found.checked.on_locus
+    record = found.to_dict()
+    assert record["measured"] == {"kind": "observations", "of": ["point_1", "point_2", "point_3"]}
+    assert "danger" not in record["parts"][0]["meaning"]
+    assert record["where"]["C"] == "centre of camera eye, fixed in base"
+    for at in found.checked.on_locus:
+        X, C = at.pose("platform"), np.array([0.3, 0.1, 0])
+        P = np.array([[0.1, 0, 0], [-0.1, 0.1, 0], [0, 0.1, 0.1]]) @ X[:3, :3].T + X[:3, 3]
+        assert abs(off_the_cylinder(P, C)) < 1e-7
+        assert abs(off_the_cylinder(P, C + [0.01, 0, 0])) > 1e-5
+
+
+@pytest.mark.slow
+def test_four_points_are_on_all_danger_cylinders() -> None:
+    found = seen(*POINTS)
+    assert "every tip Bi along ri (i = 1, 2, 3, 4); C is then on the danger cylinders of all threes" in found.words
+    assert found.checked is not None
+    places = np.array([[0.1, 0, 0], [-0.1, 0.1, 0], [0, 0.1, 0.1], [0.1, 0.1, -0.05]])
+    for at in found.checked.on_locus:
+        X = at.pose("platform")
+        P = places @ X[:3, :3].T + X[:3, 3]
+        for three in combinations(range(4), 3):
+            assert abs(off_the_cylinder(P[list(three)], np.array([0.3, 0.1, 0]))) < 1e-6
+
+
+def test_points_on_one_line() -> None:
+    found = seen("point:platform@0.1,0,0", "point:platform@0.2,0,0", "point:platform@0.4,0,0")
+    assert found.always
+    assert found.words.endswith("because B1, B2, B3 are on one line, about which the platform can turn")
+
+
+@pytest.mark.parametrize(("see", "words", "expression"), [
+    (LINES, "the images of the lines meet in a point, or C and the feet of its perpendiculars on the lines",
+     "det(e1, e2, e3)*det(n1, n2, n3)"),
+    pytest.param([*POINTS[:2], UPRIGHT], "C lies in the plane through B1, B2 that is parallel to d3 × B1B2",
+                 "det(r1, r2, cross(d3, -B1 + B2))", marks=pytest.mark.slow),
+    pytest.param([POINTS[0], LINES[1], UPRIGHT], "the image of point_1 lies on that of image_line_1 (r1 is normal",
+                 "dot(d3, e2)*dot(n2, r1)", marks=pytest.mark.slow),
+])
+def test_closed_conditions(see: list[str], words: str, expression: str) -> None:
+    found = seen(*see)
+    assert words in found.words
+    assert found.condition is not None
+    assert str(found.condition.expression) == expression
+    assert found.checked is not None
+    assert found.checked.on_locus
+    if found.condition.parts:
+        here = found.pattern.values_at(found.checked.on_locus)
+        factors = np.abs([evaluate(part, here.values) for part, _ in found.condition.parts])
+        assert factors.min(axis=0).max() < 1e-8
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("robot", "camera", "see", "words"), [
+    ("gough_stewart", EYE, [*POINTS[:2], LINES[0]], "along r2 and B3 normal to n3, and turns it about a normal of e3"),
+    ("gough_stewart", EYE, [POINTS[0], *LINES[1:]], "and turns it about the normal of e2, e3"),
+    ("gough_stewart", EYE, [x.replace("image_line", "edge") + "/0.005" for x in LINES], "feet of its perpendiculars"),
+    ("gough_stewart", EYE, ["circle:platform@0.1,0,0/1,0,0", POINTS[1]], "leaves B1 at rest and moves B2 along r2"),
+    ("gough_stewart", [EYE, "other=base@-0.3,0.2,-0.2"], [f"{c}={p}" for c, p in zip(("eye", "other", "eye"), POINTS,
+                                                                               strict=False)], "the plane B1B2B3"),
+    ("gough_stewart", "hand=platform@0,0,0.1", ["point:world@0.1,0,0", "point:world@0.3,0.2,0",
+                                                "point:world@-.1,.4,.2"], "danger cylinder"),
+    ("example:panda", "hand=panda_hand", ["point:world@0.5,0.1,0", "point:world@0.6,0.1,0.1",
+                                          "point:world@0.5,0.3,0.1"], "danger cylinder"),
+    ("delta", "eye=base@0.3,0.1,-1", POINTS[:2], "are parallel"),
+    ("3rps", EYE, POINTS[:2], "B3 normal to a3, B4 along r4 and B5 along r5"),
+])
+def test_words_expression_and_rank_agree(robot: str, camera: str | list[str], see: list[str], words: str) -> None:
+    """``singular`` itself compares them, with Pinocchio's rank and with what each observation leaves."""
+    assert words in seen(*see, camera=camera, robot=robot).words
+
+
+@pytest.mark.parametrize("see", [["image_circle:platform@0.1,0,0.1/0,1,1/0.05", "point:platform@0,0.1,0"],
+                                 ["line:platform@0.1,0,0.1/0,1,1", "distance:platform@0,0.1,0",
+                                  "depth:platform@0.3,0,0"]])
+@pytest.mark.parametrize("robot", ["gough_stewart", "delta"])
+def test_the_screws_of_all_joints_give_pinocchios_singular_values(robot: str, see: list[str]) -> None:
+    """Lengths are in characteristic lengths in both, whatever the robot's size."""
+    setting = ObservedRobot.of(robot, camera="eye=base@0.3,0.1,0.2", see=see)
+    question, chunk = setting.samples.question, setting.configurations[:5]
+    smallest, largest = spectrum(chunk, question)
+    for at, low, high in zip(chunk, smallest, largest, strict=True):
+        found = np.linalg.svd(interaction(at, question), compute_uv=False)
+        assert found[-1] == pytest.approx(low, rel=1e-8)
+        assert found[0] == pytest.approx(high, rel=1e-8)
