@@ -208,6 +208,23 @@ def test_a_singular_zero_pose_and_what_is_read_otherwise_are_told(tmp_path: Path
     assert found["merged"] >= 1
 
 
+@pytest.mark.parametrize(("robot", "open_on_purpose"), [
+    ('<joint name="f" type="floating"><parent link="base"/><child link="hand"/></joint>', True),
+    ('<joint name="f" type="continuous"><parent link="base"/><child link="hand"/></joint>', False)])
+@pytest.mark.parametrize("seen", [False, True])
+def test_what_is_open_on_purpose_is_not_told_to_close(tmp_path: Path, robot: str, open_on_purpose: bool, seen: bool):
+    """A free body, and whatever a camera looks at."""
+    eye = ('<camera name="eye" link="base"><origin xyz="0 0 -1"/></camera>'
+           '<observe kind="point" camera="eye" link="hand" at="0 0 0"/>')
+    path = tmp_path / "robot.urdf"
+    path.write_text(f'<robot name="body"><link name="base"/><link name="hand"/>{robot}<hrsynth serial="true">'
+                    f'<platform link="hand"/>{eye * seen}</hrsynth></robot>')
+    found = rules_in(path)
+    assert found["refused"] == 0
+    expected = 0 if open_on_purpose or seen else 1
+    assert (found["loop-none"], found["motor-none"]) == (expected, expected)
+
+
 SOME = ("3rps", "rrrrr_m1")
 NAMES = [name if name in SOME else pytest.param(name, marks=pytest.mark.slow) for name in shipped()]
 

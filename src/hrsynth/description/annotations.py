@@ -47,10 +47,11 @@ def drop_world(graph: JointGraph) -> JointGraph:
 def read_annotation(graph: JointGraph, key: str, text: str) -> str | None:
     """Take back one annotation; what is wrong with it, or None."""
     words = [unquote(word) for word in text.split()]
-    if key in ("platform", "camera") and len(words) == 1:
+    if key in ("platform", "formation", "camera") and len(words) == 1:
         if words[0] not in graph.links:
             return f"{key}: unknown link"
-        setattr(graph, key, words[0])
+        setattr(graph, "platform" if key == "formation" else key, words[0])
+        graph.formation = graph.formation or key == "formation"
     elif key == "motor" and len(words) == 2:
         if words[1] not in graph.joints:
             return "motor of an unknown joint"
@@ -88,7 +89,7 @@ def _camera(said: dict[str, str]) -> NamedCamera:
 
 def annotations_of(robot: Mechanism, *, motors: bool = False) -> Iterable[tuple[str, str]]:
     """Key and text of all that is added for a robot, in order."""
-    yield "platform", quote(robot.platform)
+    yield "formation" if robot.formation else "platform", quote(robot.platform)
     if robot.camera is not None:
         yield "camera", quote(robot.camera)
     for joint in robot.joints.values():

@@ -86,6 +86,17 @@ Posture = Mapping[str, Array]
 """The values of some joints, by name, as :mod:`.jointmotion` has them; all others are at zero."""
 
 
+def first_body(links: Iterable[str], joined: Iterable[tuple[str, str]], base: str, told: Iterable[str]
+               ) -> tuple[str | None, int]:
+    """The first body of a formation: of the links ``told`` to be observed or to observe, where two or more of the parts
+    that nothing but the base joins have some; and the number of such parts."""
+    some = set(told) - {base}
+    names = [name for name in links if name != base]
+    parts = graphs.components(graphs.adjacency(names, (pair for pair in joined if base not in pair)))
+    count = sum(1 for part in parts if some & part)
+    return next((name for name in names if name in some), None) if count > 1 else None, count
+
+
 @dataclass
 class JointGraph:
     """What a foreign file says; with every tree joint at zero its frames on both links coincide."""
@@ -98,6 +109,8 @@ class JointGraph:
     gears: list[GearSpec] = field(default_factory=list)
     base: str | None = None
     platform: str | None = None
+    formation: bool = False
+    """Whether the platform is only the first of the bodies that are controlled."""
     camera: str | None = None
     observations: list[Direction] = field(default_factory=list)
     sights: list[SightSpec] = field(default_factory=list)

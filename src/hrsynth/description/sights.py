@@ -10,11 +10,12 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import count
+from typing import Any
 
 import numpy as np
 
 from ..errors import BadRequest, BadRobotFile, Defect
-from ..geometry.vectors import frozen, pose, rotation_from_rpy
+from ..geometry.vectors import Array, frozen, pose, rotation_from_rpy
 from ..mechanism import Mechanism
 from ..mechanism.observation import Observation
 from ..mechanism.observations import kinds
@@ -26,7 +27,7 @@ from ..mechanism.sights import CameraObservation, NamedCamera
 from . import numerals
 
 SEE = "[CAMERA=]KIND:LINK[@x,y,z][/dx,dy,dz][/radius]"
-CAMERA = "NAME=LINK[@x,y,z[/roll,pitch,yaw]]"
+CAMERA = "NAME=LINK[@x,y,z[/roll,pitch,yaw[/focal[,width,height]]]]"
 WORLD = "world"
 """What the base is called besides its own name."""
 
@@ -134,14 +135,25 @@ def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
 
 
 def parse_camera(text: str) -> NamedCamera:
-    """The camera that ``NAME=LINK@x,y,z/r,p,y`` says; angles in radians, or with ``deg``."""
+    """The camera that ``NAME=LINK@x,y,z/r,p,y/FOCAL,WIDTH,HEIGHT`` says; angles in radians or with ``deg``, the rest of
+    its picture in pixels."""
     name, _, place = text.partition("=")
     link, *where = place.split("@")
     parts = where[0].split("/") if len(where) == 1 else []
-    if not name or not link or len(where) > 1 or len(parts) > 2:
+    if not name or not link or len(where) > 1 or len(parts) > 3:
         raise BadRequest("--camera", text, f"LINK or {CAMERA}")
-    numbers = [np.zeros(3), np.zeros(3)]
-    for number, part in enumerate(parts):
+    numbers: list[Array] = [np.zeros(3), np.zeros(3)]
+    image: list[Any] = [None, None, None]
+    for part in parts[2:]:
+        found = part.split(",")
+        try:
+            values = numerals.parse(" ".join(found), len(found))
+        except ValueError as error:
+            raise BadRequest(f"--camera {text}", part, str(error)) from None
+        if len(found) not in (1, 3) or not np.all(values > 0) or np.any(values[1:] % 1):
+            raise BadRequest(f"--camera {text}", part, "the focal length in pixels, or with width and height")
+        image[: len(found)] = [float(values[0]), *map(int, values[1:])]
+    for number, part in enumerate(parts[:2]):
         words = [re.fullmatch(r"(.*?)(deg)?", word) for word in part.split(",")]
         try:
             values = numerals.parse(" ".join(word[1] for word in words if word), 3)
@@ -150,7 +162,8 @@ def parse_camera(text: str) -> NamedCamera:
         if any(word and word[2] for word in words) and number == 0:
             raise BadRequest(f"--camera {text}", part, "metres")
         numbers[number] = values * [math.radians(1) if word and word[2] else 1.0 for word in words]
-    return NamedCamera(name, link, pose(numbers[0], rotation_from_rpy(*numbers[1])))
+    focal, width, height = image
+    return NamedCamera(name, link, pose(numbers[0], rotation_from_rpy(*numbers[1])), focal, width, height)
 
 
 def with_sights(mechanism: Mechanism, specs: Sequence[SightSpec], cameras: Iterable[NamedCamera] = ()) -> Mechanism:

@@ -75,6 +75,17 @@ def transformed(R: Components, b: Components) -> list[Any]:
     return [dot(R[3 * i : 3 * i + 3], b) for i in range(3)]
 
 
+def cayley(gamma: Components, v: Components) -> list[Any]:
+    """v turned by tan(θ/2) = |γ| about γ: v + 2 (γ × v + γ × (γ × v)) / (1 + γ·γ)."""
+    w = cross(gamma, v)
+    return plus(v, scaled(2.0 / (dot(gamma, gamma) + 1.0), plus(w, cross(gamma, w))))
+
+
+def spin(gamma: Components, rate: Components, one_axis: bool) -> list[Any]:
+    """Angular velocity 2 (γ̇ + γ × γ̇) / (1 + γ·γ) of what γ turns (:func:`cayley`), γ × γ̇ = 0 about one axis."""
+    return scaled(2.0 / (dot(gamma, gamma) + 1.0), rate if one_axis else plus(rate, cross(gamma, rate)))
+
+
 def times(B: Components, w: Components) -> list[Any]:
     """B w of a symmetric matrix."""
     x, y, z = w

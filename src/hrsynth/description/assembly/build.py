@@ -47,7 +47,9 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
             raise BadRequest(f"{graph.file}: no such {role} link", link, comma_list(graph.links))
     if open_chain := without_loop(graph, base):
         graph.note("open", open_chain)
-    platform = overrides.platform or graph.platform or guess.platform(graph, overrides.base or base)
+    graph.formation = graph.formation and overrides.platform is None
+    platform = (overrides.platform or graph.platform or (graph.formation and guess.formation(graph, base))
+                or guess.platform(graph, overrides.base or base))
     if platform == base and overrides.base is None:
         raise BadRequest(f"{graph.file}: the platform is the base", platform, "another link")
     start = None if overrides.keyframe is None else graph.in_metres(posture(graph, overrides.keyframe))
@@ -112,7 +114,7 @@ def _mechanism(graph: JointGraph, base: str, platform: str, assembly: LoopAssemb
     links = {name: replace(link, pose=poses[name]) for name, link in graph.links.items()}
     mechanism = Mechanism(graph.name, links, with_limits(joints, assembly, values), base, platform,
                           tuple(graph.observations), (), graph.camera, tuple(graph.rest), graph.file,
-                          tuple(graph.notes))
+                          tuple(graph.notes), formation=graph.formation)
     mechanism = as_written(spanning(mechanism), graph.sights, graph.cameras, graph.file)
     return replace(mechanism, couplings=tuple(_couplings(graph, mechanism)))
 

@@ -10,7 +10,7 @@ from ...budgets import LARGEST_GUESSED
 from ...errors import BadRequest
 from ...mechanism import graphs
 from ...mechanism.model import JointType
-from ..jointgraph import JointGraph, JointSpec
+from ..jointgraph import JointGraph, JointSpec, first_body
 
 _FOOT = re.compile("foot|toe|sole|tool|flange|hand|plat", re.IGNORECASE)
 
@@ -70,6 +70,14 @@ def _is_rail(graph: JointGraph, slide: JointSpec, trunk: str, platform: str | No
     rest: nx.Graph[str] = nx.Graph((a, b) for a, ends in bodies.near.items() for b in ends)
     loops: list[set[str]] = list(map(set, nx.biconnected_components(rest)))  # type: ignore[arg-type]
     return any(bodies.base in loop for loop in loops if len(loop) > 2)
+
+
+def formation(graph: JointGraph, base: str) -> str | None:
+    """The first body of a formation, None where it is none, which the graph is told."""
+    told = [*(each.link for each in graph.sights), *(each.link for each in graph.cameras)]
+    found, _ = first_body(graph.links, (joint.links for joint in graph.joints.values()), base, told)
+    graph.formation = found is not None
+    return found
 
 
 def platform(graph: JointGraph, base: str) -> str:

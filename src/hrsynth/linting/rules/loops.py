@@ -15,7 +15,7 @@ from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, so
 from ...description.jointgraph import JointGraph, JointSpec
 from ...description.jointmotion import displacement, opening
 from ...errors import HrsynthError
-from ...mechanism.model import Joint, JointType
+from ...mechanism.model import Joint, JointType, Mechanism
 from ...tolerances import NOISE, OPPOSITE
 from ..elements import NumberAt
 from ..findings import LintRule, Mend, Spot
@@ -190,9 +190,21 @@ def _redundant(file: LintedFile) -> Iterator[Spot]:
                                           "before it say")
 
 
+def unclosed(robot: Mechanism) -> bool:
+    """Whether nothing closes a loop."""
+    return not robot.couplings and all(joint.in_tree for joint in robot.joints.values())
+
+
+def watched(robot: Mechanism) -> bool:
+    """Whether a robot is open on purpose, and what counts is what is seen of it: formations, a body that nothing holds,
+    arms with a camera."""
+    seen = robot.formation or robot.observations or robot.cameras
+    return unclosed(robot) and (bool(seen) or all(joint.type is JointType.FREE for joint in robot.joints.values()))
+
+
 def _none(file: LintedFile) -> Iterator[Spot]:
     robot = file.mechanism
-    if robot is not None and not robot.couplings and all(joint.in_tree for joint in robot.joints.values()):
+    if robot is not None and unclosed(robot) and not watched(robot):
         yield Spot(None, "the file closes no loop")
 
 

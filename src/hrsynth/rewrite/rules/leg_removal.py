@@ -22,6 +22,9 @@ def find(state: State, evidence: Evidence, leg: str) -> Iterator[Match[str] | Re
     if state.mechanism.reference in own.links:
         yield Refusal("the leg carries the camera")
         return
+    if state.mechanism.formation:
+        yield Refusal("the joints of a formation say what its bodies can do")
+        return
     if state.watched & set(own.links) or state.actuators & set(own.joints):
         yield Refusal("the leg carries what is observed or sees")
         return

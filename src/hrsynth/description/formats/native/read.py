@@ -19,7 +19,7 @@ from ....tolerances import NO_FINER, SAME_DIRECTION, SAME_GEOMETRY
 from ... import chains, xml
 from ...dialect import RobotFile
 from ...elements import LIMITS
-from ...jointgraph import JointSpec, TreeJoint, zero_poses
+from ...jointgraph import JointSpec, TreeJoint, first_body, zero_poses
 from ...jointmotion import require_closed, residual
 from ...sights import SightSpec, as_written
 from ..urdf.elements import INTERFACE, UrdfReader, is_sight, simple_transmission
@@ -53,6 +53,7 @@ def parse(text: bytes | str, file: str = "<text>") -> Mechanism:
 class _NativeReader(UrdfReader):
     observations: list[Direction] = field(default_factory=list)
     platform: str | None = None
+    formation: bool = False
     seen: list[SightSpec] = field(default_factory=list)
     cameras: list[NamedCamera] = field(default_factory=list)
     camera: str | None = None
@@ -143,7 +144,10 @@ class _NativeReader(UrdfReader):
                 if self.known(link, xml.line(child), f"{role}: unknown link"):
                     setattr(self, role, link)
             elif role == "platform":
-                self.defect(xml.line(element), "no <platform>")
+                self.formation = bool(self.seen)
+                if not self.formation:
+                    self.defect(xml.line(element), "no <platform>", None,
+                                "a <platform>, or of a formation <observe> between its bodies")
         for observe in element.findall("observe"):
             self.observe(observe)
         for child in xml.children(element):
@@ -206,11 +210,18 @@ class _NativeReader(UrdfReader):
         return roots[0]
 
     def check_platform(self, base: str) -> None:
-        """The platform is another link than the base and hangs together with it."""
-        if self.platform is None:
-            return
+        """The platform is another link than the base and hangs together with it; that of a formation is its first
+        body."""
         line = next((xml.line(each) for each in self.root.iterfind("hrsynth/platform")), None)
         whole = [joint.links for joint in self.joints.values() if None not in (joint.ends[0].link, joint.ends[1].link)]
+        if self.formation:
+            told = [*(each.link for each in self.seen), *(each.link for each in self.cameras)]
+            self.platform, count = first_body(self.links, whole, base, told)
+            if self.platform is None:
+                self.defect(line, f"no <platform>, and no formation, with {count} of the bodies that nothing but the "
+                                  f"base joins observed or observing", None, "a <platform>, or two such bodies")
+        if self.platform is None:
+            return
         if self.platform == base:
             self.defect(line, "the platform is the base", base)
         elif self.platform not in graphs.component(graphs.adjacency(self.links, whole), base):
@@ -230,7 +241,7 @@ class _NativeReader(UrdfReader):
                                        self.motors.get(joint.name), joint.limits, joint.in_tree, joint.xml, joint.line)
         links = {key: replace(link, pose=poses[key]) for key, link in self.links.items()}
         mechanism = Mechanism(name, links, joints, base, platform, tuple(self.observations), tuple(self.couplings),
-                              self.camera, tuple(self.rest), self.file)
+                              self.camera, tuple(self.rest), self.file, formation=self.formation)
         found = None if self.as_written or not loops else self.rounded(mechanism, loops, poses)
         if found is not None:
             return found

@@ -161,7 +161,8 @@ class _NativeWriter:
         element = etree.Element("hrsynth")
         if all(joint.in_tree for joint in robot.joints.values()):
             element.set("serial", "true")
-        etree.SubElement(element, "platform", link=robot.platform)
+        if not robot.formation:
+            etree.SubElement(element, "platform", link=robot.platform)
         if robot.camera is not None:
             etree.SubElement(element, "camera", link=robot.camera)
         for camera in robot.cameras:

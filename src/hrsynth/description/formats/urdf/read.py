@@ -128,6 +128,7 @@ class _TolerantReader(UrdfReader):
                 if element is not None and self.known(element.get("link"), xml.line(element), f"{tag}: unknown link"):
                     setattr(graph, tag, element.get("link"))
             graph.sights, graph.cameras = self.sights(own)
+            graph.formation = graph.platform is None and bool(graph.sights)
             for element in own.findall("observe"):
                 if is_sight(element):
                     continue
