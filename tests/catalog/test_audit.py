@@ -13,9 +13,10 @@ import pytest
 import hrsynth
 from catalog.published import write
 from hrsynth.catalog.audit.closing import BatchState, batch, close, forward
-from hrsynth.catalog.audit.exact import NotExact, by_legs, exact
+from hrsynth.catalog.audit.exact import by_legs, exact
 from hrsynth.catalog.audit.freedoms import freedoms, left
 from hrsynth.catalog.audit.motions import dimensions, factors
+from hrsynth.catalog.audit.prime_field import NotExact
 from hrsynth.catalog.audit.run import audit
 from hrsynth.catalog.audit.study import StudyCase, asked, study
 from hrsynth.catalog.audit.tables import PublishedRobot, cell, read

@@ -10,7 +10,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from .exact import ModularRanks, NotExact, by_legs, exact
+from .exact import ModularRanks, by_legs, exact
+from .prime_field import NotExact
 from .study import Studied, asked
 from .tables import Held, MotorChoice, PublishedRobot
 

@@ -9,28 +9,16 @@ chance of the order of the ranks divided by the prime; two primes have to agree.
 
 from __future__ import annotations
 
-import itertools
-import math
 import random
 from collections.abc import Sequence
 from dataclasses import dataclass
-from fractions import Fraction
 from typing import Any
 
 from ...budgets import AUDIT_DRAWS
 from .motions import RZ, TURN, TX, LegFactor, dimensions, factors
+from .prime_field import PRIMES, Matrix, NotExact, PrimeField, Turn
 from .study import axes_of
 from .tables import Held, PublishedRobot
-
-PRIMES = (2147482801, 2147482081)
-"""Primes p < 2³¹, p ≡ 1 modulo 240: the cosines and sines of multiples of π/60 are in the field."""
-
-Turn = tuple[int, int]
-Matrix = list[list[int]]
-
-
-class NotExact(Exception):
-    """No closed configuration was constructed; the reason."""
 
 
 @dataclass(frozen=True)
@@ -57,7 +45,7 @@ class ModularRanks:
 
 def exact(robot: PublishedRobot, letters: str, asked: Sequence[Held], seed: int) -> tuple[ModularRanks, ...]:
     """The ranks modulo each prime; raises ``NotExact``, also where the primes disagree."""
-    fields = [_PrimeField(prime, random.Random(f"{robot.name} {letters} {prime} {seed}")) for prime in PRIMES]
+    fields = [_Instance(prime, random.Random(f"{robot.name} {letters} {prime} {seed}")) for prime in PRIMES]
     found = tuple(field.ranks(robot, letters, asked) for field in fields)
     if found[0].said != found[1].said:
         raise NotExact("the ranks modulo two primes differ")
@@ -70,7 +58,7 @@ def by_legs(robot: PublishedRobot, letters: str, seed: int) -> tuple[int, int]:
 
     A leg that leaves all of them leaves T ⊕ Ω_i with Ω_i spanned by its axes, so the platform has 3 + dim ∩ Ω_i
     freedoms at every closed configuration with regular legs at which the axes are no more special than at random."""
-    found = {_PrimeField(prime, random.Random(f"legs {robot.name} {letters} {prime} {seed}")).by_legs(robot, letters)
+    found = {_Instance(prime, random.Random(f"legs {robot.name} {letters} {prime} {seed}")).by_legs(robot, letters)
              for prime in PRIMES}
     if len(found) > 1:
         raise NotExact("the ranks modulo two primes differ")
@@ -82,63 +70,8 @@ def _orbits(legs: int) -> list[int]:
     return [k for k in range(legs - 1, 0, -1) if legs % k == 0]
 
 
-class _PrimeField:
-    """Arithmetic modulo a prime, and the draws of one instance."""
-
-    def __init__(self, prime: int, draws: random.Random) -> None:
-        self.p, self.random = prime, draws
-        root = next(r for g in itertools.count(2) for r in [pow(g, (prime - 1) // 240, prime)]
-                    if pow(r, 120, prime) == prime - 1 and pow(r, 80, prime) != 1 and pow(r, 48, prime) != 1)
-        self.root, self.half = root, (prime + 1) // 2
-        self.i = pow(root, 60, prime)
-
-    def turn_of(self, angle: float) -> Turn:
-        """A multiple of π/120 as a turn."""
-        part = Fraction(angle / math.pi * 120).limit_denominator(1)
-        if abs(float(part) - angle / math.pi * 120) > 1e-9:
-            raise NotExact(f"an angle of {angle} rad is no multiple of π/120")
-        z, back = (pow(self.root, int(k) % 240, self.p) for k in (part, -part))
-        return (z + back) * self.half % self.p, (z - back) * self.half * pow(self.i, -1, self.p) % self.p
-
-    def any_turn(self) -> Turn:
-        """A random turn, by the tangent of half of it."""
-        while True:
-            t = self.random.randrange(1, self.p)
-            if (1 + t * t) % self.p:
-                w = pow(1 + t * t, -1, self.p)
-                return (1 - t * t) * w % self.p, 2 * t * w % self.p
-
-    def matrix(self, kind: int, turn: Turn) -> Matrix:
-        """The turn about x, y or z as a matrix."""
-        c, s = turn
-        i, j = ((1, 2), (2, 0), (0, 1))[kind]
-        R = [[int(a == b) for b in range(3)] for a in range(3)]
-        R[i][i] = R[j][j] = c
-        R[i][j], R[j][i] = -s % self.p, s
-        return R
-
-    def times(self, A: Matrix, B: Matrix) -> Matrix:
-        """A B."""
-        return [[sum(a * b for a, b in zip(row, column, strict=True)) % self.p for column in zip(*B, strict=True)]
-                for row in A]
-
-    def sqrt(self, a: int) -> int | None:
-        """A square root, or None (A. Tonelli, D. Shanks)."""
-        p = self.p
-        if a % p == 0:
-            return 0
-        if pow(a, (p - 1) // 2, p) != 1:
-            return None
-        odd, twos = p - 1, 0
-        while odd % 2 == 0:
-            odd, twos = odd // 2, twos + 1
-        z = next(z for z in itertools.count(2) if pow(z, (p - 1) // 2, p) == p - 1)
-        c, t, r = pow(z, odd, p), pow(a, odd, p), pow(a, (odd + 1) // 2, p)
-        while t != 1:
-            k = next(k for k in range(1, twos) if pow(t, 1 << k, p) == 1)
-            b = pow(c, 1 << (twos - k - 1), p)
-            twos, c, t, r = k, b * b % p, t * b * b % p, r * b % p
-        return r
+class _Instance(PrimeField):
+    """A random robot of a published architecture, closed."""
 
     def ranks(self, robot: PublishedRobot, letters: str, asked: Sequence[Held]) -> ModularRanks:
         """The ranks at one instance."""
@@ -169,19 +102,10 @@ class _PrimeField:
             slides = {j: self.random.randrange(1, self.p) for j in range(len(robot.chain.joints))}
             screws = self._screws(parts, leg, columns, lengths, slides, None)
             turns.append([s[3:] for s in screws if any(s[3:])])
-            if self._rank(screws) != 3 + self._rank(turns[-1]):
+            if self.rank(screws) != 3 + self.rank(turns[-1]):
                 raise NotExact("a leg does not leave all translations")
-        width = sum(map(len, turns)) + 3
-        rows, start = [], 0
-        for each in turns:
-            for k in range(3):
-                row = [0] * width
-                row[start: start + len(each)] = [s[k] for s in each]
-                row[width - 3 + k] = self.p - 1
-                rows.append(row)
-            start += len(each)
-        same = width - self._rank(rows) - sum(len(each) - self._rank(each) for each in turns)
-        return 3, same
+        rows = self._loops(turns, 3)
+        return 3, len(rows[0]) - self.rank(rows) - sum(len(each) - self.rank(each) for each in turns)
 
     def _shared(self, parts: Sequence[LegFactor]) -> dict[str, Turn]:
         """Random turns of the dimensions that are angles."""
@@ -204,12 +128,12 @@ class _PrimeField:
         names = [name for name in dimensions(parts) if name not in shared]
         lengths, slides, p = self._placed(parts, legs, names, robot.legs, orbit)
         screws = [self._screws(parts, leg, legs[leg], lengths, slides[leg], p) for leg in range(robot.legs)]
-        idle = sum(len(each) - self._rank(each) for each in screws)
+        idle = sum(len(each) - self.rank(each) for each in screws)
         dof, translations, stated = self._freedoms(screws, axes, idle)
         left = {}
         for driven in asked:
             some = [[s for j, s in enumerate(each) if j not in driven[i]] for i, each in enumerate(screws)]
-            own = sum(len(each) - self._rank(each) for each in some)
+            own = sum(len(each) - self.rank(each) for each in some)
             all_left, _, stated_left = self._freedoms(some, axes, own)
             left[driven] = all_left, stated_left
         return ModularRanks(self.p, dof, translations, stated, idle, left, orbit, {
@@ -225,33 +149,26 @@ class _PrimeField:
         turn = self.any_turn() if axes[2] else (1, 0)
         return self.matrix(RZ, turn)
 
+    def _turn(self, part: LegFactor, leg: int, shared: dict[str, Turn]) -> Turn:
+        """The turn of a part that is no joint: by a dimension, with a leg's sign, or by a number."""
+        c, s = shared[part.dimension] if part.dimension else self.turn_of(float(part.constant[leg]))
+        return c, s if part.signs is None or part.signs[leg] > 0 else -s % self.p
+
     def _turns(self, parts: Sequence[LegFactor], leg: int, shared: dict[str, Turn]) -> list[Matrix | int]:
         """The turns of a leg, constant ones multiplied together, with the numbers of joints that turn between them."""
         found: list[Matrix | int] = [self.matrix(RZ, (1, 0))]
         for part in parts:
             if part.kind == TURN:
-                R = self._constant(part.constant[leg])
+                R = self.constant(part.constant[leg])
             elif part.kind < TX and part.joint is not None:
                 found += [part.joint, self.matrix(RZ, (1, 0))]
                 continue
             elif part.kind < TX:
-                c, s = shared[part.dimension] if part.dimension else self.turn_of(float(part.constant[leg]))
-                R = self.matrix(part.kind, (c, s if part.signs is None or part.signs[leg] > 0 else -s % self.p))
+                R = self.matrix(part.kind, self._turn(part, leg, shared))
             else:
                 continue
             found[-1] = self.times(found[-1], R)  # type: ignore[arg-type]
         return found
-
-    def _constant(self, R: Any) -> Matrix:
-        """A constant turn, whose entries are sines and cosines of multiples of π/60, in the field."""
-        found = [[self._entry(float(x)) for x in row] for row in R]
-        if self.times(found, [list(row) for row in zip(*found, strict=True)]) != self.matrix(RZ, (1, 0)):
-            raise NotExact("a coupling's frame is no product of known turns")
-        return found
-
-    def _entry(self, x: float) -> int:
-        angle = math.acos(max(-1.0, min(1.0, x)))
-        return self.turn_of(round(angle / math.pi * 120) * math.pi / 120)[0]
 
     def _oriented(self, parts: Sequence[LegFactor], leg: int, shared: dict[str, Turn], target: Matrix | None
                   ) -> tuple[dict[int, Turn], Matrix]:
@@ -292,49 +209,21 @@ class _PrimeField:
         rest = [j for j in numbers if j not in chosen]
         return sorted([*chosen, *self.random.sample(rest, min(3 - len(chosen), len(rest)))])
 
-    def _transposed(self, A: Matrix) -> Matrix:
-        return [list(row) for row in zip(*A, strict=True)]
-
     def _solved(self, blocks: list[Matrix], target: Matrix) -> list[Turn]:
         """Turns θ of A Rz(θ₁) [M Rz(θ₂) [N Rz(θ₃)]] B = C."""
         A, B = blocks[0], blocks[-1]
-        D = self.times(self.times(self._transposed(A), target), self._transposed(B))
+        D = self.times(self.times(self.transposed(A), target), self.transposed(B))
         if len(blocks) == 2:
             return [(D[0][0], D[1][0])]
         Q, second = blocks[1], []
         if len(blocks) == 4:
             u, w = blocks[1][2], [row[2] for row in blocks[2]]
-            second = [self._mixed((u[0] * w[0] + u[1] * w[1]) % self.p, (u[1] * w[0] - u[0] * w[1]) % self.p,
+            second = [self.turn_with((u[0] * w[0] + u[1] * w[1]) % self.p, (u[1] * w[0] - u[0] * w[1]) % self.p,
                                   (D[2][2] - u[2] * w[2]) % self.p)]
             Q = self.times(self.times(Q, self.matrix(RZ, second[0])), blocks[2])
-        first = self._brought((Q[0][2], Q[1][2]), (D[0][2], D[1][2]))
-        last = self.times(self._transposed(self.times(self.matrix(RZ, first), Q)), D)
+        first = self.turn_between((Q[0][2], Q[1][2]), (D[0][2], D[1][2]))
+        last = self.times(self.transposed(self.times(self.matrix(RZ, first), Q)), D)
         return [first, *second, (last[0][0], last[1][0])]
-
-    def _mixed(self, a: int, b: int, c: int) -> Turn:
-        """A turn with a cos θ + b sin θ = c; any where that asks nothing."""
-        p = self.p
-        if a == b == 0:
-            if c:
-                raise NotExact("no turns with which a leg has the orientation")
-            return self.any_turn()
-        size = (a * a + b * b) % p
-        root = self.sqrt((size - c * c) % p) if size else None
-        if root is None:
-            raise NotExact("an orientation has no root in the field")
-        root *= self.random.choice((1, -1))
-        w = pow(size, -1, p)
-        return (a * c - b * root) * w % p, (b * c + a * root) * w % p
-
-    def _brought(self, start: Turn, end: Turn) -> Turn:
-        """The turn of a plane that brings one vector to another; any where both are zero."""
-        p, size = self.p, (start[0] ** 2 + start[1] ** 2) % self.p
-        if not size:
-            if any(start) or any(end):
-                raise NotExact("no turns with which a leg has the orientation")
-            return self.any_turn()
-        w = pow(size, -1, p)
-        return (start[0] * end[0] + start[1] * end[1]) * w % p, (start[0] * end[1] - start[1] * end[0]) * w % p
 
     def _columns(self, parts: Sequence[LegFactor], leg: int, shared: dict[str, Turn], joints: dict[int, Turn]
                  ) -> list[Any]:
@@ -343,15 +232,11 @@ class _PrimeField:
         for part in parts:
             if part.kind == TURN:
                 found.append(None)
-                R = self.times(R, self._constant(part.constant[leg]))
+                R = self.times(R, self.constant(part.constant[leg]))
                 continue
             found.append([row[part.kind % 3] for row in R])
             if part.kind < TX:
-                if part.joint is not None:
-                    turn = joints[part.joint]
-                else:
-                    c, s = shared[part.dimension] if part.dimension else self.turn_of(float(part.constant[leg]))
-                    turn = (c, s if part.signs is None or part.signs[leg] > 0 else -s % self.p)
+                turn = self._turn(part, leg, shared) if part.joint is None else joints[part.joint]
                 R = self.times(R, self.matrix(part.kind, turn))
         return found
 
@@ -374,8 +259,7 @@ class _PrimeField:
                 elif part.dimension:
                     at, sign = names.index(part.dimension), 0 if part.signs is None else int(part.signs[leg])
                 else:
-                    at, value = width - 1, Fraction(float(part.constant[leg])).limit_denominator(10**6)
-                    sign = value.numerator * pow(value.denominator, -1, self.p)
+                    at, sign = width - 1, self.number(float(part.constant[leg]))
                 for k in range(3):
                     block[k][at] = (block[k][at] + sign * axis[k]) % self.p
             for k in range(3):
@@ -415,37 +299,31 @@ class _PrimeField:
             elif part.dimension:
                 value = lengths[part.dimension] * (0 if part.signs is None else int(part.signs[leg]))
             else:
-                number = Fraction(float(part.constant[leg])).limit_denominator(10**6)
-                value = number.numerator * pow(number.denominator, -1, self.p)
+                value = self.number(float(part.constant[leg]))
             at = [(a + value * b) % self.p for a, b in zip(at, axis, strict=True)]
         if p is not None and at != p:
             raise NotExact("a leg is not closed")
         return found
 
-    def _rank(self, rows: list[list[int]]) -> int:
-        from flint import nmod_mat
-
-        if not rows:
-            return 0
-        return int(nmod_mat(len(rows), len(rows[0]), [x for row in rows for x in row], self.p).rank())
-
     def _freedoms(self, screws: list[list[list[int]]], axes: Any, idle: int) -> tuple[int, int, int]:
-        """PlatformFreedoms of the platform, those that are translations, those of the stated motion: unknown are all
-        rates and the twist V of the platform, J_i q̇_i − V = 0."""
-        width = sum(map(len, screws)) + 6
-        rows, start = [], 0
-        for each in screws:
-            for k in range(6):
-                row = [0] * width
-                row[start: start + len(each)] = [s[k] for s in each]
-                row[width - 6 + k] = self.p - 1
-                rows.append(row)
-            start += len(each)
+        """Freedoms of the platform, those that are translations, those of the stated motion."""
+        rows = self._loops(screws, 6)
+        width = len(rows[0])
 
         def nullity(still: list[int]) -> int:
             more = [[int(c == width - 3 + k) for c in range(width)] for k in still]
-            return width - self._rank(rows + more) - idle
+            return width - self.rank(rows + more) - idle
 
         return nullity([]), nullity([0, 1, 2]), nullity([k for k in range(3) if not axes[k]])
 
-
+    def _loops(self, screws: list[list[list[int]]], size: int) -> Matrix:
+        """The equations J_i q̇_i − V = 0 of the legs; unknown are all rates and the platform's V, of so many numbers."""
+        width, start, rows = sum(map(len, screws)) + size, 0, []
+        for each in screws:
+            for k in range(size):
+                row = [0] * width
+                row[start: start + len(each)] = [s[k] for s in each]
+                row[width - size + k] = self.p - 1
+                rows.append(row)
+            start += len(each)
+        return rows
