@@ -91,6 +91,23 @@ def test_missing_meshes_are_told_once_and_rods_drawn(tmp_path: Path, address: st
     assert (rods(found, "prox_1"), rods(found, "dist_2"), rods(found, "platform")) == (1, 1, 0)
 
 
+def test_links_that_a_merged_joint_swallows_are_told(tmp_path: Path):
+    """Two hinges that meet are a U in the normal form, which has no link between them to carry a shape."""
+    shape = '<visual><geometry><box size="0.1 0.1 0.1"/></geometry></visual>'
+    links = "".join(f'<link name="{name}">{shape}</link>' for name in ("base", "yoke", "arm", "hand"))
+    hinges = "".join(f'<joint name="{name}" type="continuous"><parent link="{one}"/><child link="{two}"/>'
+                     f'<origin xyz="{x} 0 0"/><axis xyz="{axis}"/></joint>' for name, one, two, x, axis in
+                     (("pan", "base", "yoke", 0, "0 0 1"), ("tilt", "yoke", "arm", 0, "0 1 0"),
+                      ("elbow", "arm", "hand", 1, "0 1 0")))
+    file = tmp_path / "head.urdf"
+    file.write_text(f'<robot name="head">{links}{hinges}<hrsynth serial="true"><platform link="hand"/></hrsynth>'
+                    '</robot>')
+    found = view(load(file))
+    assert "yoke" not in found.setting.mechanism.links
+    assert [note for note in found.notes if "merged" in note] == ["links inside merged joints are not drawn: yoke"]
+    assert len(meshed(found, "hand")) == 1
+
+
 def test_a_mesh_that_is_none_is_a_note(tmp_path: Path):
     (tmp_path / "part.stl").write_bytes(b"no mesh")
     found = with_visuals(tmp_path, prox_1=mesh("part.stl"))

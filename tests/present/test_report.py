@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import html
 import re
 from collections.abc import Iterator
 from functools import cache
 from importlib.resources import files
-from itertools import pairwise
+from itertools import pairwise, permutations
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +19,7 @@ from hrsynth.analysis.derive import Derivation, derive
 from hrsynth.cli import execute
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, PlaneNotMet
+from hrsynth.families.formations import formation
 from hrsynth.present.drawings import svg
 from hrsynth.present.report import figures, parts
 from hrsynth.present.report.answer import set_rows
@@ -143,7 +145,7 @@ def test_what_is_refused_is_one_sentence():
     page = read(made(*FAST)[1])
     told = [text_of(each) for each in page.xpath("//*[@class='refused']")]
     assert told == [
-        "The directions leave 1 of the platform's freedoms undetermined: a continuum of dimension 1.",
+        "The measurements leave 1 of the platform's freedoms undetermined: a continuum of dimension 1.",
         "There is no accuracy map. The error is infinite at every pose, the legs do not see translation along z."]
 
 
@@ -221,6 +223,20 @@ def test_letters_and_lines_of_drawings_stand_out():
     assert luminance(svg.MOTOR) > 2 * luminance(svg.VIRTUAL)
 
 
+@pytest.mark.parametrize(("pairs", "color"), [(list(permutations((1, 2, 3), 2)), "good"), ([(1, 2), (2, 3)], "bad")])
+def test_a_formation_is_as_good_in_the_table_as_in_the_headline(pairs: list[tuple[int, int]], color: str):
+    made = formation([(0, 0, 0), (1, 0.1, 0), (0.5, 0.9, 0.2)], pairs, bodies="position")
+    root = read(report(derive(made)))
+    (headline,) = root.xpath("//p[contains(@class, 'verdict')]")
+    assert headline.get("class") == f"verdict {color}"
+    cells = root.xpath("//table[@class='sets']//td[1]")
+    assert {text_of(cell).split()[0]: cell.get("class") for cell in cells} == {
+        word: f"tight {shown}" for word, shown in (("flexible", "bad"), ("rigid", "good"))
+        if word == "flexible" or color == "good"}
+    assert text_of(root.xpath("//table[@class='sets']//tr[2]/td[last()]")[0]).split()[1] == "trivial;"
+    assert "directions of the legs" not in text_of(root.xpath("//p[@class='lead']")[0])
+
+
 # ---- formulas
 
 
@@ -239,6 +255,20 @@ def test_formulas_are_mathml_without_old_elements_or_entities():
         assert {etree.QName(e).localname for e in root.iter()} <= known
         assert root.get("aria-label") == 'said "so"'
         assert set(re.findall(r"&(\w+);", text)) <= {"quot"}
+
+
+def test_products_keep_their_brackets():
+    """Three points seen of a Gough-Stewart platform: · binds sums and products no closer than in print."""
+    from hrsynth.constraints.vector_algebra import products, vector
+
+    dot, cross, _det = products()
+    (b1, b2, b3), (r1, r2, r3) = ([vector(f"{name}{i}") for i in (1, 2, 3)] for name in "Br")
+    for expression, printed in (
+            (dot(r1, b2 - b1) * dot(r2, b3 - b2) * dot(r3, b1 - b3)
+             - dot(r1, b1 - b3) * dot(r2, b2 - b1) * dot(r3, b3 - b2),
+             "(r1·(-B1+B2))(r2·(-B2+B3))(r3·(B1-B3))-(r1·(B1-B3))(r2·(-B1+B2))(r3·(-B2+B3))=0"),
+            (dot(b1, b2 - r1) ** 2 - dot(b1, cross(r1, b2)), "(B1·(B2-r1))2-B1·(r1×B2)=0")):
+        assert re.sub("<[^>]*>|\u2062", "", html.unescape(formula(expression, "said"))) == printed
 
 
 def test_names_are_set_as_in_print():

@@ -10,6 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.observed import ObservedRobot
+from ..errors import BadRequest
 from ..geometry.vectors import Array, inverse
 from ..progress import tell
 from ..simulation.camera import Camera, Cylinder, cylinders, facing, seen
@@ -47,6 +49,7 @@ def animation(found: Servo) -> bytes:
     from PIL import Image
 
     setting, configurations = found.setting, found.run.configurations
+    require_legs(setting)
     question = setting.samples.question
     stage = LegRenderer(setting.mechanism, _camera(found), question.reference,
                         cylinders(setting.mechanism, question.observations))
@@ -65,6 +68,14 @@ def animation(found: Servo) -> bytes:
     frames[0].save(stream, "GIF", save_all=True, append_images=[*frames[1:], *[frames[-1]] * PAUSE], loop=0,
                    duration=MILLISECONDS, optimize=True)
     return stream.getvalue()
+
+
+def require_legs(setting: ObservedRobot) -> None:
+    """Raise ``BadRequest`` where something else is observed than legs."""
+    for each in setting.observed:
+        if not each.by_segment:
+            raise BadRequest(f"{setting.robot.name}: an animation draws the legs that are watched",
+                             f"{each.kind} {each.leg}", "a picture (.png, .pdf, .svg), which draws all kinds")
 
 
 def captions(found: Servo, moments: list[int]) -> Iterator[str]:

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import csv
 import io
+import re
 from typing import Any
 
 import numpy as np
 
-from ..simulation.ending import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE, TIME, UNDECIDED
+from ..simulation.ending import ANTIPODAL, BOUNDARY, GOAL, MINIMUM, MODE, SIGHT, TIME, UNDECIDED
 from ..simulation.endings.basins import LETTERS, NOT_REACHED, BasinEnd, Basins, place_of
 from ..simulation.endings.flow import Flags, Places
 from ..tolerances import IN_PLANE
@@ -29,13 +30,16 @@ from .plots import (
 from .sketch import axis_label
 
 SHADES = {GOAL: (COLOURS[2], "#7FCEB9"), MODE: (COLOURS[0], COLOURS[5], "#B9DDF3"), ANTIPODAL: (COLOURS[3], "#E8C4D8"),
-          MINIMUM: (COLOURS[4], "#F5D48A"), BOUNDARY: (COLOURS[1], "#EFB48D"), TIME: ("0.3",), UNDECIDED: ("0.5",)}
+          MINIMUM: (COLOURS[4], "#F5D48A"), BOUNDARY: (COLOURS[1], "#EFB48D"), SIGHT: ("#6B4A2B",), TIME: ("0.3",),
+          UNDECIDED: ("0.5",)}
 """Colours of the ends of each kind, the largest first."""
-MARKS = {GOAL: "*", MODE: "o", ANTIPODAL: "X", MINIMUM: "v", BOUNDARY: "s", UNDECIDED: "P", TIME: "d"}
+MARKS = {GOAL: "*", MODE: "o", ANTIPODAL: "X", MINIMUM: "v", BOUNDARY: "s", SIGHT: "^", UNDECIDED: "P", TIME: "d"}
 LEAST_MAP = 2.4
 """The least width (inches) of one of several maps."""
 ROOM = 3.0
 """Cells from the border of a basin at which its letter has room."""
+SEEN, RING = 0.05, 26
+"""Part of a map's width below which what is certified is not seen; the diameter (points) of the ring about it."""
 DAMPED: dict[str, Any] = {"facecolor": "none", "edgecolor": "0.25", "hatch": "....", "linewidth": 0.0}
 """How starts are drawn whose runs come to a singularity."""
 
@@ -58,29 +62,36 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
     from matplotlib.patheffects import Normal, Stroke
 
     figure, layers = (_strip if found.grid.ndim == 1 else _maps)(found, paper)
-    shades, grid = colours(found.ends), found.grid
+    shades, grid, larger, beside = colours(found.ends), found.grid, False, False
     for place, plane, cells, damped, level in layers:
         _layer(place, plane, cells, damped, shades)
-        if plane is not None:
-            _ends(place, plane, found, level)
-            _certified(place, plane, found, level)
+        if plane is None:
+            beside |= _ends_on_line(place, found)
+        else:
+            beside |= _ends(place, plane, found, level)
+            larger |= _certified(place, plane, found, level)
             plane.finish(place, plane.x, plane.y)
     entries = [Patch(facecolor=shade, label=_told(letter, each))
                for letter, each, shade in zip(LETTERS, found.ends, shades, strict=False)]
-    if found.region is not None and grid.ndim == 2:
-        entries.append(entry("certified: every start inside ends at the goal", color="white", linewidth=1.6,
-                             path_effects=[Stroke(linewidth=3.4, foreground="black"), Normal()]))
+    if found.region is not None and found.certified is not None and grid.ndim == 2:
+        told = re.sub(" (within|of) ", r"\n\1 ", found.certified.words) + ("\n(drawn larger)" if larger else "")
+        entries.append(entry(f"certified: every start inside\nends at the goal, {told}", color="white",
+                             linewidth=1.6, path_effects=[Stroke(linewidth=3.4, foreground="black"), Normal()]))
     if found.damped.any():
         entries.append(Patch(label="the run comes to a singularity", **DAMPED))
     if (found.cells == NOT_REACHED).any():
         entries.append(missing_entry())
+    kinds = dict.fromkeys(each.ending.name for each in found.ends if each.X is not None)
+    entries += [entry(f"{kind}: where the runs end", linestyle="", marker=MARKS[kind], color="black") for kind in kinds]
+    if beside:
+        others = " or ".join("φ" if name == "phi" else name for name in _held(found, 0.0))
+        entries.append(entry(f"hollow: at another {others}", linestyle="", marker="o", markerfacecolor="none",
+                             color="black"))
     if grid.ndim > 1:
-        entries += [entry("an end in this plane", linestyle="", marker="o", color="black"),
-                    entry("an end beside this plane", linestyle="", marker="o", markerfacecolor="none", color="black")]
         entries += MapPlane.of(grid.axes, found.setting.motion, 0.4, 1.6).robot(figure, found.setting.everything.start)
     plots.legend(figure, entries, paper)
     heading(figure, f"{found.setting.robot.name}, legs {', '.join(found.setting.labels)} observed: where each start "
-            f"ends\ngoal {plots.pose_words(found.goal)}{'; starts: ' if grid.fixed else ''}", grid.fixed, "")
+            f"ends\ngoal {plots.pose_words(found.goal)}", grid.fixed, "; starts: ")
     return printed(figure, paper)
 
 
@@ -95,12 +106,23 @@ def _strip(found: Basins, paper: Paper) -> tuple[Any, list[Any]]:
     figure, (place,) = panels(1, 1, 7.0, 2.4, paper)
     edges = cell_edges(tick_values(name, values))
     place.set(xlabel=axis_label(name), xlim=(edges[0], edges[-1]), ylim=(0, 1), yticks=[])
-    for letter, each, shade in zip(LETTERS, found.ends, colours(found.ends), strict=False):
-        here = None if each.X is None else float(place_of(found.setting.motion, each.X, (name,))[0])
-        if here is not None and edges[0] <= here <= edges[-1]:
-            place.plot(here, 0.5, MARKS[each.ending.name], color=shade, markeredgecolor="black", markersize=11,
-                       clip_on=False, label=letter)
     return figure, [(place, None, found.cells, found.damped, None)]
+
+
+def _ends_on_line(place: Any, found: Basins) -> bool:
+    """The ends where they lie, those of the line filled: whether one is not of the line."""
+    (name,) = found.grid.names
+    (low, high), beside = place.get_xlim(), False
+    for letter, each in zip(LETTERS, found.ends, strict=False):
+        here = None if each.X is None else float(tick_values(name, place_of(found.setting.motion, each.X, (name,)))[0])
+        if here is not None and low <= here <= high:
+            inside = _inside(found, each, None)
+            place.plot(here, 0.5, MARKS[each.ending.name], markeredgecolor="black", markersize=11, clip_on=False,
+                       markerfacecolor="black" if inside else "none")
+            place.annotate(letter, (here, 0.5), (0, 13), textcoords="offset points", ha="center",
+                           path_effects=outlined())
+            beside |= not inside
+    return beside
 
 
 def _maps(found: Basins, paper: Paper) -> tuple[Any, list[Any]]:
@@ -118,6 +140,7 @@ def _maps(found: Basins, paper: Paper) -> tuple[Any, list[Any]]:
         place.set_visible(k < len(ps))
         if k < len(ps):
             plots.outer(place, k, columns, len(ps))
+            place.locator_params(axis="x", nbins=8 if columns == 1 else 4)
             if pname:
                 layer_title(place, pname, tick_values(pname, ps)[k])
             layers.append((place, plane, cells[..., k], damped[..., k], float(ps[k]) if pname else None))
@@ -136,6 +159,8 @@ def _layer(place: Any, plane: MapPlane | None, cells: Places, damped: Flags, sha
         edges = np.linspace(low, high, len(cells) + 1)
         place.axvspan(low, high, zorder=0, linewidth=0, **plots.MISSING)
         place.pcolormesh(edges, [0, 1], np.ma.masked_invalid(values[None]), **style)
+        if damped.any():
+            place.pcolor(edges, [0, 1], np.ma.masked_where(~damped, damped.astype(float))[None], **DAMPED)
         return
     plane.cells(place, values, **style)
     if damped.any():
@@ -154,14 +179,36 @@ def _layer(place: Any, plane: MapPlane | None, cells: Places, damped: Flags, sha
                        path_effects=outlined())
 
 
-def _certified(place: Any, plane: MapPlane, found: Basins, level: float | None) -> None:
-    """The border of what is certified, in a plane."""
+def _certified(place: Any, plane: MapPlane, found: Basins, level: float | None) -> bool:
+    """The border of what is certified, in a plane; a ring about it where it is too small to be seen: whether that is
+    so."""
     if found.region is None or level is not None:
-        return
+        return False
     near, inside = found.region
     u, v = plane.at(*np.meshgrid(*(tick_values(name, values) for name, values in near.axes), indexing="ij"))
     for colour, width in (("black", 3.4), ("white", 1.6)):
         place.contour(u, v, inside.astype(float), levels=[0.5], colors=[colour], linewidths=[width], zorder=4)
+    small = max(np.ptp(u[inside]) / np.ptp(plane.at(plane.x, plane.y[0])[0]),
+                np.ptp(v[inside]) / np.ptp(plane.at(plane.x[0], plane.y)[1])) < SEEN
+    if small:
+        for colour, width in (("black", 3.4), ("white", 1.6)):
+            place.plot(u[inside].mean(), v[inside].mean(), "o", markersize=RING, markerfacecolor="none",
+                       markeredgecolor=colour, markeredgewidth=width, zorder=4)
+    return bool(small)
+
+
+def _inside(found: Basins, end: BasinEnd, level: float | None) -> bool:
+    """Whether an end is one of the poses of a plane or line; ``level`` is the third part's value of one of a box."""
+    assert end.X is not None
+    held = _held(found, level)
+    away = np.abs(place_of(found.setting.motion, end.X, tuple(held)) - np.array(list(held.values())))
+    return bool(np.all(away <= IN_PLANE * found.target.twin.length))
+
+
+def _held(found: Basins, level: float | None) -> dict[str, float]:
+    """The parts of a pose that all poses of a plane or line share, with their values."""
+    held = {name: values[0] for name, values in found.grid.fixed.given.items() if name != "rpy"}
+    return held if level is None else {**held, **dict.fromkeys(found.grid.names[2:], level)}
 
 
 def outlined() -> list[Any]:
@@ -171,9 +218,9 @@ def outlined() -> list[Any]:
     return [Stroke(linewidth=2.5, foreground="white"), Normal()]
 
 
-def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> None:
-    """The ends where they lie, those of the plane filled."""
-    motion, length = found.setting.motion, found.target.twin.length
+def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> bool:
+    """The ends where they lie, those of the plane filled: whether one is not of the plane."""
+    motion, beside = found.setting.motion, False
     spots: list[tuple[float, float, str]] = []
     for letter, each in zip(LETTERS, found.ends, strict=False):
         if each.X is None:
@@ -181,18 +228,16 @@ def _ends(place: Any, plane: MapPlane, found: Basins, level: float | None) -> No
         u, v = plane.spots(place_of(motion, each.X, plane.names)[None])
         if not (plane.x[0] <= u[0] <= plane.x[-1] and plane.y[0] <= v[0] <= plane.y[-1]):
             continue
-        held = {name: values[0] for name, values in found.grid.fixed.given.items() if name != "rpy"}
-        if level is not None:
-            held[found.grid.names[2]] = level
-        away = np.abs(place_of(motion, each.X, tuple(held)) - np.array(list(held.values())))
-        inside = bool(np.all(away <= IN_PLANE * length)) if held else True
+        inside = _inside(found, each, level)
         place.plot(u, v, MARKS[each.ending.name], markersize=14 if each.ending.name == GOAL else 8, zorder=5,
                    markerfacecolor="black" if inside else "none", markeredgecolor="black", markeredgewidth=1.2)
         spots.append((float(u[0]), float(v[0]), letter))
+        beside |= not inside
     for k, (x, y, letter) in enumerate(spots):
         turn = 2 * np.pi * (k + 0.5) / len(spots)
         place.annotate(letter, (x, y), (13 * np.cos(turn), 13 * np.sin(turn)), textcoords="offset points", fontsize=9,
                        ha="center", va="center", zorder=6, path_effects=outlined())
+    return beside
 
 
 def table(found: Basins) -> bytes:

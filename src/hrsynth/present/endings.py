@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..kinematics.configuration import ClosedConfiguration
-from ..simulation.endings.endings import CRITICAL, STABLE, Endings, RestPoint
+from ..simulation.endings.rests import CRITICAL, STABLE, Endings, RestPoint
 from .paper import PNG, Paper, legend_within, printed, settled
 from .plots import COLOURS, empty_figure, entry, pose_words, styled
 from .skeleton import legs_of, outline
@@ -24,6 +24,7 @@ LOOKS: dict[str, dict[str, Any]] = {
     "antipodal": {"color": COLOURS[3], "marker": "s", "markersize": 8},
     "critical": {"color": COLOURS[1], "marker": "o", "markersize": 8},
     "other": {"color": "0.6", "marker": "x", "markersize": 5}}
+BASE: dict[str, Any] = {"color": "black", "marker": "s", "markersize": 4}
 WORDS = {"goal": "the goal", "mode": "another mode", "antipodal": "antipodal pose",
          "critical": "pose with an error that attracts", "other": "rest that does not attract"}
 
@@ -49,7 +50,10 @@ def picture(found: Endings, paper: Paper = PNG) -> bytes:
                             f"{beyond}", va="top")
     above = settled(figure, title)
     kinds = [kind for kind in WORDS if any(look(each) == kind for each, _ in near)]
-    entries = [entry("robot at the goal", color="0.72"), *(entry(WORDS[k], linestyle="", **LOOKS[k]) for k in kinds)]
+    entries = [entry("robot at the goal", color="0.72"), entry("joints of the base", linestyle="", **BASE),
+               *(entry(WORDS[k], linestyle="", **LOOKS[k]) for k in kinds)]
+    if shapes:
+        entries.append(entry("platform where it attracts (in its colour)", color="black", linewidth=1.6))
     low = legend_within(figure, entries, figure.get_figwidth(), loc="lower center")
     wide, tall = figure.get_figwidth(), figure.get_figheight()
     box = (SCALES / wide, (low + SCALES) / tall, 1 - (SCALES + EDGE) / wide, 1 - (low + SCALES + above + EDGE) / tall)
@@ -63,7 +67,7 @@ def picture(found: Endings, paper: Paper = PNG) -> bytes:
     for kind in reversed(kinds):
         points = np.array([p for each, p in near if look(each) == kind])
         sketch.stroke(place, points, linestyle="", zorder=8 if kind != "other" else 4, **LOOKS[kind])
-    sketch.stroke(place, ground, color="black", marker="s", markersize=4, linestyle="", zorder=6)
+    sketch.stroke(place, ground, linestyle="", zorder=6, **BASE)
     return printed(figure, paper)
 
 

@@ -215,9 +215,10 @@ def _drawn_locus(place: Any, plane: MapPlane, field: SingularityMap, name: str) 
 
 
 def _boundary(place: Any, plane: MapPlane, drawn: Locus) -> list[Any]:
-    """The reached poses at the border, those near a Type 1 singularity in orange; what the legend says of them."""
+    """The reached poses next to others that are not, those near a Type 1 singularity in orange; what the legend says.
+    """
     reached = np.isfinite(drawn.hidden.type2)
-    padded = np.pad(reached, 1)
+    padded = np.pad(reached, 1, mode="edge")
     inside = padded[:-2, 1:-1] & padded[2:, 1:-1] & padded[1:-1, :-2] & padded[1:-1, 2:]
     border = reached & ~inside
     near = np.zeros_like(reached)

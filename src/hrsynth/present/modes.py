@@ -173,7 +173,8 @@ def _robot(sketch: Sketch, place: Any, drawn: ModesScene, each: Placed, k: int) 
 def _heading(whole: Any, found: AssemblyModes, drawn: ModesScene) -> float:
     """Write the title; its height (inches)."""
     setting, count = found.setting, found.found
-    held = f"directions of legs {', '.join(setting.labels)}" if found.kind == "hidden" else "motor coordinates"
+    what = "directions of legs" if all(o.by_segment for o in setting.observed) else "values of"
+    held = f"{what} {', '.join(setting.labels)}" if found.kind == "hidden" else "motor coordinates"
     many = found.count + ("" if count.complete else ", not proved to be all")
     many += f"; {len(found.near)} near" if found.near else ""
     many += f"; the first {MOST} drawn as robots" if len(drawn.placed) > MOST else ""

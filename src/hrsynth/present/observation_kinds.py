@@ -16,11 +16,12 @@ AT = Sighting(np.zeros(3), np.array([0, 0, 1.0]), np.array([0.3, 0.2, 1.0]), uni
 
 def table() -> str:
     """The Markdown table of all kinds, as they say it themselves."""
-    lines = ["| kind | measured | attributes | numbers | virtual chain | held, it transmits |",
-             "| --- | --- | --- | --- | --- | --- |"]
+    lines = ["| kind | measured | attributes | numbers | virtual chain | held, it transmits | error in a servo loop |",
+             "| --- | --- | --- | --- | --- | --- | --- |"]
     for word, kind in kinds().items():
         needs = ", ".join(f"`{name.rstrip('?')}`{' (optional)' * name.endswith('?')}" for name in kind.needs)
-        cells = (f"`{word}`", kind.words, needs, str(kind.rank), chain_word(word), kind.locked)  # type: ignore[attr-defined]
+        cells = (f"`{word}`", kind.words, needs, str(kind.rank), chain_word(word), kind.locked,  # type: ignore[attr-defined]
+                 kind.fed_back)
         lines.append("| " + " | ".join(each.replace("|", "\\|") for each in cells) + " |")
     return "\n".join(lines) + "\n"
 

@@ -60,6 +60,8 @@ class File:
     """Whether it is a figure, of which width and font can be asked for."""
     installed: tuple[str, str] | None = None
     """An ending, and what raises ``MissingExtra`` where a library for it is missing."""
+    limited: tuple[str, str] | None = None
+    """An ending, and what raises ``BadRequest`` for an observed robot that cannot be drawn so."""
     plotted: tuple[str, ...] = (".png", ".svg", ".pdf")
     """The endings that are drawn with matplotlib."""
 
@@ -88,6 +90,14 @@ class File:
         if self.installed is not None and ending == self.installed[0]:
             function(self.installed[1])()
         require_folder(path)
+
+    def require_drawable(self, path: str | None, robot: Any, asked: Asked) -> None:
+        """Raise ``BadRequest`` where what is observed of a robot cannot be drawn so: before long work as well."""
+        if path is not None and self.limited is not None and Path(path).suffix.lower() == self.limited[0]:
+            from ..analysis.observed import ObservedRobot
+
+            watched = {name: asked[name] for name in ("observe", "camera", "see", "seed") if name in asked}
+            function(self.limited[1])(ObservedRobot.of(robot, **watched))
 
     def told(self, path: str) -> str:
         """The sentence that tells where it was written."""
@@ -217,7 +227,8 @@ OUTPUTS = {
         File("cannot draw the run", {**figures("runs:picture"), ".gif": "animations:animation"},
              "The picture of the run", "Draw the run: curves (run.png, .pdf, .svg) or an animation (run.gif).",
              allowed=".png, .pdf, .svg (curves) or .gif (camera view)", drawn=True,
-             installed=(".gif", ".simulation.pictures:drawing"), plotted=(*FIGURES, ".gif")),)),
+             installed=(".gif", ".simulation.pictures:drawing"),
+             limited=(".gif", "animations:require_legs"), plotted=(*FIGURES, ".gif")),)),
     "singular": Outputs("text.poses:singularity", (
         File("cannot draw the locus", figures("maps:locus_map"), "The locus", "Draw the locus: locus.png, .pdf, .svg.",
              computed="maps:locus", takes=("plane", "steps"), record="locus", drawn=True),)),

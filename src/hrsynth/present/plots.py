@@ -163,7 +163,10 @@ class MapPlane:
         if not set(self.names) <= set("xyz"):
             return []
         platform = at.twin.mechanism.platform
-        strokes = [*legs_of(at, (platform,)), outline(at.twin.mechanism, platform, at.pose(platform))]
+        outer = outline(at.twin.mechanism, platform, at.pose(platform))
+        strokes = [each for each in (*legs_of(at, (platform,)), outer) if np.ptp(each, axis=0).any()]
+        if not strokes:
+            return []
         for place in figure.axes:
             if place.get_visible() and place.get_label() != "<colorbar>":
                 drawn = LineCollection([stroke @ self.across.T for stroke in strokes], zorder=1.5, **ROBOT)

@@ -3,13 +3,14 @@ far a singularity is (MMT Figs. 22-29)."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
 
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
+from ..mechanism.sights import CameraObservation, NamedCamera
 from ..simulation.result import Servo
 from ..simulation.track import TYPE_2
 from ..tolerances import REST_OF_RUN, UNMOVED
@@ -17,6 +18,7 @@ from .paper import PNG, Paper, legend_within, printed, settled, wrap
 from .plots import COLOURS, empty_figure, entry, pose_words, styled
 from .skeleton import legs_of, outline
 from .sketch import Box, Sketch
+from .view.sights import REACH, eyes, half_picture
 from .view.view import plane_normal
 
 STYLES = ("solid", "dashed", "dashdot", "dotted", "solid", "dashed")
@@ -29,10 +31,15 @@ SHARE, HSPACE = 0.56, 0.18
 START, END, GOAL = ("0.72", "solid"), (COLOURS[1], "solid"), (COLOURS[2], (0, (4, 2)))
 """Colour and stroke of the robot at these."""
 BASE: dict[str, Any] = {"color": "black", "marker": "s", "markersize": 4, "linestyle": ""}
+LONG_NAME = 8
+"""Letters of a name from which on a legend is printed small."""
+PICTURE = 2.2
+"""Height of a camera's picture over that of a curve."""
 LEAST_TURN = 0.01
 """Turns below this (degrees) are not drawn."""
 ENDS = {"goal": "the goal", "mode": "another assembly mode", "antipodal": "an antipodal pose",
-        "local minimum": "a local minimum", "boundary": "a boundary of the workspace", "time": "the end of its time",
+        "local minimum": "a local minimum", "boundary": "a boundary of the workspace",
+        "lost from sight": "a place from which a camera does not see all", "time": "the end of its time",
         "undecided": "a place that is not decided"}
 """Endings in words."""
 
@@ -43,11 +50,15 @@ def picture(found: Servo, paper: Paper = PNG) -> bytes:
     panels = list(_panels(found))
     figure = empty_figure(paper.wide(WIDE), TALL)
     legs = ", ".join(found.setting.labels)
-    title = figure.suptitle(f"{found.setting.robot.name}, legs {legs} observed: ended at {ENDS[found.ended]}\n"
+    word = "legs " if all(each.by_segment for each in found.setting.observed) else ""
+    title = figure.suptitle(f"{found.setting.robot.name}, {word}{legs} observed: ended at {ENDS[found.ended]}\n"
                             f"from {pose_words(found.start)} to {pose_words(found.goal)}", va="top")
     x, y, wide, tall = _robots(figure, found, settled(figure, title), len(panels))
     title.set_y(1 - GAP / 2 / figure.get_figheight())
-    places = figure.add_gridspec(len(panels), 1, left=x, bottom=y, right=x + wide, top=y + tall,
+    pictures = _pictures(found)
+    high = PICTURE * len(panels) / (len(panels) + PICTURE * len(pictures)) if pictures else 0.0
+    share = tall * high * len(pictures) / len(panels) if pictures else 0.0
+    places = figure.add_gridspec(len(panels), 1, left=x, bottom=y + share, right=x + wide, top=y + tall,
                                  hspace=HSPACE).subplots(sharex=True)
     times = found.run.times
     for place, (label, curves, bottom) in zip(np.atleast_1d(places), panels, strict=True):
@@ -59,11 +70,61 @@ def picture(found: Servo, paper: Paper = PNG) -> bytes:
         wrap(place.set_ylabel(label, fontsize=9), place.get_window_extent().height / figure.dpi)
         place.set(xlim=(0, until(found) or 1.0), **({} if bottom is None else {"ylim": (bottom, None)}))
         if len(curves) > 1 or curves[0][0]:
-            place.legend(loc="center left", bbox_to_anchor=(1.01, 0.5))
+            place.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), **_small(curves))
     still = "" if until(found) >= times[-1] else f"; nearly still until {times[-1]:.3g} s"
     place.set_xlabel(f"time (s){still}")
+    for number, (eye, half) in enumerate(pictures):
+        part = share / len(pictures)
+        side = figure.add_axes((x, y + number * part, wide, part - BELOW * 1.3 / figure.get_figheight()))
+        _picture(side, found, eye, half)
     figure.align_ylabels()
     return printed(figure, paper)
+
+
+def _pictures(found: Servo) -> list[tuple[NamedCamera, Array]]:
+    """The cameras that see something, and half of their pictures where these have a size."""
+    every = eyes(found.setting)
+    seen = [(eye, half_picture(eye)) for eye in every]
+    return [(eye, half) for eye, half in seen if _seen_by(found, eye)]
+
+
+def _seen_by(found: Servo, eye: NamedCamera) -> list[CameraObservation]:
+    return [o for o in found.setting.observed if isinstance(o, CameraObservation) and o.image(
+        *_poses(found, o, found.target), REACH * found.target.twin.length) and (
+            o.camera.name if o.camera else found.setting.mechanism.reference) == eye.name]
+
+
+def _poses(found: Servo, seen: CameraObservation, at: ClosedConfiguration) -> tuple[Array, Array]:
+    return at.pose(seen.seen_from or found.setting.mechanism.reference), at.pose(seen.link)
+
+
+def _picture(place: Any, found: Servo, eye: NamedCamera, half: Array) -> None:
+    """What the camera sees: the ways of the middles of what is seen, and all of it at start, end and goal."""
+    size = REACH * found.target.twin.length
+    states = [(found.run.configurations[0], START), (found.settled, END), (found.target, GOAL)]
+    for number, seen in enumerate(_seen_by(found, eye)):
+        ways = [seen.image(*_poses(found, seen, at), size) for at in found.run.configurations]
+        middles = np.array([each[0][:-1].mean(axis=0) if len(each[0]) > 2 else each[0].mean(axis=0)
+                            for each in ways if each])
+        place.plot(*middles.T, color=COLOURS[number % 6], linestyle=STYLES[number % 6], label=seen.leg)
+        for at, (colour, style) in states:
+            for stroke in seen.image(*_poses(found, seen, at), size):
+                marker = {"marker": "o", "markersize": 5, "markerfacecolor": "none"} if len(stroke) == 1 else {}
+                place.plot(*stroke.T, color=colour, linestyle=style, **marker)
+    sized = eye.focal and eye.width and eye.height
+    if sized:
+        place.set(xlim=(-half[0], half[0]), ylim=(half[1], -half[1]))
+    else:
+        place.invert_yaxis()
+    place.set_aspect("equal", adjustable="box" if sized else "datalim")
+    place.set_xlabel(f"picture of {eye.name}: x = X/Z", fontsize=9)
+    place.set_ylabel("y = Y/Z", fontsize=9)
+    place.legend(loc="center left", bbox_to_anchor=(1.01, 0.5), **_small([(o.leg,) for o in _seen_by(found, eye)]))
+
+
+def _small(named: Sequence[tuple[Any, ...]]) -> dict[str, Any]:
+    """What makes a legend narrow that has long names."""
+    return {"fontsize": 7, "handlelength": 1.2} if any(len(each[0]) > LONG_NAME for each in named) else {}
 
 
 def _layout(figure: Any, entries: list[Any], above: float, panels: int) -> tuple[Box, Box]:
@@ -95,8 +156,9 @@ Curve = tuple[str, Array, str, str]
 
 def _panels(found: Servo) -> Iterator[tuple[str, list[Curve], float | None]]:
     """What is drawn against time: its name, its curves, the lower end of its scale."""
-    yield r"error $\|e_i\|$", [(f"leg {observation.leg}", found.errors[:, i], COLOURS[i % 6], STYLES[i % 6])
-                               for i, observation in enumerate(found.setting.observed)], 0.0
+    names = [f"leg {each.leg}" if each.by_segment else each.leg for each in found.setting.observed]
+    yield r"error $\|e_i\|$", [(name, found.errors[:, i], COLOURS[i % 6], STYLES[i % 6])
+                               for i, name in enumerate(names)], 0.0
     path, goal = found.way, found.goal_position
     moved = [i for i in range(3) if np.ptp(path[:, i]) > UNMOVED or abs(path[-1, i] - goal[i]) > UNMOVED] or [0]
     yield "position − goal (m)", [("xyz"[i], path[:, i] - goal[i], COLOURS[i], STYLES[i]) for i in moved], None
@@ -124,9 +186,10 @@ def _robots(figure: Any, found: Servo, above: float, panels: int) -> Box:
     path = found.way
     every = np.vstack([ground, path, *(stroke for each, _ in drawn for stroke, _ in each)])
     sketch = sketch_of(found, every)
-    entries = [entry("robot at the start", color=START[0]), entry("robot where it ended", color=END[0]),
-               entry("robot at the goal", color=GOAL[0], linestyle="dashed"),
-               entry("way of the platform", color=COLOURS[0]), entry("joints of the base", **BASE)]
+    entries = [entry("way of the platform", color=COLOURS[0]), entry("joints of the base", **BASE)]
+    if any(np.ptp(stroke, axis=0).any() for each, _ in drawn for stroke, _ in each):
+        entries[:0] = [entry("robot at the start", color=START[0]), entry("robot where it ended", color=END[0]),
+                       entry("robot at the goal", color=GOAL[0], linestyle="dashed")]
     inside = others[np.all((others >= every.min(axis=0) - 1e-9) & (others <= every.max(axis=0) + 1e-9), axis=1)]
     marks = [(inside, "D", COLOURS[3], "other modes of the goal"), (path[-1:], "o", COLOURS[1], "")]
     marks += [(path[each.place][None], "x", "crimson", "crossing a singularity" if each.kind == TYPE_2 else

@@ -88,7 +88,7 @@ class _Plot:
 def scene(found: AssemblyModes) -> ModesScene:
     """What a picture of the modes shows; they must not be a continuum."""
     confined = found.confined
-    plot = _platform(found) if confined is None else _PLOTS[confined.motion](found, confined)
+    plot = _platform(found) if confined is None or confined.back else _PLOTS[confined.motion](found, confined)
     listed = [(str(k), mode) for k, mode in enumerate(found.modes, 1)]
     listed += [(f"near {k}", mode) for k, mode in enumerate(found.near, 1)]
     placed = tuple(_placed(found, plot, label, mode) for label, mode in listed)

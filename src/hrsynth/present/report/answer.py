@@ -12,7 +12,7 @@ from ...analysis.derive import Derivation
 from ...analysis.verdict import Verdict
 from ...geometry.vectors import Array
 from ..text.poses import all_of
-from ..text.robots import exact_cell
+from ..text.robots import exact_cell, unseen
 from .parts import CONE, Parts, Refused
 
 
@@ -35,6 +35,10 @@ def answer(found: Derivation, told: Parts) -> Iterator[str]:
 def seen(found: Derivation) -> str:
     """How many freedoms are seen, and what is not."""
     verdict, watched = found.verdict, _legs(found.setting.labels)
+    if (bodies := verdict.formation) is not None:
+        rest = "".join(f"; {each.name}" for each in bodies.flexes) or "; nothing else"
+        return (f"Watching {watched} shows {verdict.rank} of the bodies' {found.dof} freedoms. Not seen: "
+                f"{', '.join(bodies.trivial) or 'no trivial motion'}{rest}.")
     text = f"Watching {watched} shows {verdict.rank} of the platform's {found.dof} freedoms"
     return text + (": not " + "; ".join(each.name for each in verdict.lost) if verdict.lost else "") + "."
 
@@ -67,13 +71,18 @@ def _legs(labels: tuple[str, ...] | list[str]) -> str:
     return f"leg{'s' * (len(labels) > 1)} {', '.join(labels)}"
 
 
+def good(found: Verdict) -> bool:
+    """Whether all is seen that can be: of a formation all but its trivial motions."""
+    return not found.lost and (found.rank == found.dof if found.formation is None else not found.formation.flexes)
+
+
 def set_rows(found: Legs, most: int) -> Iterator[tuple[tuple[str, ...], Verdict, str, bool]]:
     """The sets of the table, ``most`` at most, those of one size that show all alike in one row; each with its verdict,
     what is known exactly, and whether it is among the smallest."""
     alike: dict[object, tuple[list[str], Verdict, str, bool]] = {}
     for each, exact in zip(found.sets[:most], found.exact, strict=False):
         cell, smallest = exact_cell(exact, each.rank), each.legs in found.minimal
-        key = each.legs if each.lost else (len(each.legs), each.verdict, each.rank, cell, smallest)
+        key = each.legs if unseen(each) else (len(each.legs), each.verdict, each.rank, cell, smallest)
         alike.setdefault(key, ([], each, cell, smallest))[0].append(", ".join(each.legs))
     for sets, each, cell, smallest in alike.values():
         yield tuple(sets), each, cell, smallest

@@ -22,6 +22,7 @@ _FORMULA = ("I", "T", "x", "e")
 def _printer() -> Any:
     """SymPy's printer of presentation MathML, taught the products of vectors."""
     from sympy.printing.mathml import MathMLPresentationPrinter
+    from sympy.printing.precedence import PRECEDENCE
 
     class Printer(MathMLPresentationPrinter):
         def _print_dot(self, expression: Any) -> Any:
@@ -46,8 +47,13 @@ def _printer() -> Any:
                     mark = self.dom.createElement("mo")
                     mark.appendChild(self.dom.createTextNode(sign))
                     row.appendChild(mark)
-                row.appendChild(self._print(each))
+                row.appendChild(self.parenthesize(each, PRECEDENCE["Mul"], strict=True))
             return row
+
+        def parenthesize(self, item: Any, level: int, strict: bool = False) -> Any:
+            """As SymPy does, which holds every function to be bracketed already; the signs · and × are not."""
+            product = type(item).__name__ in ("dot", "cross")
+            return super().parenthesize(item, PRECEDENCE["Atom"] if product else level, strict and not product)
 
     return Printer()
 

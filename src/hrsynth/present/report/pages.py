@@ -14,9 +14,9 @@ from ..maps import error_map
 from ..modes import picture, why_undrawn
 from ..portrait import Portrait
 from ..text.poses import all_of, at_mode, proved
-from ..text.robots import exact_words
+from ..text.robots import exact_words, unseen
 from ..text.runs import field_rows
-from .answer import answer, set_rows
+from .answer import answer, good, set_rows
 from .figures import SOURCES, actuators, pairs, step_figures
 from .formulas import barred, collected, formula, indexed
 from .parts import CONE, Parts, Refused, asked, parts
@@ -67,8 +67,8 @@ def _template() -> Any:
     environment.tests["refused"] = lambda part: isinstance(part, Refused)
     environment.globals.update(
         all_of=all_of, at_mode=at_mode, collected=collected, exact_words=exact_words,
-        field_rows=field_rows, formula=formula, most=LARGEST_LIST, proved=proved, rank_gap=RANK_GAP,
-        same_relation=SAME_RELATION, sources=SOURCES, version=__version__, set_rows=set_rows)
+        field_rows=field_rows, formula=formula, good=good, most=LARGEST_LIST, proved=proved, rank_gap=RANK_GAP,
+        same_relation=SAME_RELATION, sources=SOURCES, version=__version__, set_rows=set_rows, unseen=unseen)
     return environment.get_template("page.html.j2")
 
 

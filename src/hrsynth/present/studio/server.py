@@ -79,6 +79,9 @@ def view_server(found: View, port: int = 0, open_: bool = True, source: dict[str
     Raises as :func:`studio`."""
     from ...description.overrides import names
 
+    if not all(seen.by_segment for seen in found.setting.observed):
+        raise BadRequest("a view that is served knows directions of segments only", ", ".join(found.setting.labels),
+                         "a page that needs no server (--static view.html, View.save)")
     robot = found.setting.robot
     if source is None or "/" in (source["keyframe"] or ""):  # the page names no files
         given = _as_read(robot)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 from .tables import GAP, Rows, camera, head, listing, named, table
 
 if TYPE_CHECKING:
-    from ...simulation.endings.endings import Endings, RestPoint, SignedModes
+    from ...simulation.endings.rests import Endings, RestPoint, SignedModes
 
 LISTED_SADDLES = 12
 """Rests that do not attract which are told one by one."""
@@ -26,11 +26,40 @@ def endings(found: Endings) -> str:
         rows += [("do not", [*told, *([f"and {left} more (--json lists them)"] if left > 0 else [])]), *GAP]
     rows += [("enclosed", _enclosed(found, boxed)), *GAP]
     rows += [("continua", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.continua])]
-    rows += [("all", [*map(_signs, found.lists), f"the others are found, not proved to be all: {found.search.words}"])]
+    rows += [("all", [*map(_signs, filter(_met, found.lists)),
+                      *_others([each for each in found.lists if not _met(each)]), *_complete(found)])]
     return listing(rows)
 
 
 HEADS = ("kind", "‖e‖", "", "pose", "")
+
+
+def _met(each: SignedModes) -> bool:
+    """Whether there are poses with these legs reversed."""
+    return each.listed is not None or bool(each.boxes)
+
+
+def _others(unmet: list[SignedModes]) -> list[str]:
+    """The choices of reversed legs at which no pose was met."""
+    proved = sum(each.empty for each in unmet)
+    if not unmet:
+        return []
+    what = (f"{named('leg', unmet[0].reversed)} reversed" if len(unmet) == 1 else
+            f"{len(unmet)} other choices of reversed legs")
+    return [f"poses with {what}: none, proved by boxes of poses" if proved == len(unmet) else
+            f"poses with {what}: none found, not proved"]
+
+
+def _complete(found: Endings) -> list[str]:
+    """Whether the list is all, or how it was sought."""
+    if found.cover is None:
+        return [f"the others are found, not proved to be all: {found.search.words}"]
+    if not found.cover.complete:
+        return [f"the others are found, not proved to be all: {found.search.words}", found.cover.reason]
+    where = ("wherever the legs reach" if found.cover.within is None else
+             f"with the point within {found.cover.within:.3g} m of the goal's either way")
+    return [f"all rests, proved by {found.cover.cover.boxes:,} boxes of poses: no other in any working mode of the "
+            f"watched legs, {where}"]
 
 
 def _enclosed(found: Endings, boxed: list[RestPoint]) -> list[str]:
@@ -53,10 +82,14 @@ def _line(each: RestPoint) -> list[str]:
         notes.append(f"{named('leg', each.across)} at right angles")
     if each.ways > 1:
         notes.append(f"in {each.ways} working modes")
+    if each.side == "other":
+        notes.append("in another aspect")
     if each.other_legs:
         notes.append(f"{named('leg', each.other_legs)} in another working mode")
     if each.beyond:
         notes.append(f"beyond the limits of {', '.join(each.beyond)}")
+    if each.rates and each.kind == "critical":
+        notes.append(f"rates {', '.join(f'{(low + high) / 2:.3g}' for low, high in each.rates)}")
     return [each.kind, f"{each.error:.3g}" if each.kind == "critical" else "0", each.stability, str(each.pose),
             "; ".join(notes)]
 

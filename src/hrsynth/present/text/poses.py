@@ -14,7 +14,7 @@ from ...analysis.aspects.path import SAME, SEPARATED
 from ...analysis.aspects.path import UNDECIDED as UNDECIDED_PAIR
 from ...analysis.posture import CONSTRAINT, REGULAR, UNDECIDED
 from ...tolerances import NOISE, RANK_GAP
-from .robots import NO_MATRIX
+from .robots import NO_MATRIX, formation
 from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, known, listing, watched
 
 if TYPE_CHECKING:
@@ -68,9 +68,12 @@ def _free(grid: GridCheck) -> Iterator[str]:
 def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
     shown = "directions" if all(each.by_segment for each in setting.observed) else "observations"
     mobility, far, dof = posture.mobility, posture.distances, posture.dof
-    rows = [("mobility", f"{mobility.total}, of which {mobility.idle} idle; the platform has "
-             + ("one freedom" if dof == 1 else f"{dof} freedoms")),
-            *_kinds("hidden robot", f"the {shown} show {posture.hidden.rank} of {dof}", posture.hidden, "not seen")]
+    whose = "bodies have" if setting.mechanism.formation else "platform has"
+    rows = [("mobility", f"{mobility.total}, of which {mobility.idle} idle; the {whose} " + (
+        "one freedom" if dof == 1 else f"{dof} freedoms")),
+            *_kinds("hidden robot", f"the {shown} show {posture.hidden.rank} of {dof}", posture.hidden, "not seen"),
+            *([] if posture.formation is None else [("verdict here", posture.formation.verdict)]),
+            *formation(posture.formation)]
     if far.condition is not None and far.type2 is not None and far.type1 is not None:
         rows += [("", f"singular values of Mᵀ {far.type2:.3g} to {1 / far.type1:.3g}, condition {far.condition:.3g}"),
                  *([("", f"one degree of error in the {shown}{_moved(far, length)}")]
@@ -125,6 +128,7 @@ def singularity(found: Singularity) -> str:
         ("Type 2", found.words)]
     if condition is not None:
         rows += [("expression", f"{condition.expression}{' (never zero)' if condition.never else ' = 0'}"),
+                 ("factors", [f"{part}: {meaning}" for part, meaning in condition.parts]),
                  ("where", [f"{name}: {meaning}" for name, meaning in condition.where.items()]),
                  ("split off", list(condition.factors))]
     if checked is not None:
@@ -148,7 +152,7 @@ def modes(found: AssemblyModes) -> str:
     """The pose whose measurements are held, the count with its proof, a block for each mode."""
     count = found.found
     name, seen = head(found.setting)
-    rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_SINCE[found.kind]} at {found.pose}")]
+    rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_held(found)} at {found.pose}")]
     if count.continuum is None or count.complex is None:
         rows += [("modes", f"{found.count}, {all_of(found)}"),
                  ("proof", count.proof)]
@@ -165,11 +169,27 @@ def modes(found: AssemblyModes) -> str:
     for number, mode in enumerate(found.modes, 1):
         rows += [*GAP, (f"mode {number}", [f"{mode.pose}" + ("   (the pose itself)" if mode.goal else ""),
                  proved(mode) if mode.fits is not None else f"{proved(mode)}, residual {mode.residual:.1e}",
-                 *at_mode(mode, found.kind)])]
+                 *ahead(mode), *at_mode(mode, found.kind)])]
+    for number, mode in enumerate(found.antipodal, 1):
+        rows += [*GAP, (f"antipodal {number}", [f"{mode.pose}   no mode: the opposite value of "
+                                                f"{', '.join(mode.opposite)}", proved(mode), *ahead(mode)])]
     for number, mode in enumerate(found.near, 1):
         rows += [*GAP, (f"near {number}", [f"{mode.pose}   residual {mode.residual:.2e}: almost a mode"
                  + (", and none" if count.complete else ""), *at_mode(mode, found.kind)])]
     return listing(rows)
+
+
+def _held(found: AssemblyModes) -> str:
+    if found.kind == "hidden" and not all(o.by_segment for o in found.setting.observed):
+        return "what is observed"
+    return _SINCE[found.kind]
+
+
+def ahead(mode: AssemblyMode) -> list[str]:
+    """Whether what is seen is in front of the cameras."""
+    if mode.behind is None:
+        return []
+    return [f"behind the camera: {', '.join(mode.behind)}" if mode.behind else "in front of the camera"]
 
 
 def all_of(found: AssemblyModes) -> str:

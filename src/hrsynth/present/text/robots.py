@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from ...analysis.advice import Advice, FurtherMeasurement
     from ...analysis.controllability import Legs
     from ...analysis.derive import Derivation
+    from ...analysis.formation import Formation
     from ...analysis.observed import ObservedRobot
     from ...analysis.verdict import Verdict
     from ...codegen.export import ExportedCode
@@ -36,7 +37,7 @@ def robot(found: Mechanism) -> str:
     from ...mechanism.sensors import defaults_of
 
     rows: Rows = [("links, joints", f"{len(found.links)}, {len(found.joints)}"), ("base", found.base),
-                  ("platform", found.platform),
+                  ("bodies", ", ".join(found.bodies)) if found.formation else ("platform", found.platform),
                   ("motors", ", ".join(joint.name for joint in found.joints.values() if joint.actuated) or "none"),
                   *known("camera on", found.reference if found.reference != found.base else None)]
     try:
@@ -57,10 +58,13 @@ def derivation(found: Derivation) -> str:
     if observed.anatomy.point is not None:
         dof.append("the platform is a point: its velocity is what is controlled, its turn is idle")
     name, seen = head(observed)
+    if found.verdict.formation is not None:
+        dof[0] = f"{found.dof} of {len(found.verdict.formation.bodies)} bodies{dof[0].removeprefix(str(found.dof))}"
     rows: Rows = [
         name, ("dof", dof), seen, *camera(observed),
         ("hidden robot", str(hidden) if hidden else "none: every observed direction is constant"),
         ("verdict", [found.verdict.verdict, *([near(found.verdict)] if found.verdict.near else [])]),
+        *formation(found.verdict.formation),
         ("mode", _modes(observed)),
         ("architecture", exact_words(found.exact, found.verdict.rank)),
         ("lost at zero", [freedom.name for freedom in found.verdict.lost]),
@@ -74,6 +78,14 @@ def derivation(found: Derivation) -> str:
     steps = [(step.rule, step.leg or "all", "yes" if step.accepted else "no",
               "" if step.largest_angle is None else f"{step.largest_angle:.1e}", step.reason) for step in found.steps]
     return "\n".join([listing(rows), "", table(steps, ("rule", "leg", "taken", "angle", "why"))])
+
+
+def formation(found: Formation | None) -> Rows:
+    """What is not seen of a formation."""
+    if found is None:
+        return []
+    return [("trivial", list(found.trivial) or "no motion: all are seen, or flexes"),
+            ("flexes", [each.name for each in found.flexes] or "none"), *known("special", found.special or None)]
 
 
 def _modes(observed: ObservedRobot) -> list[str]:
@@ -125,16 +137,25 @@ def exact_cell(exact: ExactVerdict, rank: int) -> str:
     return text if exact.rank == rank else f"{text}, of generic geometry: {exact.rank} of {exact.dof}"
 
 
+def unseen(found: Verdict) -> str:
+    """What a set of legs does not see, in a cell of a table."""
+    if found.formation is None:
+        return "; ".join(freedom.name for freedom in found.lost)
+    return f"{len(found.formation.trivial)} trivial" + "".join(f"; {flex.name}" for flex in found.formation.flexes)
+
+
 def legs(found: Legs) -> str:
-    """One line a set of legs, the smallest sets of the best rank last."""
+    """The smallest sets of the best rank, and one line a set of legs."""
     rows = [(", ".join(each.legs), each.verdict, f"{each.rank} of {each.dof}", exact_cell(exact, each.rank),
-             "; ".join(freedom.name for freedom in each.lost))
+             unseen(each))
             for each, exact in zip(found.sets, found.exact, strict=True)]
     lost = "lost" if any("platform at (" in row[-1] for row in rows) else f"lost (at {found.where})"
+    if found.setting.mechanism.formation:
+        lost = f"not seen (at {found.where})"
     lines = [f"{found.robot}   {found.architecture}   {found.dof} dof", "",
+             f"smallest sets of the best rank: {found.smallest}", "",
              table(rows, ("legs", "verdict", "rank", "exact", lost)), "",
-             *(f"leg {leg}: {', '.join(seen)}" for leg, seen in watched(found.setting).items()), "",
-             f"smallest sets of the best rank: {found.smallest}"]
+             *(f"leg {leg}: {', '.join(seen)}" for leg, seen in watched(found.setting).items())]
     lines += [f"not decided in exact arithmetic: {reason}"
               for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)]
     chance = max(each.chance for each in found.exact)
@@ -143,7 +164,9 @@ def legs(found: Legs) -> str:
     lines += [f"legs {', '.join(each.legs)}: {near(each)}" for each in found.sets if each.near]
     lines += _modes(found.setting)
     if not found.complete:
-        lines.append("not all sets were tried: there are too many legs")
+        lines.append("not all sets are listed, there are too many: " + (
+            "no other set as small has the best rank at the samples" if found.minimal_complete else
+            "of the smallest none can be left out, but a smaller one may exist"))
     return "\n".join(lines)
 
 
@@ -222,7 +245,7 @@ def view(found: View) -> str:
         sliders.append(f"{slider.name}: {ends}, {len(slider.values)} closed configurations")
     return listing([
         ("robot", f"{found.setting.robot.name}   {found.machines[0].words}"),
-        ("observed", ", ".join(f"{arrow.leg} ({arrow.link})" for arrow in found.arrows) or "nothing"),
+        head(found.setting)[1],
         *(("hidden robot", machine.words) for machine in found.machines[1:]), ("sliders", sliders),
         ("other modes", ", ".join(outline.label for outline in found.mode_outlines) or []),
         *(("note", note) for note in found.notes)])

@@ -69,7 +69,7 @@ def servo(found: Servo) -> str:
 
 def basins(found: Basins) -> str:
     """The goal, the starts, where they end and how many each, and how that was found."""
-    from ...simulation.endings.basins import LETTERS
+    from ...simulation.endings.basins import LETTERS, hindrances
 
     size = " × ".join(f"{count} {name}" for count, name in zip(found.grid.shape, found.grid.names, strict=True))
     rows = [*head(found.setting), *camera(found.setting), ("to", str(found.goal)),
@@ -82,8 +82,7 @@ def basins(found: Basins) -> str:
              for number, (letter, each) in enumerate(zip(LETTERS, found.ends, strict=False))]
     notes = []
     if not found.abreast:
-        notes.append("each start simulated by itself: a leg is no closed form, a joint has limits, or other links are "
-                     "watched")
+        notes.append(f"each start simulated by itself: {', '.join(hindrances(found.setting))}")
     elif found.checked:
         notes.append(f"integrated abreast; of {found.checked} starts that were simulated by themselves besides, "
                      f"{found.agreed} ended at the same pose")

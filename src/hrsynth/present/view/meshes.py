@@ -18,13 +18,15 @@ MOST_TRIANGLES = 200_000
 
 
 def meshes(setting: ObservedRobot, within: Path | None = None) -> tuple[tuple[Shape, ...], tuple[str, ...]]:
-    """The shapes of the file's visuals, on the links of the normal form, and a note where meshes are missing; with
+    """The shapes of the file's visuals, on the links of the normal form, and notes where meshes are missing; with
     ``within`` no files are read that do not lie in that folder."""
     robot, mechanism = setting.robot, setting.mechanism
-    found, missing, count = [], [], 0
+    found, missing, between, count = [], [], [], 0
     for name, link in robot.links.items():
         into = setting.normal.into.get(name)
         if into is None or into not in mechanism.links:
+            if any(solid.role == "visual" for solid in content_of(link, robot).solids):
+                between.append(name)
             continue
         role = BASE if into == mechanism.base else PLATFORM if into in setting.anatomy.platform else LEG
         for solid in content_of(link, robot).solids:
@@ -40,8 +42,10 @@ def meshes(setting: ObservedRobot, within: Path | None = None) -> tuple[tuple[Sh
             count += len(faces)
             if count > MOST_TRIANGLES:
                 return (), (f"the meshes have more than {MOST_TRIANGLES} triangles: rods are drawn instead",)
-    note = (f"{len(missing)} visual shapes cannot be read ({missing[0]}): rods are drawn instead",) if missing else ()
-    return tuple(found), note
+    notes = [f"{len(missing)} visual shapes cannot be read ({missing[0]}): rods are drawn instead"] if missing else []
+    if between:
+        notes.append(f"links inside merged joints are not drawn: {', '.join(between)}")
+    return tuple(found), tuple(notes)
 
 
 def _surface(solid: Solid, file: str | None, within: Path | None) -> tuple[Array, Any] | None:

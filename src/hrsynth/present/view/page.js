@@ -12,10 +12,44 @@ function element(kind, parent, text, fields = {}) {
 const ASSEMBLY = { yes: "", no: " (cannot be assembled)", "beyond limits": " (only beyond limits)", "not found": " (assembly not found)" };
 const written = (value, unit) => unit === "rad" ? `${(value * 180 / Math.PI).toFixed(1)}°` : `${value.toFixed(4)} m`;
 
+/* What a camera sees, in its plane z = 1: x to the right, y down; its frame is that of its picture where its size is known. */
+class Picture {
+  constructor({ name, half }, number) {
+    const figure = element("figure", $("pictures")), width = 260;
+    this.canvas = element("canvas", figure, undefined, { width: 2 * width, height: Math.round(2 * width * half[1] / half[0]) });
+    this.canvas.setAttribute("role", "img");
+    element("figcaption", figure, `seen by ${name}`);
+    Object.assign(this, { name, half, number });
+  }
+
+  show(sights) {
+    const { width, height } = this.canvas, pen = this.canvas.getContext("2d"), scale = width / 2 / this.half[0];
+    const own = sights.filter(({ camera, image }) => camera === this.number && image.length);
+    const place = ([x, y]) => [width / 2 + scale * x, height / 2 + scale * y];
+    pen.clearRect(0, 0, width, height);
+    pen.strokeStyle = "#b6bec9";
+    pen.lineWidth = 1;
+    pen.strokeRect(width / 2 - 8, height / 2, 16, 0);
+    pen.strokeRect(width / 2, height / 2 - 8, 0, 16);
+    Object.assign(pen, { strokeStyle: Colours.of("watched"), fillStyle: Colours.of("watched"), lineWidth: 4, font: "22px system-ui, sans-serif" });
+    for (const { name, image } of own) for (const [i, stroke] of image.entries()) {
+      const points = stroke.map(place), middle = points[Math.floor((points.length - 1) / 2)];
+      pen.beginPath();
+      if (points.length === 1) pen.arc(...middle, 7, 0, 7);
+      points.forEach((each) => pen.lineTo(...each));
+      points.length === 1 ? pen.fill() : pen.stroke();
+      if (i === 0) pen.fillText(name, middle[0] + 12, middle[1] - 10);
+    }
+    this.canvas.setAttribute("aria-label", `Picture of ${this.name}: ${own.map(({ name }) => name).join(", ") || "nothing of what is observed"}`);
+  }
+}
+
 /* The sliders: stored configurations, one coordinate at a time. */
 class Panel {
   constructor(stage) {
     this.stage = stage;
+    this.pictures = scene.cameras.map((record, i) => new Picture(record, i));
+    $("pictures").hidden = !this.pictures.length;
     stage.scene(scene);
     this.show(scene.home);
     this.values = scene.sliders.map((each) => each.values[each.home]);
@@ -53,6 +87,7 @@ class Panel {
 
   show(state) {
     this.stage.state(state);
+    this.pictures.forEach((each) => each.show(state.sights ?? []));
     $("error").textContent = state.error?.words ?? "";
     $("now").textContent = state.distance === null ? "not known" : state.distance.toPrecision(3);
   }

@@ -27,6 +27,7 @@ from ...results import Value
 from ...tolerances import FOLLOWED, SOLVED
 from ..studio.scale import error
 from .shapes import PAGE_DIGITS
+from .sights import ShownSight, shown_sights
 
 REAL, HIDDEN = "real", "hidden"
 TURN, WAY = 1.0, 1.0
@@ -40,17 +41,20 @@ STEPS = 10
 @dataclass(frozen=True, eq=False, repr=False)
 class ViewState(Value):
     """The places (links, 7) of each machine's links, the smallest singular value of Mᵀ (characteristic lengths; None
-    where Mᵀ does not exist), and how wrong the platform can be there (:func:`.error`), where that was asked."""
+    where Mᵀ does not exist), how wrong the platform can be there (:func:`.error`), where that was asked, and what
+    sensors see."""
 
     places: Mapping[str, Array]
     distance: float | None
     error: Mapping[str, Any] | None = None
+    sights: tuple[ShownSight, ...] = ()
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
         return {**{key: page_values(places) for key, places in self.places.items()},
                 "distance": None if self.distance is None else float(f"{self.distance:.5g}"),
-                **({} if self.error is None else {"error": dict(self.error)})}
+                **({} if self.error is None else {"error": dict(self.error)}),
+                **({"sights": [each.scene() for each in self.sights]} if self.sights else {})}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -107,7 +111,8 @@ class Mover(Value):
 
     def state(self, at: Posed) -> ViewState:
         """What the page shows of a configuration."""
-        return ViewState(self.places(at), self.examiner.classify(at.real).distances.type2)
+        sights = shown_sights(self.setting, at.real)
+        return ViewState(self.places(at), self.examiner.classify(at.real).distances.type2, sights=sights)
 
     def places(self, at: Posed) -> dict[str, Array]:
         """The places (links, 7) of each machine's links."""

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...analysis.derive import Derivation, derive
-from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike
+from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ...analysis.question import question
 from ...geometry.vectors import Array, oriented
 from ...kinematics.coordinates import Coordinates
@@ -25,6 +25,7 @@ from ..studio.scale import scale, unit_of
 from .meshes import meshes
 from .mode_outlines import ModeOutline, mode_outlines
 from .shapes import PAGE_DIGITS, RADIUS, Drawer, Shape
+from .sights import eyes, frames
 from .states import HIDDEN, REAL, Mover, Slider, ViewState, page_values, place
 
 ARROW = (0.35, 0.7)
@@ -115,26 +116,29 @@ class View(Result, shown_as="view"):
 
     def scene(self) -> dict[str, Any]:
         """What the page is given."""
+        every = eyes(self.setting)
         return {
             **stage(self.setting, self.machines, self.arrows), "scale": scale(unit_of(self.setting)),
             "home": self.home.scene(), "sliders": [slider.scene() for slider in self.sliders],
             "ghosts": [outline.scene() for outline in self.mode_outlines], "notes": list(self.notes),
+            "cameras": [{"name": eye.name, "half": half.tolist()} for eye, half in
+                        zip(every, frames(every, self.home.sights), strict=True)],
         }
 
 
 @question()
-def view(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
+def view(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
          hidden: bool = False, seed: int = 0) -> View:
     """What there is to see of a robot, and with ``hidden`` of its hidden robot too: every position of a slider is a
     closed configuration, in which one of the platform's coordinates alone differs from the zero configuration's.
 
-    ``observe`` and ``camera`` as for ``derive``, which also says what is raised. Assembly modes that cannot be listed
-    and meshes that are missing are told in ``notes``.
+    ``observe``, ``camera`` and ``see`` as for ``derive``, which also says what is raised. Assembly modes that cannot be
+    listed and meshes that are missing are told in ``notes``.
 
     >>> hrsynth.view("3rrr_m1")
     <View: 3rrr_m1, 3 sliders, 1 other assembly modes>
     """
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("view")
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     derivation = derive(setting, seed=seed) if hidden else None
     other = None if derivation is None else derivation.hidden
     mover = Mover.of(setting, other)

@@ -178,5 +178,19 @@ function line(points, radius, look) {
   return group;
 }
 
-return { LostArrows, Motion, Plane, ellipsoid };
+/* What sensors see, as each kind draws itself: lines, and see-through polygons that the view does not fit itself to. */
+function sights(records, radius) {
+  const look = material(Colours.of("watched"));
+  const sheer = new THREE.MeshBasicMaterial({ color: Colours.of("watched"), ...BEHIND, opacity: 0.22, side: THREE.DoubleSide });
+  return records.flatMap(({ lines, areas }) => [
+    ...lines.map((each) => each.length > 1 ? line(each.map(vector), 0.3 * radius, look) : new THREE.Group()),
+    ...areas.map((each) => {
+      const geometry = new THREE.BufferGeometry();
+      geometry.setAttribute("position", new THREE.Float32BufferAttribute(each.flat(), 3));
+      geometry.setIndex(each.slice(2).flatMap((_, i) => [0, i + 1, i + 2]));
+      return new THREE.Mesh(geometry, sheer);
+    })]);
+}
+
+return { LostArrows, Motion, Plane, ellipsoid, sights };
 })();

@@ -5,7 +5,7 @@
 const Stage = (() => {
 const { clear, label, turn, vector } = Solids;
 const { Machine, Direction, outline } = Robots;
-const { LostArrows, Plane, ellipsoid } = Overlays;
+const { LostArrows, Plane, ellipsoid, sights } = Overlays;
 const CLICK = 6, NEAR = { mouse: 7, pen: 10, touch: 18 }, ASK_EACH = 120, SAME = 1e-3;  /* px, px, ms, rad or characteristic lengths */
 const NO_WEBGL = "The 3D picture needs WebGL 2, which this browser does not give: all words and numbers are still there.";
 const LOST = "The graphics card has gone; the picture comes back with it.";
@@ -22,7 +22,7 @@ return class Stage {
     this.mode = "overlay";
     this.world = new THREE.Scene();
     this.sides = { real: new THREE.Group(), hidden: new THREE.Group() };
-    this.parts = Object.fromEntries(["ghosts", "goal", "lost", "plane", "ellipsoid"].map((key) => [key, new THREE.Group()]));
+    this.parts = Object.fromEntries(["ghosts", "goal", "lost", "plane", "ellipsoid", "sights"].map((key) => [key, new THREE.Group()]));
     this.sides.real.add(...Object.values(this.parts));
     this.names = new THREE.Group();
     this.canvas = Object.assign(document.createElement("canvas"), { tabIndex: 0 });
@@ -97,6 +97,8 @@ return class Stage {
       machine?.step(state.error?.step);
     }
     this.arrows.forEach((each) => this.follow(each));
+    clear(this.parts.sights);
+    if (state.sights) this.parts.sights.add(...sights(state.sights, this.record.radius));
     this.steer();
     this.arrange();
   }
@@ -252,7 +254,7 @@ return class Stage {
     const roles = new Set(shown.flatMap((each) => [...each.roles()]));
     const keys = ["base", "leg", "joint", "motor", "virtual", "actuator"].filter((role) => roles.has(role));
     const seen = this.arrows.filter(({ group }) => group.visible);
-    if (seen.some(({ watched }) => watched)) keys.push("watched");
+    if (seen.some(({ watched }) => watched) || this.parts.sights.children.length) keys.push("watched");
     if (seen.some(({ watched }) => !watched)) keys.push("unwatched");
     if (this.parts.ghosts.children.some(({ visible }) => visible)) keys.push("mode");
     if (this.parts.goal.children.length) keys.push("goal");
@@ -268,6 +270,7 @@ return class Stage {
   /* What a colour means here: the scale with its thresholds, the ellipsoid with how large it is drawn. */
   words(key) {
     const { names, edges, unit } = this.record.scale ?? {};
+    if (key === "watched" && this.parts.sights.children.length) return "what is observed, and cameras";
     if (key === "ellipsoid") return `${Colours.words(key)} for 0.1°${this.factor > 1 ? `, drawn ${this.factor} times as large` : ""}`;
     if (!names || !key.startsWith("step")) return Colours.words(key);
     const step = Number(key.slice(4)), sign = unit === "deg" ? "°" : ` ${unit}`, { falling, steps } = this.sheet?.record ?? {};
