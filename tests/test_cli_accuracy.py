@@ -51,7 +51,6 @@ def test_files_and_text(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> N
 @pytest.mark.parametrize(("arguments", "status", "word"), [
     (("--cone", "90deg"), 2, "less than 90deg"), (("--cone", "0"), 2, "more than 0"),
     (("--cone", "1e-300deg"), 2, "at least 1e-15"),
-    (("--observe", "1"), 2, "do not see"), (("--observe", "7"), 2, "no leg or link"),
     (("--at", "x=5"), 3, "is not reached"), (("--plane", "z=5"), 3, "no pose of the plane"),
     (("--grid", "x=0:1:4000,y=0:1:4000,z=-0.7"), 2, "at most 10000000"),
     (("--grid", "x=0:1:1,z=-0.7"), 2, "a count of 2 to"), (("-o", "map.png"), 2, "--plane or --grid"),
@@ -63,6 +62,15 @@ def test_refusals_are_one_line(capsys: pytest.CaptureFixture[str], arguments: tu
     assert (found, out) == (status, "")
     (line,) = err.splitlines()
     assert line.startswith("hrsynth: ")
+    assert word in line
+
+
+@pytest.mark.parametrize(("legs", "word"), [("1", "do not see"), ("7", "no leg or link")])
+def test_legs_that_cannot_be_watched_are_refused_in_one_line(capsys: pytest.CaptureFixture[str], legs: str, word: str
+                                                             ) -> None:
+    found, out, err = told(capsys, *(legs if each == "1,4" else each for each in QUATTRO))
+    assert (found, out) == (2, "")
+    (line,) = err.splitlines()
     assert word in line
 
 

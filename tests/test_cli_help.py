@@ -121,6 +121,9 @@ def test_a_flag_can_be_denied_and_words_that_repeat_are_all_taken():
     ("modes delta --effort nan", "--effort, found 'nan'"),
     ("derive quattro a b", "derive takes no more words, found 'a b'"),
     ("derive quattro --at", "--at: expected one argument, allowed: POSE"),
+    ("derive quattro -o --observe 1,4", "-o needs a value, found '--observe', allowed: FILE, or -o=--observe"),
+    ("legs delta --observe --at 1", "--observe needs a value, found '--at'"),
+    ("derive quattro --observe 1 --observe 4", "--observe is given 2 times, found '1 4', allowed: 1,4"),
     ("derive quattro --json=3", "--json: ignored explicit argument '3'"),
     *[(f"derive quattro --seed{between}--", "--seed, found '--', allowed: an integer, at least 0") for between in " ="],
     ("nope", "no such command, found 'nope', allowed: derive"), ("catalog nope", "no such command, found 'nope'")])

@@ -8,6 +8,7 @@ import os
 import pty
 import select
 import shlex
+import signal
 import subprocess
 import sys
 import termios
@@ -35,12 +36,18 @@ def told_of(folder: Path) -> Path:
     return path
 
 
+def at_a_terminal() -> None:
+    """What a terminal gives a process: control, and interrupts, even where its parent takes none."""
+    fcntl.ioctl(0, termios.TIOCSCTTY, 0)
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def talk(folder: Path, arguments: list[str], answers: list[str]) -> tuple[int, str]:
     """What a person at a terminal sees who answers each question (^C interrupts, ^D ends the input)."""
     main, end = pty.openpty()
     run = subprocess.Popen([sys.executable, "-m", "hrsynth", *arguments], stdin=end, stdout=end, stderr=end, cwd=folder,
                            env={**os.environ, "TERM": "dumb", "BROWSER": "true"}, start_new_session=True,
-                           preexec_fn=lambda: fcntl.ioctl(0, termios.TIOCSCTTY, 0))
+                           preexec_fn=at_a_terminal)
     os.close(end)
     shown, left, until = b"", list(answers), time.monotonic() + SECONDS
     keys = {"^C": b"\x03", "^D": b"\x04"}

@@ -237,6 +237,8 @@ FLOW_PART, FLOW_SINGLE = 2_500, 4
 FLOW_FOLLOWED, FLOW_CHECKED, FLOW_NAMED = 24, 6, 16
 """Of many runs at once, those that could not go on and are simulated one by one, others that are held against that, and
 the poses of rest that are named."""
+FLOW_EXAMPLES = 8
+"""Of starts that end alike, those of which one to which small steps lead is told."""
 FLOW_STEPS = 4_000
 """Steps of many runs at once."""
 LONGEST_RUN = 10_000.0
@@ -345,6 +347,11 @@ RADIUS_BOXES = 60_000
 """Boxes with which a certified radius is tried, at most."""
 COVER_BOXES = 2_000_000
 """Boxes of platform poses that are looked at, at most, where all critical points of the error are to be listed."""
+SIGN_BOXES = 80_000
+"""Boxes of platform poses of three freedoms, at most, in which those are sought at which the error vanishes; with more
+freedoms only where all critical ones are asked for."""
+SIGN_CHOICES = 64
+"""Choices of reversed legs, at most, that are told one by one."""
 BOXES_AT_ONCE = 4096
 """Boxes of those that are looked at together."""
 

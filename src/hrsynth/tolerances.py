@@ -164,6 +164,9 @@ COMPLEX_STEP = 1e-20
 PARALLEL = 1e-13
 """Sine of the angle below which two directions of given curves are taken for exactly parallel, as an angle rounded from
 one that is: it decides how many solutions lie at infinity."""
+SAME_SENSE = 1e-3
+"""Difference of measured values (unit vectors; lengths in characteristic lengths) up to which a mode has the value that
+is held, and not the opposite one."""
 VANISHES = 1e-9
 """Distance of a tip from its curve (sizes of the mechanism) at which a pose matches one observation too many."""
 NEAR_MODE = 1e-2
@@ -254,7 +257,11 @@ FLAT_CURVATURE = 0.05
 DAMPED = 1e-3
 """Singular values of the rows that a controller inverts (characteristic lengths, radians) below which it damps them."""
 SERVED = 1e-10
-"""Norm of the error of the directions at which a servo loop has ended."""
+"""Norm of the error at which a servo loop has ended."""
+NEAREST_SEEN = 1e-3
+"""Depth (m) from which on lines are drawn in a picture."""
+SEEN_ABOVE = 1e-3
+"""Sine of the angle to the focal plane, or to a side of the picture, below which a camera has lost what it sees."""
 AT_REST = 1e-8
 """Speed (characteristic lengths, radians) for each unit of error and gain below which a servo loop is at a local
 minimum."""
@@ -363,7 +370,10 @@ CERTIFIED_LEVEL = 0.95
 """Part of the error at which a ray is seen to stop rising up to which it is tried to prove that all rays rise."""
 RADIUS_SHARES = (0.97, 0.9, 0.8, 0.65, 0.5, 0.3)
 """Parts of the radius that rays show that are tried, one after the other, as the certified one."""
-COVER_REACH = 3.0
+MET_AGAIN = 1e-7
+"""How far apart (characteristic lengths, directions) one critical point can seem in two charts; boxes in which there is
+one alone are a thousand times as large."""
+COVER_REACH = 1.0
 """Half the width (characteristic lengths) of the box of platform positions that is looked at where legs have none."""
 SHORTEST_ROD = 0.05
 """Length (characteristic lengths) of a rod that slides below which its leg counts as out of reach."""

@@ -10,7 +10,7 @@ VERDICTS = {
     "green": ("controllable", "regular", "same aspect", "goal", "passed"),
     "yellow": ("partially controllable", "not decided", "undecided"),
     "red": ("uncontrollable", "separated", "FAILED", r"Type [123] singularity", "constraint singularity", "boundary",
-            "local minimum", "antipodal"),
+            "local minimum", "antipodal", "lost from sight"),
 }
 """Words that end a question well, not wholly, badly; they stand first in their row, or as a cell of a table."""
 CODES = {"green": 32, "yellow": 33, "red": 31}

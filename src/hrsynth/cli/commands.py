@@ -33,15 +33,15 @@ class DeclaredCommand:
         """As it is called after ``hrsynth``."""
         return self.path.partition(" ")[2]
 
-    def main(self, words: Sequence[str]) -> None:
-        """Run the command on the words after its name, or show its help."""
-        values = self.values(words)
+    def main(self, words: Sequence[str], beside: Sequence[DeclaredCommand] = ()) -> None:
+        """Run the command on the words after its name, or show its help; ``beside`` are other commands."""
+        values = self.values(words, beside)
         if values is None:
             say(self.shown())
         else:
             self.run(**values)
 
-    def values(self, words: Sequence[str]) -> dict[str, Any] | None:
+    def values(self, words: Sequence[str], beside: Sequence[DeclaredCommand] = ()) -> dict[str, Any] | None:
         """The value of each option by its name, None where help is asked for; what is called by an old name is told.
         Raises ``BadRequest``.
 
@@ -57,9 +57,12 @@ class DeclaredCommand:
             how: dict[str, Any] = {"action": "append_const", "const": told} if option.kind is bool else {}
             parser.add_argument(name, dest=option.name, **{"action": "append", **how})
         # argparse takes a value that begins with a dash only behind "="
-        rest = iter(words)
-        joined = [f"{word}={value}" if word in flags and flags[word][0].kind is not bool
-                  and (value := next(rest, None)) is not None else word for word in takewhile("--".__ne__, rest)]
+        rest, joined = iter(words), list[str]()
+        for word in takewhile("--".__ne__, rest):
+            value = next(rest, None) if word in flags and flags[word][0].kind is not bool else None
+            if value in flags:
+                raise BadRequest(f"{word} needs a value", value, f"{flags[word][0].value}, or {word}={value}")
+            joined.append(word if value is None else f"{word}={value}")
         if set(HELP) & set(joined):
             return None
         try:
@@ -71,6 +74,8 @@ class DeclaredCommand:
         for name in (word.partition("=")[0] for word in plain if word.startswith("-") and word != "-"):
             from difflib import get_close_matches
 
+            if takers := [each.name for each in beside if any(name in option.names for option in each.options)]:
+                raise BadRequest(f"{self.name} has no such option", name, f"it goes with {', '.join(takers)}")
             raise BadRequest(f"{self.name}: no such option", name, get_close_matches(name, flags) or sorted(flags))
         for name in (word.partition("=")[0] for word in joined):
             if name in flags and name in flags[name][0].old:
@@ -82,6 +87,9 @@ class DeclaredCommand:
                 count = len(plain) if option.several else 1
                 given[option.name], plain = plain[:count], plain[count:]
         # Python 3.11 and 3.12 make [] of the value "--"
+        for option in self.options:
+            if option.names_several and len(texts := given.get(option.name, ())) > 1:
+                raise BadRequest(f"{option.names[0]} is given {len(texts)} times", " ".join(texts), ",".join(texts))
         read = {each: [each.read("--" if value == [] else value) for value in given[each.name]]
                 for each in self.options if each.name in given}
         if plain:
@@ -127,7 +135,11 @@ class Group:
         elif name not in self.commands:
             raise BadRequest("no such command", name, tuple(self.commands))
         else:
-            self.commands[name].main(rest)
+            found = self.commands[name]
+            if isinstance(found, Group):
+                found.main(rest)
+            else:
+                found.main(rest, [each for each in self.commands.values() if isinstance(each, DeclaredCommand)])
 
     def shown(self) -> str:
         """A row a command."""

@@ -67,6 +67,11 @@ class Option:
         """Whether it can be given more than once."""
         return self.kind == list[str]
 
+    @property
+    def names_several(self) -> bool:
+        """Whether one value names several things, so that a second value would not be taken for the only one."""
+        return self.metavar in ("LEGS", "LINKS", "JOINTS")
+
     def read(self, text: str) -> Any:
         """A value as it is written on the command line; raises ``BadRequest``."""
         from ..errors import BadRequest
@@ -102,10 +107,11 @@ def shipped() -> Iterable[str]:
 
 
 JSON = flag("json", "Print the result as one JSON object; its schema: hrsynth schema COMMAND.", OUTPUT)
-OBSERVE = Option("observe", "Legs to watch (1,4), links, or all (default: all, beside --see none).", "LEGS",
-                 group=WATCHING)
+OBSERVE = Option("observe", "Legs to watch (1,4), links, or all (default: as in the file, else all; with --see none).",
+                 "LEGS", group=WATCHING)
 CAMERA = Option("camera", "The link that carries the camera; or a further camera by a name, its place on a link "
-                "(metres; radians or deg): again for more.", "LINK|NAME=LINK@x,y,z/r,p,y", list[str], group=WATCHING)
+                "(metres; radians or deg; focal length, width and height in pixels): again for more.",
+                "LINK|NAME=LINK@x,y,z/r,p,y/f,w,h", list[str], group=WATCHING)
 WATCHED = (OBSERVE, CAMERA)
 SEE = Option("see", "What else is observed: circle, depth, direction, distance, edge, edges, encoder, image_circle, "
              "image_line, inclination, line, point or position, with a point, an axis and a radius where the kind "

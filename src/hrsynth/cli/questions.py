@@ -71,7 +71,11 @@ class Question:
         writers = []
         with Progress() as progress, following(progress.tell):
             mechanism = robot_of(values)
-            found = self._ask(getattr(hrsynth, self.name), mechanism, values)
+            function = getattr(hrsynth, self.name)
+            given = self._given(function, values)
+            for each, path in files.items():
+                each.require_drawable(path, mechanism, given)
+            found = function(mechanism, **given)
             for option in ("cone", "noise"):
                 told_radians(option, values.get(option))
             for each, path in files.items():
@@ -101,15 +105,15 @@ class Question:
         if self.after is not None:
             self.after(found, **values)
 
-    def _ask(self, function: Callable[..., Any], mechanism: Any, values: dict[str, Any]) -> Any:
-        """The answer of a function to those options that it takes and that are given."""
+    def _given(self, function: Callable[..., Any], values: dict[str, Any]) -> dict[str, Any]:
+        """The options that a function takes and that are given."""
         known = inspect.signature(function).parameters
         given = {name: value for name, value in values.items() if name in known and value is not None}
         if "observe" in given:
             given["observe"] = listed(given["observe"])
         if len(given.get("camera", ())) == 1:
             (given["camera"],) = given["camera"]
-        return function(mechanism, **given)
+        return given
 
 
 def _decided(found: Any, at: list[str] | None, **_: Any) -> None:
@@ -185,7 +189,7 @@ QUESTIONS = (
              after=_decided),
     Question("singular", "Where a freedom of the platform is lost: the Type 2 condition in words, as an expression and "
              "drawn.",
-             (*WATCHED, flag("real", "The real robot with its own motors instead of the hidden one."),
+             (*WATCHED, SEE, flag("real", "The real robot with its own motors instead of the hidden one."),
               Option("plane", "Plane of poses to draw, as z=-0.7.", "PART=VALUE"), _file("singular"),
               Option("points", "Random poses at which the condition is checked.", None, int, 10_000, low=1,
                      high=10_000_000),
@@ -202,7 +206,7 @@ QUESTIONS = (
     Question("modes", "All assembly modes: every pose of the platform with the same directions.",
              (Option("at", "Pose whose directions are held, as x=0.02,y=0.1,z=-0.7 (default: the zero "
                      "configuration's).", "POSE"),
-              *WATCHED, flag("real", "The real robot with its own motors held instead."),
+              *WATCHED, SEE, flag("real", "The real robot with its own motors held instead."),
               Option("effort", "Seconds of one core that a list may need, by its size; what needs more is left out "
                      "and told.", "SECONDS", float, EFFORT, low=0),
               _file("modes"), _file("modes", "certificate")),
@@ -219,13 +223,16 @@ QUESTIONS = (
               _file("path", "certificate")),
              ("quattro --observe 1,4 --start x=0.05 --goal x=-0.05,phi=20deg",
               "3rrr_m1 --start x=0,y=0 --goal mode:2 --certificate c.json")),
-    Question("servo", "A servo run on the directions of legs, simulated: where it ends, and what it passes on the way.",
-             (START, _goal("Pose whose directions are desired."), *WATCHED,
+    Question("servo", "A servo run on what is observed, simulated: where it ends, and what it passes on the way.",
+             (START, _goal("Pose whose measurements are desired."), *WATCHED, SEE,
               Option("gain", "λ of the control law (1/s).", None, float, 0.8, high=1e6),
-              Option("noise", "Error of measured directions, as 0.1deg; of edges, as 0.3px.", "AMOUNT"),
-              flag("bias", "Keep the error of each direction or edge constant."),
-              Option("duration", "Move the desired directions along the straight line in this time (default: at once).",
-                     "SECONDS", float),
+              Option("noise", "Error of measurements: angles as 0.1deg, in pictures as 0.3px, lengths as 1mm.",
+                     "AMOUNT"),
+              flag("bias", "Keep the error of each measurement constant."),
+              Option("depth", "How the law knows depths in images: exact, desired (those at the goal) or "
+                     "constant:METRES.", default="exact"),
+              Option("duration", "Move the desired measurements along the straight line in this time (default: at "
+                     "once).", "SECONDS", float),
               Option("time", "Longest run.", "SECONDS", float),
               flag("physics", "Drive a mock-up with rods, masses and velocity servos."),
               Option("sense", "exact, edges (of the legs before a camera) or pictures (rendered).", "SENSE",
@@ -236,7 +243,9 @@ QUESTIONS = (
     Question("endings", "All poses at which the loop can rest, and which of them attract: the goal, modes, antipodal "
              "poses, critical poses of the error.",
              (Option("at", "The goal: pose whose directions are desired, as x=0.02,y=0.1,z=-0.7; or mode:2.", "POSE",
-                     default=NEEDED), *WATCHED, _file("endings")),
+                     default=NEEDED), *WATCHED,
+              flag("complete", "Prove that the list is all, by boxes of platform poses, as far as that goes."),
+              _file("endings")),
              ("3rrr_m1 --at x=0.02,y=0,phi=10deg", "quattro --observe 1,4 --at x=0.05,y=0.1,z=-0.7 -o endings.png")),
     Question("basins", "Where the servo loop to a goal ends, from each start of a line, plane or box of poses.",
              (Option("to", "Pose whose directions are desired.", "POSE", default=NEEDED), *WATCHED,
@@ -287,7 +296,7 @@ QUESTIONS = (
              ("rrrrr_m1 --box shoulder_1=-0.1:0.1,shoulder_2=-0.1:0.1 -o five_bar.hpp",
               "robot.urdf --lang numpy -o robot.py"), seeded=False),
     Question("view", "A 3D view in the browser: sliders that keep the loops closed, what is observed, assembly modes.",
-             (*WATCHED, flag("hidden", "The hidden robot too, its virtual actuators highlighted."),
+             (*WATCHED, SEE, flag("hidden", "The hidden robot too, its virtual actuators highlighted."),
               _file("view", "static"),
               PORT,
               Option("open_", "Open the page in the browser.", None, bool, True, ("--open/--no-open",))),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, NotRequired, TypedDict
 
-Word = Literal["controllable", "partially controllable", "uncontrollable"]
+Word = Literal["controllable", "partially controllable", "uncontrollable", "rigid", "flexible"]
 Number = float | None
 Array = list[Any]
 Twist = Annotated[list[float], "vx, vy, vz, wx, wy, wz at the platform frame's origin, base axes (m, rad)"]
@@ -120,6 +120,25 @@ class ArchitectureRecord(TypedDict):
     proved: bool
     chance: float
     relations: RelationsRecord | None
+    trivial: NotRequired[Annotated[int, "of a formation: how many unseen motions are trivial"]]
+
+
+class FlexRecord(TypedDict):
+    """Independent motions of some bodies of a formation, while all others rest and no measured value changes."""
+
+    links: list[str]
+    count: int
+    name: str
+
+
+class FormationRecord(TypedDict):
+    """What is not seen of a formation: trivial motions, flexes; `special` is the line or plane that holds all points
+    that are sensed here and generically not, in words."""
+
+    bodies: list[str]
+    trivial: list[str]
+    flexes: list[FlexRecord]
+    special: str
 
 
 class NotationRecord(TypedDict):
@@ -200,6 +219,7 @@ class Derive(OfRobot, Modes):
     lost: list[FreedomRecord]
     rank: int
     margin: MarginRecord
+    formation: NotRequired[FormationRecord]
     point_platform: bool
     has_interaction_matrix: bool
     interaction_matrix: bool
@@ -223,12 +243,14 @@ class LegSet(TypedDict):
     has_interaction_matrix: bool
     interaction_matrix: bool
     margin: MarginRecord
+    formation: NotRequired[FormationRecord]
     exact: bool
     architecture: ArchitectureRecord
 
 
 class LegsAnswer(OfRobot, Modes):
-    """Every set of watched legs; `minimal` are the smallest sets of the best rank."""
+    """Sets of watched legs, all if `complete`; `minimal` are the smallest of the best rank, all of these if
+    `minimal_complete`, else one of which none can be left out."""
 
     architecture_ascii: str
     dof: int
@@ -236,6 +258,7 @@ class LegsAnswer(OfRobot, Modes):
     complete: bool
     watched: list[WatchedAxis]
     minimal: list[list[str]]
+    minimal_complete: bool
 
 
 class ClassCounts(TypedDict):
@@ -305,6 +328,7 @@ class PostureRecord(KindsRecord):
     constraint: ConstraintRecord
     redundant: list[RedundantRecord]
     distances: DistancesRecord
+    formation: NotRequired[FormationRecord]
 
 
 class GridAxes(TypedDict):
@@ -357,7 +381,7 @@ class CheckAnswer(OfRobot, WrittenTo):
 class MeasuredRecord(TypedDict):
     """What is measured, and of what."""
 
-    kind: Literal["directions", "motors"]
+    kind: Literal["directions", "observations", "motors"]
     of: list[str]
 
 
@@ -402,6 +426,13 @@ class LocusRecord(TypedDict):
     real: LocusField | None
 
 
+class FactorRecord(TypedDict):
+    """A factor of the expression, and what it means that it vanishes."""
+
+    expression: str
+    meaning: str
+
+
 class Singular(OfRobot, WrittenTo):
     """The Type 2 condition in words and as an expression, and singular poses."""
 
@@ -415,6 +446,7 @@ class Singular(OfRobot, WrittenTo):
     expression: str
     where: dict[str, str]
     factors: list[str]
+    parts: list[FactorRecord]
     characteristic_length: float
     checked: CheckedRecord
     examples: list[ExampleRecord]
@@ -540,6 +572,8 @@ class ModeRecord(TypedDict):
     proved: bool
     rounded: bool
     fits: Number
+    opposite: list[str]
+    behind: list[str] | None
 
 
 class MeantRecord(TypedDict):
@@ -577,6 +611,7 @@ class ListedModes(OfRobot, WrittenTo):
     modes: list[ModeRecord]
     motions: list[SelfMotionRecord]
     near: list[ModeRecord]
+    antipodal: list[ModeRecord]
     degenerate: str | None
     continuum: int | None
     meant: list[MeantRecord]
@@ -705,7 +740,7 @@ class SpreadRecord(TypedDict):
 
 Servo = TypedDict("Servo", {
     "command": str, "version": str, "robot": str, "file": str | None, "observed": list[Watched], "camera": str,
-    "from": PoseRecord, "to": PoseRecord, "gain": float, "sense": Literal["exact", "edges", "pictures"],
+    "from": PoseRecord, "to": PoseRecord, "gain": float, "depth": str, "sense": Literal["exact", "edges", "pictures"],
     "noise": str | None, "ended": str, "reason": str, "pose": PoseRecord, "matched_mode": int | None,
     "modes": list[ModeRecord] | None, "type2": TrackRecord, "notes": list[str], "spread": SpreadRecord | None,
     "times": list[float], "error": list[list[float]], "poses": list[PoseRecord]})
@@ -713,8 +748,9 @@ Servo.__doc__ = "A servo run: where it ended, and at each time (s) the pose and 
 
 
 class RestRecord(TypedDict):
-    """A pose at which a loop rests; `curvatures` are the eigenvalues of the Hessian of ½ ‖e‖², `met` how many starts
-    led to it."""
+    """A pose at which a loop rests; `curvatures` are the eigenvalues of the Hessian of ½ ‖e‖², `rates` enclose those of
+    the linearised loop without damping, times −1 / gain; `side` of the Type 2 locus; `met` how many starts led to it.
+    """
 
     pose: PoseRecord
     kind: Literal["goal", "mode", "antipodal", "critical"]
@@ -724,6 +760,8 @@ class RestRecord(TypedDict):
     curvatures: list[float]
     proved: bool
     decided: bool
+    rates: list[list[float]]
+    side: Literal["goal", "other"] | None
     radius_m: Number
     radius_rad: Number
     reversed: list[str]
@@ -738,12 +776,30 @@ class RestRecord(TypedDict):
 
 
 class SignedModesRecord(TypedDict):
-    """How many poses there are with the directions of some legs reversed, complex ones too."""
+    """How many poses there are with the directions of some legs reversed, complex ones too, and how many by boxes of
+    poses; null where that is not known."""
 
     reversed: list[str]
     modes: int | None
     complex: int | None
+    boxes: int | None
     complete: bool
+
+
+class RestCoverRecord(TypedDict):
+    """What boxes of platform poses prove of a list of rests: `proved` critical poses; `open` boxes, a `share` of all;
+    `within_m` of the goal, null where legs end the box. `unmet` of those are not in the list, `strangers` of the list
+    are not among them."""
+
+    complete: bool
+    proved: int
+    boxes: int
+    open: int
+    share: float
+    within_m: Number
+    unmet: int
+    strangers: int
+    reason: str | None
 
 
 class EndingsAnswer(OfRobot, WrittenTo):
@@ -755,6 +811,7 @@ class EndingsAnswer(OfRobot, WrittenTo):
     camera: str
     complex: int | None
     complete: bool
+    cover: RestCoverRecord | None
     signs: list[SignedModesRecord]
     proof: str
     starts: int

@@ -17,8 +17,9 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..results import Value
 from ..simulation.ending import GOAL
-from ..simulation.endings.endings import CRITICAL, RestSearch
+from ..simulation.endings.endings import RestSearch
 from ..simulation.endings.radius import CertifiedRadius, certified_radius
+from ..simulation.endings.rests import CRITICAL
 
 
 @dataclass(frozen=True, eq=False, repr=False)
