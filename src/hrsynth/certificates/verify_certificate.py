@@ -28,7 +28,6 @@ from fractions import Fraction
 from itertools import combinations, product
 
 PRIME, FIT, WITHIN, FAR = 2147483647, Fraction(1, 10 ** 9), Fraction(1, 10 ** 6), 10 ** 7
-
 class NotAccepted(Exception):
     """Why a certificate is not accepted."""
 def need(true, why):
@@ -41,7 +40,6 @@ def add(*terms):  # a sum of polynomials {exponents: coefficient}
         for e, c in p.items():
             total[e] = total.get(e, 0) + c
     return {e: c for e, c in total.items() if c}
-
 def mul(p, q): return add(*({tuple(map(sum, zip(e, f))): c * d for f, d in q.items()} for e, c in p.items()))
 def times(c, p): return {e: c * d for e, d in p.items() if c * d}
 def minus(p, q): return add(p, times(-1, q))
@@ -64,7 +62,6 @@ def rational(value):
         return list(map(rational, value))
     need(isinstance(value, str) and len(value) < 300 and not set(value) - set("0123456789/.-"), "a number in words")
     return Fraction(value)
-
 def reach_of(record, size=3):  # a kind, its centre; direction, normal, spokes of a circle, squared radius
     (kind, values), = record.items()
     lengths = {"point": [size], "line": [size] * 2, "circle": [size] * 3, "plane": [3] * 2, "sphere": [3, 1]}
@@ -73,7 +70,6 @@ def reach_of(record, size=3):  # a kind, its centre; direction, normal, spokes o
     need(kind != "circle" or dot(*rest) == 0 == dot(rest[0], rest[0]) - dot(rest[1], rest[1]), "the spokes of a circle")
     need(kind == "point" or (any(rest[0]) and (kind != "sphere" or rest[0][0] > 0)), f"a {kind} without extent")
     return kind, vectors
-
 def running(reach, k, n):  # N / w, a curve's point, Q / w its square, at x_k: t of c + t d, or a half-angle tangent
     kind, (c, *rest) = reach
     one, t = term(1, n), term(1, n, k)
@@ -207,21 +203,27 @@ def pose(system, tips):
 KINDS = {"spatial": (spatial, "square"), "planar": (planar, "square"), "shifting": (shifting, "square bodies slide"),
          "pose": (pose, "chart arrows hub")}
 
+def whole(x):  # complex numbers, pairs of fractions, as integers, and what they are over
+    q = math.lcm(*(u.denominator for z in x for u in z))
+    return [[u.numerator * (q // u.denominator) for u in z] for z in x], q
 def value(p, x):  # at complex numbers, pairs of fractions
-    total = [Fraction(0), Fraction(0)]
+    (z, q), d, total = whole(x), max(map(sum, p), default=0), [0, 0]
+    below = math.lcm(*(c.denominator for c in p.values()))
     for e, c in p.items():
-        a, b = Fraction(c), Fraction(0)
-        for u, v in (z for z, k in zip(x, e) for _ in range(k)):
+        a, b = c.numerator * (below // c.denominator) * q ** (d - sum(e)), 0
+        for u, v in (y for y, k in zip(z, e) for _ in range(k)):
             a, b = a * u - b * v, a * v + b * u
         total = [total[0] + a, total[1] + b]
-    return total
-
-def most(p, far): return sum(abs(c) * math.prod(map(pow, far, e)) for e, c in p.items())  # of |p| where |x_k| <= far_k
-def change(p, m, r): return r * sum(most(slope(p, k), [size(z) + r for z in m]) for k in range(len(m)))  # in a box
+    return [Fraction(t, below * q ** d) for t in total]
+def most(p, far): return sum(abs(c) * math.prod(x ** k for x, k in zip(far, e) if k) for e, c in p.items())  # of |p|
+def change(p, m, r):  # in a box; distances rounded upwards
+    far = [Fraction(1 + int((size(z) + r) * 2 ** 64), 2 ** 64) for z in m]
+    return r * sum(most(slope(p, k), far) for k in range(len(m)))
 def most_of(p, m, r): return size(value(p, m)) + change(p, m, r)
-def least(p, m, r): return size(value(p, m)) / 2 - change(p, m, r)  # of |p| in a box
+def least(p, m, r): return size(value(p, m)) / 2 - change(p, m, r)  # of |p| in the box
 def along(y, z):
-    return [sum(a * c - b * d for (a, b), (c, d) in zip(y, z)), sum(a * d + b * c for (a, b), (c, d) in zip(y, z))]
+    (y, q), (z, s) = whole(y), whole(z)
+    return [Fraction(sum(x), q * s) for x in zip(*((a * c - b * d, a * d + b * c) for (a, b), (c, d) in zip(y, z)))]
 def enclosed(equations, m, r, Y):  # Krawczyk's condition; see above
     n = len(m)
     need(r > 0 and len(Y) == n and all(len(row) == n for row in Y), "a box without radius or inverse")
@@ -232,7 +234,6 @@ def enclosed(equations, m, r, Y):  # Krawczyk's condition; see above
         wide = sum(size(sub(along(y, [J[k][j] for k in range(n)]), [int(i == j), 0])) for j in range(n))
         wide += sum(size(z) * h for z, h in zip(y, H))
         need(size(along(y, F)) + wide * r < r, "a box in which no solution is proved")
-
 def multiples(equations, halves, groups):  # monomials above, at, below the caps, how many; all multiples within
     n = len(halves)
     need(n <= 4 and sorted(k for group, _, _ in groups for k in group) == [*range(n)], "each unknown in one group")
@@ -245,7 +246,6 @@ def multiples(equations, halves, groups):  # monomials above, at, below the caps
     moved = [{tuple(map(sum, zip(e, shift))): c for e, c in p.items()} for p in equations for shift in columns]
     rows = [[row.get(e, 0) for e in columns] for row in moved if all(e in below for e in row)]
     return rows, *(sum(below[e] < least for e in columns) for least in (0, 1, 99))
-
 def rank(equations, halves, system, ranks_of=None):
     rows, above, edge, every = multiples(equations, halves, system["bound"]["groups"])
     far = [[int(c, 16) for c in v] for v in system["bound"].get("far", ())]
@@ -270,9 +270,8 @@ def poses(equations, halves, system):
     kinds = {kind for kind, _ in reaches}
     together = max(each.count(b) for each in (tips, [v[0] for _, v in reaches]) for b in each)
     return 8 if "point" in kinds or kinds <= {"line", "plane"} else 16 if kinds == {"sphere"} and together > 2 else 40
-
 def modes(record):
-    seen, real, complex_, whole, apart = [], 0, 0, 0, 0
+    seen, proofs, real, complex_, closed, apart = [], [], 0, 0, 0, 0
     for system in record["systems"]:
         tips = rational(system["tips"])
         far = FAR * fair(system, tips, 2 if system["kind"] == "planar" else 3)
@@ -289,15 +288,15 @@ def modes(record):
             need(len(m) == len(halves) and all(len(z) == 2 for z in m), "a box without its unknowns")
             one = "misses" if "misses" in each else "pose within links"  # what a box says, and nothing else
             need(each.keys() <= {*f"middle radius inverse {one}".split()}, "another key of a box")
-            enclosed(flat, m, r, rational(each["inverse"]))
             boxes.append((m, r))
+            proofs.append((flat, m, r, rational(each["inverse"])))
             finite = all(least(w, m, r) > 0 for _, _, w in points)
             away = far > 0 and any(least(p, m, r) > far * most_of(w, m, r) for N, _, w in points for p in N)
             if "pose" in each:
                 need(all(most_of(p, m, r) < FIT for leg in legs for p in leg), "a leg that misses")
                 need(finite and not away and all(v == 0 for _, v in m), "a real pose with a complex or far box")
                 told(system, each, points, tips, m, r)
-                whole += "links" in each and closes(record["assembly"], each["links"])
+                closed += "links" in each and closes(record["assembly"], each["links"])
             elif "misses" in each:
                 need(any(least(p, m, r) > 0 for p in legs[each["misses"]]), "a leg that may not miss")
             elif away:
@@ -310,9 +309,11 @@ def modes(record):
         for (m, r), (k, s) in combinations(boxes, 2):
             need(any(max(abs(a - c), abs(b - d)) > r + s for (a, b), (c, d) in zip(m, k)), "two boxes touch")
     need(seen and record["real"] == real and record["complex"] == complex_, f"{real} real of {complex_} are proved")
+    for each in proofs:
+        enclosed(*each)
     more = " (more legs than needed fit)" * any(legs for _, legs in seen) + f" ({len(seen)} systems)" * (len(seen) > 1)
     more += f" nearer than 10^7 of its sizes ({apart} solutions are farther)" * (apart > 0)
-    more += f"; the robot closes at {whole} of the real ones, to 1e-9" * ("assembly" in record)
+    more += f"; the robot closes at {closed} of the real ones, to 1e-9" * ("assembly" in record)
     return f"{real} real of {complex_} complex poses, and no other{more}"
 def fair(system, tips, d):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
     need(system.keys() <= {*f"kind reaches tips boxes bound places {KINDS[system['kind']][1]}".split()}, "another key")
@@ -375,7 +376,6 @@ def ranks(record):
         need({len(row) for row in rows + kernel} == {each["rank"] + len(kernel)}, "too few vectors that are annulled")
         need(modular([[c % PRIME for c in v] for v in kernel], 0)[1] == len(kernel), "vectors that are dependent")
     return "; ".join(f"rank [{'; '.join(each['of'])}] = {each['rank']}" for each in record["stacks"])
-
 def digest(record):
     rest = {key: each for key, each in record.items() if key != "sha256"}
     return hashlib.sha256(json.dumps(rest, sort_keys=True, separators=(",", ":")).encode()).hexdigest()
