@@ -60,6 +60,7 @@ robots: setup  ## regenerate robots/*.urdf from the families
 readme: setup  ## regenerate the tables of robots/README.md and of docs/pages
 	@$(BIN)/python -m hrsynth.present.readme robots/README.md docs/pages/papers.md docs/pages/lint.md
 	@$(BIN)/python -m hrsynth.catalog.readme docs/pages/catalog.md
+	@$(BIN)/python docs/catalog_says.py
 	@$(BIN)/python -m hrsynth.claims docs/pages/claims.md
 
 catalog: setup-all  ## build catalog/, or go on where that was broken off (JOBS= processes; hours)

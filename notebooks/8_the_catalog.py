@@ -11,6 +11,7 @@
 from collections import Counter
 
 import matplotlib.pyplot as plt
+import numpy as np
 
 import hrsynth
 from hrsynth.catalog.drawing import drawing
@@ -87,6 +88,45 @@ plt.show()
 # %%
 for record in [each for each in wanted if each["verdict"] != "controllable"][:8]:
     print(f"{record['word']:42}loses {'; '.join(record['lost'])}; cure: {record.get('cure')}")
+
+# %% [markdown]
+# ## What all of them say
+#
+# Which legs make a robot controllable? Robots with equal legs, by the joints of a leg:
+
+# %%
+verdicts = {}
+for record in catalog.where(group="spatial"):
+    chain = {"".join(joint.letter for joint in leg.joints) for leg in parse(record["word"]).legs}
+    if len(chain) == 1 and record.get("verdict"):
+        verdicts.setdefault(chain.pop(), Counter())[record["verdict"]] += 1
+names = sorted(verdicts, key=lambda name: verdicts[name]["controllable"] / verdicts[name].total())
+figure, place = plt.subplots(figsize=(6, 6.5))
+left = [0.0] * len(names)
+for verdict, colour in colours.items():
+    share = [100 * verdicts[name][verdict] / verdicts[name].total() for name in names]
+    place.barh(names, share, left=left, color=colour, label=verdict)
+    left = [a + b for a, b in zip(left, share, strict=True)]
+place.set(xlabel="architectures of the group spatial (%)", xlim=(0, 100))
+place.legend(loc="lower center", bbox_to_anchor=(0.5, 1.0), ncols=3)
+plt.show()
+
+# %% [markdown]
+# Legs with no slide are at the top, legs with two of them at the bottom: a link that only slides has a direction that
+# says nothing. For planar robots this is a theorem, with its proof on the page *What the catalog says*. While a watched
+# direction is held, the platform's instantaneous centre stays on a line, and the legs see the rank of their lines. Here
+# it is tried on 3-RRR with random joints; the watched link follows the second R:
+
+# %%
+rng = np.random.default_rng(0)
+seen = []
+for _ in range(3):
+    centres = rng.normal(size=(3, 2))
+    twists = np.array([[1.0, y, -x] for x, y in centres]).T
+    turned = np.array([[1.0, 1.0, 0.0]])
+    kept = twists @ np.linalg.svd(turned)[2][1:].T
+    seen.append(np.linalg.svd(kept)[0][:, 2])
+print("rank", np.linalg.matrix_rank(np.array(seen)), "of 3;", catalog["3(Rz*-Rz-Rz)"]["verdict"])
 
 # %% [markdown]
 # ## From a word to a robot

@@ -1,0 +1,90 @@
+"""What the page on all verdicts says: its tables are those of the catalog, its theorem that of twists."""
+
+from __future__ import annotations
+
+import importlib.util
+import sys
+from pathlib import Path
+from types import ModuleType
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import hrsynth
+from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.words import JointSymbol, LegWord, RobotWord, parse
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def _script() -> ModuleType:
+    spec = importlib.util.spec_from_file_location("catalog_says", ROOT / "docs" / "catalog_says.py")
+    module = importlib.util.module_from_spec(spec)
+    sys.modules["catalog_says"] = module
+    spec.loader.exec_module(module)
+    return module
+
+
+says = _script()
+
+
+def test_the_tables_are_those_of_the_catalog() -> None:
+    text = says.PAGE.read_text(encoding="utf-8")
+    assert says.written(text, hrsynth.catalog.load()) == text, "the page is stale: make readme"
+
+
+def test_every_record_agrees_with_each_rule() -> None:
+    lines = says.rules(hrsynth.catalog.load()).splitlines()[2:]
+    assert len(lines) == 3
+    for line in lines:
+        some, _, every = line.split("|")[2].split()
+        assert some == every != "0"
+
+
+def _leg(letters: str, after: int, rail: bool) -> LegWord:
+    axes = iter("xj" if rail else "hj")
+    return LegWord(tuple(JointSymbol(letter, "z" if letter == "R" else next(axes), watched=i == after)
+                         for i, letter in enumerate(letters)))
+
+
+@st.composite
+def planar_legs(draw: st.DrawFn) -> LegWord:
+    letters = draw(st.sampled_from(["RRR", "RRP", "RPR", "PRR", "PPR", "PRP", "RPP"]))
+    return _leg(letters, draw(st.sampled_from([0, 1])), letters[0] == "P" and draw(st.booleans()))
+
+
+def left_free(leg: LegWord, rng: np.random.Generator) -> np.ndarray:
+    """A basis (3, k) of the platform's twists (ω, vx, vy) while the link after the mark keeps its direction."""
+    twists = []
+    for joint in leg.joints:
+        x, y = rng.normal(size=2)
+        twists.append([1.0, y, -x] if joint.letter == "R" else [0.0, 1.0, 0.0] if joint.axes == "x" else [0.0, x, y])
+    angle = np.array([[float(joint.letter == "R" and i <= leg.observed) for i, joint in enumerate(leg.joints)]])
+    free = np.linalg.svd(angle)[2][np.linalg.matrix_rank(angle):].T
+    return np.array(twists).T @ free
+
+
+@settings(max_examples=300, deadline=None)
+@given(st.lists(planar_legs(), min_size=2, max_size=6), st.integers(0, 2**32 - 1))
+def test_the_theorem_on_planar_robots_is_that_of_their_twists(legs: list[LegWord], seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    seen = [np.linalg.svd(basis)[0][:, basis.shape[1]:].T for basis in (left_free(leg, rng) for leg in legs)]
+    assert np.linalg.matrix_rank(np.vstack(seen), tol=1e-7) == says.planar_rank(RobotWord("", (tuple(legs),)))
+
+
+@pytest.mark.parametrize("word", ["3(Rz*-Rz-Rz)", "3(Rz*!-Rz-Rz)", "3(Px*-Rz-Rz)", "3(Px*!-Rz-Rz)", "3(Px*-Rz!-Ph)"])
+def test_the_rule_is_what_derive_finds(word: str) -> None:
+    robot = mechanism(parse(word))
+    assert hrsynth.derive(robot).verdict.rank == says.planar_rank(parse(word))
+
+
+@pytest.mark.parametrize("word", ["3(Rz*-Rz-Rz)", "3(Ph-Rz*-Pj)", "3(Piz!-Rz*-Rz)", "3(Ra-Ra-Ra-Rb-Rb)", "2(Pk*-2SSt)",
+                                  "3(Ph!-Rz*-Pj)"])
+def test_the_observed_link_is_that_of_the_robot(word: str) -> None:
+    """The mark of a word whose link is not told is that of the link that is watched."""
+    for leg in parse(word).legs:
+        told = LegWord(tuple(JointSymbol(j.letter, j.axes, j.motor, i == says.mark(leg))
+                             for i, j in enumerate(leg.joints)))
+        assert told.canonical == leg.canonical
