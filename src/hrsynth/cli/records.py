@@ -698,6 +698,7 @@ class Exported(OfRobot, WrittenTo):
     held: list[str]
     legs: list[str]
     cells: int
+    inverse: Annotated[Literal["closed form", "Newton's method"], "how the program finds the motors of a pose"]
     back: Annotated[Array | None, "low and high of motors, no two of which give the platform one pose (proved)"]
     parts: list[ExportedPart]
 

@@ -210,3 +210,28 @@ class PlatformDirection(ClosedFormLeg):
             return None
         margin, B = self.at(self.tip.value(p, R).T, lambda value: value, self.mode, *(R @ self.axis).T)
         return np.where(margin > 0, B, np.nan).T
+
+
+@dataclass(frozen=True, eq=False)
+class Pinned(ClosedFormLeg):
+    """B is the tip itself: the link that carries it is jointed to the platform, whose direction ``axis`` is the rod."""
+
+    axis: Array = field(kw_only=True)
+
+    def at(self, tip: Components, number: Number, mode: Any) -> tuple[Any, list[Any]]:
+        return 1.0, list(tip)
+
+
+@dataclass(frozen=True, eq=False)
+class RailAndLine(ClosedFormLeg):
+    """B is at ``centre`` + s ``axis`` and on a line through the tip, in the plane of both; ``normal`` to it, in the
+    base, or in the platform where it ``turns``: s = n·(C − centre) / n·axis."""
+
+    axis: Array = field(kw_only=True)
+    normal: Array = field(kw_only=True)
+    turns: bool = field(kw_only=True)
+
+    def at(self, tip: Components, number: Number, mode: Any, *n: Any) -> tuple[Any, list[Any]]:
+        centre, axis = number(self.centre), number(self.axis)
+        crossing = dot(axis, n)
+        return crossing * crossing, plus(centre, scaled(dot(minus(tip, centre), n) / crossing, axis))

@@ -16,6 +16,7 @@ from ..mechanism.observations.direction import Direction
 from ..progress import tell
 from ..results import Result
 from ..tolerances import GENERATED_CLOSED, GENERATED_LAST_STEP
+from .inverse import closed_inverse
 from .languages import TEMPLATES, program
 from .source import Source
 from .tubes import TubedBranch
@@ -28,6 +29,8 @@ class ExportedCode(Result, shown_as="export"):
     proof: BranchProof
     lang: str
     legs: tuple[str, ...]
+    closed: bool
+    """Whether the motors of a pose are found in closed form."""
     code: str
 
     @property
@@ -52,7 +55,8 @@ class ExportedCode(Result, shown_as="export"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
         return {"lang": self.lang, "motors": list(self.proof.motors), "passive": list(self.proof.passive),
-                "held": list(self.proof.held), "legs": list(self.legs), "cells": self.cells,
+                "held": list(self.proof.held), "legs": list(self.legs), "cells": self.cells, 
+                "inverse": "closed form" if self.closed else "Newton's method",
                 "back": None if self.proof.back is None else [each.tolist() for each in self.proof.back],
                 "parts": [{"motors": list(part.motors), "share": part.share,
                            "proved": [each.tolist() for each in part.proved]} for part in self.proof.parts]}
@@ -79,9 +83,10 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
         raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
     tell("code")
     watched = _watched(given, observe, camera)
-    source = Source.of(TubedBranch.of(proof), watched)
+    branch_ = TubedBranch.of(proof)
+    source = Source.of(branch_, watched, closed_inverse(given, proof, branch_))
     code = program(source, lang, _told(proof, source, lang, box))
-    return ExportedCode(proof, lang, tuple(each.leg for each in watched), code)
+    return ExportedCode(proof, lang, tuple(each.leg for each in watched), bool(source.legs), code)
 
 
 def _watched(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Sequence
 from functools import cache
@@ -15,6 +16,7 @@ from ..tolerances import (
     GENERATED_REACHED,
     GENERATED_SINGULAR,
 )
+from .inverse import traced
 from .source import Source
 
 if TYPE_CHECKING:
@@ -46,8 +48,10 @@ def program(source: Source, language: str, told: Sequence[str]) -> str:
         "back": [[float(x) for x in end] for end in branch.back or ()],
         "motor_names": source.names(branch.motors), "passive_names": [*source.names(branch.passive), *source.cut],
         "direction_names": [observation.leg for observation in source.observed],
+        "turning": [int(not branch.system.coordinates[i].slides) for i in branch.motors],
         "length": repr(float(mechanism.length)), "near": GENERATED_NEAR, "last_step": GENERATED_LAST_STEP,
-        "closed": GENERATED_CLOSED, "reached": GENERATED_REACHED, "singular": GENERATED_SINGULAR}
+        "legs": source.legs and traced(source.legs), "closed": GENERATED_CLOSED, "reached": GENERATED_REACHED,
+        "turn": repr(2 * math.pi), "singular": GENERATED_SINGULAR}
     return _templates().get_template(TEMPLATES[language]).render(**values)
 
 

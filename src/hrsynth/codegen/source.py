@@ -11,6 +11,7 @@ import numpy as np
 from ..mechanism.observations.direction import Direction
 from ..results import Value
 from .cell_tree import Node, cell_tree
+from .inverse import LegMotor
 from .trace import FormulaTracer, TracedFunction
 from .tubes import TubedBranch, TubePart
 
@@ -51,15 +52,17 @@ class Source(Value):
     cut_slopes: TracedFunction
     rates: TracedFunction
     observed: tuple[Direction, ...]
+    legs: tuple[LegMotor, ...]
+    """Closed forms of the motors of a pose; none where Newton's method finds them."""
 
     @classmethod
-    def of(cls, branch: TubedBranch, observed: Sequence[Direction]) -> Source:
-        """The formulas of a branch, and those of observed directions."""
+    def of(cls, branch: TubedBranch, observed: Sequence[Direction], legs: Sequence[LegMotor] = ()) -> Source:
+        """The formulas of a branch, those of observed directions and of the motors of a pose."""
         tracer = FormulaTracer(branch.system, branch.motors, branch.passive)
         parts = tuple(_part(branch, tracer, part) for part in branch.parts)
         names, values, slopes = tracer.cut()
         return cls(branch, parts, tracer.platform(), tuple(names), values, slopes, tracer.rates(observed),
-                   tuple(observed))
+                   tuple(observed), tuple(legs))
 
     def names(self, places: Sequence[int]) -> list[str]:
         """The names of coordinates."""

@@ -175,7 +175,8 @@ def exported(found: ExportedCode) -> str:
     proof = found.proof
     rows: Rows = [("robot", proof.robot.name), ("language", found.lang), ("motors", ", ".join(proof.motors)),
                   ("joints", f"{len(proof.passive)} passive, {len(proof.held)} idle (held)"),
-                  ("directions", ", ".join(found.legs) or "none")]
+                  ("directions", ", ".join(found.legs) or "none"),
+                  ("inverse", "in closed form" if found.closed else "by Newton's method, from motors that are near")]
     for part in proof.parts:
         rows.append(("answers for", [f"{name} {low:.6g} to {high:.6g}" for name, low, high in
                                      zip(part.motors, *part.proved, strict=True)]
