@@ -157,11 +157,11 @@ def test_what_is_wrong_on_the_command_line_is_one_line(words: list[str], said: s
     assert said in told
 
 
-@pytest.mark.parametrize("command", ["atlas", "accuracy", "select", "path", "endings"])
+@pytest.mark.parametrize("command", ["atlas", "accuracy", "select", "path"])
 def test_commands_that_know_segments_only_say_so(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
                                                  ) -> None:
     save(with_sights(load("delta"), [parse_see("point:platform@0,0,0.1", [])]), tmp_path / "delta.urdf")
-    more = {"endings": ["--at", "x=0"], "accuracy": ["--cone", "0.1deg"],
+    more = {"accuracy": ["--cone", "0.1deg"],
             "servo": ["--start", "x=0", "--goal", "x=0.01"],
             "select": ["--start", "x=0", "--goal", "x=0.01"], "path": ["--start", "x=0", "--goal", "x=0.01"]}
     assert execute([command, str(tmp_path / "delta.urdf"), *more.get(command, [])]) == 2

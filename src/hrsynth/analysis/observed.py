@@ -114,7 +114,8 @@ class ObservedRobot(Value):
             if not each.by_segment:
                 raise BadRequest(f"{self.robot.name}: {what} knows directions of segments only",
                                  f"{each.kind} {each.leg}",
-                                 "legs to watch (advise, check, derive, legs, modes, servo, singular, view know all)")
+                                 "legs to watch (advise, basins, check, derive, endings, legs, modes, servo, singular, "
+                                 "view know all)")
         return self
 
     @property
@@ -316,6 +317,9 @@ def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...]
 def _seeing(robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...]) -> tuple[Mechanism, set[str]]:
     """The robot with cameras and observations that are asked for, and the labels of these."""
     named = [parse_camera(text) for text in cameras if "=" in text]
+    if named and not see:
+        raise BadRequest(f"{robot.name}: a camera to which nothing is given to see", named[0].name,
+                         f"--see {named[0].name}=KIND:LINK…, or no camera")
     for link in [text for text in cameras if "=" not in text]:
         if link not in robot.links:
             raise BadRequest(f"{robot.name} has no link for the camera", link, sorted(robot.links))

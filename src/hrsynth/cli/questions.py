@@ -242,13 +242,13 @@ QUESTIONS = (
               "delta --start x=0 --goal x=0.05 --noise 0.1deg --json")),
     Question("endings", "All poses at which the loop can rest, and which of them attract: the goal, modes, antipodal "
              "poses, critical poses of the error.",
-             (Option("at", "The goal: pose whose directions are desired, as x=0.02,y=0.1,z=-0.7; or mode:2.", "POSE",
-                     default=NEEDED), *WATCHED,
+             (Option("at", "The goal: pose whose measurements are desired, as x=0.02,y=0.1,z=-0.7; or mode:2.", "POSE",
+                     default=NEEDED), *WATCHED, SEE,
               flag("complete", "Prove that the list is all, by boxes of platform poses, as far as that goes."),
               _file("endings")),
              ("3rrr_m1 --at x=0.02,y=0,phi=10deg", "quattro --observe 1,4 --at x=0.05,y=0.1,z=-0.7 -o endings.png")),
     Question("basins", "Where the servo loop to a goal ends, from each start of a line, plane or box of poses.",
-             (Option("to", "Pose whose directions are desired.", "POSE", default=NEEDED), *WATCHED,
+             (Option("to", "Pose whose measurements are desired.", "POSE", default=NEEDED), *WATCHED, SEE,
               Option("plane", "Plane of starts, as z=-0.7: all of it that is reached (default: one through the goal).",
                      "PART=VALUE"),
               Option("grid", "A line, plane or box of starts, such as x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7 "

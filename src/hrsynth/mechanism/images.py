@@ -7,8 +7,11 @@ The picture's plane is z = 1 of the camera's frame; noise is in units of it, or 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
+from ..geometry.jets import Jet, turn
 from ..geometry.so3 import wrap_angle
 from ..geometry.vectors import Array, cross, unit
 
@@ -53,11 +56,29 @@ def line_apart(n: Array, wanted: Array) -> Array:
     return np.array([found[0], wrap_angle(float(found[1]))])
 
 
+def line_fed(n: Sequence[Jet], wanted: Array) -> list[Jet]:
+    """The same with derivatives, n of any length."""
+    rho, theta = line_image(wanted).tolist()
+    c, s = float(np.cos(theta)), float(np.sin(theta))
+    size = (n[0] * n[0] + n[1] * n[1]).sqrt()
+    return [n[2] / size * -1.0 - rho, turn(n[1] * c - n[0] * s, n[0] * c + n[1] * s)]
+
+
 def ellipse_image(Q: Array) -> Array:
     """Centre x, y and moments n₂₀, n₁₁, n₀₂ of the ellipse (x, y, 1) Q (x, y, 1)ᵀ = 0, Q (…, 3, 3) symmetric: those
     second moments over the area, a quarter of k A⁻¹ where (x − c)ᵀ A (x − c) = k."""
     centre, spread, _, _ = _ellipse(Q)
     return np.concatenate([centre, spread[..., (0, 0, 1), (0, 1, 1)]], axis=-1)
+
+
+def ellipse_fed(Q: Sequence[Sequence[Jet]], wanted: Array) -> list[Jet]:
+    """Their difference from those of a wanted Q (3, 3), with derivatives."""
+    (a, b, x), (_, c, y), (_, _, z) = Q
+    size = a * c - b * b
+    centre = [(b * y - c * x) / size, (b * x - a * y) / size]
+    k = (x * centre[0] + y * centre[1] + z) / size * -0.25
+    told = [*centre, k * c, k * b * -1.0, k * a]
+    return [each - w for each, w in zip(told, ellipse_image(wanted).tolist(), strict=True)]
 
 
 def ellipse_slope(Q: Array, along: Array) -> Array:

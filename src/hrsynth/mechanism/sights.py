@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Self
 import numpy as np
 
 from ..errors import BadMechanism, NotMeasured
+from ..geometry.jets import Jet
 from ..geometry.vectors import Array, Numbers, dot, frozen, hat, inverse, perpendicular, transform, unit
 from ..results import Value
 from ..tolerances import NEAREST_SEEN, SAME_POINT
@@ -235,6 +236,11 @@ class CameraObservation(Observation):
     def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
         """The p and d of the same value that a controller takes for true which supposes the plane g."""
         return p, d
+
+    @staticmethod
+    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+        """:meth:`error` by formula, with its derivatives, of the coordinates of p and d in the camera's frame."""
+        raise NotImplementedError
 
     def wrenches(self, at: Sighting) -> list[Numbers]:
         """The wrenches transmitted when the value is held, on the link's twist relative to the reference link."""

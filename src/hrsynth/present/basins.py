@@ -90,7 +90,8 @@ def picture(found: Basins, paper: Paper = PNG) -> bytes:
     if grid.ndim > 1:
         entries += MapPlane.of(grid.axes, found.setting.motion, 0.4, 1.6).robot(figure, found.setting.everything.start)
     plots.legend(figure, entries, paper)
-    heading(figure, f"{found.setting.robot.name}, legs {', '.join(found.setting.labels)} observed: where each start "
+    word = "legs " if all(each.by_segment for each in found.setting.observed) else ""
+    heading(figure, f"{found.setting.robot.name}, {word}{', '.join(found.setting.labels)} observed: where each start "
             f"ends\ngoal {plots.pose_words(found.goal)}", grid.fixed, "; starts: ")
     return printed(figure, paper)
 

@@ -35,17 +35,19 @@ def picture(found: Endings, paper: Paper = PNG) -> bytes:
     goal, platform = found.goal, found.setting.anatomy.platform
     mechanism, motion = goal.twin.mechanism, found.setting.motion
     ground = np.array([joint.point for joint in mechanism.joints_of(mechanism.base)])
-    robot = [*legs_of(goal, platform), *_outlines(goal, platform)]
+    robot = [*legs_of(goal, platform), *_outlines(goal, platform), *_sights(found, goal)]
     extent = np.vstack([ground, *robot])
     middle, size = (extent.min(axis=0) + extent.max(axis=0)) / 2, float(np.ptp(extent, axis=0).max())
     drawn = [(each, motion.position(each.configuration.pose(motion.link))) for each in found.rests]
     near = [(each, p) for each, p in drawn if np.abs(p - middle).max() <= WITHIN * size]
-    shapes = [(look(each), _outlines(each.configuration, platform)) for each, _ in near if each.stability == STABLE]
+    shapes = [(look(each), [*_outlines(each.configuration, platform), *_sights(found, each.configuration)])
+              for each, _ in near if each.stability == STABLE]
     every = np.vstack([extent, *(p for _, p in near), *(stroke for _, some in shapes for stroke in some)])
     figure = empty_figure(paper.wide(WIDE), TALL)
     far = len(drawn) - len(near)
     beyond = f"; {far} more farther away" if far else ""
-    title = figure.suptitle(f"{found.setting.robot.name}, legs {', '.join(found.setting.labels)} observed, goal "
+    word = "legs " if all(each.by_segment for each in found.setting.observed) else ""
+    title = figure.suptitle(f"{found.setting.robot.name}, {word}{', '.join(found.setting.labels)} observed, goal "
                             f"{pose_words(found.pose)}\n{len(found.attracting)} of {len(found.rests)} rests attract"
                             f"{beyond}", va="top")
     above = settled(figure, title)
@@ -78,3 +80,10 @@ def look(each: RestPoint) -> str:
 
 def _outlines(at: ClosedConfiguration, platform: Any) -> list[Any]:
     return [outline(at.twin.mechanism, link, at.pose(link)) for link in platform]
+
+
+def _sights(found: Endings, at: ClosedConfiguration) -> list[Any]:
+    """What is observed that is no segment, as lines in space."""
+    reference, size = found.setting.mechanism.reference, at.twin.length / 2
+    return [line for each in found.setting.observed if not each.by_segment
+            for line in each.drawn(at.pose(each.seen_from or reference), at.pose(each.link), size).lines]

@@ -1,7 +1,8 @@
 """Rests of a loop counted again: gradient descent and Newton's method in the oracle's maximal coordinates.
 
-E = ½ Σ (1 − (u_i · u_di)²) depends on link poses alone; the constraints are the oracle's wrenches. A step is projected
-onto the motions that these allow. Nothing is shared with what is under test but the description of the robot.
+E = ½ Σ (1 − (u_i · u_di)²), of image points ½ Σ ‖x_i − x_di‖², depends on link poses alone; the constraints are the
+oracle's wrenches. A step is projected onto the motions that these allow. Nothing is shared with what is under test but
+the description of the robot.
 
 ``python -m simulation.endings.count 1000 3rpr_m1 quattro:1,4`` (from ``tests/``) counts and compares.
 """
@@ -18,12 +19,15 @@ import numpy as np
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.geometry.vectors import Array
 from hrsynth.mechanism.observations.direction import Direction
+from hrsynth.mechanism.observations.point import ImagePoint
 from hrsynth.simulation.endings.endings import endings
 from hrsynth.simulation.endings.rests import Endings
 from oracle import Oracle
 
 EPS = 1e-13
 FOUND, CLOSED, SAME = 1e-9, 1e-9, 1e-4
+LOST, FLAT = 1e-9, 1e-7
+"""Relative sizes of singular values and curvatures below which they vanish."""
 
 
 @dataclass
@@ -43,9 +47,11 @@ class Descent:
     def __init__(self, found: Endings) -> None:
         setting = found.setting
         self.oracle = Oracle(setting.mechanism)
-        self.seen = [(self.oracle.index[o.link], o.direction) for o in setting.samples.question.observations
-                     if isinstance(o, Direction)]
-        self.desired = found.desired
+        every = list(zip(setting.samples.question.observations, found.desired, strict=True))
+        self.seen = [(self.oracle.index[o.link], o.direction, w) for o, w in every if isinstance(o, Direction)]
+        self.points = [(self.oracle.index[o.link], o.at, self.oracle.index[o.seen_from or setting.mechanism.reference],
+                        o.view, w[:2] / w[2]) for o, w in every if isinstance(o, ImagePoint)]
+        assert len(self.seen) + len(self.points) == len(every)
         self.place = {number: 6 * k for k, number in enumerate(self.oracle.moving)}
         self.size = 6 * len(self.place)
         self.scale = np.tile([self.oracle.length] * 3 + [1.0] * 3, len(self.place))
@@ -53,17 +59,35 @@ class Descent:
     def constraints(self, state: Array) -> tuple[Array, Array]:
         """Residual and its derivative by the scaled velocities of all links but the base."""
         residual, J = self.oracle.rows.evaluate(state)
-        return residual, J[:, self.oracle.moving].reshape(len(residual), -1) * self.scale
+        return residual, J[:, self.oracle.moving].reshape(len(residual), self.size) * self.scale
 
     def error(self, state: Array) -> tuple[float, Array]:
         """E and its derivative."""
         value, slope = 0.0, np.zeros(self.size)
-        for (link, d), w in zip(self.seen, self.desired, strict=True):
+        for link, d, w in self.seen:
             u = state[link, :3, :3] @ d
             c = u @ w
             value += 0.5 * (1 - c * c)
             slope[self.place[link] + 3 : self.place[link] + 6] -= c * np.cross(u, w)
+        for link, at, eye, view, wanted in self.points:
+            p, R, B = self.ray(state, link, at, eye, view)
+            e = p[:2] / p[2] - wanted
+            value += 0.5 * float(e @ e)
+            pull = R @ np.append(e, -(p[:2] @ e) / p[2]) / p[2]
+            for body, sign in ((link, 1.0), (eye, -1.0)):
+                if body in self.place:
+                    row = np.append(pull, np.cross(B - state[body, :3, 3], pull)) * self.scale[:6]
+                    slope[self.place[body] : self.place[body] + 6] += sign * row
         return value, slope
+
+    def ray(self, state: Array, link: int, at: Array, eye: int, view: Array) -> tuple[Array, Array, Array]:
+        """A point in the camera's frame, the turn of that frame, and the point in the base's."""
+        X, B = state[eye] @ view, state[link, :3, :3] @ at + state[link, :3, 3]
+        return X[:3, :3].T @ (B - X[:3, 3]), X[:3, :3], B
+
+    def sighted(self, state: Array) -> bool:
+        """Whether all points are in front of their cameras."""
+        return all(self.ray(state, *each[:4])[0][2] > 1e-3 for each in self.points)
 
     def moved(self, state: Array, step: Array) -> Array:
         return self.oracle.moved(state, step * self.scale)
@@ -88,7 +112,7 @@ class Descent:
         for _ in range(steps):
             way = self.along(self.constraints(state)[1], rng.normal(size=self.size))
             there, left = self.closed(self.moved(state, 0.4 * rng.uniform(0.2, 1) * way / np.abs(way).max()))
-            if left < CLOSED:
+            if left < CLOSED and self.sighted(there):
                 state = there
         return state
 
@@ -108,7 +132,8 @@ class Descent:
             step *= min(1.0, 0.2 / np.abs(step).max())
             for _ in range(12):
                 there, left = self.closed(self.moved(state, step))
-                if left < CLOSED and self.error(there)[0] < value + 1e-3 * abs(value) * (last is not None):
+                lower = self.error(there)[0] < value + 1e-3 * abs(value) * (last is not None)
+                if left < CLOSED and self.sighted(there) and lower:
                     break
                 step = step / 3
             else:
@@ -117,25 +142,28 @@ class Descent:
         return state
 
     def newton(self, state: Array, steps: int = 40) -> tuple[Array, float]:
-        """Newton's method on ∇E + Jᵀ μ = 0 beside the loops, the derivative by differences."""
-        mu, left = None, np.inf
-        for _ in range(steps):
-            (r, J), g = self.constraints(state), self.error(state)[1]
-            if mu is None or left > 1e-4:
-                mu = -np.linalg.solve(J @ J.T + EPS * np.eye(len(r)), J @ g)
-            pull = g + J.T @ mu
-            left = max(float(np.linalg.norm(pull)), float(np.linalg.norm(r)))
-            if left < FOUND:
+        """Newton's method for ∇E + Jᵀ μ = 0 along the kernel of J, the derivative by differences, closed again after
+        each step; motions along which nothing changes are left alone."""
+        left = np.inf
+        for number in range(steps):
+            state, open_ = self.closed(state, 20)
+            (_, J), g = self.constraints(state), self.error(state)[1]
+            U, values, right = np.linalg.svd(J)
+            rank = int(np.sum(values > LOST * values.max(initial=1.0)))
+            Z = right[rank:].T
+            mu = -U[:, :rank] @ ((right[:rank] @ g) / values[:rank])
+            left = max(float(np.linalg.norm(Z.T @ g)), open_)
+            if left < FOUND or not np.isfinite(left) or number == steps - 1:
                 break
-            H = np.empty((self.size, self.size))
-            for k in range(self.size):
-                there = self.moved(state, 1e-6 * np.eye(self.size)[k])
-                H[:, k] = (self.error(there)[1] + self.constraints(there)[1].T @ mu - pull) / 1e-6
-            K = np.block([[H + 1e-10 * np.eye(self.size), J.T], [J, -1e-12 * np.eye(len(r))]])
-            step = np.linalg.solve(K, -np.concatenate([pull, r]))
-            way = step[: self.size]
-            short = min(1.0, 0.3 / np.abs(way).max())
-            state, mu = self.moved(state, short * way), mu + short * step[self.size :]
+            H = np.empty((Z.shape[1],) * 2)
+            for k, way in enumerate(1e-6 * Z.T):
+                ends = [self.moved(state, sign * way) for sign in (1, -1)]
+                pulls = [self.error(end)[1] + self.constraints(end)[1].T @ mu for end in ends]
+                H[:, k] = Z.T @ (pulls[0] - pulls[1]) / 2e-6
+            values, V = np.linalg.eigh((H + H.T) / 2)
+            kept = np.abs(values) > FLAT * np.abs(values).max(initial=1.0)
+            way = -Z @ (V[:, kept] @ ((V[:, kept].T @ (Z.T @ g)) / values[kept]))
+            state = self.moved(state, min(1.0, 0.3 / max(np.abs(way).max(), 1e-300)) * way)
         return state, left
 
     def manner(self, state: Array, rng: np.random.Generator) -> tuple[int, int, int]:
@@ -162,7 +190,7 @@ class Descent:
         """What a rest is known by: the platform's pose and the directions."""
         X = state[self.oracle.index[self.oracle.mechanism.platform]]
         return np.concatenate([X[:3, 3] / self.oracle.length, X[:3, :3].ravel(),
-                               *(state[link, :3, :3] @ d for link, d in self.seen)])
+                               *(state[link, :3, :3] @ d for link, d, _ in self.seen)])
 
 
 def counted(found: Endings, starts: int, seed: int = 1) -> Counted:
@@ -177,7 +205,7 @@ def counted(found: Endings, starts: int, seed: int = 1) -> Counted:
         state = scene.start(home if number % 20 == 0 else state, rng)
         for method, end in (("descent", scene.descend(state)), ("newton", state)):
             end, left = scene.newton(end)
-            if left >= 1e-7:
+            if left >= 1e-7 or not scene.sighted(end):
                 result.ends[method, "no rest"] += 1
                 continue
             told = scene.told(end)

@@ -2,17 +2,24 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import replace
 from functools import cache
 from itertools import islice
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.linalg import null_space
+from scipy.optimize import least_squares
 
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot
+from hrsynth.errors import BadRequest
 from hrsynth.geometry.affine import AffineForms
+from hrsynth.geometry.so3 import exponential, logarithm
+from hrsynth.geometry.vectors import pose
 from hrsynth.kinematics.chart import TangentChart
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import joint_at
@@ -237,6 +244,101 @@ def test_a_thousand_random_starts_find_no_other(name: str, legs: str | None) -> 
     setting = ObservedRobot.of(name, legs)
     goal = setting.motion.pose(setting.configurations[3].pose(setting.motion.link))
     assert not counted(endings(setting, at=str(goal)), 1000).strangers
+
+
+SQUARE = np.array([[0.1, 0.1, 0], [-0.1, 0.1, 0], [-0.1, -0.1, 0], [0.1, -0.1, 0]])
+TILTED = "x=0.1,y=0,z=1.2,rpy=0.3/-0.5/0.2"
+BODY = """<robot name="body"><link name="base"/><link name="platform"/>
+  <joint name="free" type="floating"><parent link="base"/><child link="platform"/><origin xyz="0 0 1.2"/></joint>
+  <hrsynth serial="true"><platform link="platform"/></hrsynth></robot>"""
+
+
+def seen(points: np.ndarray, link: str = "platform") -> list[str]:
+    return [f"point:{link}@{x},{y},{z}" for x, y, z in points]
+
+
+def body(folder: Path, see: list[str], **options: Any) -> Endings:
+    """The endings of a body that nothing holds before a camera."""
+    (folder / "body.urdf").write_text(BODY)
+    return endings(folder / "body.urdf", see=see, camera="eye=base@0,0,0", **options)
+
+
+def pulled(x: np.ndarray, at: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """∇½‖e‖², e that of image points at a pose x (translation, rotation vector), by hand."""
+    arms = at @ exponential(x[3:]).T
+    p = arms + x[:3]
+    e = p[:, :2] / p[:, 2:] - wanted
+    force = np.column_stack([e, -np.sum(p[:, :2] / p[:, 2:] * e, axis=1)]) / p[:, 2:]
+    return np.concatenate([force.sum(axis=0), np.cross(arms, force).sum(axis=0)])
+
+
+@pytest.mark.slow
+def test_four_image_points_of_a_tilted_square(tmp_path: Path) -> None:
+    """The goal and the pose tilted the other way attract, a saddle lies between them; by hand they are rests, gradient
+    descent in maximal coordinates ends at them alone, and zeros of the gradient by least squares are no others."""
+    found = body(tmp_path, seen(SQUARE), at=TILTED)
+    poses = [each.configuration.pose("platform") for each in found.rests]
+    p = SQUARE @ poses[0][:3, :3].T + poses[0][:3, 3]
+    wanted = p[:, :2] / p[:, 2:]
+    assert [(each.kind, each.stability) for each in found.rests] == [
+        ("goal", "stable"), ("critical", "stable"), ("critical", "saddle"), ("critical", "saddle")]
+    assert all(each.proved and each.decided for each in found.rests)
+    for each, X in zip(found.rests, poses, strict=True):
+        x = np.append(X[:3, 3], logarithm(X[:3, :3]))
+        assert pulled(x, SQUARE, wanted) == pytest.approx(np.zeros(6), abs=1e-11)
+        shown = SQUARE @ X[:3, :3].T + X[:3, 3]
+        assert np.linalg.norm(shown[:, :2] / shown[:, 2:] - wanted) == pytest.approx(each.error, abs=1e-12)
+    result = counted(found, 25)
+    assert not result.strangers
+    assert {0, 1} <= result.met
+    rng, met = np.random.default_rng(0), set()
+    for _ in range(150):
+        z, way = rng.uniform(0.5, 3), rng.normal(size=3)
+        away = z * rng.uniform(-0.5, 0.5, 2)
+        turn = rng.uniform(0, 2.5) * way / np.linalg.norm(way)
+        start = np.array([*away, z, *turn])
+        with suppress(ValueError):
+            end = least_squares(pulled, start, args=(SQUARE, wanted), xtol=1e-15, ftol=1e-15, gtol=1e-15).x
+            X = pose(end[:3], exponential(end[3:]))
+            ahead = np.min(SQUARE @ X[2, :3] + X[2, 3])
+            if np.abs(pulled(end, SQUARE, wanted)).max() < 1e-11 and 1e-3 < ahead < 30:
+                apart = [np.abs(X - each).max() for each in poses]
+                assert min(apart) < 1e-3
+                met.add(int(np.argmin(apart)))
+    assert met
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("see", [
+    ["circle:platform@0.1,0,0/0,0.3,1", "distance:platform@0.1,0.1,0"],
+    ["edges:platform@0.1,0,0/0,1,0.2/0.02", "edge:platform@0.1,0.1,0/1,0,0/0.02"],
+    ["inclination:platform", "position:platform@0.1,0,0", "direction:platform/1,0,0"],
+], ids=["circle and distance", "edges", "inclination, position and direction"])
+def test_rests_of_all_kinds_are_those_of_the_law(see: list[str], tmp_path: Path) -> None:
+    """The law commands nothing there, and from next to one that attracts a run ends at it."""
+    found = body(tmp_path, see, at=TILTED)
+    assert found.rests[0].kind == "goal"
+    assert all(each.stable and each.proved for each in found.rests if each.error < 1e-9)
+    search = RestSearch.of(found.setting, found.goal)
+    loop = Loop(replace(search.law, gain=0.8), found.setting.everything.question, FixedDirections(found.desired))
+    for each in found.rests[:3]:
+        command = search.law.at(each.configuration, FixedDirections(found.desired)(0.0))
+        assert command.size == pytest.approx(each.error, abs=1e-9)
+        assert command.pull < 1e-7
+        if each.singular is None:
+            assert command.speed < 1e-6
+            run = loop.simulate(nearby(found, each), 60.0)
+            away = np.abs(run.last.pose("platform") - each.configuration.pose("platform"))
+            assert (away.max() < 1e-4) == (each.stable is True)
+
+
+def test_what_cannot_be_asked_of_cameras_is_refused_in_one_line(tmp_path: Path) -> None:
+    for options, said in (({"at": "x=0,y=0,z=-0.5,rpy=0/0/0"}, "not in front of its camera at the goal"),
+                          ({"at": TILTED, "complete": True}, "knows directions of segments only")):
+        with pytest.raises(BadRequest, match=said):
+            body(tmp_path, seen(SQUARE), **options)
+    with pytest.raises(BadRequest, match="a camera to which nothing is given to see"):
+        endings(FIVE_BAR, camera="eye=base@0,0,0", at=POSE)
 
 
 @pytest.mark.parametrize(("curvatures", "word"), [

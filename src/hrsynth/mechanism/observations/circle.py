@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...geometry.jets import Jet
 from ...geometry.screws import couple, force, normals
 from ...geometry.vectors import Array, Numbers, frozen
 from ..images import tilted
@@ -65,6 +66,10 @@ class SpaceCircle(CameraObservation):
 
     def in_front(self, X_reference: Array, X_link: Array) -> float:
         return np.inf if self.camera is None else self.ahead(X_reference, X_link)
+
+    @staticmethod
+    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+        return [a - b for a, b in zip([*p, *d], wanted.tolist(), strict=True)]
 
     def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """The centre beside its place, the normal in a cone."""

@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...geometry.jets import Jet, inner
 from ...geometry.screws import force, normals
 from ...geometry.vectors import Array, Numbers, unit
 from ..observation import Drawn
@@ -37,6 +38,10 @@ class PointDistance(CameraObservation):
     @staticmethod
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
         return normalised(p)[0][..., None, :], None
+
+    @staticmethod
+    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+        return [inner(p, p).sqrt() - float(wanted[0])]
 
     def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         return value + noise["m"] * shocks[0, :1]

@@ -5,15 +5,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import NotMeasured
+from ...geometry.jets import Jet, inner, moment
 from ...geometry.screws import couple, force
 from ...geometry.vectors import Array, Numbers, cross, unit
-from ..images import line_apart, line_slope, shifted_line
+from ..images import line_apart, line_fed, line_slope, shifted_line
 from ..observation import Drawn
 from ..sights import (
     CameraObservation,
@@ -39,6 +40,14 @@ def tangent(p: Array, d: Array, r: Array) -> Array:
         raise NotMeasured("an edge of a cylinder: distance of its axis from the camera's centre (m)", float(D.min()),
                           f"more than its radius {float(np.abs(r).max()):g}")
     return np.asarray((r / D) * f / D + np.sqrt(1 - (r / D) ** 2) * cross(d, f / D))
+
+
+def touching(p: Sequence[Jet], d: Sequence[Jet], r: Jet) -> list[Jet]:
+    """The same of any length, with derivatives."""
+    along = inner(p, d)
+    foot = [a - along * b for a, b in zip(p, d, strict=True)]
+    high = (inner(foot, foot) - r * r).sqrt()
+    return [r * f + high * m * -1.0 for f, m in zip(foot, moment(p, d), strict=True)]
 
 
 def tangent_partials(p: Array, d: Array, r: Array) -> tuple[Array, Array]:
@@ -87,6 +96,10 @@ class CylinderEdge(CameraObservation):
         n = tangent(p, d, r)
         foot = on_plane(n, g)
         return foot + r * n, normalised(cross(foot, n))[0]
+
+    @staticmethod
+    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+        return line_fed(touching(p, d, r), wanted)
 
     def error(self, value: Array, wanted: Array) -> Array:
         return line_apart(value, wanted)

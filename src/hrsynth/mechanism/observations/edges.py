@@ -5,16 +5,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...geometry.jets import Jet
 from ...geometry.vectors import Array, Numbers
-from ..images import line_apart, line_slope, shifted_line
+from ..images import line_apart, line_fed, line_slope, shifted_line
 from ..observation import Drawn
 from ..sights import CameraObservation, HeldPlace, Sighting, VirtualJoint, apart, normalised
-from .edge import CylinderEdge, tangent, tangent_partials
+from .edge import CylinderEdge, tangent, tangent_partials, touching
 from .line import SpaceLine, line_chain, line_loci, line_wrenches
 
 
@@ -41,6 +42,10 @@ class CylinderEdges(CameraObservation):
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
         one, other = tangent_partials(p, d, r), tangent_partials(p, d, -r)
         return np.concatenate([one[0], other[0]], axis=-2), np.concatenate([one[1], other[1]], axis=-2)
+
+    @staticmethod
+    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+        return [*line_fed(touching(p, d, r), wanted[:3]), *line_fed(touching(p, d, r * -1.0), wanted[3:])]
 
     def error(self, value: Array, wanted: Array) -> Array:
         pairs = ((value[..., rows], wanted[..., rows]) for rows in (slice(3), slice(3, 6)))

@@ -5,14 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from ...errors import BadMechanism
+from ...geometry.jets import Jet, inner
 from ...geometry.vectors import Array, Numbers, dot
-from ..images import ellipse_image, ellipse_slope, shifted_ellipse
+from ..images import ellipse_fed, ellipse_image, ellipse_slope, shifted_ellipse
 from ..observation import Drawn
 from ..sights import RING, CameraObservation, Sighting, VirtualJoint, ring
 from .circle import circle_chain, circle_wrenches
@@ -85,6 +86,13 @@ class ImageCircle(CameraObservation):
             return np.asarray((J - q @ (np.swapaxes(q, -1, -2) @ J)) / norm)
 
         return rates(d, p, _both(d, d)), rates(p, d, _both(d, d))
+
+    @staticmethod
+    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+        h, rest = inner(p, d), inner(p, p) - r * r
+        Q = [[rest * d[i] * d[k] - h * (p[i] * d[k] + p[k] * d[i]) + (h * h if i == k else 0.0) for k in range(3)]
+             for i in range(3)]
+        return ellipse_fed(Q, _matrix(wanted))
 
     def error(self, value: Array, wanted: Array) -> Array:
         return ellipse_image(_matrix(value)) - ellipse_image(_matrix(wanted))

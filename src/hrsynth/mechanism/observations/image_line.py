@@ -5,14 +5,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...geometry.jets import Jet, moment
 from ...geometry.screws import couple, force
 from ...geometry.vectors import Array, Numbers, cross, hat, unit
-from ..images import line_apart, line_slope, shifted_line
+from ..images import line_apart, line_fed, line_slope, shifted_line
 from ..observation import Drawn
 from ..sights import (
     CameraObservation,
@@ -64,6 +65,10 @@ class ImageLine(CameraObservation):
         n = normalised(cross(p, d))[0]
         foot = on_plane(n, g)
         return foot, normalised(cross(n, foot))[0]
+
+    @staticmethod
+    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+        return line_fed(moment(p, d), wanted)
 
     def error(self, value: Array, wanted: Array) -> Array:
         return line_apart(value, wanted)

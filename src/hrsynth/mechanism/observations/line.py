@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...geometry.jets import Jet, moment
 from ...geometry.screws import couple, force, normals
 from ...geometry.vectors import Array, Numbers, cross, frozen, hat, perpendicular, unit
 from ...tolerances import LINE_AT_CENTRE
@@ -65,6 +66,10 @@ class SpaceLine(CameraObservation):
     def partials(p: Array, d: Array, r: Array) -> tuple[Array | None, Array | None]:
         one = np.broadcast_to(np.eye(3), (*d.shape, 3))
         return np.concatenate([0 * one, -hat(d)], axis=-2), np.concatenate([one, hat(p)], axis=-2)
+
+    @staticmethod
+    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+        return [a - b for a, b in zip([*d, *moment(p, d)], wanted.tolist(), strict=True)]
 
     def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         """Its point nearest to C beside its place, its direction in a cone."""

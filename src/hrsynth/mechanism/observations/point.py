@@ -5,9 +5,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+from ...geometry.jets import Jet
 from ...geometry.screws import force, normals
 from ...geometry.vectors import Array, Numbers, dot
 from ..images import point_image, point_slope, shifted_point, tilted
@@ -55,6 +56,11 @@ class ImagePoint(CameraObservation):
     def supposed(p: Array, d: Array, r: Array, g: Array) -> tuple[Array, Array]:
         """Where the ray meets the plane."""
         return p / dot(g, p)[..., None], d
+
+    @staticmethod
+    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+        x, y = point_image(wanted).tolist()
+        return [p[0] / p[2] - x, p[1] / p[2] - y]
 
     def error(self, value: Array, wanted: Array) -> Array:
         return point_image(value) - point_image(wanted)

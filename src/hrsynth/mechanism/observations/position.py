@@ -5,11 +5,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from ...geometry.jets import Jet
 from ...geometry.screws import force
 from ...geometry.vectors import Array, Numbers
 from ..observation import Drawn
@@ -39,6 +40,10 @@ class PointPosition(CameraObservation):
 
     def in_front(self, X_reference: Array, X_link: Array) -> float:
         return np.inf if self.camera is None else self.ahead(X_reference, X_link)
+
+    @staticmethod
+    def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
+        return [a - b for a, b in zip(p, wanted.tolist(), strict=True)]
 
     def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
         return value + noise["m"] * shocks[0]

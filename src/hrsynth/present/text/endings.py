@@ -26,7 +26,7 @@ def endings(found: Endings) -> str:
         rows += [("do not", [*told, *([f"and {left} more (--json lists them)"] if left > 0 else [])]), *GAP]
     rows += [("enclosed", _enclosed(found, boxed)), *GAP]
     rows += [("continua", [f"‖e‖ = {each.error:.3g}, {each.stability}{_why(each)}" for each in found.continua])]
-    rows += [("all", [*map(_signs, filter(_met, found.lists)),
+    rows += [("all", [*(_signs(each, found) for each in found.lists if _met(each)),
                       *_others([each for each in found.lists if not _met(each)]), *_complete(found)])]
     return listing(rows)
 
@@ -94,8 +94,9 @@ def _line(each: RestPoint) -> list[str]:
             "; ".join(notes)]
 
 
-def _signs(each: SignedModes) -> str:
-    which = f"with {named('leg', each.reversed)} reversed" if each.reversed else "with the desired directions"
+def _signs(each: SignedModes, found: Endings) -> str:
+    what = "directions" if all(o.by_segment for o in found.setting.observed) else "measurements"
+    which = f"with {named('leg', each.reversed)} reversed" if each.reversed else f"with the desired {what}"
     if each.listed is None:
         return f"poses {which}: found, not listed"
     known = "proved to be all" if each.complete else "found, not proved to be all"

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...analysis.accuracy.error_map import Mapper
 from ...analysis.asked import configurations_at
-from ...analysis.observed import LegsLike, ObservedRobot, RobotLike
+from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ...analysis.question import question
 from ...batch.grids import poses_over
 from ...batch.reach import sweep
@@ -38,9 +38,9 @@ from ...kinematics.platform_motion import PlatformMotion
 from ...mechanism.pose import Grid, Pose, PoseLike, as_pose, asked_pose
 from ...progress import tell
 from ...results import Result, Value
-from ...tolerances import RUNS_ALIKE
-from ..ending import ENDINGS, GOAL, TIME, UNDECIDED, Ending, EndingClassifier
-from ..law import directions
+from ...tolerances import RUNS_ALIKE, SEEN_ABOVE
+from ..ending import ENDINGS, GOAL, SIGHT, TIME, UNDECIDED, Ending, EndingClassifier
+from ..law import measured
 from ..run import AWAY, EFFORT, LOST, POISED, REST, SERVED_AT
 from ..run import TIME as OVER
 from ..servo import ServoTask
@@ -158,16 +158,16 @@ class Basins(Result, shown_as="basins"):
 
 
 @question()
-def basins(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *, to: PoseLike,
-           plane: PoseLike | None = None, grid: str | None = None, steps: int | None = None, jobs: int | None = None,
-           seed: int = 0) -> Basins:
-    """Where the loop that servoes the directions at the pose ``to`` ends, from each start of a plane of poses (by
+def basins(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
+           to: PoseLike, plane: PoseLike | None = None, grid: str | None = None, steps: int | None = None,
+           jobs: int | None = None, seed: int = 0) -> Basins:
+    """Where the loop that servoes what is observed at the pose ``to`` ends, from each start of a plane of poses (by
     default one through the goal, all of it that is reached, ``steps`` poses a side) or of a ``grid``, a line, plane or
     box such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
 
-    ``observe`` and ``camera`` as for ``derive``. The law is that of ``servo`` with exact directions. Robots whose legs
-    are closed forms are integrated abreast, others one by one. There are ``jobs`` processes, by default as many as
-    cores; the answer does not depend on them.
+    ``observe``, ``camera`` and ``see`` as for ``derive``. The law is that of ``servo`` with exact measurements. Robots
+    whose legs are closed forms and watched by their directions are integrated abreast, others one by one. There are
+    ``jobs`` processes, by default as many as cores; the answer does not depend on them.
 
     Raises ``BadRequest`` for names that there are not, legs that do not see the platform, a singular goal, too many
     starts; ``PoseNotReached``, ``PlaneNotMet`` for poses out of reach.
@@ -175,7 +175,7 @@ def basins(robot: RobotLike, observe: LegsLike = None, camera: str | None = None
     >>> hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid="x=-0.02:0.02:5,y=-0.02:0.02:5,phi=0")
     <Basins: 3rrr_m1, watching 1, 2, 3: 100 % of 25 starts end at the goal x=0,y=0,z=0,phi=0>
     """
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed)
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
     asked = asked_pose(to)
     setting = setting.telling([asked])
     if plane is not None and grid is not None:
@@ -354,14 +354,17 @@ def _followed(flow: Flow, horizon: float, farthest: float, X: Array) -> Runs:
 
 
 def _simulated(task: ServoTask, starts: Sequence[ClosedConfiguration | None]) -> list[Outcome]:
-    classifier = EndingClassifier(task.setting, task.goal, task.directions)
+    classifier = EndingClassifier(task.setting, task.goal, task.wanted)
     loop, found = task.loop(), []
     for start in starts:
         if start is None:
             found.append(Outcome(Ending(UNDECIDED, "the robot was not found closed there")))
             continue
+        if task.law.in_front(start) < SEEN_ABOVE:
+            found.append(Outcome(Ending(SIGHT, "a camera does not see at the start what it is to see")))
+            continue
         run = loop.simulate(start, task.conditions.horizon)
-        ending = classifier.classify(run, directions(run.last, task.law.question)[0])
+        ending = classifier.classify(run, measured(run.last, task.law.question)[0])
         rests = run.stopped in (SERVED_AT, REST, POISED)
         found.append(Outcome(ending, run.last.pose(task.setting.motion.link), run.commands[-1].size) if rests
                      else Outcome(ending))

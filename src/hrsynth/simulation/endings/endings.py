@@ -16,7 +16,7 @@ from ...analysis.aspects.path_segments import path_coordinates
 from ...analysis.aspects.vector_expressions import NoLegForm
 from ...analysis.measured import MeasuredRobot
 from ...analysis.modes.modes import AssemblyModes, modes
-from ...analysis.observed import LegsLike, ObservedRobot, RobotLike
+from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ...analysis.posture import ConfigurationAnalysis
 from ...analysis.question import question
 from ...constraints.condition import Condition
@@ -27,12 +27,13 @@ from ...geometry.vectors import Array, pose_difference, transform
 from ...kinematics.assembly import of_links
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
+from ...mechanism.observations.direction import SeenAxis
 from ...mechanism.pose import PoseLike, asked_pose
 from ...progress import tell
-from ...tolerances import DAMPED, SAME_ENDING, VANISHED
+from ...tolerances import DAMPED, SAME_ENDING, SEEN_ABOVE, VANISHED
 from ..ending import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
-from ..law import FixedDirections, Law, directions
-from ..servo import require_regular, require_seen
+from ..law import FixedDirections, Law, Measures, measured
+from ..servo import require_regular, require_seen, require_sight
 from .carried import SweptChains
 from .completeness import Covers
 from .enclosure import EnclosedPoint, enclosed
@@ -42,29 +43,34 @@ from .search import NEARBY, Critical, critical_points, descend, in_mode, walked
 
 
 @question()
-def endings(robot: RobotLike, observe: LegsLike = None, camera: str | None = None, *, at: PoseLike,
-            complete: bool = False, seed: int = 0) -> Endings:
-    """All poses at which the loop can rest that servoes the directions which are observed at ``at``: the goal, modes
-    and antipodal poses, where the error vanishes, and critical poses, where it does not; which of them attract.
+def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
+            at: PoseLike, complete: bool = False, seed: int = 0) -> Endings:
+    """All poses at which the loop can rest that servoes what is observed at ``at``: the goal, modes and antipodal
+    poses, where the error vanishes, and critical poses, where it does not; which of them attract.
 
-    ``observe`` and ``camera`` as for ``derive``. The law rests exactly at the critical points of ½ ‖e‖² on the closed
-    loops (theory.md 11). These are sought from random walks on the branch of the zero configuration. ``complete``:
-    prove that they are all, by subdivision of a box of platform poses (seconds to minutes), as far as that goes.
+    ``observe``, ``camera`` and ``see`` as for ``derive``; each kind of observation has its error. The law rests exactly
+    at the critical points of ½ ‖e‖² on the closed loops (theory.md 11); those at which a camera does not see what it is
+    to see are left out. They are sought from random walks on the branch of the zero configuration. ``complete``: prove
+    that they are all, by subdivision of a box of platform poses (seconds to minutes), as far as that goes.
 
-    Raises ``BadRequest`` for names that there are not, legs that do not see the platform, a singular goal;
-    ``PoseNotReached`` for a pose out of reach.
+    Raises ``BadRequest`` for names that there are not, observations that do not see the platform, a singular goal, one
+    at which something is behind its camera; ``PoseNotReached`` for a pose out of reach.
 
     >>> hrsynth.endings("rrrrr_m1", at="x=0,y=0.25").attracting[0].kind
     'goal'
     """
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("endings")
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    if complete:
+        setting.by_segments("subdivision")
     asked = asked_pose(at)
     setting = setting.telling([asked])
     require_seen(setting)
     (goal,) = configurations_at(setting, [asked])
     require_regular(ConfigurationAnalysis.of(setting), "goal", goal)
+    search = RestSearch.of(setting, goal)
+    require_sight(setting, search.law, "goal", goal)
     tell("rests")
-    return RestSearch.of(setting, goal).answer(seed, complete=complete)
+    return search.answer(seed, complete=complete)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,14 +81,17 @@ class RestSearch:
     goal: ClosedConfiguration
     system: RestSystem
     law: Law
-    desired: Array
+    desired: Measures
 
     @classmethod
     def of(cls, setting: ObservedRobot, goal: ClosedConfiguration) -> RestSearch:
         """That of a goal."""
         question = setting.samples.question
         system = RestSystem.of(goal, question, setting.configurations)
-        return cls(setting, goal, system, Law(question, setting.dof, 1.0), directions(goal, question)[0])
+        values = measured(goal, question)[0]
+        by_directions = all(isinstance(each, SeenAxis) for each in question.observations)
+        return cls(setting, goal, system, Law(question, setting.dof, 1.0),
+                   np.array(values) if by_directions else values)
 
     def answer(self, seed: int = 0, *, minima: bool = False, rounds: Iterable[Array] | None = None,
                complete: bool = False) -> Endings:
@@ -91,7 +100,9 @@ class RestSearch:
         setting, motion = self.setting, self.setting.motion
         found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds)
         isolated = self._in_mode(found.isolated)
-        covers = None if minima else Covers.of(setting, self.goal, self.system, self.law.question, complete)
+        covers = None
+        if not minima and all(each.by_segment for each in setting.observed):
+            covers = Covers.of(setting, self.goal, self.system, self.law.question, complete)
         if covers is not None:
             places = [(at, each.point.q) for each in isolated if (at := self._placed(each.point.q)) is not None]
             isolated += covers.missed([at for at, _ in places], np.array([q for _, q in places]), found.idle)
@@ -107,7 +118,7 @@ class RestSearch:
         order = {GOAL: 0, MODE: 1, ANTIPODAL: 2, CRITICAL: 3}
         rests.sort(key=lambda each: (order[each.kind], not each.stable, each.error))
         if covers is not None:
-            lists = covers.signed(lists, self.desired)
+            lists = covers.signed(lists, np.array(self.desired))
         return Endings(setting, self.goal, motion.pose(self.goal.pose(motion.link)), self.desired, tuple(rests),
                        tuple(continua), tuple(lists), measured, found,
                        None if covers is None else covers.judged(rests))
@@ -146,8 +157,12 @@ class RestSearch:
 
     def _reversed(self, at: ClosedConfiguration) -> tuple[str, ...]:
         """The legs whose direction is opposite to the desired one, as far as it is along it."""
-        cosines = np.sum(directions(at, self.law.question)[0] * self.desired, axis=1)
-        return tuple(o.leg for o, c in zip(self.law.question.observations, cosines, strict=True) if c < VANISHED - 1)
+        return tuple(leg for leg, c in self._cosines(measured(at, self.law.question)[0]) if c < VANISHED - 1)
+
+    def _cosines(self, values: Measures) -> list[tuple[str, float]]:
+        """The legs whose directions are observed, each with the cosine of its angle with the desired one."""
+        every = zip(self.law.question.observations, values, self.desired, strict=True)
+        return [(o.leg, float(u @ w)) for o, u, w in every if isinstance(o, SeenAxis)]
 
     def alike(self, at: ClosedConfiguration, other: ClosedConfiguration) -> bool:
         """Whether the platform is at the same pose."""
@@ -155,20 +170,18 @@ class RestSearch:
                    for body in attached(self.setting.anatomy))
 
     def read(self, found: Critical, box: EnclosedPoint | None = None) -> RestPoint | None:
-        """A critical point as a pose of the robot; None where its loops do not close."""
+        """A critical point as a pose of the robot; None where its loops do not close, or a camera does not see what it
+        is to see."""
         motion, point = self.setting.motion, found.point
         at = self._placed(point.q)
-        if at is None:
+        if at is None or self.law.in_front(at) < SEEN_ABOVE:
             return None
         command = self.law.at(at, FixedDirections(self.desired)(0.0))
         if command.pull > SAME_ENDING:
             return None
-        u = np.array(command.true)
-        cosines = np.sum(u * self.desired, axis=1)
-        labels = [o.leg for o in self.law.question.observations]
         error = command.size
         reversed_ = self._reversed(at)
-        across = tuple(label for label, c in zip(labels, cosines, strict=True) if abs(c) < VANISHED)
+        across = tuple(leg for leg, c in self._cosines(command.true) if abs(c) < VANISHED)
         kind, singular, boundary = CRITICAL, None, False
         if error < VANISHED:
             kind = ANTIPODAL if reversed_ else GOAL if self.alike(at, self.goal) else MODE
@@ -252,13 +265,13 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
     working modes nearest to the goal's (where loops are singular, coordinates are known to half their digits), with how
     many there are."""
     setting = search.setting
-    segments = [directions(each.configuration, setting.everything.question)[0] for each in rests]
-    home = directions(search.goal, setting.everything.question)[0]
+    segments, (home,) = ([np.concatenate([*measured(at, setting.everything.question)[0]]) for at in every] for every in
+                         ([each.configuration for each in rests], [search.goal]))
     groups: list[list[int]] = []
     for k, each in enumerate(rests):
-        seen = directions(each.configuration, search.law.question)[0]
+        seen = _values(each.configuration, search)
         own = next((group for group in groups if search.alike(rests[group[0]].configuration, each.configuration)
-                    and np.abs(directions(rests[group[0]].configuration, search.law.question)[0] - seen).max()
+                    and np.abs(_values(rests[group[0]].configuration, search) - seen).max()
                     < SAME_ENDING), None)
         if own is None:
             groups.append([k])
@@ -268,3 +281,8 @@ def _ways(rests: Sequence[RestPoint], search: RestSearch) -> list[RestPoint]:
             for group in groups]
     return [replace(rests[k], ways=len(group), met=sum(rests[i].met for i in group))
             for k, group in zip(best, groups, strict=True)]
+
+
+def _values(at: ClosedConfiguration, search: RestSearch) -> Array:
+    """All that is measured, (rows,)."""
+    return np.concatenate(measured(at, search.law.question)[0])

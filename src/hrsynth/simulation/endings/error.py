@@ -17,8 +17,8 @@ import numpy as np
 
 from ...analysis.branch.loops import GearEquation, JointLoop, LoopRow, LoopSystem, loop_system
 from ...analysis.branch.part import whole
-from ...errors import BadRequest
-from ...geometry.affine import AffineForms, crossed
+from ...geometry.affine import crossed, stacked
+from ...geometry.jets import Jet, angle
 from ...geometry.so3 import exponential
 from ...geometry.vectors import Array, cross, transform
 from ...kinematics.configuration import ClosedConfiguration, measure
@@ -26,8 +26,9 @@ from ...kinematics.relation import Measurement
 from ...mechanism.observation import Observation
 from ...mechanism.observations.direction import SeenAxis
 from ...mechanism.observations.encoder import AngleEncoder, SlideEncoder
+from ...mechanism.sights import CameraObservation
 from ...results import Value
-from ...tolerances import AFFINE_ROUNDING, RANK_CUTOFF
+from ...tolerances import RANK_CUTOFF
 from .carried import CarriedVector, Product, SweptChains, Total, add_bend, add_slope, outer
 
 Row = tuple[JointLoop, LoopRow]
@@ -134,6 +135,52 @@ class AngleTerm(Value):
         sums.add_square(angle(s.value, c.value), slope, [(s, one), (c, other)])
 
 
+@dataclass(frozen=True, eq=False, repr=False)
+class SightTerm(Value):
+    """½ ‖e‖² of what a camera sees of the ``point`` and the ``axis`` (3,) behind a chain, with its centre and the
+    columns of its ``frame`` (3, 3) behind that of the reference link, all as they are at zero; characteristic lengths.
+    """
+
+    chains: tuple[tuple[int, ...], tuple[int, ...]]
+    seen: CameraObservation
+    point: Array
+    axis: Array | None
+    radius: float
+    centre: Array
+    frame: Array
+    wanted: Array
+
+    def coordinates(self, carrier: SweptChains) -> list[Product]:
+        """p, and d where there is an axis, in the camera's frame."""
+        ray = carrier.point(self.chains[0], self.point) - carrier.point(self.chains[1], self.centre)
+        told = [ray] if self.axis is None else [ray, carrier.direction(self.chains[0], self.axis)]
+        own = [carrier.direction(self.chains[1], each) for each in self.frame.T]
+        return [Product(each, column) for each in told for column in own]
+
+    def errors(self, values: Sequence[Any]) -> list[Jet]:
+        """e and its derivatives by these coordinates, no numbers where nothing is measured."""
+        x = [Jet.variable(value, place, len(values)) for place, value in enumerate(values)]
+        with np.errstate(all="ignore"):
+            return self.seen.fed(x[:3], x[3:], x[0] * 0.0 + self.radius, self.wanted)
+
+    def add(self, carrier: SweptChains, sums: ErrorSums) -> None:
+        """As of :class:`ErrorTerm`: with X the rates of the coordinates, ∇e = X ∂e and ∇²e = X ∂²e Xᵀ + Σ ∂ₐe ∇²xₐ."""
+        products = self.coordinates(carrier)
+        e = self.errors([each.value for each in products])
+        X = stacked([gradient(each, sums) for each in products])
+        along = sum(each.slope * each.value[..., None] for each in e)
+        sums.value = sums.value + sum(each.value * each.value for each in e) * 0.5
+        sums.slope.add((slice(None),), (X * along[..., None, :]).sum(-1))
+        gram = sum(each.slope[..., :, None] * each.slope[..., None, :] for each in e)
+        if sums.gram is not None:
+            sums.gram.add((slice(None), slice(None)), outer(outer(X, gram), X))
+        if sums.bend is not None:
+            bend = gram + sum(each.bend * each.value[..., None, None] for each in e)
+            sums.bend.add((slice(None), slice(None)), outer(outer(X, bend), X))
+            for place, product in enumerate(products):
+                add_bend(sums.bend, product, along[..., place])
+
+
 def gradient(product: Product, sums: ErrorSums) -> Any:
     """∇(x · y), (c, N)."""
     total = Total(sums.value, sums.slope.shape)
@@ -152,19 +199,6 @@ def seen_rates(product: Product, sums: ErrorSums) -> Any:
     return total.sum
 
 
-def angle(s: Any, c: Any) -> Any:
-    """atan2(s, c); of forms an enclosure, not a number where both may vanish."""
-    if not isinstance(s, AffineForms):
-        return np.arctan2(s, c)
-    far, near = np.hypot(s.spread, c.spread), np.hypot(s.v[0], c.v[0])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        # asin x ≤ π x / 2
-        doubt = np.where(far < near, np.pi / 2 * far / near, np.nan) + 4 * AFFINE_ROUNDING
-    middle = np.zeros_like(s.v)
-    middle[0] = np.arctan2(s.v[0], c.v[0])
-    return AffineForms(middle, doubt)
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class RestSystem(Value):
     """The loops of a robot and the error that its controller decreases: ``rows`` are as many equations of the loops as
@@ -178,8 +212,6 @@ class RestSystem(Value):
     @classmethod
     def of(cls, goal: ClosedConfiguration, question: Measurement, generic: Sequence[ClosedConfiguration]) -> RestSystem:
         """That of the values measured at a goal; which equations are independent is seen at ``generic`` configurations.
-
-        Raises ``BadRequest`` for observations of a kind whose error has no formula here.
         """
         mechanism = goal.twin.mechanism
         system = loop_system(mechanism, ())
@@ -201,6 +233,12 @@ class RestSystem(Value):
     def size(self) -> tuple[int, int]:
         """Coordinates N and equations m."""
         return len(self.system.coordinates), len(self.rows) + len(self.gears)
+
+    def scale(self, curvatures: Array) -> float:
+        """Curvatures of E that are small are so beside this: E of directions is of size one; of what is far from a
+        camera it hardly changes at all."""
+        return min(1.0, float(np.abs(curvatures).max(initial=0.0))) if any(
+            isinstance(each, SightTerm) for each in self.terms) else 1.0
 
     def at(self, values: Sequence[Any]) -> RestEquations:
         """All of it at values (N,) of (c,) each."""
@@ -283,8 +321,7 @@ def row_product(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> Product:
 
 
 def term(system: LoopSystem, reference: str, seen: Observation, value: Array) -> ErrorTerm:
-    """The part of E of an observation whose desired value is given (characteristic lengths, radians); raises
-    ``BadRequest`` for kinds without a formula."""
+    """The part of E of an observation whose desired value is given (characteristic lengths, radians)."""
     links, length = system.mechanism.links, system.length
     view = seen.seen_from or reference
     chains = system.way(system.body[seen.link]), system.way(system.body[view])
@@ -295,6 +332,10 @@ def term(system: LoopSystem, reference: str, seen: Observation, value: Array) ->
     match seen:
         case SeenAxis():
             return DirectionTerm(chains, R @ seen.direction, S @ value)
+        case CameraObservation():
+            C = Y @ seen.view
+            return SightTerm(chains, seen, transform(X, seen.at) / length, None if seen.axis is None else R @ seen.axis,
+                             (seen.radius or 0.0) / length, C[:3, 3] / length, C[:3, :3], value)
         case SlideEncoder():
             return SlideTerm(chains, transform(X, seen.point) / length, transform(Y, seen.start) / length,
                              S @ seen.axis, float(value[0]))
@@ -302,5 +343,4 @@ def term(system: LoopSystem, reference: str, seen: Observation, value: Array) ->
             normal = seen.start - (seen.axis @ seen.start) * seen.axis
             along = exponential(float(value[0]) * seen.axis) @ normal
             return AngleTerm(chains, R @ seen.mark, S @ cross(seen.axis, along), S @ along)
-    raise BadRequest(f"endings of a loop on the {type(seen).__name__} of leg {seen.leg}", seen.link,
-                     "directions and encoders")
+    raise NotImplementedError(type(seen).__name__)

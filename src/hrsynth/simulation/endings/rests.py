@@ -16,6 +16,7 @@ from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism.pose import Pose
 from ...results import Result, Value
 from ...tolerances import SAME_ENDING
+from ..law import Measures
 from .cover import Cover
 from .search import CriticalPoints
 
@@ -185,7 +186,7 @@ class Endings(Result, shown_as="endings"):
     setting: ObservedRobot
     goal: ClosedConfiguration
     pose: Pose
-    desired: Array
+    desired: Measures
     rests: tuple[RestPoint, ...]
     continua: tuple[RestPoint, ...]
     lists: tuple[SignedModes, ...]

@@ -40,7 +40,8 @@ from ...kinematics.relation import relation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
-from ...tolerances import CRITICAL, CRITICAL_FLAT, ERROR_ROUNDING, SAME_ENDING
+from ...tolerances import CRITICAL, CRITICAL_FLAT, ERROR_ROUNDING, SAME_ENDING, SEEN_ABOVE
+from ..law import Law
 from .carried import SweptChains
 from .error import RestEquations, RestSystem
 
@@ -117,12 +118,16 @@ class Expansion:
     @classmethod
     def of(cls, system: RestSystem, q: Array, idle: int) -> Expansion:
         """That at q (c, N)."""
-        at = RestEquations(system, list(q.T))
-        tangents = Tangents.of(at.DG)
-        p, mu = tangents.closing(at.G), tangents.multipliers(at.slope)
-        H = at.bend(mu)
+        with np.errstate(all="ignore"):
+            at = RestEquations(system, list(q.T))
+            tangents = Tangents.of(at.DG)
+            p, mu = tangents.closing(at.G), tangents.multipliers(np.nan_to_num(at.slope))
+            H = at.bend(mu)
         Z = tangents.Z
         back = np.swapaxes(Z, -1, -2)
+        # where nothing is measured there is no way to go
+        lost = ~np.isfinite(H).all(axis=(-1, -2))
+        H, p = np.where(lost[:, None, None], 0.0, H), np.where(lost[:, None], np.nan, p)
         flat = _times(back, at.slope)
         slope = flat + _times(back, _times(H, p))
         values, vectors = np.linalg.eigh(back @ H @ Z)
@@ -226,8 +231,9 @@ def starts(system: RestSystem, homes: Array, seed: int = 0, setting: ObservedRob
     strict = False
     if setting is not None:
         drawn = anywhere(system, rng, ENDING_STARTS)
-        good = in_mode(system, setting, drawn)
-        homes, strict = np.concatenate([homes, drawn[good]]), not good.all()
+        good, kept = in_mode(system, setting, drawn), in_mode(system, setting, homes)
+        kept[0] = True
+        homes, strict = np.concatenate([homes[kept], drawn[good]]), not (good.all() and kept.all())
     q = homes[np.arange(ENDING_STARTS) % len(homes)]
     while True:
         q = walked(system, q, rng, ENDING_WALK)
@@ -259,8 +265,9 @@ def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConf
         points += descend(system, q, index, idle)
         new = 0
         for point, mark in zip(points, marks(system, setting, bodies, points), strict=True):
-            flat = np.abs(point.curvatures) < SAME_ENDING
-            key = (*(int(np.sum(each)) for each in (point.curvatures < -SAME_ENDING, flat)),)
+            least = SAME_ENDING * system.scale(point.curvatures)
+            flat = np.abs(point.curvatures) < least
+            key = (*(int(np.sum(each)) for each in (point.curvatures < -least, flat)),)
             if flat.any():
                 key = (*key, round(point.value / SAME_ENDING))
                 old = families.get(key)
@@ -293,14 +300,17 @@ def anywhere(system: RestSystem, rng: np.random.Generator, count: int) -> Array:
 
 
 def in_mode(system: RestSystem, setting: ObservedRobot, q: Array) -> NDArray[np.bool_]:
-    """Which of some closed configurations (c, N), regular ones, are of the operation mode of the zero configuration."""
+    """Which of some closed configurations (c, N), regular ones, are of the operation mode of the zero configuration,
+    with all that is to be seen in front of its camera."""
     drawn, kept = setting.everything, np.zeros(len(q), dtype=bool)
+    law = Law(setting.samples.question, setting.dof, 1.0)
     for k, each in enumerate(q):
         try:
             at = of_links(drawn.twin, partial(system.system.pose, values=each.tolist()))
         except LoopsNotClosed:
             continue
-        kept[k] = drawn.signature.agrees(Signature.of(relation(at, drawn.question)))
+        kept[k] = law.in_front(at) > SEEN_ABOVE and (
+            not system.size[1] or drawn.signature.agrees(Signature.of(relation(at, drawn.question))))
     return kept
 
 
