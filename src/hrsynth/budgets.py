@@ -184,6 +184,9 @@ LARGEST_FORMS = 700
 """Forms of a degree above which all poses of conditions are not looked for by linear algebra."""
 CAP_OF_MULTIPLES, LARGEST_MULTIPLES = 4, 250
 """Largest degree in a group of unknowns, and most monomials, of a bound by multiples of quadrics."""
+LARGEST_GEAR, LARGEST_LOOPS, PLANAR_STARTS = 6, 120, 20
+"""Of planar loops: whole numbers of which a gear's ratio is the quotient, closings that are looked for, and how many
+times 64 random starts."""
 MOST_INFINITE = 4
 """Powers of q · q that are tried to leave out what are no poses."""
 FINEST_BOX = 2.0 ** -100

@@ -217,6 +217,22 @@ def test_robots_with_motors_held(name, count, far):
     assert (f"({far} solutions are farther)" in told) == (far > 0)
 
 
+@pytest.mark.parametrize("name", ["3prp", "3rrp"])
+def test_lines_of_a_platform_that_keep_to_points_of_the_base(name):
+    """They are told as the platform sees the base; three lines through three points are met twice."""
+    found = hrsynth.modes(name, real=True)
+    record = json.loads(json.dumps(hrsynth.certificate(found)))
+    assert hrsynth.verify(record, name) == "2 real of 2 complex poses, and no other"
+    back = [np.linalg.inv(mode.bodies["platform"] @ np.linalg.inv(found.goal.pose("platform")))[:2, :2]
+            for mode in found.modes]
+    told = [np.array([[float(Fraction(x)) for x in row[:2]] for row in box["pose"]])
+            for box in record["systems"][0]["boxes"]]
+    assert np.trace(back[0] @ back[1].T) == pytest.approx(np.trace(told[0] @ told[1].T))
+    with pytest.raises(CertificateRefused, match="not about"):
+        hrsynth.verify(record, {"3prp": "3rrp", "3rrp": "3prp"}[name])
+    assert sum(attacked(json.dumps(record), 40, 6).values()) == 40
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["AABBCD on ABCDEF", "AABCDE on ABCCDE"])
 def test_six_legged_pods_whose_rods_share_balls(name):

@@ -15,18 +15,20 @@ from typing import Any
 
 import numpy as np
 
+from ..analysis.modes.conditions import OnMovingPlane
 from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shifted
 from ..analysis.modes.modes import AssemblyModes, modes
+from ..analysis.modes.posed import PosedPlatform
 from ..analysis.modes.quadrics import UNIT, PoseSystem, Rounded, WorkingFrame, direction, spokes
 from ..analysis.modes.rigid import Planar, Spatial
 from ..analysis.modes.roots import Roots, is_real
-from ..analysis.modes.solve import Solved, SystemModes
+from ..analysis.modes.solve import Solved, SystemModes, solve
 from ..analysis.modes.squares import TURNS, SquareSystem
 from ..analysis.modes.translating import Articulated, Translating, coplanar, met_normal
 from ..analysis.observed import ObservedRobot
 from ..errors import NoCertificate
 from ..geometry.so3 import quaternions
-from ..geometry.vectors import Array, cross, unit
+from ..geometry.vectors import Array, cross, pose, unit
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
 from ..tolerances import NO_POSE_START
@@ -49,10 +51,27 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
              "observed": [[o.leg, o.link if o.by_segment else o.leg] for o in found.setting.observed]}
     if found.found.complete and not found.found.solved and found.confined is not None:  # a copy: solved again
         found = modes(found.setting, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
+    listed = _seen_from_platform(found) or found.found
     try:
-        return of_systems(found.found, about, ClosedRobot.of(found))
+        return of_systems(listed, about, ClosedRobot.of(found))
     except NotAccepted as reason:
         raise NoCertificate(found.setting.robot.name, str(reason)) from None
+
+
+def _seen_from_platform(found: AssemblyModes) -> SystemModes | None:
+    """The modes as poses of the base, as the platform sees it, where each leg keeps a point of the base on a line of a
+    platform that moves in a plane; None elsewhere."""
+    system = None if found.model is None else found.model.system
+    if not (isinstance(system, PosedPlatform) and found.found.complete and system.poses.motion == "planar"
+            and all(isinstance(each, OnMovingPlane) for each in system.conditions)):
+        return None
+    n, size = cross(*system.poses.moves.T), system.size
+    frame = pose(np.zeros(3), np.column_stack([system.poses.moves, n]))
+    rows = [each for each in system.conditions if isinstance(each, OnMovingPlane)]
+    lines = tuple(Line(size * (row.h + row.b @ row.c) / (row.c @ row.c) * row.c, cross(n, row.c)) for row in rows)
+    tips = size * np.array([row.o @ system.poses.moves for row in rows])
+    turned = solve(Planar(lines, tips, frame, error=system.error), near=False)
+    return turned if (turned.complex, len(turned.modes)) == (found.found.complex, len(found.modes)) else None
 
 
 def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot | None = None) -> dict[str, Any]:

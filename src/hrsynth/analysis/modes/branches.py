@@ -13,6 +13,7 @@ import numpy as np
 from ...budgets import BRANCH_CHOICES, EFFORT
 from ...errors import TooLarge
 from ...geometry.vectors import Array, inverse, perpendicular, pose, pose_difference, transform
+from ...kinematics.configuration import ClosedConfiguration
 from ...results import Value
 from ...tolerances import RANK_GAP, SAME_POINT
 from .curves import Circle, Line, Plane, Reach
@@ -33,6 +34,8 @@ class Model(Value):
     home: Array
     back: bool = False
     """Whether the system's pose is that of the base, as the platform sees it."""
+    closing: Callable[[Array], ClosedConfiguration] | None = None
+    """The whole robot at the system's coordinates, where these tell it."""
 
 
 def model(confined: TipLoci) -> Model:

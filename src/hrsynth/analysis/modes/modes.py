@@ -32,6 +32,7 @@ from ..singularity.agreement import weakest
 from .branches import Model, solve_all
 from .drift import drift
 from .motions import SelfMotion, self_motion
+from .planar_loops import PlanarLoops, solve_loops
 from .posed import PosedPlatform, most_posed, solve_posed
 from .search import FoundMode, leaves_free, search
 from .sighted import all_loci, behind, opposite, sights
@@ -140,7 +141,9 @@ class AssemblyModes(Result, shown_as="modes"):
         if self.confined is not None:
             return WITHIN[self.confined.motion]
         system = None if self.model is None else self.model.system
-        return WITHIN[system.poses.motion] if isinstance(system, PosedPlatform) else None
+        motion = (system.poses.motion if isinstance(system, PosedPlatform) else
+                  "planar" if isinstance(system, PlanarLoops) else None)
+        return None if motion is None else WITHIN[motion]
 
     @property
     def labels(self) -> tuple[str, ...]:
@@ -277,7 +280,7 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
     reasons = list[NotConfined | Unsolved | TooLarge | MissingExtra]()
     answers = list[tuple[TipLoci | None, Model, SystemModes]]()
     exact = drift(goal, wanted, setting.normal.moved)
-    for listed in (partial(_of_tips, as_written=as_written, effort=effort), _of_conditions):
+    for listed in (partial(_of_tips, as_written=as_written, effort=effort), _of_conditions, _of_loops):
         try:
             answers.append(listed(measured, goal, exact))
         except (NotConfined, Unsolved, TooLarge, MissingExtra) as error:
@@ -286,7 +289,7 @@ def _listed(setting: ObservedRobot, measured: MeasuredRobot, goal: ClosedConfigu
             if answers[-1][2].complete:
                 break
     if not answers:
-        raise reasons[0]
+        raise reasons[-1] if isinstance(reasons[-1], Unsolved) else reasons[0]
     # what is measured leaves no freedom: a continuum is that of legs which tips alone do not show
     confined, made, found = max(answers, key=lambda each: (each[2].complete, each[2].continuum is None))
     reader = _ModeReader(setting, measured.question, goal, made)
@@ -312,6 +315,10 @@ def _of_tips(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float, a
 
 def _of_conditions(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
     return None, *solve_posed(measured, goal, exact)
+
+
+def _of_loops(measured: MeasuredRobot, goal: ClosedConfiguration, exact: float) -> tuple[None, Model, SystemModes]:
+    return None, *solve_loops(measured, goal, exact)
 
 
 def expected(measured: MeasuredRobot, at: ClosedConfiguration) -> int:
@@ -368,9 +375,13 @@ class _ModeReader:
         found = Assembly(self.goal)
         if antipodal:  # no mode: whether the robot can be assembled is not asked
             found = Assembly(None, platform=self.assembler.platform(bodies))
+        elif self.made.closing is not None:
+            at = self.made.closing(mode.q)
+            found = Assembly(at, (), tuple(outside(at.twin, at.q)), held=True)
         elif not at_goal or near or outside(self.goal.twin, self.goal.q):
             found = self.assembler.at(bodies, held, 0.0 if near else self.known(mode))
-        X = self.goal.pose(self.motion.link) if found.platform is None else found.platform[self.motion.link]
+        X = (found.platform[self.motion.link] if found.platform is not None else self.goal.pose(self.motion.link)
+             if found.configuration is None else found.configuration.pose(self.motion.link))
         shift, turn = self.radius(mode, bodies, X)
         return AssemblyMode(
             self.motion.pose(X), shift, turn, mode.residual * scale, at_goal, found.reachable,

@@ -10,19 +10,26 @@ zeros, multiple ones counted so often, and no continuum. A rank modulo a prime i
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from itertools import product
+from typing import Any
 
 import numpy as np
 
 from ...budgets import CAP_OF_MULTIPLES, LARGEST_MULTIPLES
 from .polynomials import Quadric
 
-PRIME = (1 << 62) - 57
+PRIME = (1 << 62) - 87
+ROOT = pow(5, (PRIME - 1) // 4, PRIME)
+"""A square root of -1 modulo the prime."""
 
-Form = dict[tuple[int, ...], Fraction]
-"""Coefficients by exponents."""
+GROUPINGS = 3
+"""Ways to group the unknowns of loops that are tried."""
+
+Form = dict[tuple[int, ...], Any]
+"""Coefficients, fractions or residues, by exponents."""
 
 
 def most_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
@@ -37,13 +44,72 @@ def most_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
         left.remove(k)
     if len(forms) < len(left):
         return None
-    flat = [{tuple(e[k] for k in left): c for e, c in form.items()} for form in forms]
-    best: int | None = None if left else 1
-    for groups in _partitions(list(range(len(left)))) if left else ():
-        best = min((each for each in (best, _ranked(flat, groups, enough)) if each is not None), default=None)
+    flat = [{tuple(e[k] for k in left): int(c * math.lcm(*(d.denominator for d in form.values())))
+             for e, c in form.items()} for form in forms]
+    return _least(flat, _partitions(list(range(len(left)))), enough) if left else 1
+
+
+def _least(forms: Sequence[Form], groupings: Iterable[Sequence[Sequence[int]]], enough: int) -> int | None:
+    """The least bound by ranks of multiples, the first that is ``enough``, of some ways to group the unknowns."""
+    best: int | None = None
+    for groups in groupings:
+        best = min((each for each in (best, _ranked(forms, groups, enough)) if each is not None), default=None)
         if best is not None and best <= enough:
             break
     return best
+
+
+@dataclass(frozen=True, eq=False)
+class Residues:
+    """Polynomials modulo the prime, those of degree one used to eliminate as many unknowns; n are left."""
+
+    forms: tuple[Form, ...]
+    n: int
+
+    @classmethod
+    def of(cls, forms: Sequence[Mapping[tuple[int, ...], complex]]) -> Residues:
+        """Of polynomials with complex coefficients, which are taken as they are."""
+        from flint import nmod
+
+        def residue(c: complex) -> Any:
+            (a, b), (x, y) = c.real.as_integer_ratio(), c.imag.as_integer_ratio()
+            return nmod(a, PRIME) / nmod(b, PRIME) + nmod(ROOT, PRIME) * nmod(x, PRIME) / nmod(y, PRIME)
+
+        made: list[Form] = [{e: residue(c) for e, c in form.items() if c} for form in forms]
+        left = list(range(len(next(iter(made[0])))))
+        while pivots := [(sum(any(e[k] for e in other) for other in made), len(form), k, i)
+                         for i, form in enumerate(made) if all(sum(e) <= 1 for e in form)
+                         for k in left if _at(form, k)]:
+            *_, k, i = min(pivots)  # the unknown that is in the fewest
+            made = [_without(form, made[i], k) for form in made if form is not made[i]]
+            left.remove(k)
+        return cls(tuple({tuple(e[k] for k in left): int(c) for e, c in form.items()} for form in made), len(left))
+
+    def most_by_degrees(self) -> int:
+        """The least number of isolated zeros, multiple ones counted so often, that the degrees in groups of unknowns
+        allow (Bézout's theorem in a product of projective spaces)."""
+        return min(_bezout(self.forms, groups) for groups in _partitions(list(range(self.n))))
+
+    def most_by_ranks(self, enough: int) -> int | None:
+        """The least bound by ranks of multiples, the first that is ``enough``, in the groups of the least degrees."""
+        groupings = sorted(_partitions(list(range(self.n))), key=lambda groups: _bezout(self.forms, groups))
+        return _least(self.forms, groupings[:GROUPINGS], enough) if self.n else 1
+
+
+def _bezout(forms: Sequence[Form], groups: Sequence[Sequence[int]]) -> int:
+    """The coefficient of the product of all hₖ to the number of unknowns in group k, in that of Σ dₖ hₖ for each
+    polynomial, dₖ its degree in the group."""
+    ways = {(0,) * len(groups): 1}
+    for form in forms:
+        degrees = [max((sum(e[k] for k in group) for e in form), default=0) for group in groups]
+        total = dict[tuple[int, ...], int]()
+        for used, count in ways.items():
+            for k, degree in enumerate(degrees):
+                if degree and used[k] < len(groups[k]):
+                    key = (*used[:k], used[k] + 1, *used[k + 1:])
+                    total[key] = total.get(key, 0) + count * degree
+        ways = total
+    return sum(ways.values())
 
 
 def combined(quadrics: Sequence[Quadric]) -> list[Quadric]:
@@ -68,9 +134,9 @@ def _form(quadric: Quadric) -> Form:
     return {e: c for e, c in found.items() if c}
 
 
-def _at(line: Form, k: int) -> Fraction:
+def _at(line: Form, k: int) -> Any:
     """The coefficient of an unknown."""
-    return next((c for e, c in line.items() if e[k] and sum(e) == 1), Fraction(0))
+    return next((c for e, c in line.items() if e[k] and sum(e) == 1), 0)
 
 
 def _reduced(forms: Sequence[Form]) -> list[Form]:
@@ -81,13 +147,13 @@ def _reduced(forms: Sequence[Form]) -> list[Form]:
         pivot = next((row for row in rows if row.get(e)), None)
         if pivot is None:
             continue
-        rows = [_minus(row, pivot, row.get(e, Fraction(0)) / pivot[e]) for row in rows if row is not pivot]
+        rows = [_minus(row, pivot, row.get(e, 0) / pivot[e]) for row in rows if row is not pivot]
         found.append(pivot)
     return found
 
 
-def _minus(row: Form, other: Form, factor: Fraction) -> Form:
-    total = {e: row.get(e, Fraction(0)) - factor * other.get(e, Fraction(0)) for e in row.keys() | other.keys()}
+def _minus(row: Form, other: Form, factor: Any) -> Form:
+    total = {e: row.get(e, 0) - factor * other.get(e, 0) for e in row.keys() | other.keys()}
     return {e: c for e, c in total.items() if c}
 
 
@@ -104,14 +170,14 @@ def _without(form: Form, line: Form, k: int) -> Form:
         terms = {(*e[:k], 0, *e[k + 1:]): c}
         for _ in range(e[k]):
             terms = _times(terms, given)
-        total = _minus(total, terms, Fraction(-1))
+        total = _minus(total, terms, -1)
     return total
 
 
 def _times(one: Form, other: Form) -> Form:
     total = Form()
     for e, c in one.items():
-        total = _minus(total, {tuple(map(sum, zip(e, f, strict=True))): c * d for f, d in other.items()}, Fraction(-1))
+        total = _minus(total, {tuple(map(sum, zip(e, f, strict=True))): c * d for f, d in other.items()}, -1)
     return total
 
 
@@ -130,8 +196,6 @@ def _ranked(forms: Sequence[Form], groups: Sequence[Sequence[int]], enough: int)
     """The least bound with some groups."""
     from flint import nmod_mat
 
-    whole = [{e: int(c * math.lcm(*(d.denominator for d in form.values()))) for e, c in form.items()}
-             for form in forms]
     found = None
     for caps in sorted(product(range(2, CAP_OF_MULTIPLES + 1), repeat=len(groups)), key=sum):
         if math.prod(math.comb(len(group) + cap, cap) for group, cap in zip(groups, caps, strict=True)
@@ -142,7 +206,7 @@ def _ranked(forms: Sequence[Form], groups: Sequence[Sequence[int]], enough: int)
         columns = sorted((e for e in below if below[e] >= 0), key=lambda e: below[e] > 0)
         edge = sum(below[e] == 0 for e in columns)
         moved = [{tuple(map(sum, zip(e, by, strict=True))): c % PRIME for e, c in form.items()}
-                 for form in whole for by in columns]
+                 for form in forms for by in columns]
         rows = [[row.get(e, 0) for e in columns] for row in moved if all(below.get(e, -1) >= 0 for e in row)]
         if not rows or nmod_mat([row[:edge] for row in rows], PRIME).rank() < edge:
             continue

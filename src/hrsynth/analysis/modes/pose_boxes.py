@@ -180,7 +180,7 @@ def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) ->
                 each: PoseBox | None = replace(twin, middle=twin.middle.conj())
             elif np.all(np.isfinite(x)):
                 start = [arb(v) for v in x.real.tolist()] if real else [acb(v.real, v.imag) for v in x.tolist()]
-                each = _box(krawczyk(equations, start), real, turned)
+                each = as_box(krawczyk(equations, start), real, turned)
             else:
                 each = None
             if each is None:
@@ -190,7 +190,7 @@ def enclosed(forms: SquareForms, slack: float, proposed: tuple[Array, Array]) ->
     return found, lost
 
 
-def _box(box: Sequence[Any] | None, real: bool, turned: int) -> PoseBox | None:
+def as_box(box: Sequence[Any] | None, real: bool, turned: int) -> PoseBox | None:
     """A box with its radii made a little larger; None where there is none, or a complex one may hold a real pose."""
     if box is None:
         return None

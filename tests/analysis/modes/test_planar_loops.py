@@ -1,0 +1,194 @@
+"""Modes of planar mechanisms from their joints: the same as by tips on curves, and geared ones as by a polynomial."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from functools import cache
+from itertools import combinations
+
+import numpy as np
+import pytest
+from sympy import Matrix, gcd_list
+
+import hrsynth
+from analysis.modes.gears import closings, five_bar, linkage
+from hrsynth.analysis.measured import MeasuredRobot
+from hrsynth.analysis.modes.modes import AssemblyModes
+from hrsynth.analysis.modes.multiples import Residues
+from hrsynth.analysis.modes.planar_loops import planar_loops, solve_loops, whole_kernel
+from hrsynth.analysis.modes.search import search
+from hrsynth.constraints.pattern import attached
+from hrsynth.description import load, shipped
+from hrsynth.errors import NotConfined, Unsolved
+from hrsynth.geometry.vectors import pose_difference
+
+QUICK = {"rrrrr_m1", "3rrr_m1", "3rpr_m2", "3prp", "prrrp_m1", "rprpr_m2"}
+
+
+@cache
+def planar() -> list[str]:
+    """The shipped robots whose joints turn about one direction and slide across it."""
+    found = []
+    for name, path in shipped().items():
+        joints = load(path).joints.values()
+        axes = [joint.axis for joint in joints if joint.type.value == "R"]
+        if axes and all(joint.type.value in "RP" and abs(abs(joint.axis @ axes[0]) - (joint.type.value == "R")) < 1e-9
+                        for joint in joints):
+            found.append(name)
+    return found
+
+
+def measured(found: AssemblyModes) -> MeasuredRobot:
+    return (MeasuredRobot.driven if found.kind == "real" else MeasuredRobot.watched)(found.setting)
+
+
+@pytest.mark.parametrize("real", [False, True])
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[] if name in QUICK else [pytest.mark.slow])
+                                  for name in planar()])
+def test_loops_and_tips_agree(name: str, real: bool):
+    """The general way shares neither unknowns nor solver with the others."""
+    listed = hrsynth.modes(name, real=real)
+    if listed.found.continuum is not None:
+        with pytest.raises((NotConfined, Unsolved)):
+            solve_loops(measured(listed), listed.goal)
+        return
+    made, found = solve_loops(measured(listed), listed.goal)
+    assert listed.found.complete
+    assert found.complete
+    assert found.complex == listed.found.complex
+    assert len(found.modes) == len(listed.modes) + len(listed.antipodal)
+    length = listed.goal.twin.length
+    for mode in listed.modes:
+        assert mode.bodies is not None
+        assert min(max(pose_difference(X, made.bodies(each.q)[body], length, listed.setting.anatomy.point)
+                       for body, X in mode.bodies.items()) for each in found.modes) < 1e-9
+
+
+def test_there_are_planar_robots():
+    assert len(planar()) > 15
+    assert QUICK.issubset(planar())
+
+
+@pytest.mark.parametrize("ratio", ["1", "2", "-1", "-2", "1/2", "-3/2", "4"])
+@pytest.mark.parametrize("seed", range(5))
+def test_geared_five_bars(ratio: str, seed: int):
+    """Of the crank's and the driven bar's turns q and p the closings are 2 max(p, q), and 2 (p + q) where they turn
+    against each other."""
+    k = Fraction(ratio)
+    mechanism, points = five_bar(float(k), seed, 1 if seed % 2 else -1)
+    found = hrsynth.modes(mechanism, "1")
+    count, turns = closings(k, points)
+    assert count == 2 * (max(k.numerator, k.denominator) if k > 0 else abs(k.numerator) + k.denominator)
+    assert (found.found.complete, found.found.complex, len(found.modes)) == (True, count, len(turns))
+    assert found.modes[0].goal
+    for mode in found.modes:
+        assert mode.proved
+        assert mode.radius < 1e-8
+        assert mode.configuration is not None
+        assert np.linalg.norm(mode.configuration.twin.residual(mode.configuration.q)) < 1e-9  # its gears too
+        R = mode.configuration.pose("floating")[:3, :3] @ found.goal.pose("floating")[:3, :3].T
+        assert np.abs(np.exp(1j * np.arctan2(R[1, 0], R[0, 0])) - np.exp(1j * turns)).min() < 1e-8
+    real = hrsynth.modes(mechanism, real=True)
+    assert (real.found.complete, real.found.complex) == (True, 2)
+
+
+@pytest.mark.parametrize("ratio", [2.0, -1.0])
+def test_a_search_finds_only_closings_that_are_listed(ratio: float):
+    listed = hrsynth.modes(five_bar(ratio, 3)[0], "1")
+    found = search(listed.goal, measured(listed).question, attached(listed.setting.anatomy))
+    assert len(found.modes) > 1
+    for mode in found.modes:
+        assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
+                   for each in listed.modes if each.bodies) < 1e-6
+
+
+def test_more_than_needed_is_measured():
+    """The floating bar is seen too: all other closings are excluded."""
+    found = hrsynth.modes(five_bar(-1.0)[0])
+    assert found.found.complete
+    assert (len(found.modes), found.found.complex, found.modes[0].goal) == (1, 1, True)
+    assert "3 excluded by the legs in interval arithmetic" in found.found.proof
+
+
+STEPHENSON = [(0, 0), (0.2, 0.6), (1.1, 0.9), (1.2, 0), (0.8, 1.4), (2.0, 1.5), (2.1, 0.1)]
+LINKS = {"base": [0, 3, 6], "a": [0, 1], "coupler": [1, 2, 4], "b": [2, 3], "c": [4, 5], "d": [5, 6]}
+
+
+@pytest.mark.parametrize(("motor", "platform", "count", "loops"), [
+    ("j0", "coupler", 2, 1), ("j6", "coupler", 6, 2), ("j3", "coupler", 2, 1), ("j0", "c", 4, 2)])
+def test_a_six_bar_of_two_loops(motor: str, platform: str, count: int, loops: int):
+    """Stephenson's: with the motor in the four-bar that has two closings, whatever the other loop, with it in the other
+    one, coupler curve and circle meet in six; the last bar has two places for each of the four-bar's."""
+    mechanism = linkage(STEPHENSON, LINKS, platform, motor)
+    observed = hrsynth.observe(mechanism)
+    driven = MeasuredRobot.driven(observed)
+    system = planar_loops(driven, observed.everything.start)
+    assert len(system.loops) == loops
+    _, found = solve_loops(driven, observed.everything.start)
+    assert (found.complete, found.complex) == (True, count)
+
+
+def test_slides_that_are_coupled():
+    """Two carriages on one rail, the second twice as fast, joined by two bars: with a bar's direction held their
+    distance is what it was, and so is all else; with both held by the motor the bars have two closings."""
+    points, links = [(0, 0), (1.5, 0), (0, 0.2), (1.5, 0.2), (0.6, 1.1)], {
+        "base": [0, 1], "left": [0, 2], "right": [1, 3], "one": [2, 4], "other": [3, 4]}
+    mechanism = linkage(points, links, "other", "j0", {0: (1, 0), 1: (1, 0)}, [("left", "right", 2.0)])
+    found = hrsynth.modes(mechanism, real=True)
+    assert (found.found.complete, found.found.complex, len(found.modes)) == (True, 2, 2)
+    assert found.found.proof.startswith("1 loop, 2 angles and 0 slides: ")
+
+
+def test_what_has_no_loops_says_why():
+    for ratio, reason in ((np.sqrt(2.0), "is no quotient of whole numbers"), (7.0, "is no quotient of whole numbers")):
+        observed = hrsynth.observe(five_bar(ratio)[0], "1")
+        with pytest.raises(NotConfined, match=reason):
+            planar_loops(MeasuredRobot.watched(observed), observed.everything.start)
+        assert not hrsynth.modes(observed).found.complete
+    observed = hrsynth.observe("delta")
+    with pytest.raises(NotConfined, match="none of a planar mechanism"):
+        planar_loops(MeasuredRobot.watched(observed), observed.everything.start)
+
+
+def test_what_is_too_large_says_its_size():
+    from hrsynth.analysis.modes import planar_loops as module
+
+    found = hrsynth.modes("3rrr_m1")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(module, "LARGEST_LOOPS", 5)
+        with pytest.raises(Unsolved, match="2 loops, 4 angles and 0 slides: up to 6 closings, too many"):
+            solve_loops(measured(found), found.goal)
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_whole_vectors_that_are_annulled(seed: int):
+    """As many as the rank leaves, and no whole vector besides their whole combinations: their minors have no common
+    divisor."""
+    rng = np.random.default_rng(seed)
+    rows = rng.integers(-3, 4, size=(2, 4)).tolist()
+    basis = whole_kernel(rows)
+    assert basis is not None
+    B, M = Matrix(basis), Matrix(rows)
+    assert Matrix.zeros(2, len(basis)) == M * B.T
+    assert len(basis) == 4 - M.rank()
+    assert B.rank() == len(basis)
+    minors = [B[:, list(columns)].det() for columns in combinations(range(4), len(basis))]
+    assert gcd_list(minors) == 1
+    torsion = gcd_list([M[list(r), list(c)].det() for r in combinations(range(2), M.rank())
+                        for c in combinations(range(4), M.rank())])
+    if M.rank() == 2:
+        assert (whole_kernel(rows, whole=True) is None) == (torsion != 1)
+
+
+def test_degrees_in_groups_bound_what_ranks_bound():
+    """Two conics of random complex coefficients: 4; two bilinear ones in two unknowns: 2."""
+    rng = np.random.default_rng(0)
+
+    def form(monomials: list[tuple[int, int]]) -> dict[tuple[int, ...], complex]:
+        return {e: complex(*rng.normal(size=2)) for e in monomials}
+
+    conics = Residues.of([form([(0, 0), (1, 0), (0, 1), (1, 1), (2, 0), (0, 2)]) for _ in range(2)])
+    bilinear = Residues.of([form([(0, 0), (1, 0), (0, 1), (1, 1)]) for _ in range(2)])
+    line = Residues.of([form([(0, 0), (1, 0), (0, 1)]), form([(0, 0), (1, 1), (2, 0), (0, 2)])])
+    assert [each.most_by_degrees() for each in (conics, bilinear, line)] == [4, 2, 2]
+    assert [each.most_by_ranks(1) for each in (conics, bilinear, line)] == [4, 2, 2]
