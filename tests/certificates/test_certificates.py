@@ -229,7 +229,7 @@ def test_lines_of_a_platform_that_keep_to_points_of_the_base(name):
             for box in record["systems"][0]["boxes"]]
     assert np.trace(back[0] @ back[1].T) == pytest.approx(np.trace(told[0] @ told[1].T))
     with pytest.raises(CertificateRefused, match="not about"):
-        hrsynth.verify(record, {"3prp": "3rrp", "3rrp": "3prp"}[name])
+        hrsynth.verify(record, scaled(name))
     assert sum(attacked(json.dumps(record), 40, 6).values()) == 40
 
 
