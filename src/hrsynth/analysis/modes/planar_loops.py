@@ -171,6 +171,11 @@ class PlanarLoops(System):
         return self.goal.twin.length
 
     @property
+    def slack(self) -> float:
+        """How far the numbers of a loop, sums of differences of points, can be from the exact ones (sizes)."""
+        return 2.0 * (1 + len(self.loops)) * self.error / self.size
+
+    @property
     def home(self) -> Array:
         """The goal."""
         return np.zeros(self.angles + self.slides)
@@ -570,8 +575,7 @@ def _judged(system: PlanarLoops) -> SystemModes:
 
 def _excluded(system: PlanarLoops, box: PoseBox) -> bool:
     """Whether something that is measured besides is another at each closing in a real box."""
-    slack = system.error / system.size
-    return any(not _Part(each, part, slack).value(_balls(box)).contains(0) for each in system.besides
+    return any(not _Part(each, part, system.slack).value(_balls(box)).contains(0) for each in system.besides
                for part in (False, True))
 
 
@@ -587,7 +591,7 @@ def _enclosed(system: PlanarLoops, proposed: Array) -> tuple[list[PoseBox], int]
     """Boxes of closings, apart from each other, and how many proposals have none."""
     from flint import acb, arb, ctx
 
-    a, slack = system.angles, system.error / system.size
+    a, slack = system.angles, system.slack
     equations: list[Polynomial] = [*(_Part(loop, part, slack) for loop in system.loops for part in (False, True)),
                                    *(_Circle(k, a) for k in range(a))]
     u, v, t = proposed[:, :a], proposed[:, a:2 * a], proposed[:, 2 * a:]
