@@ -166,6 +166,8 @@ BEGIN = Option("at", "Start there instead of at the zero configuration, in anoth
                "mode:2.", "POSE")
 START = Option("start", "Start pose, such as x=0.02,y=0.1,z=-0.7, or mode:2 of the other pose.", "POSE",
                default=NEEDED, old=("--from",))
+DEPTH = Option("depth", "How the law knows depths in images: exact, desired (those at the goal) or constant:METRES.",
+               default="exact")
 BOX = Option("box", "Intervals of motors (m, rad), as hip=-1:1,slide=0:0.2 (default: the file's limits, else a whole "
              "turn, or a characteristic length either way).", "INTERVALS")
 QUESTIONS = (
@@ -229,8 +231,7 @@ QUESTIONS = (
               Option("noise", "Error of measurements: angles as 0.1deg, in pictures as 0.3px, lengths as 1mm.",
                      "AMOUNT"),
               flag("bias", "Keep the error of each measurement constant."),
-              Option("depth", "How the law knows depths in images: exact, desired (those at the goal) or "
-                     "constant:METRES.", default="exact"),
+              DEPTH,
               Option("duration", "Move the desired measurements along the straight line in this time (default: at "
                      "once).", "SECONDS", float),
               Option("time", "Longest run.", "SECONDS", float),
@@ -243,12 +244,12 @@ QUESTIONS = (
     Question("endings", "All poses at which the loop can rest, and which of them attract: the goal, modes, antipodal "
              "poses, critical poses of the error.",
              (Option("at", "The goal: pose whose measurements are desired, as x=0.02,y=0.1,z=-0.7; or mode:2.", "POSE",
-                     default=NEEDED), *WATCHED, SEE,
+                     default=NEEDED), *WATCHED, SEE, DEPTH,
               flag("complete", "Prove that the list is all, by boxes of platform poses, as far as that goes."),
               _file("endings")),
              ("3rrr_m1 --at x=0.02,y=0,phi=10deg", "quattro --observe 1,4 --at x=0.05,y=0.1,z=-0.7 -o endings.png")),
     Question("basins", "Where the servo loop to a goal ends, from each start of a line, plane or box of poses.",
-             (Option("to", "Pose whose measurements are desired.", "POSE", default=NEEDED), *WATCHED, SEE,
+             (Option("to", "Pose whose measurements are desired.", "POSE", default=NEEDED), *WATCHED, SEE, DEPTH,
               Option("plane", "Plane of starts, as z=-0.7: all of it that is reached (default: one through the goal).",
                      "PART=VALUE"),
               Option("grid", "A line, plane or box of starts, such as x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7 "

@@ -811,6 +811,7 @@ class EndingsAnswer(OfRobot, WrittenTo):
     observed: list[Watched]
     camera: str
     complex: int | None
+    depth: str
     complete: bool
     cover: RestCoverRecord | None
     signs: list[SignedModesRecord]

@@ -332,6 +332,27 @@ def test_rests_of_all_kinds_are_those_of_the_law(see: list[str], tmp_path: Path)
             assert (away.max() < 1e-4) == (each.stable is True)
 
 
+@pytest.mark.slow
+@pytest.mark.parametrize(("depth", "mixed"), [("desired", False), ("constant:1", True)])
+def test_rests_with_supposed_depths_are_those_of_the_law(depth: str, mixed: bool, tmp_path: Path) -> None:
+    """There the law commands nothing, and its differences have the eigenvalues that are told."""
+    see = ["image_line:platform@0.1,0,0/0,1,0", "distance:platform@0,0.1,0"] if mixed else []
+    found = body(tmp_path, seen(SQUARE[: 3 if mixed else 4]) + see, at=TILTED, depth=depth)
+    search = RestSearch.of(found.setting, found.goal, depth)
+    assert found.rests[0].kind == "goal"
+    assert not any(each.proved for each in found.rests)
+    for each in (each for each in found.rests if each.singular is None):
+        at, wanted = each.configuration, FixedDirections(found.desired)(0.0)
+        assert search.law.at(at, wanted).speed < 1e-6
+        chart = TangentChart.around(at, found.setting.everything.question)
+        back, A = np.linalg.pinv(chart.basis), []
+        for way in 1e-6 * np.eye(chart.basis.shape[1]):
+            pair = [back @ search.law.at(chart.at(sign * way, at.q), wanted).velocity for sign in (1, -1)]
+            A.append((pair[0] - pair[1]) / 2e-6)
+        values = np.sort(-np.linalg.eigvals(np.array(A).T).real)
+        assert values == pytest.approx(each.curvatures, rel=1e-2, abs=1e-2)
+
+
 def test_what_cannot_be_asked_of_cameras_is_refused_in_one_line(tmp_path: Path) -> None:
     for options, said in (({"at": "x=0,y=0,z=-0.5,rpy=0/0/0"}, "not in front of its camera at the goal"),
                           ({"at": TILTED, "complete": True}, "knows directions of segments only")):

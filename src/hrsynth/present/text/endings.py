@@ -18,7 +18,8 @@ def endings(found: Endings) -> str:
     drawn = [each for each in found.rests if each.stability in ("stable", "undecided")]
     others = [each for each in found.rests if each.stability not in ("stable", "undecided")]
     boxed = [each for each in found.rests if each.proved]
-    rows: Rows = [*head(found.setting), *camera(found.setting), ("goal", str(found.pose)), *GAP,
+    rows: Rows = [*head(found.setting), *camera(found.setting), ("goal", str(found.pose)),
+                  *([] if found.depth == "exact" else [("depth", f"{found.depth}, as the law supposes it")]), *GAP,
                   ("attract", table([_line(each) for each in drawn], HEADS).splitlines()), *GAP]
     if others:
         told = table([_line(each) for each in others[:LISTED_SADDLES]], HEADS).splitlines()

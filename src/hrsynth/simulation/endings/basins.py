@@ -43,7 +43,7 @@ from ..ending import ENDINGS, GOAL, SIGHT, TIME, UNDECIDED, Ending, EndingClassi
 from ..law import measured
 from ..run import AWAY, EFFORT, LOST, POISED, REST, SERVED_AT
 from ..run import TIME as OVER
-from ..servo import ServoTask
+from ..servo import Conditions, ServoTask
 from .abreast import Abreast, Runs
 from .flow import Flags, Flow, Places
 from .outcomes import Found, Outcome, Outcomes
@@ -160,12 +160,13 @@ class Basins(Result, shown_as="basins"):
 @question()
 def basins(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
            to: PoseLike, plane: PoseLike | None = None, grid: str | None = None, steps: int | None = None,
-           jobs: int | None = None, seed: int = 0) -> Basins:
+           jobs: int | None = None, depth: str = "exact", seed: int = 0) -> Basins:
     """Where the loop that servoes what is observed at the pose ``to`` ends, from each start of a plane of poses (by
     default one through the goal, all of it that is reached, ``steps`` poses a side) or of a ``grid``, a line, plane or
     box such as ``x=-0.3:0.3:50,y=-0.3:0.3:50,z=-0.7``.
 
-    ``observe``, ``camera`` and ``see`` as for ``derive``. The law is that of ``servo`` with exact measurements. Robots
+    ``observe``, ``camera`` and ``see`` as for ``derive``. The law is that of ``servo`` with exact measurements
+    (and a ``depth``). Robots
     whose legs are closed forms and watched by their directions are integrated abreast, others one by one. There are
     ``jobs`` processes, by default as many as cores; the answer does not depend on them.
 
@@ -183,7 +184,8 @@ def basins(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None
     (goal,) = configurations_at(setting, [asked])
     if jobs is not None and jobs < 1:
         raise BadRequest("number of processes", jobs, "1 or more")
-    search = BasinSearch(setting, goal, ServoTask.between(setting, goal, goal), jobs or os.cpu_count() or 1)
+    task = ServoTask.between(setting, goal, goal, Conditions(depth=depth))
+    search = BasinSearch(setting, goal, task, jobs or os.cpu_count() or 1)
     return search.over(Grid.parse(grid, FLOW_STARTS) if grid else search.plane(plane, steps), seed)
 
 

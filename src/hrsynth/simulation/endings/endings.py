@@ -32,7 +32,7 @@ from ...mechanism.pose import PoseLike, asked_pose
 from ...progress import tell
 from ...tolerances import DAMPED, SAME_ENDING, SEEN_ABOVE, VANISHED
 from ..ending import ANTIPODAL, BOUNDARY, GOAL, MODE, rest
-from ..law import FixedDirections, Law, Measures, measured
+from ..law import FixedDirections, Law, Measures, measured, supposed_planes
 from ..servo import require_regular, require_seen, require_sight
 from .carried import SweptChains
 from .completeness import Covers
@@ -44,14 +44,15 @@ from .search import NEARBY, Critical, critical_points, descend, in_mode, walked
 
 @question()
 def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-            at: PoseLike, complete: bool = False, seed: int = 0) -> Endings:
+            at: PoseLike, depth: str = "exact", complete: bool = False, seed: int = 0) -> Endings:
     """All poses at which the loop can rest that servoes what is observed at ``at``: the goal, modes and antipodal
     poses, where the error vanishes, and critical poses, where it does not; which of them attract.
 
     ``observe``, ``camera`` and ``see`` as for ``derive``; each kind of observation has its error. The law rests exactly
     at the critical points of ½ ‖e‖² on the closed loops (theory.md 11); those at which a camera does not see what it is
     to see are left out. They are sought from random walks on the branch of the zero configuration. ``complete``: prove
-    that they are all, by subdivision of a box of platform poses (seconds to minutes), as far as that goes.
+    that they are all, by subdivision of a box of platform poses (seconds to minutes), as far as that goes. ``depth`` is
+    that of ``servo``; where the law supposes depths, what it commands is no gradient, and rests are found alone.
 
     Raises ``BadRequest`` for names that there are not, observations that do not see the platform, a singular goal, one
     at which something is behind its camera; ``PoseNotReached`` for a pose out of reach.
@@ -67,7 +68,7 @@ def endings(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = Non
     require_seen(setting)
     (goal,) = configurations_at(setting, [asked])
     require_regular(ConfigurationAnalysis.of(setting), "goal", goal)
-    search = RestSearch.of(setting, goal)
+    search = RestSearch.of(setting, goal, depth)
     require_sight(setting, search.law, "goal", goal)
     tell("rests")
     return search.answer(seed, complete=complete)
@@ -82,16 +83,18 @@ class RestSearch:
     system: RestSystem
     law: Law
     desired: Measures
+    depth: str = "exact"
 
     @classmethod
-    def of(cls, setting: ObservedRobot, goal: ClosedConfiguration) -> RestSearch:
+    def of(cls, setting: ObservedRobot, goal: ClosedConfiguration, depth: str = "exact") -> RestSearch:
         """That of a goal."""
         question = setting.samples.question
-        system = RestSystem.of(goal, question, setting.configurations)
+        planes = supposed_planes(depth, goal, question)
+        system = RestSystem.of(goal, question, setting.configurations, planes)
         values = measured(goal, question)[0]
         by_directions = all(isinstance(each, SeenAxis) for each in question.observations)
-        return cls(setting, goal, system, Law(question, setting.dof, 1.0),
-                   np.array(values) if by_directions else values)
+        return cls(setting, goal, system, Law(question, setting.dof, 1.0, planes),
+                   np.array(values) if by_directions else values, depth)
 
     def answer(self, seed: int = 0, *, minima: bool = False, rounds: Iterable[Array] | None = None,
                complete: bool = False) -> Endings:
@@ -109,7 +112,7 @@ class RestSearch:
         lists = [] if minima else self._lists(isolated)
         isolated += [each for one in lists for each in self._listed(one, isolated, found.idle)]
         tell("enclosures")
-        boxes = ([None] * len(isolated) if minima else
+        boxes = ([None] * len(isolated) if minima or self.system.supposes else
                  enclosed(self.system, [each.point for each in isolated], found.idle))
         rests = _ways([each for one, box in zip(isolated, boxes, strict=True)
                        if (each := self.read(one, box)) is not None], self)
@@ -121,7 +124,7 @@ class RestSearch:
             lists = covers.signed(lists, np.array(self.desired))
         return Endings(setting, self.goal, motion.pose(self.goal.pose(motion.link)), self.desired, tuple(rests),
                        tuple(continua), tuple(lists), measured, found,
-                       None if covers is None else covers.judged(rests))
+                       None if covers is None else covers.judged(rests), self.depth)
 
     def _lists(self, found: Sequence[Critical]) -> list[SignedModes]:
         """The lists of modes of those combinations of signs at which the error was found to vanish, that of the goal

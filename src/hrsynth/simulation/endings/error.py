@@ -149,6 +149,8 @@ class SightTerm(Value):
     centre: Array
     frame: Array
     wanted: Array
+    plane: Array | None = None
+    """The plane in which the law supposes it to lie, where that is not known."""
 
     def coordinates(self, carrier: SweptChains) -> list[Product]:
         """p, and d where there is an axis, in the camera's frame."""
@@ -181,6 +183,36 @@ class SightTerm(Value):
                 add_bend(sums.bend, product, along[..., place])
 
 
+    def supposed(self, carrier: SweptChains, sums: ErrorSums) -> None:
+        """Add to ``slope`` and ``gram`` J̃ᵀe and J̃ᵀJ̃, J̃ the rates of e that hold if what is seen lies in the plane: for
+        floats. It moves as the link does, x̃' = x' + ω × (x̃ − x)."""
+        products = self.coordinates(carrier)
+        x = np.array([each.value for each in products])
+        there = x
+        if self.plane is not None:
+            r = np.full((x.shape[1], 1), self.radius)
+            p, d = x[:3].T, x[3:].T if len(x) > 3 else np.zeros((x.shape[1], 3))
+            there = np.concatenate([each.T for each in self.seen.supposed(p, d, r, self.plane)])[: len(x)]
+        e = self.errors(list(there))
+        X = np.array([gradient(each, sums) for each in products])
+        turn = np.array([spun(each, sums) for each in products[:3]])
+        for k in range(0, len(x), 3):
+            X[k : k + 3] += np.cross(turn, (there - x)[k : k + 3, :, None], axis=0)
+        J = np.array([np.einsum("ca,acn->cn", each.slope, X) for each in e])
+        sums.slope.add((slice(None),), np.einsum("kcn,kc->cn", J, np.array([each.value for each in e])))
+        assert sums.gram is not None
+        sums.gram.add((slice(None), slice(None)), np.einsum("kcm,kcn->cmn", J, J))
+        sums.value = sums.value + sum(each.value * each.value for each in e) * 0.5
+
+
+def spun(product: Product, sums: ErrorSums) -> Array:
+    """The rates (c, N) of y · ω, ω the angular velocity of the links between which x goes, one less the other."""
+    total = Total(sums.value, sums.slope.shape)
+    for part in product.x.parts:
+        total.add((part.places,), (part.axes * product.y.value[..., None, :]).sum(-1) * part.sign)
+    return np.asarray(total.sum)
+
+
 def gradient(product: Product, sums: ErrorSums) -> Any:
     """∇(x · y), (c, N)."""
     total = Total(sums.value, sums.slope.shape)
@@ -210,14 +242,17 @@ class RestSystem(Value):
     terms: tuple[ErrorTerm, ...]
 
     @classmethod
-    def of(cls, goal: ClosedConfiguration, question: Measurement, generic: Sequence[ClosedConfiguration]) -> RestSystem:
-        """That of the values measured at a goal; which equations are independent is seen at ``generic`` configurations.
+    def of(cls, goal: ClosedConfiguration, question: Measurement, generic: Sequence[ClosedConfiguration],
+           planes: Sequence[Array | None] | None = None) -> RestSystem:
+        """That of the values measured at a goal; which equations are independent is seen at ``generic`` configurations;
+        ``planes`` (3,), in metres, are those in which the law supposes what is seen to lie, None where it knows them.
         """
         mechanism = goal.twin.mechanism
         system = loop_system(mechanism, ())
         values = measure(goal.twin, goal.q, question.reference, question.observations)[2]
-        terms = tuple(term(system, question.reference, each, value)
-                      for each, value in zip(question.observations, values, strict=True))
+        terms = tuple(term(system, question.reference, each, value, None if plane is None else plane * system.length)
+                      for each, value, plane in zip(question.observations, values,
+                                                    planes or [None] * len(values), strict=True))
         return cls(system, (), (), terms).chosen_at(np.array([system.read(each.pose) for each in generic]))
 
     def chosen_at(self, q: Array) -> RestSystem:
@@ -228,6 +263,11 @@ class RestSystem(Value):
         chosen, count = independent(rates, self.size[1] or None), len(every)
         return replace(self, rows=tuple(every[k] for k in chosen if k < count),
                        gears=tuple(system.gears[k - count] for k in chosen if k >= count))
+
+    @property
+    def supposes(self) -> bool:
+        """Whether the law supposes depths, so that what it commands is no gradient of E."""
+        return any(isinstance(each, SightTerm) and each.plane is not None for each in self.terms)
 
     @property
     def size(self) -> tuple[int, int]:
@@ -276,9 +316,19 @@ class RestEquations:
             each.add(self.carrier, sums)
         return sums
 
-    def bend(self, multipliers: Any) -> Any:
-        """The Hessian (c, N, N) of E + μ · G for multipliers μ (c, m)."""
-        total = self._error(bend=True).bend
+    def commanded(self) -> tuple[Array, Array, Array]:
+        """E (c,), J̃ᵀe (c, N) and J̃ᵀJ̃ (c, N, N), J̃ the rates of e with the depths that the law supposes."""
+        size = self.system.size[0]
+        sums = ErrorSums(self.like, Total(self.like, (size,)), gram=Total(self.like, (size, size)))
+        for each in self.system.terms:
+            (each.supposed if isinstance(each, SightTerm) else each.add)(self.carrier, sums)
+        assert sums.gram is not None
+        return sums.value, sums.slope.sum, sums.gram.sum
+
+    def bend(self, multipliers: Any, error: bool = True) -> Any:
+        """The Hessian (c, N, N) of E + μ · G for multipliers μ (c, m), or of μ · G alone."""
+        size = self.system.size[0]
+        total = self._error(bend=True).bend if error else Total(self.like, (size, size))
         assert total is not None
         for k, product in enumerate(self.products):
             add_bend(total, product, multipliers[..., k])
@@ -320,8 +370,9 @@ def row_product(carrier: SweptChains, loop: JointLoop, row: LoopRow) -> Product:
     return Product(k, carrier.point(loop.chains[1], loop.point) - carrier.point(loop.chains[0], loop.point))
 
 
-def term(system: LoopSystem, reference: str, seen: Observation, value: Array) -> ErrorTerm:
-    """The part of E of an observation whose desired value is given (characteristic lengths, radians)."""
+def term(system: LoopSystem, reference: str, seen: Observation, value: Array, plane: Array | None = None) -> ErrorTerm:
+    """The part of E of an observation whose desired value is given, and what the law supposes of its depth
+    (characteristic lengths, radians)."""
     links, length = system.mechanism.links, system.length
     view = seen.seen_from or reference
     chains = system.way(system.body[seen.link]), system.way(system.body[view])
@@ -335,7 +386,7 @@ def term(system: LoopSystem, reference: str, seen: Observation, value: Array) ->
         case CameraObservation():
             C = Y @ seen.view
             return SightTerm(chains, seen, transform(X, seen.at) / length, None if seen.axis is None else R @ seen.axis,
-                             (seen.radius or 0.0) / length, C[:3, 3] / length, C[:3, :3], value)
+                             (seen.radius or 0.0) / length, C[:3, 3] / length, C[:3, :3], value, plane)
         case SlideEncoder():
             return SlideTerm(chains, transform(X, seen.point) / length, transform(Y, seen.start) / length,
                              S @ seen.axis, float(value[0]))

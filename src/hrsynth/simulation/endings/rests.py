@@ -180,7 +180,8 @@ class Endings(Result, shown_as="endings"):
     the goal first, then those that attract; ``continua``: one rest each of those that fill curves or surfaces.
     ``lists`` are those of the modes and of the antipodal poses of each combination of signs, those first that were
     met; equations of the loops ``measured`` are met as well as numbers tell and not enclosed; ``search`` says how rests
-    were sought, ``cover`` whether they are all (None where that was not asked).
+    were sought, ``cover`` whether they are all (None where that was not asked). ``depth`` is how the law knows depths
+    in images; where it supposes them, ``curvatures`` are real parts of eigenvalues of the linearised loop over −gain.
     """
 
     setting: ObservedRobot
@@ -193,6 +194,7 @@ class Endings(Result, shown_as="endings"):
     measured: tuple[str, ...]
     search: CriticalPoints
     cover: RestCover | None = None
+    depth: str = "exact"
 
     @property
     def complete(self) -> bool:
@@ -227,6 +229,7 @@ class Endings(Result, shown_as="endings"):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line, without the command's own fields."""
         return {"at": self.pose.to_dict(), **self.setting.to_dict(), "complex": self.lists[0].to_dict()["complex"],
+                "depth": self.depth,
                 "complete": self.complete, "cover": None if self.cover is None else self.cover.to_dict(),
                 "signs": [each.to_dict() for each in self.lists],
                 "proof": self.search.words, "starts": self.starts, "attracting": len(self.attracting),

@@ -51,6 +51,10 @@ WALK_STEP = 0.3
 """The same of a random step between starts."""
 WIDEST_SLIDE = 2.5
 """Coordinate of a slide (characteristic lengths) up to which one is drawn."""
+DIFFERENCE = 1e-7
+"""Step (characteristic lengths, radians) of differences of what the law commands."""
+FAINT = 1e-10
+"""Relative size of a singular value that is none."""
 NEARBY = 0.02
 """Step (characteristic lengths, radians) to a configuration that shows the operation mode in which a point lies."""
 
@@ -177,6 +181,8 @@ def walked(system: RestSystem, q: Array, rng: np.random.Generator, steps: int, l
 
 def descend(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) -> list[CriticalPoint]:
     """The critical points to which starts (c, N) lead, each sought as one of an index (c,)."""
+    if system.supposes:
+        return settle(system, q, index, idle)
     found: list[CriticalPoint] = []
     for _ in range(ENDING_STEPS):
         if not len(q):
@@ -194,6 +200,42 @@ def descend(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) ->
         q = q + step + _shortened(at.closing, LONGEST_STEP)
         going = ~done & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < FARTHEST_ENDING)
         q, index = q[going], index[going]
+    return found
+
+
+def settle(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) -> list[CriticalPoint]:
+    """The zeros of J̃ᵀe along the motions of the loops, J̃ the rates that the law supposes, to which starts (c, N) lead:
+    implicit steps of the loop s' = −(J̃ᵀJ̃)⁻¹ J̃ᵀe, which end where it does, or (``index`` not 0) Newton's method.
+    ``curvatures`` are real parts of the eigenvalues of the loop, linearised, over −λ."""
+    found: list[CriticalPoint] = []
+    flows = index == 0
+    for _ in range(ENDING_STEPS):
+        if not len(q):
+            break
+        with np.errstate(all="ignore"):
+            at = RestEquations(system, list(q.T))
+            tangents = Tangents.of(at.DG)
+            Z, back = tangents.Z, np.swapaxes(tangents.Z, -1, -2)
+            E, pull, gram = at.commanded()
+            lost = np.asarray(~np.isfinite(gram).all(axis=(-1, -2)) | ~np.isfinite(pull).all(axis=-1))
+            pull, gram = np.where(lost[:, None], 0.0, pull), np.where(lost[:, None, None], 0.0, gram)
+            mu, p, v, M = tangents.multipliers(pull), tangents.closing(at.G), _times(back, pull), back @ gram @ Z
+            there = (q[:, None] + DIFFERENCE * back).reshape(-1, q.shape[1])
+            turned = RestEquations(system, list(there.T)).commanded()[1].reshape(*back.shape) - pull[:, None]
+            A = back @ (np.swapaxes(np.nan_to_num(turned), -1, -2) / DIFFERENCE + at.bend(mu, error=False) @ Z)
+        residual = np.maximum(np.linalg.norm(at.G, axis=-1), np.linalg.norm(v, axis=-1))
+        done = (residual < CRITICAL) & ~lost
+        inverse = np.linalg.pinv(M, rcond=FAINT, hermitian=True)
+        for k in np.flatnonzero(done):
+            values = np.linalg.eigvals(inverse[k] @ A[k])
+            kept = values[np.argsort(np.abs(values))[idle:]].real
+            found.append(CriticalPoint(q[k], mu[k], float(residual[k]), np.sort(kept), float(E[k])))
+        # steps of half a unit of time where the loop is fast, longer ones where it slows down
+        slow = np.where(flows, 2 * np.minimum(1.0, np.linalg.norm(_times(inverse, v), axis=-1)), 0.0)
+        step = -_times(np.linalg.pinv(slow[:, None, None] * M + A, rcond=FAINT), v)
+        q = q + _shortened(_times(Z, step), LONGEST_STEP) + _shortened(p, LONGEST_STEP)
+        going = ~done & ~lost & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < FARTHEST_ENDING)
+        q, flows = q[going], flows[going]
     return found
 
 
