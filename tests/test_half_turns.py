@@ -15,6 +15,7 @@ import pytest
 
 from hrsynth.analysis import check as checks
 from hrsynth.analysis.accuracy import accuracy as accuracies
+from hrsynth.analysis.accuracy.cones import Blur
 from hrsynth.analysis.aspects.path import Aspects
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot, motors
@@ -32,7 +33,6 @@ from hrsynth.mechanism import Mechanism
 from hrsynth.mechanism.observations.encoder import AngleEncoder
 from hrsynth.mechanism.pose import Grid, Pose
 from hrsynth.selection import select as selections
-from hrsynth.simulation.law import whole
 from hrsynth.simulation.servo import servo
 from kinematics.robots import state_of
 from oracle import Oracle
@@ -129,7 +129,7 @@ def led_whole(case: Case, pose: Pose) -> Answer:
     """Led to the whole pose, as trajectories are."""
     X = np.eye(4)
     X[:3, :3], X[:3, 3] = pose.rotation, [pose.x, pose.y, pose.z]
-    at, came = track(case.setting.everything.start, case.setting.motion, whole(case.setting.motion, X))
+    at, came = track(case.setting.everything.start, case.setting.motion, case.setting.motion.whole(X))
     if came < 1:
         raise PoseNotReached(case.robot.name, str(pose), came, "")
     return [at]
@@ -182,7 +182,7 @@ def mapped(case: Case, pose: Pose) -> Answer:
     field = accuracies.accuracy(case.robot, case.observe, cone=1e-3, grid=grid).field
     assert field is not None
     if field.reached[0]:
-        single = accuracies.errors_at(case.setting, np.full(len(case.setting.observed), 1e-3), at[0])
+        single = accuracies.errors_at(case.setting, Blur(np.full(len(case.setting.observed), 1e-3)), at[0])
         assert field.position[0] == pytest.approx(single.position.largest, rel=1e-2)
     return at
 

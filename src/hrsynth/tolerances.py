@@ -262,6 +262,8 @@ NEAREST_SEEN = 1e-3
 """Depth (m) from which on lines are drawn in a picture."""
 SEEN_ABOVE = 1e-3
 """Sine of the angle to the focal plane, or to a side of the picture, below which a camera has lost what it sees."""
+NOISE_STEP = 1e-5
+"""Noise (radians, metres, parts of the focal length) by which its first-order effect is found by differences."""
 AT_REST = 1e-8
 """Speed (characteristic lengths, radians) for each unit of error and gain below which a servo loop is at a local
 minimum."""

@@ -157,15 +157,24 @@ def test_what_is_wrong_on_the_command_line_is_one_line(words: list[str], said: s
     assert said in told
 
 
-@pytest.mark.parametrize("command", ["atlas", "accuracy", "select", "path"])
+@pytest.mark.parametrize("command", ["servo"])
 def test_commands_that_know_segments_only_say_so(command: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
                                                  ) -> None:
     save(with_sights(load("delta"), [parse_see("point:platform@0,0,0.1", [])]), tmp_path / "delta.urdf")
-    more = {"accuracy": ["--cone", "0.1deg"],
-            "servo": ["--start", "x=0", "--goal", "x=0.01"],
-            "select": ["--start", "x=0", "--goal", "x=0.01"], "path": ["--start", "x=0", "--goal", "x=0.01"]}
-    assert execute([command, str(tmp_path / "delta.urdf"), *more.get(command, [])]) == 2
+    words = ["--start", "x=0", "--goal", "x=0.01", "--physics"]
+    assert execute([command, str(tmp_path / "delta.urdf"), *words]) == 2
     assert "knows directions of segments only" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("words", ["atlas", "path --start x=0 --goal x=0.01", "accuracy --noise 0.1deg,1mm", "derive",
+                                   "select --start x=0 --goal x=0.01 --noise 0.1deg,1mm --runs 0"])
+def test_commands_read_what_a_file_observes(words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    sights = [parse_see(text, []) for text in ("point:platform@0,0,0.1", "distance:platform@0,0,0.1")]
+    save(with_sights(load("delta"), sights), tmp_path / "delta.urdf")
+    command, *more = words.split()
+    assert execute([command, str(tmp_path / "delta.urdf"), *more, "--json"]) == 0
+    assert '"kind": "point"' in (told := capsys.readouterr().out) or command == "select"
+    assert "distance_1" in told
 
 
 def test_the_command_line_and_python_see_the_same(capsys: pytest.CaptureFixture[str]) -> None:

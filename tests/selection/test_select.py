@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from hrsynth.analysis.accuracy.accuracy import accuracy
-from hrsynth.analysis.accuracy.cones import half_angles
+from hrsynth.analysis.accuracy.cones import Blur
 from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.controllability import legs
 from hrsynth.analysis.modes.modes import modes
@@ -44,7 +44,7 @@ def work() -> _Work:
     setting = ObservedRobot.of(load("quattro"))
     everything = setting.everything
     ends = [reach(everything.start, everything.question, Pose.parse(text), setting.motion) for text in (START, GOAL)]
-    cones = half_angles("0.1deg", setting.observed)
+    cones = Blur.of("0.1deg", None, setting.observed)
     return _Work(setting, ends[0], ends[1], cones, None, Criteria(), math.inf, 0)
 
 

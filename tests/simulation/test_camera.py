@@ -13,11 +13,12 @@ from hypothesis import strategies as st
 from hrsynth.description import load
 from hrsynth.errors import BadRequest, MissingExtra, NotRendered
 from hrsynth.geometry.vectors import Array, unit
+from hrsynth.mechanism.noise import Noise
 from hrsynth.mechanism.observations.direction import Direction
 from hrsynth.simulation import pictures
 from hrsynth.simulation.camera import Camera, Edges, cylinders, edges, placed, rebuilt, sensitivity
 from hrsynth.simulation.law import directions
-from hrsynth.simulation.noise import PERIOD, Noise, Sensors, Shocks
+from hrsynth.simulation.noise import PERIOD, Sensors, Shocks
 from hrsynth.simulation.servo import servo
 from simulation.scenes import home
 

@@ -114,8 +114,7 @@ class ObservedRobot(Value):
             if not each.by_segment:
                 raise BadRequest(f"{self.robot.name}: {what} knows directions of segments only",
                                  f"{each.kind} {each.leg}",
-                                 "legs to watch (advise, basins, check, derive, endings, legs, modes, servo, singular, "
-                                 "view know all)")
+                                 "legs to watch (export and the studio know these alone)")
         return self
 
     @property

@@ -179,18 +179,19 @@ def _deficient(M: Array, twists: Array, cones: Array) -> Array:
         gone = np.linalg.norm(along * ~seen[:, None], axis=(1, 2)) > RANK_CUTOFF * np.linalg.norm(along, axis=(1, 2))
         P = along * (seen / np.where(seen, values, 1.0))[:, None]
         J = P[:, :, : s.shape[1]] @ U[:, :, : s.shape[1]].transpose(0, 2, 1)
-        for number, value in enumerate(_of_map(J, cones, freedom(part))):
+        for number, value in enumerate(bounds_of_maps(J * np.repeat(cones, 3), freedom(part))):
             found[2 * row + number] = np.where(finite, np.where(gone, np.inf, value), np.nan)
     return found
 
 
-def _of_map(J: Array, cones: Array, only: Array | None) -> tuple[Array, Array]:
-    """The bounds (n,) for maps J (n, 3, 3 k) from the directions' errors to the platform's."""
-    blocks = J.reshape(len(J), 3, len(cones), 3) * cones[:, None]
+def bounds_of_maps(J: Array, only: Array | None) -> tuple[Array, Array]:
+    """The bounds (n,) for maps J (n, 3, 3 k) of k unit balls to the platform's error, ``only`` along a direction (3,)
+    where one is given."""
+    blocks = J.reshape(len(J), 3, -1, 3)
     B = np.einsum("naic,nbic->niab", blocks, blocks)
     entries = np.stack([B[:, :, a, b] for a, b in ENTRIES], axis=2)
     if only is not None:
-        found = np.sum([error_along(entries[:, i].T, only) for i in range(len(cones))], axis=0)
+        found = np.sum([error_along(entries[:, i].T, only) for i in range(entries.shape[1])], axis=0)
         return found, found
     return largest_errors(list(entries.transpose(1, 2, 0)))
 

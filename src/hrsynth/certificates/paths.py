@@ -35,6 +35,8 @@ def certificate(found: PathAnswer) -> dict[str, Any]:
     name = found.setting.robot.name
     if not found.certified:
         raise NoCertificate(name, found.reason or "no path was proved")
+    if not all(o.by_segment for o in found.setting.observed):
+        raise NoCertificate(name, "what is observed is not the direction of a segment")
     aspects = Aspects.of(found.setting)
     ends = [found.start, found.goal] if found.verdict == SEPARATED else [found.start]
     enclosures = [aspects.enclosure(end.configuration) for end in ends]

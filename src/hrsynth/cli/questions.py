@@ -162,6 +162,8 @@ FIGURE = (
     Option("font", "Font of a figure, its size, or both: serif, 8pt, 'DejaVu Sans 8pt'.", group=OUTPUT),
 )
 POSES = "or mode:2, of the list that modes gives; again for more (default: the zero configuration)."
+NOISE = Option("noise", "Largest errors of what else is observed: in pictures as 0.3px, angles as 0.1deg, lengths as "
+               "1mm; several with commas.", "AMOUNT")
 BEGIN = Option("at", "Start there instead of at the zero configuration, in another operation mode if need be; or "
                "mode:2.", "POSE")
 START = Option("start", "Start pose, such as x=0.02,y=0.1,z=-0.7, or mode:2 of the other pose.", "POSE",
@@ -217,11 +219,11 @@ QUESTIONS = (
     Question("atlas", "Which modes with the same directions can be led to each other without Type 2 singularity, mode "
              "by mode.",
              (Option("at", "Pose whose directions are held, as x=0.02,y=0.1,z=-0.7 (default: the zero "
-                     "configuration's).", "POSE"), *WATCHED, _file("atlas")),
+                     "configuration's).", "POSE"), *WATCHED, SEE, _file("atlas")),
              ("quattro --observe 1,4", "3rrr_m1 --observe 2,1,3 -o atlas.png")),
     Question("path", "Whether a path without Type 2 singularity joins two poses, with a proof: same aspect, separated, "
              "undecided.",
-             (START, _goal("Where it ends; mode:2 is a mode with the directions at the start."), *WATCHED,
+             (START, _goal("Where it ends; mode:2 is a mode with the directions at the start."), *WATCHED, SEE,
               _file("path", "certificate")),
              ("quattro --observe 1,4 --start x=0.05 --goal x=-0.05,phi=20deg",
               "3rrr_m1 --start x=0,y=0 --goal mode:2 --certificate c.json")),
@@ -260,10 +262,10 @@ QUESTIONS = (
               _file("basins")),
              ("quattro --observe 1,4 --to z=-0.7 --plane z=-0.7,phi=0 -o basins.png",
               "3rrr_m1 --to x=0,y=0,phi=0 --grid x=-0.1:0.1:50,y=0,phi=0")),
-    Question("accuracy", "How far the platform can be off where the observed directions are off by up to given angles.",
+    Question("accuracy", "How far the platform can be off where what is observed is off by given amounts.",
              (Option("cone", "Half-angle of the cone about each observed direction, as 0.1deg; or one a leg: "
-                     "1=0.1deg,2=0.2deg.", "ANGLE", default=NEEDED),
-              *WATCHED, Option("at", f"A pose, as x=0.02,y=0.1,z=-0.7; {POSES}", "POSE", list[str]),
+                     "1=0.1deg,2=0.2deg.", "ANGLE"),
+              NOISE, *WATCHED, SEE, Option("at", f"A pose, as x=0.02,y=0.1,z=-0.7; {POSES}", "POSE", list[str]),
               Option("plane", "Plane of poses, as z=-0.7: all of it that is reached.", "PART=VALUE"),
               Option("grid", "A line, plane or box of poses, such as x=-0.3:0.3:21,y=0,z=-0.7 (from:to:count).",
                      "GRID"),
@@ -275,9 +277,9 @@ QUESTIONS = (
     Question("select", "Which legs to watch for a displacement: all sets, ranked by where else the loop may end and by "
              "accuracy, and why the others are discarded.",
              (START, _goal("Goal pose."),
-              Option("cone", "Half-angle of the cone about each direction, or one a leg: 1=0.1deg,2=0.2deg,…", "ANGLE",
-                     default="0.1deg"),
-              *WATCHED, Option("size", "Legs of the largest sets.", None, int, 4, low=1),
+              Option("cone", "Half-angle of the cone about each direction, or one a leg: 1=0.1deg,2=0.2deg,… (default: "
+                     "0.1deg).", "ANGLE"),
+              NOISE, *WATCHED, SEE, Option("size", "Legs of the largest sets.", None, int, 4, low=1),
               Option("runs", "How many sets must pass a simulated run, best first.", None, int, 3, low=0),
               Option("endings", "How many of the examined sets are asked where else the loop may end, the most "
                      "accurate first.", None, int, 20, low=0),

@@ -637,6 +637,17 @@ class CrossingRecord(TypedDict):
     at: int
 
 
+class SampledRoadRecord(TypedDict):
+    """The straight way, sampled: the smallest |value| and where, changes of its sign, the part that was reached."""
+
+    poses: int
+    least: float
+    at: PoseRecord
+    changes: int | None
+    reached: float
+    lost_from_sight: str | None
+
+
 class PathRecord(TypedDict):
     """Whether a path without Type 2 singularity joins two poses."""
 
@@ -654,6 +665,7 @@ class PathRecord(TypedDict):
     reason: str
     limits: list[str]
     not_considered: str
+    sampled: SampledRoadRecord | None
 
 
 class Path(OfRobot, PathRecord):
@@ -916,11 +928,14 @@ class SpotCheck(TypedDict):
 
 
 class AccuracyAnswer(OfRobot, WrittenTo):
-    """The largest errors at poses; of a plane or grid also its axes and a table of each error."""
+    """The largest errors at poses; of a plane or grid also its axes and a table of each error. ``noise``: by unit (px,
+    m, rad), of what is no direction; ``exact``: what has none."""
 
     observed: list[Watched]
     camera: str
     cones: list[ConeRecord]
+    noise: dict[str, float]
+    exact: list[str]
     poses: list[ErrorsRecord]
     axes: NotRequired[list[str]]
     x: NotRequired[list[float]]
@@ -994,9 +1009,9 @@ class UnexaminedRecord(TypedDict):
 
 Select = TypedDict("Select", {
     "command": str, "version": str, "robot": str, "from": PoseRecord, "to": PoseRecord, "camera": str,
-    "cones": dict[str, float], "sight": dict[str, Any] | None, "best": list[str] | None,
+    "cones": dict[str, float], "noise": dict[str, float], "sight": dict[str, Any] | None, "best": list[str] | None,
     "fewer": str | None, "not_examined": UnexaminedRecord, "sets": list[CandidateRecord]})
-Select.__doc__ = "The sets of legs for a displacement, ranked; the cones by leg in degrees."
+Select.__doc__ = "The sets for a displacement, ranked; the cones by leg in degrees, noise by its unit (px, m, rad)."
 
 
 class SliderRecord(TypedDict):

@@ -19,7 +19,7 @@ from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.sights import CameraObservation
 from ..results import Value
 from ..tolerances import SAME_RELATION
-from .named_vectors import BodyPoint, BodyVector, CrossProduct, NamedVector, Segment, TangentNormal, poses_at
+from .named_vectors import BodyPoint, BodyVector, CrossProduct, NamedVector, Ray, TangentNormal, poses_at
 
 Sight = CameraObservation | SeenAxis
 Place = tuple[str, tuple[float, ...]]
@@ -168,7 +168,7 @@ def _candidates(seen: Sight, symbol: str, link: str, reference: str, tip: BodyPo
     found: list[NamedVector] = []
     axis = seen.axis if isinstance(seen, CameraObservation) else seen.direction
     if eye is not None:
-        found += [Segment(f"r{symbol}", f"ray from {eye.symbol} to {tip.symbol}", eye, tip),
+        found += [Ray(f"r{symbol}", f"ray from {eye.symbol} to {tip.symbol}", eye, tip),
                   BodyVector(f"z{symbol}", f"z axis of {eye.meaning.removeprefix('centre of ')}", reference,
                              frozen(seen.view[:3, 2]))]
     if axis is not None:

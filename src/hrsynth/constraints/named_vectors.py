@@ -101,8 +101,14 @@ class Segment(NamedVector):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Ray(Segment):
+    """The same from a camera's centre: where it has no length, nothing is seen."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class CrossProduct(NamedVector):
-    """The unit vector along the cross product of two."""
+    """The unit vector along the cross product of two, one of them a ray, or in the plane of one: where it vanishes
+    nothing is seen."""
 
     one: NamedVector
     other: NamedVector

@@ -213,6 +213,10 @@ class PlatformMotion(Value):
         return Goal(self.link, self.point, R, np.eye(3), self.position(self.home), self.normal,
                     rotation=R if self.body else None)
 
+    def whole(self, X: Array) -> Goal:
+        """The goal of the whole platform pose X (4, 4), as far as the platform's pose counts."""
+        return replace(self.at_home(), values=self.position(X), rotation=X[:3, :3] if self.body else None)
+
     def manner(self) -> Goal:
         """What the platform never changes: where its point does not move, turns that it does not make (or makes about
         one axis only)."""

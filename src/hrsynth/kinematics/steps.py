@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -55,6 +56,17 @@ def track(here: ClosedConfiguration, motion: PlatformMotion, goal: GuidedTask,
         else:
             step /= 2
     return here, 1.0
+
+
+def led(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last: bool
+             ) -> tuple[ClosedConfiguration, bool]:
+    """The configuration at a goal of the whole pose nearby, and whether it was reached: where parts of the pose depend
+    on each other the nearest one, which is to be the goal's only at the ``last``."""
+    if motion.dof >= motion.translations.shape[1] + motion.rotations.shape[1]:
+        there, came = track(here, motion, goal)
+        return there, came == 1
+    there = nearest(here, replace(goal, directions=np.zeros((0, 3)), values=np.zeros(0), rotation=None), goal)
+    return there, not last or float(np.linalg.norm(goal.rows(there.twin, there.q)[0])) < NEAREST
 
 
 def approach(here: ClosedConfiguration, goal: Goal, easing: int = EASING) -> ClosedConfiguration:

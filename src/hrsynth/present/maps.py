@@ -251,9 +251,9 @@ def error_map(found: Accuracy, paper: Paper = PNG) -> bytes:
     figure, locus = (_error_curves(field, shown, paper) if field.grid.ndim == 1
                      else _error_maps(field, shown, found.setting.motion, paper))
     plots.legend(figure, _error_entries(field, locus) + _robot(figure, field.grid, found.setting), paper)
-    legs = ", ".join(f"{o.leg} within {np.degrees(cone):.3g}°"
-                     for o, cone in zip(found.setting.observed, found.cones, strict=True))
-    heading(figure, f"{found.setting.robot.name}: largest errors\nobserved legs: {legs}", field.grid.fixed, "; ")
+    legs = ", ".join(f"{o.leg} {found.blur.words(i, o)}" for i, o in enumerate(found.setting.observed))
+    what = "observed legs" if all(o.by_segment for o in found.setting.observed) else "observed"
+    heading(figure, f"{found.setting.robot.name}: largest errors\n{what}: {legs}", field.grid.fixed, "; ")
     return printed(figure, paper)
 
 

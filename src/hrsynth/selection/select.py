@@ -13,12 +13,12 @@ from typing import Any
 import numpy as np
 
 from ..analysis.accuracy.accuracy import errors_at
-from ..analysis.accuracy.cones import Cones, half_angles
+from ..analysis.accuracy.cones import Blur, Cones, unseen
 from ..analysis.accuracy.pose_errors import PoseErrors
 from ..analysis.asked import configurations_at
 from ..analysis.aspects.path import SEPARATED, Aspects
 from ..analysis.modes.modes import AssemblyModes, modes
-from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike
+from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..analysis.posture import ConfigurationAnalysis, Posture
 from ..analysis.question import question
 from ..analysis.verdict import CONTROLLABLE, verdict_of
@@ -26,8 +26,9 @@ from ..budgets import AXIS_SEEN, SELECT_ROUNDS
 from ..errors import BadRequest, HrsynthError
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
+from ..mechanism.noise import Noise
 from ..mechanism.observation import labels_of
-from ..mechanism.observations.direction import Direction
+from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.pose import Pose, PoseLike, asked_pose
 from ..progress import tell
 from ..results import Compared, Result, Value, by_name
@@ -41,6 +42,8 @@ from .sight import CameraView, camera_at, of_focal
 
 BUDGET = 2_000
 """Intervals that a path's certificate may take."""
+CONE = "0.1deg"
+"""Half-angle of the cones about directions where nothing is said."""
 FOCAL = 800.0
 """Focal length of the camera (pixels)."""
 AUTO = "auto"
@@ -165,8 +168,8 @@ class Selection(Result, shown_as="select"):
     start: Pose
     goal: Pose
     candidates: tuple[Candidate, ...]
-    cones: Array
-    """Half-angles (rad) of all legs' cones."""
+    blur: Blur
+    """How wrong each measurement may be."""
     sight: CameraView | None
     left: str | None
     """Why sets were not examined, None where all were."""
@@ -201,7 +204,8 @@ class Selection(Result, shown_as="select"):
                                            "focal": eye.camera.focal}
         return {"from": self.start.to_dict(), "to": self.goal.to_dict(), "camera": self.setting.mechanism.reference,
                 "cones": {o.leg: float(np.degrees(cone))
-                          for o, cone in zip(self.setting.observed, self.cones, strict=True)},
+                          for o, cone in zip(self.setting.observed, self.blur.cones, strict=True) if cone},
+                "noise": self.blur.amounts,
                 "sight": camera, "best": None if best is None else list(best.legs), "fewer": self.fewer,
                 "not_examined": {"count": len(self.unexamined), "reason": self.left},
                 "sets": [each.to_dict() for each in self.candidates]}
@@ -209,19 +213,22 @@ class Selection(Result, shown_as="select"):
 
 @question(cones="cone")
 @by_name(Criteria, "criteria")
-def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = None, start: PoseLike, goal: PoseLike,
-           cone: Cones = "0.1deg", criteria: Criteria, seed: int = 0) -> Selection:
-    """All sets of legs for the displacement from ``start`` to ``goal``, ranked by how many poses besides the goal were
-    found to attract the loop, by the certified radius (those of one power of two are alike), then by the largest
-    position error at the goal for cones about the directions (``cone``: the half-angle of all, or one a leg; MMT A.2).
+def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = None, see: SeeLike = None,
+           start: PoseLike, goal: PoseLike, cone: Cones | None = None, noise: str | Noise | None = None,
+           criteria: Criteria, seed: int = 0) -> Selection:
+    """All sets of legs, or of what is observed, for the displacement from ``start`` to ``goal``, ranked by how many
+    poses besides the goal were found to attract the loop, by the certified radius (those of one power of two are
+    alike), then by the largest position error at the goal for cones about the directions (``cone``: the half-angle of
+    all, or one a leg, by default 0.1°; MMT A.2) and ``noise`` of what else is observed (as ``0.3px,1mm,0.1deg``).
 
     The fields of :class:`Criteria` can be given by their names: ``size``, ``examine``, ``endings``, ``runs``,
-    ``sight``, ``focal``, ``seconds``. The sets are those of the legs or links ``observe``, by default of all legs. A
-    set is discarded where it does not see every freedom, where an end is singular, where the camera (``sight``) sees
-    too little of a leg, where start and goal are proved to lie in different aspects, and where a simulated run ends
-    elsewhere. Modes, aspects and endings are asked for the ``examine`` most accurate sets (endings for ``endings`` of
-    them), the others are neither kept nor discarded. Runs are made from the best set on, until ``runs`` of them ended
-    at the goal.
+    ``sight``, ``focal``, ``seconds``. The sets are those of the legs or links ``observe`` and of what else the file
+    or ``see`` observes, by default of all legs. A set is discarded where it does not see every freedom, where an end is
+    singular or something is behind its camera there, where the camera (``sight``) sees too little of a leg, where start
+    and goal are proved to lie in different aspects, and where a simulated run ends elsewhere. Modes, aspects and
+    endings are asked for the ``examine`` most accurate sets (endings for ``endings`` of them, of directions of
+    segments), the others are neither kept nor discarded. Runs are made from the best set on, until ``runs`` of them
+    ended at the goal.
 
     Raises ``BadRequest``, ``PoseNotReached``.
 
@@ -229,21 +236,25 @@ def select(robot: RobotLike, camera: CameraLike = None, *, observe: LegsLike = N
     <Selection: 3rrr_m1: 7 sets, 1 kept, best 1, 2, 3>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("select").telling(wanted)
-    segments = setting.segments if observe is None else setting.observed
-    directions = tuple(o for o in segments if isinstance(o, Direction))
-    setting = replace(setting, observed=directions)
-    half = half_angles(cone, directions)
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted)
+    others = not all(o.by_segment for o in setting.observed)
+    if others and criteria.sight is not None:
+        setting.by_segments("select with --sight")
+    if observe is None and not others:
+        setting = replace(setting, observed=setting.segments)
+    directed = any(isinstance(o, SeenAxis) for o in setting.observed)
+    blur = Blur.of(CONE if cone is None and directed and (noise is None or not others) else cone, noise,
+                   setting.observed)
     ends = configurations_at(setting, wanted)
-    work = _Work(setting, ends[0], ends[1], half, _sight(setting, ends, criteria), criteria,
+    work = _Work(setting, ends[0], ends[1], blur, _sight(setting, ends, criteria), criteria,
                  np.inf if criteria.seconds is None else time.monotonic() + criteria.seconds, seed)
-    labels = labels_of(directions)
+    labels = labels_of(setting.observed)
     sets = [legs for count in range(1, min(criteria.size, len(labels)) + 1) for legs in combinations(labels, count)]
     found, left = work.examined(sorted((work.first(legs) for legs in sets), key=lambda each: each.order))
     found.sort(key=lambda each: (each.discarded is not None, not each.examined,
                                  () if each.discarded is not None else each.rank))
     poses = [setting.motion.pose(at.pose(setting.motion.link)) for at in ends]
-    return Selection(setting, poses[0], poses[1], tuple(found), half, work.sight, left)
+    return Selection(setting, poses[0], poses[1], tuple(found), blur, work.sight, left)
 
 
 def _sight(setting: ObservedRobot, ends: Sequence[ClosedConfiguration], criteria: Criteria) -> CameraView | None:
@@ -263,14 +274,14 @@ class _Work:
     setting: ObservedRobot
     start: ClosedConfiguration
     goal: ClosedConfiguration
-    cones: Array
+    blur: Blur
     sight: CameraView | None
     criteria: Criteria
     until: float
     seed: int
 
     def watching(self, legs: Sequence[str]) -> ObservedRobot:
-        """The setting with some legs watched."""
+        """The setting with some of what is observed."""
         return replace(self.setting, observed=tuple(o for o in self.setting.observed if o.leg in legs))
 
     def first(self, legs: tuple[str, ...]) -> Candidate:
@@ -283,13 +294,16 @@ class _Work:
                 lost = "; ".join(freedom.name for freedom in verdict.lost)
                 return Candidate(legs, verdict.verdict, f"{verdict.verdict}, not seen: {lost}")
             analysis = ConfigurationAnalysis.of(setting)
-            reasons = [_singular_at(name, analysis.classify(at))
-                       for name, at in (("start", self.start), ("goal", self.goal))]
+            ends = (("start", self.start), ("goal", self.goal))
+            behind = [(name, unseen(at, setting.samples.question)) for name, at in ends]
+            reasons = [f"{o.kind} {o.leg} is not in front of its camera at the {name}" for name, o in behind if o]
+            if reasons:
+                return Candidate(legs, verdict.verdict, reasons[0])
+            reasons = [reason for name, at in ends if (reason := _singular_at(name, analysis.classify(at)))]
         except HrsynthError as error:
             return Candidate(legs, "undecided", str(error))
-        cones = np.array([cone for o, cone in zip(self.setting.observed, self.cones, strict=True) if o.leg in legs])
-        found = Candidate(legs, verdict.verdict, next((reason for reason in reasons if reason), None),
-                          errors_at(setting, cones, self.goal))
+        blur = self.blur.chosen([i for i, o in enumerate(self.setting.observed) if o.leg in legs])
+        found = Candidate(legs, verdict.verdict, next(iter(reasons), None), errors_at(setting, blur, self.goal))
         return self.looked(found, (self.start, self.goal))
 
     def looked(self, candidate: Candidate, configurations: Sequence[ClosedConfiguration]) -> Candidate:
@@ -358,11 +372,16 @@ class _Work:
         if candidate.discarded or number > self.criteria.endings:
             return candidate
         tell("endings")
-        return replace(candidate, ends=LoopEnds.of(self.watching(candidate.legs), self.goal, self.rounds))
+        setting = self.watching(candidate.legs)
+        if not all(o.by_segment for o in setting.observed):
+            return replace(candidate, ends=LoopEnds(None, None, "sought for directions of segments only"))
+        return replace(candidate, ends=LoopEnds.of(setting, self.goal, self.rounds))
 
     @cached_property
-    def rounds(self) -> tuple[Array, ...]:
-        """Starts from which all sets' endings are sought."""
+    def rounds(self) -> tuple[Array, ...] | None:
+        """Starts from which all sets' endings are sought; None where not all are directions of segments."""
+        if not all(o.by_segment for o in self.setting.observed):
+            return None
         system = RestSearch.of(self.setting, self.goal).system
         homes = np.array([system.system.read(at.pose) for at in (self.goal, *self.setting.configurations)])
         return tuple(islice(starts(system, homes, self.seed, self.setting), SELECT_ROUNDS))
@@ -373,7 +392,9 @@ class _Work:
         start, goal = (motion.pose(at.pose(motion.link)) for at in (self.start, self.goal))
         camera = None if mechanism.reference == mechanism.base else mechanism.reference
         try:
-            found = servo(self.setting.robot, candidate.legs, camera, start=start, goal=goal, seed=self.seed)
+            found = (servo(self.setting.robot, candidate.legs, camera, start=start, goal=goal, seed=self.seed)
+                     if all(o.by_segment for o in self.setting.observed) else
+                     servo(self.watching(candidate.legs), start=start, goal=goal, seed=self.seed))
         except HrsynthError as error:
             return replace(candidate, run=Decision("refused", str(error)), discarded=f"the run is refused: {error}")
         run = Decision(found.ended, found.ending.reason)

@@ -12,7 +12,7 @@ does not exist because a watched leg is stretched (Type 1), as the motion throug
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
@@ -24,11 +24,11 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration, measure
 from ..kinematics.platform_motion import Goal, PlatformMotion
 from ..kinematics.relation import Measurement
-from ..kinematics.steps import nearest, track
+from ..kinematics.steps import led
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.sights import CameraObservation, depth_plane
 from ..results import Value
-from ..tolerances import DAMPED, NEAREST
+from ..tolerances import DAMPED
 
 Measures = Sequence[Array] | Array
 """The values (size,) of each observation, lengths in characteristic lengths; of directions also as (k, 3)."""
@@ -222,7 +222,7 @@ def straight(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, que
     every = question.observations
     here, marks = start, [measured(start, question)[0]]
     for fraction in np.linspace(0, 1, POSES + 1)[1:]:
-        here, came = _towards(here, motion, goal.towards(X, float(fraction)), last=fraction == 1)
+        here, came = led(here, motion, goal.towards(X, float(fraction)), last=fraction == 1)
         if not came:
             at = motion.pose(here.pose(motion.link))
             raise PoseNotReached(start.twin.mechanism.name, str(motion.pose(goal_pose(goal))), float(fraction), str(at),
@@ -232,24 +232,6 @@ def straight(start: ClosedConfiguration, motion: PlatformMotion, goal: Goal, que
         marks.append(tuple(last + o.apart(value, last) for o, value, last in zip(every, now, marks[-1], strict=True)))
     units = tuple(isinstance(o, SeenAxis) for o in every)
     return Trajectory(np.array([np.concatenate(each) for each in marks]), duration, question.sizes, units), here
-
-
-def _towards(here: ClosedConfiguration, motion: PlatformMotion, goal: Goal, last: bool
-             ) -> tuple[ClosedConfiguration, bool]:
-    """The configuration at a goal of the whole pose nearby, and whether it was reached: where parts of the pose depend
-    on each other the nearest one, which is to be the goal's only at the ``last``."""
-    if motion.dof >= motion.translations.shape[1] + motion.rotations.shape[1]:
-        there, came = track(here, motion, goal)
-        return there, came == 1
-    there = nearest(here, replace(goal, directions=np.zeros((0, 3)), values=np.zeros(0), rotation=None), goal)
-    return there, not last or float(np.linalg.norm(goal.rows(there.twin, there.q)[0])) < NEAREST
-
-
-def whole(motion: PlatformMotion, X: Array) -> Goal:
-    """The goal of the whole platform pose X (4, 4), as far as the platform's pose counts."""
-    home = motion.at_home()
-    return Goal(home.link, home.point, home.zero, home.directions, motion.position(X), home.normal,
-                rotation=X[:3, :3] if motion.body else None)
 
 
 def goal_pose(goal: Goal) -> Array:

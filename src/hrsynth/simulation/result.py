@@ -12,11 +12,11 @@ from ..analysis.observed import ObservedRobot
 from ..geometry.so3 import angle_of
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
+from ..mechanism.noise import Noise
 from ..mechanism.pose import Pose
 from ..results import Result
 from .ending import Ending
 from .law import Measures
-from .noise import Noise
 from .run import Run
 from .track import Track
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..analysis.accuracy.accuracy import seen_words
+from ..analysis.accuracy.cones import IN_SIGHT
 from ..analysis.asked import configurations_at
 from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
@@ -18,6 +20,7 @@ from ..errors import BadRequest, RankUndecided
 from ..geometry.so3 import angle_of
 from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
+from ..mechanism.noise import Noise
 from ..mechanism.observation import Observation
 from ..mechanism.observations.direction import SeenAxis
 from ..mechanism.observations.point import ImagePoint
@@ -28,8 +31,8 @@ from ..tolerances import RANK_GAP, SEEN_ABOVE
 from .bench import Bench
 from .camera import Camera, Edges, cylinders, placed
 from .ending import EndingClassifier
-from .law import FixedDirections, Law, Sense, Trajectory, measured, straight, supposed_planes, whole
-from .noise import Noise, Sensors, Shocks
+from .law import FixedDirections, Law, Sense, Trajectory, measured, straight, supposed_planes
+from .noise import Sensors, Shocks
 from .pictures import LegRenderer, Pictures, drawing, vision
 from .result import Scatter, Servo
 from .run import EFFORT, Loop, Run
@@ -48,7 +51,6 @@ ALLOWED_NOISE = {EXACT: "an angle, such as 0.1deg", EDGES: "pixels, such as 0.3p
 DIRECTIONS, ANGLES, PIXELS = ("directions", " degrees"), ("angles", " degrees"), ("image points", " px")
 LENGTHS, VALUES = ("lengths", " mm"), ("values", "")
 """What is wrong by noise, and its unit."""
-CURES = "a pose from which all is seen, or a camera whose z axis points at it"
 
 
 @dataclass(frozen=True)
@@ -178,7 +180,7 @@ class ServoTask:
             require_sight(setting, law, name, at)
         desired: FixedDirections | Trajectory = FixedDirections(measured(ends[1], question)[0])
         if conditions.duration is not None:
-            goal_pose = whole(motion, ends[1].pose(motion.link))
+            goal_pose = motion.whole(ends[1].pose(motion.link))
             desired, ends[1] = straight(ends[0], motion, goal_pose, question, conditions.duration)
         analysis = ConfigurationAnalysis.of(setting)
         for name, at in _named(ends):
@@ -287,8 +289,7 @@ def require_seen(setting: ObservedRobot) -> None:
     verdict = verdict_of(setting, setting.labels, setting.samples)
     if verdict.lost:
         lost = "; ".join(freedom.name for freedom in verdict.lost)
-        what, cure = (("the legs do", "legs that make") if all(each.by_segment for each in setting.observed) else
-                      ("what is observed does", "observations that make"))
+        what, cure = seen_words(setting)
         raise BadRequest(f"{robot}: {what} not see {lost}", name, f"{cure} it controllable (hrsynth legs lists them)")
     if any(member.relation.RI for member in setting.samples.members):
         raise BadRequest(f"{robot}: observed links move while the platform rests, there is no interaction matrix", name,
@@ -332,7 +333,7 @@ def require_sight(setting: ObservedRobot, law: Law, name: str, at: ClosedConfigu
         if seen.in_front(X, at.pose(seen.link)) < SEEN_ABOVE:
             pose = setting.motion.pose(at.pose(setting.motion.link))
             raise BadRequest(f"{setting.robot.name}: {seen.kind} {seen.leg} is not in front of its camera at the "
-                             f"{name}", str(pose), CURES)
+                             f"{name}", str(pose), IN_SIGHT)
 
 
 def require_regular(analysis: ConfigurationAnalysis, name: str, at: ClosedConfiguration) -> None:

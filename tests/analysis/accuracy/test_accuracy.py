@@ -10,7 +10,7 @@ import pytest
 from hypothesis import HealthCheck, assume, given, settings
 
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy, errors_at, sees_all
-from hrsynth.analysis.accuracy.cones import half_angles
+from hrsynth.analysis.accuracy.cones import Blur, half_angles
 from hrsynth.analysis.accuracy.error_map import Mapper
 from hrsynth.analysis.accuracy.pose_errors import _descended, _width, attained, error_axes, reading
 from hrsynth.analysis.accuracy.sampled import sampled
@@ -94,7 +94,7 @@ def test_a_map_is_the_closed_form(legs: str) -> None:
 def check_extents(setting: ObservedRobot, cones: Array) -> None:
     """The extremes are attained by the directions that are told, and no random errors in the cones do worse."""
     for at in setting.configurations[:2]:
-        errors = errors_at(setting, cones, at)
+        errors = errors_at(setting, Blur(cones), at)
         rates, twists = reading(at, setting.samples.question)
         inverse = np.linalg.pinv(rates, rcond=1e-7)
         rng = np.random.default_rng(1)
@@ -146,8 +146,8 @@ def test_samples_approach_the_linear_maxima_as_cones_shrink(robot: str) -> None:
     away = []
     for cone in (2e-3, 1e-3):
         cones = np.full(len(setting.observed), cone)
-        errors = errors_at(setting, cones, start)
-        true = sampled(start, question, setting.motion, cones, errors, 8)
+        errors = errors_at(setting, Blur(cones), start)
+        true = sampled(start, question, setting.motion, Blur(cones), errors, 8)
         assert true.missed == 0
         away.append(abs(true.position - errors.position.largest) / errors.position.largest)
     assert away[1] < 0.02
@@ -172,7 +172,7 @@ def test_cones_of_their_own_scale_their_legs() -> None:
 
 def test_a_grid_by_the_batch_is_that_by_pinocchio() -> None:
     setting = ObservedRobot.of(load("quattro"), "1,3,4")
-    mapper = Mapper(setting, np.full(3, CONE))
+    mapper = Mapper(setting, Blur(np.full(3, CONE)))
     grid = Grid.parse("x=-0.2:0.2:4,phi=-10deg:20deg:3,y=0.05,z=-0.7")
     quick, slow = mapper.over(grid, 0), mapper._one_by_one(grid)
     assert quick.position.ravel() == pytest.approx(slow.position, rel=1e-8)
@@ -270,12 +270,12 @@ def test_what_an_ascent_attains_lies_between_the_two_bounds(name: str):
     setting = ObservedRobot.of(name)
     cones = np.full(len(setting.observed), 1e-3)
     for at in (setting.everything.start, *setting.configurations[:4]):
-        found, bounds = attained(at, setting.samples.question, cones), errors_at(setting, cones, at)
+        found, bounds = attained(at, setting.samples.question, Blur(cones)), errors_at(setting, Blur(cones), at)
         for bound, met in zip((bounds.position, bounds.orientation), found, strict=True):
             assert np.isinf(met) == np.isinf(bound.largest)
             if np.isfinite(met):
                 assert (1 - bound.gap) * bound.largest * (1 - 1e-6) <= met <= bound.largest * (1 + 1e-9) + 1e-15
-        axes = error_axes(at, setting.samples.question, cones)
+        axes = error_axes(at, setting.samples.question, Blur(cones))
         assert (axes is None) == np.isinf(found[0])
         if axes is not None:
             assert np.linalg.norm(axes[0]) == pytest.approx(found[0], rel=1e-9)

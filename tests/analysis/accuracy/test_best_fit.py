@@ -12,7 +12,8 @@ from scipy.optimize import minimize
 
 from hrsynth.analysis.accuracy.accuracy import Accuracy, accuracy
 from hrsynth.analysis.accuracy.best_fit import ENDS, FIT, Fit, best_fits, seen, weakest
-from hrsynth.analysis.accuracy.sampled import _tangents, tilted
+from hrsynth.analysis.accuracy.cones import tilted
+from hrsynth.analysis.accuracy.sampled import _tangents
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.batch.reach import reach
 from hrsynth.description import load
@@ -84,7 +85,7 @@ def test_what_ends_is_no_singularity() -> None:
 
 def ways(setting: ObservedRobot, at: ClosedConfiguration, cone: float, count: int, seed: int) -> list[Array]:
     rng = np.random.default_rng(seed)
-    u = seen(at, setting.samples.question)[0]
+    u = np.array(seen(at, setting.samples.question)[0])
     return [cone * _tangents(rng, u) for _ in range(count)]
 
 
@@ -97,7 +98,7 @@ def test_best_fits_are_those_of_the_closed_form(legs: str, at: str, chosen: list
     here = reach(setting.everything.start, setting.everything.question, Pose.parse(at), setting.motion)
     numbers = [int(leg) - 1 for leg in legs.split(",")]
     P = setting.motion.position(here.pose(setting.motion.link))
-    u = seen(here, setting.samples.question)[0]
+    u = np.array(seen(here, setting.samples.question)[0])
     assert np.allclose(u, directions(P, numbers), atol=1e-9)
     drawn = ways(setting, here, math.radians(2), 30, 0)
     for way in (drawn[i] for i in chosen):
@@ -112,7 +113,7 @@ def check_fit(setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fi
     """A fit is where the loop rests whose desired directions are the wrong ones, and nothing next to it fits better;
     where there is none, that is no claim about the robot."""
     question, link = setting.samples.question, setting.motion.link
-    u = seen(at, question)[0]
+    u = np.array(seen(at, question)[0])
     fit = best_fits(at, question, lambda part: tilted(u, part * way))
     assert fit.weakest <= weakest(at, question) * (1 + 1e-9)
     if fit.outcome != FIT:
@@ -121,7 +122,7 @@ def check_fit(setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fi
     wanted, there = tilted(u, way), fit.way[-1]
 
     def size(here: ClosedConfiguration) -> float:
-        return float(np.sum(np.cross(seen(here, question)[0], wanted) ** 2))
+        return float(np.sum(np.cross(np.array(seen(here, question)[0]), wanted) ** 2))
 
     rng = np.random.default_rng(0)
     for _ in range(10):

@@ -11,16 +11,16 @@ import numpy as np
 from ...errors import BadRequest
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
-from ...mechanism.observations.direction import Direction
+from ...mechanism.noise import Noise
 from ...mechanism.pose import Grid, ModeNumber, Pose, PoseLike, as_pose, asked_poses
 from ...progress import tell
 from ...results import Result
 from ...tolerances import LARGEST_FIRST_ORDER
 from ..asked import configurations_at
-from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike
+from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from ..verdict import verdict_of
-from .cones import Cones, half_angles
+from .cones import IN_SIGHT, Blur, Cones, unseen
 from .error_map import ErrorMap, Mapper
 from .pose_errors import PoseErrors, measured
 from .sampled import Sampled, sampled
@@ -33,15 +33,19 @@ WORST = 3
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Accuracy(Result, shown_as="accuracy"):
-    """The error maxima for cones about the observed directions: at single poses, over a grid, and where asked for what
-    samples of true errors give (None otherwise)."""
+    """The error maxima for cones about the observed directions, and noise of what else is observed: at single poses,
+    over a grid, and where asked for what samples of true errors give (None otherwise)."""
 
     setting: ObservedRobot
-    cones: Array
-    """Half-angles (k,) of the observed directions (rad)."""
+    blur: Blur
     poses: tuple[PoseErrors, ...]
     sampled: tuple[Sampled | None, ...]
     field: ErrorMap | None
+
+    @property
+    def cones(self) -> Array:
+        """Half-angles (k,) of the observed directions (rad), 0 of what is no direction."""
+        return self.blur.cones
 
     def headline(self) -> str:
         """The robot, and the largest errors at each pose or of the grid."""
@@ -57,25 +61,29 @@ class Accuracy(Result, shown_as="accuracy"):
                   "orientation_deg": each.orientation.to_dict(180 / np.pi), "sampled": true and true.to_dict()}
                  for each, true in zip(self.poses, self.sampled, strict=True)]
         cones = [{"leg": o.leg, "link": o.link, "cone_deg": float(np.degrees(cone))}
-                 for o, cone in zip(self.setting.observed, self.cones, strict=True)]
-        return {**self.setting.to_dict(), "cones": cones, **({} if self.field is None else self.field.to_dict()),
+                 for o, cone in zip(self.setting.observed, self.cones, strict=True) if cone]
+        noise = {"noise": self.blur.amounts, "exact": list(self.blur.exact(self.setting.observed))}
+        return {**self.setting.to_dict(), "cones": cones, **noise, **(self.field.to_dict() if self.field else {}),
                 "poses": poses}
 
 
 @question(cones="cone", samples="nonlinear")
-def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
-             cone: Cones, at: PoseLike | Iterable[PoseLike] = (), plane: PoseLike | None = None,
-             grid: Grid | str | None = None, steps: int | None = None, nonlinear: int = 0, seed: int = 0) -> Accuracy:
-    """The largest position and orientation error of the platform over all errors of the directions inside the cones
+def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
+             cone: Cones | None = None, noise: str | Noise | None = None, at: PoseLike | Iterable[PoseLike] = (),
+             plane: PoseLike | None = None, grid: Grid | str | None = None, steps: int | None = None,
+             nonlinear: int = 0, seed: int = 0) -> Accuracy:
+    """The largest position and orientation error of the platform over all errors of what is observed, to first order
     (docs/pages/theory.md, section 10; MMT A.1): max over unit w of Σ ψ_i ‖(J_i P_i)ᵀ w‖, J = M^{T+}.
 
-    ``cone`` is the half-angle of all cones, or one a leg. At the poses ``at``, over ``plane`` (what is reached of it,
-    ``steps`` poses a side), or over ``grid``; default: the zero configuration. In a grid free parts stay as at the zero
-    configuration where legs are known subproblems. ``nonlinear`` true errors are tried at each single pose, of a grid
-    at its worst ones. ``observe`` and ``camera`` as for ``derive``.
+    ``cone`` is the half-angle of the cones about directions, of all or one a leg; ``noise`` how wrong other kinds may
+    be, as ``0.3px,1mm,0.1deg`` (of directions too, without a cone). At the poses ``at``, over ``plane`` (what is
+    reached of it, ``steps`` poses a side), or over ``grid``; default: the zero configuration. In a grid free parts stay
+    as at the zero configuration where legs are known subproblems. The platform comes to rest where ``servo`` does;
+    poses of a grid at which something is not in front of its camera are left out. ``nonlinear`` true errors are tried
+    at each single pose, of a grid at its worst ones. ``observe``, ``camera`` and ``see`` as for ``derive``.
 
-    Raises ``BadRequest`` for names that there are not, cones that are none, legs that do not see every freedom (their
-    error is infinite everywhere), ``PoseNotReached``, ``PlaneNotMet``.
+    Raises ``BadRequest`` for names that there are not, cones that are none, what does not see every freedom (the error
+    is infinite everywhere) or is behind its camera, ``PoseNotReached``, ``PlaneNotMet``.
 
     >>> hrsynth.accuracy("3rrr_m1", cone="0.1deg", at="x=0,y=0,phi=0")
     <Accuracy: 3rrr_m1, watching 1, 2, 3: 0.414 mm at x=0,y=0,z=0,phi=0>
@@ -89,12 +97,10 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
         raise BadRequest("number of samples", nonlinear, "none or more")
     held = None if plane is None else as_pose(plane)
     cells = Grid.parse(grid, LARGEST_FIELD) if isinstance(grid, str) else grid
-    setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("accuracy").telling(wanted)
-    if not all(isinstance(o, Direction) for o in setting.observed):
-        raise BadRequest("cones apply to directions only", ", ".join(setting.labels), "directions of legs")
-    half = half_angles(cone, setting.observed)
+    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted)
+    blur = Blur.of(cone, noise, setting.observed)
     sees_all(setting)
-    mapper = Mapper(setting, half)
+    mapper = Mapper(setting, blur)
     field = None
     if held is not None:
         cells = mapper.plane(held, steps)
@@ -107,16 +113,20 @@ def accuracy(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = No
     if not configurations and field is None:
         configurations = [start]
     tell("errors")
-    poses = tuple(errors_at(setting, half, each) for each in configurations)
-    true = tuple(sampled(each, mapper.question, motion, half, errors, nonlinear, seed)
+    poses = tuple(errors_at(setting, blur, each) for each in configurations)
+    true = tuple(sampled(each, mapper.question, motion, blur, errors, nonlinear, seed)
                  if nonlinear else None for each, errors in zip(configurations, poses, strict=True))
-    return Accuracy(setting, half, poses, true, field)
+    return Accuracy(setting, blur, poses, true, field)
 
 
-def errors_at(setting: ObservedRobot, cones: Array, at: ClosedConfiguration) -> PoseErrors:
-    """The error maxima at a closed configuration for half-angles (k,)."""
-    motion = setting.motion
-    return measured(at, setting.samples.question, cones, motion.pose(at.pose(motion.link)))
+def errors_at(setting: ObservedRobot, blur: Blur, at: ClosedConfiguration) -> PoseErrors:
+    """The error maxima at a closed configuration; raises ``BadRequest`` where something is behind its camera."""
+    motion, question = setting.motion, setting.samples.question
+    pose, lost = motion.pose(at.pose(motion.link)), unseen(at, question)
+    if lost is not None:
+        raise BadRequest(f"{setting.robot.name}: {lost.kind} {lost.leg} is not in front of its camera", str(pose),
+                         IN_SIGHT)
+    return measured(at, question, blur, pose)
 
 
 def sees_all(setting: ObservedRobot) -> None:
@@ -124,5 +134,12 @@ def sees_all(setting: ObservedRobot) -> None:
     verdict = verdict_of(setting, setting.labels, setting.samples)
     if verdict.lost:
         lost = "; ".join(freedom.name for freedom in verdict.lost)
-        raise BadRequest(f"{setting.robot.name}: the error is infinite at every pose, the legs do not see {lost}",
-                         ", ".join(setting.labels), "legs that make it controllable (hrsynth legs lists them)")
+        what, cure = seen_words(setting)
+        raise BadRequest(f"{setting.robot.name}: the error is infinite at every pose, {what} not see {lost}",
+                         ", ".join(setting.labels), f"{cure} it controllable (hrsynth legs lists them)")
+
+
+def seen_words(setting: ObservedRobot) -> tuple[str, str]:
+    """What is observed, with its verb, and what to ask for instead."""
+    return (("the legs do", "legs that make") if all(each.by_segment for each in setting.observed) else
+            ("what is observed does", "observations that make"))

@@ -1,7 +1,8 @@
 """The pose at which a controller rests when its directions are wrong, followed from the pose where they are right.
 
-The law rests at critical points of F = ½ Σ ‖u_i × û_i‖² over the closed configurations (theory.md 11). û_i(s) is u_i
-turned by the part s of its error. At s = 0 the pose itself is a strict minimum, F = 0, where all freedoms are seen; by
+The law rests at critical points of F = ½ Σ ‖u_i × û_i‖² over the closed configurations (theory.md 11), of other kinds
+of observations with the error e_i of each kind. û_i(s) is u_i turned by the part s of its error. At s = 0 the pose
+itself is a strict minimum, F = 0, where all freedoms are seen; by
 the implicit function theorem it goes on as one smooth curve of strict minima while the Hessian of F is positive
 definite. The curve is followed by Newton steps with the whole Hessian, not that of Gauss and Newton, which need not
 converge where errors are large.
@@ -9,7 +10,7 @@ converge where errors are large.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -17,7 +18,7 @@ import numpy as np
 
 from ...budgets import BEST_FIT_FIRST_STEP, BEST_FIT_SHORTEST_STEP, BEST_FIT_STEPS
 from ...errors import LoopsNotClosed
-from ...geometry.vectors import Array, hat
+from ...geometry.vectors import Array
 from ...kinematics.chart import TangentChart
 from ...kinematics.configuration import ClosedConfiguration, measure
 from ...kinematics.relation import Measurement, relation
@@ -30,8 +31,9 @@ CORRECTIONS = 8
 AIMED = 0.35
 """The change at which the next step's length aims."""
 
-Wanted = Callable[[float], Array]
-"""The directions û (k, 3) at a part of the error."""
+Values = Sequence[Array] | Array
+Wanted = Callable[[float], Values]
+"""The values û at a part of the error, of each observation (size,)."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,15 +59,16 @@ class _Bowl:
     def chart(self) -> TangentChart:
         return TangentChart.around(self.at, self.question)
 
-    def slope(self, at: ClosedConfiguration, wanted: Array) -> Array:
+    def slope(self, at: ClosedConfiguration, wanted: Values) -> Array:
         """∇F (n,) in y at a configuration."""
         u, rates = seen(at, self.question)
+        every = list(zip(self.question.observations, u, wanted, strict=True))
         kernel, _ = at.kernel()
         forth = kernel @ np.linalg.pinv(self.chart.slope(at.q) @ kernel, rcond=INVERTED)
-        rows = np.vstack([-hat(w) @ r for w, r in zip(wanted, rates, strict=True)]) @ forth
-        return np.asarray(np.cross(u, wanted).ravel() @ rows)
+        rows = np.vstack([o.error_slope(v, w) @ r for (o, v, w), r in zip(every, rates, strict=True)]) @ forth
+        return np.asarray(np.concatenate([o.error(v, w) for o, v, w in every]) @ rows)
 
-    def hessian(self, wanted: Array) -> Array:
+    def hessian(self, wanted: Values) -> Array:
         """∇²F (n, n) at y = 0, by central differences of ∇F."""
         columns = []
         for step in HESSIAN_STEP * np.eye(self.chart.basis.shape[1]):
@@ -74,7 +77,7 @@ class _Bowl:
         H = np.array(columns)
         return np.asarray((H + H.T) / 2)
 
-    def minimum(self, H: Array, wanted: Array, guess: Array) -> ClosedConfiguration | None:
+    def minimum(self, H: Array, wanted: Values, guess: Array) -> ClosedConfiguration | None:
         """The critical point next to ``guess`` (n,) by Newton steps with a Hessian; None where they do not contract, or
         lead further away than the guess did."""
         y, at, last = guess, self.chart.at(guess, self.at.q), float(np.linalg.norm(guess))
@@ -90,10 +93,9 @@ class _Bowl:
         return None
 
 
-def seen(at: ClosedConfiguration, question: Measurement) -> tuple[Array, list[Array]]:
-    """The observed directions (k, 3) and the rates (3, nv) of each."""
-    _, _, values, rates = measure(at.twin, at.q, question.reference, question.observations)
-    return np.array(values), rates
+def seen(at: ClosedConfiguration, question: Measurement) -> tuple[list[Array], list[Array]]:
+    """The value (size,) of each observation and its rates (size, nv)."""
+    return measure(at.twin, at.q, question.reference, question.observations)[2:]
 
 
 def weakest(at: ClosedConfiguration, question: Measurement) -> float:

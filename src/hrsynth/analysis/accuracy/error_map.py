@@ -25,6 +25,7 @@ from ...results import Value
 from ...tolerances import SAME_RELATION, USUAL_ERROR
 from ..observed import ObservedRobot
 from ..singularity.locus import framed
+from .cones import Blur, unseen
 from .pose_errors import maxima, reading
 
 Flags = NDArray[np.bool_]
@@ -115,10 +116,10 @@ def nested(values: Array) -> list[Any]:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Mapper(Value):
-    """What evaluates grids for observed legs and half-angles (k,)."""
+    """What evaluates grids for what is observed and how wrong that may be."""
 
     setting: ObservedRobot
-    cones: Array
+    blur: Blur
 
     @property
     def question(self) -> Measurement:
@@ -169,7 +170,7 @@ class Mapper(Value):
         """Poses by the batch; of a part of them no more is kept than their errors."""
         reached, gaps = [], []
         columns: tuple[list[Array], list[Array]] = [], []
-        for possible, part in self._parts(grid, places, self.cones):
+        for possible, part in self._parts(grid, places, self.blur.cones):
             reached.append(possible & part.reached)
             for column, spread in zip(columns, (part.position, part.orientation), strict=True):
                 assert spread is not None
@@ -211,10 +212,10 @@ class Mapper(Value):
         found = sweep(everything.start, everything.question, grid, self.setting.motion, self.setting.placer)
         table = np.full((3, len(found)), np.nan)
         for i, at in enumerate(found):
-            if at is not None:
+            if at is not None and unseen(at, self.question) is None:
                 tell("errors")
                 rates, twists = reading(at, self.question)
-                table[:2, i] = maxima(at, self.question, self.cones)
+                table[:2, i] = maxima(at, self.question, self.blur)
                 table[2, i] = _weakest(rates, twists, at.twin.length)
         return Seen(np.isfinite(table[2]), table[0], table[1], lambda: None, lambda: table[2], 0.0)
 
@@ -231,7 +232,7 @@ class Mapper(Value):
                 continue
             met += 1
             for mine, theirs, all_of in zip((seen.position[i], seen.orientation[i]),
-                                            maxima(at, self.question, self.cones), sizes, strict=True):
+                                            maxima(at, self.question, self.blur), sizes, strict=True):
                 scale = max(mine, float(np.median(all_of[all_of > 0])) if (all_of > 0).any() else 1.0)
                 largest = max(largest, abs(mine - theirs) / scale)
         if largest > SAME_RELATION + seen.gap:

@@ -1,4 +1,7 @@
-"""The error maxima at a closed configuration, from Pinocchio's relation there, with the directions that attain them."""
+"""The error maxima at a closed configuration, from Pinocchio's relation there, with the directions that attain them.
+
+Of directions in cones, and of what else is observed (``cones``): the platform is where a servo loop comes to rest.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...batch.error_bounds import bounds_of
+from ...batch.error_bounds import bounds_of_maps, freedom
 from ...geometry.ranks import kernel_basis
 from ...geometry.vectors import Array, oriented
 from ...kinematics.configuration import ClosedConfiguration
@@ -16,6 +19,7 @@ from ...kinematics.relation import Measurement, relation
 from ...mechanism.pose import Pose
 from ...results import Value
 from ...tolerances import INVERTED, RANK_CUTOFF
+from .cones import Blur
 
 VIEWS = 2000
 """Directions on the half-sphere from which the largest and the least error are sought."""
@@ -30,7 +34,8 @@ class ErrorEllipsoid(Value):
     """The largest error in each direction of space, its extremes: ``largest`` with its unit direction (3,), ``least``
     with its own, among the directions in which there are errors at all.
 
-    ``errors`` (k, 3) are the errors of the observed directions (rad) that give the largest one; ``gap`` bounds how much
+    ``errors`` (k, 3) are the errors that give the largest one, of directions in radians, else in the balls that
+    :class:`.Blur` tells; ``gap`` bounds how much
     larger, relative, the true maximum may be. Where a freedom is lost ``largest`` is infinite and ``errors`` is None;
     where there are no errors both are zero and the directions are None.
     """
@@ -77,41 +82,65 @@ def reading(at: ClosedConfiguration, question: Measurement) -> tuple[Array, Arra
     return found.rates, twists
 
 
-def maxima(at: ClosedConfiguration, question: Measurement, cones: Array) -> tuple[float, float]:
+def maxima(at: ClosedConfiguration, question: Measurement, blur: Blur) -> tuple[float, float]:
     """The largest position (m) and orientation error (rad) at a configuration; infinite where a freedom is lost."""
-    rates, twists = reading(at, question)
-    position, orientation = bounds_of(rates[:, :, None], twists, cones)
-    return float(position.largest[0]), float(orientation.largest[0])
+    found = [np.inf if part is None else float(bounds_of_maps(part.J[None], part.only)[0][0])
+             for part in _parts(at, question, blur)]
+    return found[0], found[1]
 
 
-def attained(at: ClosedConfiguration, question: Measurement, cones: Array) -> tuple[float, float]:
+def attained(at: ClosedConfiguration, question: Measurement, blur: Blur) -> tuple[float, float]:
     """The largest position (m) and orientation error (rad) that an ascent from many views finds: as :func:`maxima`, but
     a lower bound of it, in a tenth of the time."""
-    position, orientation = (_axes(part, 1) for part in _parts(at, question, cones))
+    position, orientation = (_axes(part, 1) for part in _parts(at, question, blur))
     return _longest(position), _longest(orientation)
 
 
-def error_axes(at: ClosedConfiguration, question: Measurement, cones: Array) -> Array | None:
+def error_axes(at: ClosedConfiguration, question: Measurement, blur: Blur) -> Array | None:
     """Three axes (3, 3), by rows, as long as the largest position errors (m) along them, the first along the largest
     that an ascent finds, the next along the largest normal to it; None where a freedom is lost that moves it."""
-    return _axes(next(_parts(at, question, cones)), 3)
+    return _axes(next(_parts(at, question, blur)), 3)
 
 
-def _parts(at: ClosedConfiguration, question: Measurement, cones: Array) -> Iterator[tuple[Array, Array] | None]:
-    """Range and blocks of position and orientation, None where a freedom is lost that moves it."""
+@dataclass(frozen=True, eq=False)
+class ErrorMaps:
+    """The maps J (3, 3 k) of k unit balls to the position or orientation error, each with what its unit is in ``radii``
+    (k,); ``only`` is the one direction (3,) that the platform leaves, None where there are more; at most ``none`` is
+    rounding."""
+
+    J: Array
+    radii: Array
+    only: Array | None
+    none: float
+
+    @property
+    def seen(self) -> tuple[Array, Array]:
+        """The range (3, d) of J, and its blocks J_iᵀ (k, 3, 3)."""
+        left, values, _ = np.linalg.svd(self.J)
+        count = int(np.sum(values > INVERTED * values[0])) if values[0] > self.none else 0
+        return left[:, :count], self.J.reshape(3, -1, 3).transpose(1, 2, 0)
+
+
+def _parts(at: ClosedConfiguration, question: Measurement, blur: Blur) -> Iterator[ErrorMaps | None]:
+    """Of position and orientation, None where a freedom is lost that moves it: δt = T (E R)⁺ E δy for rates R of the
+    values and twists T on one basis, E the slopes of what is fed back."""
     rates, twists = reading(at, question)
-    lost, _ = kernel_basis(rates, 1.0)
-    inverse = np.linalg.pinv(rates, rcond=RANK_CUTOFF)
+    errors = blur.at(at, question)
+    rows = errors.rows(rates)
+    lost, _ = kernel_basis(rows, 1.0)
+    inverse = np.linalg.pinv(rows, rcond=RANK_CUTOFF)
+    balls = np.hstack(errors.maps) if errors.maps else np.zeros((len(rows), 3))
+    radii, none = blur.radii(errors.balls), INVERTED * float(np.linalg.norm(balls))
     for part in (twists[:3], twists[3:]):
         gone = np.linalg.norm(part @ lost) > RANK_CUTOFF * np.linalg.norm(part)
-        yield None if gone else _seen(part @ inverse, cones)
+        yield None if gone else ErrorMaps(part @ inverse @ balls, radii, freedom(part), none)
 
 
-def _axes(part: tuple[Array, Array] | None, count: int) -> Array | None:
+def _axes(part: ErrorMaps | None, count: int) -> Array | None:
     """So many axes (count, 3) of the errors, zero where there are no more."""
     if part is None:
         return None
-    (span, blocks), found = part, np.zeros((count, 3))
+    (span, blocks), found = part.seen, np.zeros((count, 3))
     for row in found[: span.shape[1]]:
         w = span @ _ascended(blocks @ span)
         row[:] = float(_width(blocks, w[:, None])[0]) * w
@@ -123,39 +152,28 @@ def _longest(axes: Array | None) -> float:
     return np.inf if axes is None else float(np.linalg.norm(axes[0]))
 
 
-def measured(at: ClosedConfiguration, question: Measurement, cones: Array, pose: Pose) -> PoseErrors:
-    """The error maxima at a configuration with their directions, for half-angles (k,)."""
-    rates, twists = reading(at, question)
-    found = bounds_of(rates[:, :, None], twists, cones)
-    inverse = np.linalg.pinv(rates, rcond=RANK_CUTOFF)
-    position, orientation = (
-        _extent(part @ inverse, cones, float(spread.largest[0]), float(spread.lower[0]))
-        for part, spread in zip((twists[:3], twists[3:]), found, strict=True))
+def measured(at: ClosedConfiguration, question: Measurement, blur: Blur, pose: Pose) -> PoseErrors:
+    """The error maxima at a configuration with their directions."""
+    position, orientation = map(_extent, _parts(at, question, blur))
     return PoseErrors(pose, position, orientation)
 
 
-def _extent(J: Array, cones: Array, largest: float, lower: float) -> ErrorEllipsoid:
-    """The extremes of Σ ψ_i ‖J_iᵀ w‖ over unit w in the range of J (3, 3 k)."""
-    if not np.isfinite(largest):
+def _extent(part: ErrorMaps | None) -> ErrorEllipsoid:
+    """The extremes of Σ ‖J_iᵀ w‖ over unit w in the range of J."""
+    if part is None:
         return ErrorEllipsoid(np.inf, None, 0.0, None, None)
-    span, blocks = _seen(J, cones)
+    span, blocks = part.seen
     if not span.shape[1]:
         return ErrorEllipsoid(0.0, None, 0.0, None, None)
+    largest, lower = (float(bound[0]) for bound in bounds_of_maps(part.J[None], part.only))
     inside = blocks @ span
     w = oriented(span @ _ascended(inside))
     low = oriented(span @ _descended(inside))
     pulls = blocks @ w
     sizes = np.linalg.norm(pulls, axis=1)
-    errors = cones[:, None] * pulls / np.where(sizes > 0, sizes, 1.0)[:, None]
+    errors = part.radii[:, None] * pulls / np.where(sizes > 0, sizes, 1.0)[:, None]
     return ErrorEllipsoid(largest, w, float(_width(blocks, low[:, None])[0]), low, errors,
                   (largest - lower) / largest if largest else 0.0, span.shape[1] == 1)
-
-
-def _seen(J: Array, cones: Array) -> tuple[Array, Array]:
-    """The range (3, d) of J (3, 3 k), and its blocks ψ_i J_iᵀ (k, 3, 3)."""
-    left, values, _ = np.linalg.svd(J)
-    span = left[:, : int(np.sum(values > INVERTED * values[0]))] if values[0] > INVERTED else np.zeros((3, 0))
-    return span, (J.reshape(3, -1, 3) * cones[:, None]).transpose(1, 2, 0)
 
 
 def _width(blocks: Array, w: Array) -> Array:

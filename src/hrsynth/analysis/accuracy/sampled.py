@@ -1,24 +1,25 @@
-"""The check of the linear law: directions that are truly off, and the poses at which a controller rests with them.
+"""The check of the linear law: measurements that are truly off, and the poses at which a controller rests with them.
 
 To first order such a pose is M^{T+} δu away. Near a singularity, and where errors are large, the two part.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ...geometry.so3 import angle_of
-from ...geometry.vectors import Array, rotation_about
+from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
 from ...kinematics.relation import Measurement
 from ...progress import tell
 from ...results import Value
 from .best_fit import ENDS, NOT_FOUND, best_fits, seen, weakest
+from .cones import Blur
 from .pose_errors import PoseErrors, finite
 
 
@@ -51,19 +52,26 @@ class Sampled(Value):
                 "singular_value_at_pose": finite(self.usual)}
 
 
-def sampled(at: ClosedConfiguration, question: Measurement, motion: PlatformMotion, cones: Array, linear: PoseErrors,
+def sampled(at: ClosedConfiguration, question: Measurement, motion: PlatformMotion, blur: Blur, linear: PoseErrors,
             count: int, seed: int = 0) -> Sampled:
     """The true errors at a configuration for ``count`` samples, seeded."""
-    u = seen(at, question)[0]
+    values, length = seen(at, question)[0], at.twin.length
+    balls = blur.at(at, question)
     ways = _extremes(linear)
     rng = np.random.default_rng(seed)
-    ways += [cones[:, None] * _tangents(rng, u) for _ in range(max(0, count - len(ways)))]
+    axes = np.array([values[i] if blur.cones[i] else np.zeros(3) for i, _ in balls.balls])
+    radii = blur.radii(balls.balls)[:, None]
+    ways += [radii * _tangents(rng, axes) for _ in range(max(0, count - len(ways)))]
+
+    def wrong(way: Array, part: float) -> list[Array]:
+        return blur.wrong(question.observations, values, length, balls, way, part)
+
     home = at.pose(motion.link)
     position, orientation, usual = 0.0, 0.0, weakest(at, question)
     least, ended, not_found = usual, [], 0
     for way in ways:
         tell("samples")
-        fit = best_fits(at, question, lambda part, way=way: tilted(u, part * way))  # type: ignore[misc]
+        fit = best_fits(at, question, partial(wrong, way))
         least = min(least, fit.weakest)
         if fit.outcome == ENDS:
             ended.append(fit.reached)
@@ -77,19 +85,13 @@ def sampled(at: ClosedConfiguration, question: Measurement, motion: PlatformMoti
 
 
 def _extremes(linear: PoseErrors) -> list[Array]:
-    """The errors of directions (k, 3) that are the worst to first order, of both signs."""
+    """The errors (k, 3) that are the worst to first order, of both signs."""
     found = [each.errors for each in (linear.position, linear.orientation) if each.errors is not None]
     return [sign * errors for errors in found for sign in (1.0, -1.0)]
 
 
 def _tangents(rng: np.random.Generator, u: Array) -> Array:
-    """Random unit vectors (k, 3) normal to u (k, 3)."""
+    """Random unit vectors (k, 3) normal to u (k, 3), of unit vectors or zero."""
     vectors = rng.normal(size=u.shape)
     vectors -= np.sum(vectors * u, axis=1, keepdims=True) * u
     return np.asarray(vectors / np.linalg.norm(vectors, axis=1, keepdims=True))
-
-
-def tilted(u: Sequence[Array] | Array, way: Array) -> Array:
-    """u (k, 3), each turned by the angle ‖way‖ towards its way (k, 3), which is normal to it."""
-    return np.array([rotation_about(np.cross(a, b), float(np.linalg.norm(b))) @ a if np.any(b) else a
-                     for a, b in zip(u, way, strict=True)])

@@ -22,7 +22,7 @@ from ...results import Result, Value
 from ...tolerances import FOLLOWED
 from ..asked import at_mode
 from ..modes.modes import AssemblyModes, modes
-from ..observed import CameraLike, LegsLike, RobotLike
+from ..observed import CameraLike, LegsLike, RobotLike, SeeLike
 from ..question import question
 from .held_leg import HeldLegSection, section
 from .path import BUDGET, SAME, SEPARATED, UNDECIDED, Aspects, PathAnswer
@@ -140,7 +140,7 @@ class Atlas(Result, shown_as="atlas"):
 
 
 @question()
-def atlas(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
+def atlas(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
           at: PoseLike | ClosedConfiguration | None = None, seed: int = 0, budget: int = BUDGET) -> Atlas:
     """Of all modes with the directions at ``at`` (as for ``modes``), which two lie in one aspect (as for ``path``), and
     whether that shows the hidden robot to be cuspidal: that it can go from one mode to another, with the same
@@ -152,7 +152,7 @@ def atlas(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     >>> hrsynth.atlas("rrrrr_m1")
     <Atlas: rrrrr_m1, watching 1, 2: 2 real of 2 complex (hidden robot) at x=0.02,y=0.24,z=0,rpy=0/0/0, aspects: 2>
     """
-    listed = modes(robot, observe, camera, at=at, seed=seed)
+    listed = modes(robot, observe, camera, see=see, at=at, seed=seed)
     aspects = Aspects.of(listed.setting, seed=seed)
     places = tuple(_place(listed, number) for number in range(1, len(listed.modes) + 1))
     answers: dict[tuple[int, int], PathAnswer] = {}

@@ -55,7 +55,7 @@ class LegForms:
 
     def beyond(self, p: Array, R: Array) -> tuple[str, ...]:
         """The joints that are not within their limits at one pose (3,), (3, 3)."""
-        within = self.at(p[None], R[None]).reach_margins[0, len(self.limbs) :] > 0
+        within = self.at(p[None], R[None]).reach_margins[0, len(self.limbs) :][: len(self.bounds)] > 0
         return tuple(bound.joint for bound, held in zip(self.bounds, within, strict=True) if not held)
 
     def at(self, p: Field, R: Field, leading: tuple[int, Field] | None = None) -> LegStates:
@@ -67,7 +67,8 @@ class LegForms:
             values = {symbol: value_of(each, p, R, carried) for symbol, each in self.vectors.items()}
             within = [bound.reach_margin(lambda each: value_of(each, p, R, carried)) for bound in self.bounds]
         values.update({symbol: values[symbol] - values[self.points[0]] for symbol in self.points[::-1]})
-        return LegStates(np.stack([*(margin for margin, _ in solved), *within], axis=1), values)
+        free = [0 * p[:, 0] + 1.0] * (not solved and not within)
+        return LegStates(np.stack([*(margin for margin, _ in solved), *within, *free], axis=1), values)
 
 
 @dataclass(frozen=True, eq=False)
@@ -109,11 +110,13 @@ def pattern(anatomy: LegDecomposition, features: Sequence[NamedVector], coordina
     sight = SampledMechanism(anatomy.mechanism, coordinates, configurations, rules)
     found: list[tuple[ClosedFormLeg, NamedVector]] = []
     for leg in anatomy.legs:
+        if len(leg.joints) == 1 and anatomy.mechanism.joints[leg.joints[0]].type.freedoms == 6:
+            continue
         of_leg = list(sight.limbs(leg))
         if not of_leg:
             raise NoLegForm(f"leg {leg.label} is neither a rod on a crank or rail nor a rod that slides")
         found += of_leg
-    limbs, carried = (tuple(part) for part in zip(*found, strict=True))
+    limbs, carried = (tuple(part) for part in zip(*found, strict=True)) if found else ((), ())
     vectors = {f.symbol: sight.source(f, carried) for f in features}
     points = tuple(f.symbol for f in features if isinstance(f, BodyPoint))
     kept = tuple(bounds(sight, lambda feature: sight.source(feature, carried)))

@@ -14,14 +14,15 @@ from ...constraints.pattern import ConstraintPattern
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.platform_motion import PlatformMotion
-from ...kinematics.steps import track
+from ...kinematics.steps import led, track
 from ...mechanism.pose import Pose, PoseLike, asked_pose
 from ...progress import tell
 from ...results import Result, Value
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SOLVED
+from ..accuracy.cones import unseen
 from ..asked import configurations_at
 from ..measured import MeasuredRobot
-from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike
+from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from ..singularity.agreement import smallest_of
 from .condition_enclosure import ConditionEnclosure, PathSegment, enclosed, sign_of
@@ -44,6 +45,25 @@ class PathEnd(Value):
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
         return {"pose": self.pose.to_dict(), "value": self.value}
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SampledRoad(Value):
+    """The condition at ``count`` poses on the straight way between two: the smallest |value|, ``at`` which pose; how
+    often its sign changes from one to the next (None of a value without sign); the part of the way that was
+    ``reached``, and what was first seen not to be in front of its camera. Nothing is known between the poses."""
+
+    count: int
+    least: float
+    at: Pose
+    changes: int | None
+    reached: float
+    lost: str | None
+
+    def to_dict(self) -> dict[str, Any]:
+        """The record of the command line."""
+        return {"poses": self.count, "least": self.least, "at": self.at.to_dict(), "changes": self.changes,
+                "reached": self.reached, "lost_from_sight": self.lost}
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -72,6 +92,8 @@ class PathAnswer(Result, shown_as="path"):
     """Joints whose limits hold all along a certified path."""
     unlimited: tuple[str, ...] = ()
     """Joints whose limits are not considered."""
+    road: SampledRoad | None = None
+    """The straight way, sampled; where neither a path nor a separation was enclosed."""
 
     def headline(self) -> str:
         """The robot and the verdict."""
@@ -81,7 +103,14 @@ class PathAnswer(Result, shown_as="path"):
     def not_proved(self) -> str:
         """What a certificate says nothing about."""
         joints = f"limits of joints {', '.join(self.unlimited)}; " if self.unlimited else ""
+        if not all(o.by_segment for o in self.setting.observed):
+            joints += "what is behind a camera or out of its picture; "
         return f"{joints}collisions and constraint singularities of the loops are not considered"
+
+    @property
+    def where(self) -> str:
+        """Which paths are meant: on which what is observed has a value (no point is in a camera's centre)."""
+        return "" if all(o.by_segment for o in self.setting.observed) else "on which all that is observed has a value "
 
     @property
     def crossings(self) -> tuple[tuple[str, int], ...]:
@@ -102,7 +131,8 @@ class PathAnswer(Result, shown_as="path"):
                 "margin": self.margin, "boxes": self.boxes,
                 "value": "expression" if self.signed else "smallest singular value",
                 "start": self.start.to_dict(), "goal": self.goal.to_dict(), "reason": self.reason,
-                "limits": list(self.limits), "not_considered": self.not_proved}
+                "limits": list(self.limits), "not_considered": self.not_proved,
+                "sampled": self.road and self.road.to_dict()}
 
 
 def between(answer: PathAnswer, coordinates: PathCoordinates, ways: Sequence[PathSegment]) -> list[Pose]:
@@ -134,6 +164,8 @@ def _led(here: ClosedConfiguration, coordinates: PathCoordinates, p: Array) -> C
     return track(here, motion, goal)[0]
 
 
+SAMPLES = 33
+"""Poses at which a way is sampled that cannot be enclosed."""
 BUDGET = 10_000
 """Intervals that are enclosed in all before a path is given up."""
 CLEAR = RANK_CUTOFF * RANK_GAP
@@ -153,9 +185,9 @@ class Aspects(Value):
 
     @classmethod
     def of(cls, robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
-           *, seed: int = 0) -> Aspects:
+           *, see: SeeLike = None, seed: int = 0) -> Aspects:
         """The condition of a robot from random samples of its motion."""
-        setting = ObservedRobot.of(robot, observe, camera, seed=seed).by_segments("an atlas")
+        setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
         seen = MeasuredRobot.watched(setting)
         return cls(setting, setting.motion, seen.pattern, seen.condition,
                    tuple(freedom.name for freedom in seen.verdict.lost))
@@ -175,6 +207,8 @@ class Aspects(Value):
         many = self.motion.translations.shape[1] + self.motion.rotations.shape[1]
         reason = (f"the {many} parts of the platform's pose that change depend on each other, {self.setting.dof} are "
                   "free: ways that move a point straight and turn about one axis do not keep to the others")
+        if many == self.setting.dof:
+            reason = "the platform has other freedoms at the zero configuration than elsewhere"
         question = self.setting.samples.question
         for each in path_coordinates(self.setting.anatomy, question, self.setting.dof, self.members):
             try:
@@ -205,8 +239,28 @@ class Aspects(Value):
         try:
             enclosures = [self.enclosure(end.configuration) for end in ends]
         except NoLegForm as why:
-            return _pointwise(answer, str(why))
+            answer = _pointwise(answer, str(why))
+            return answer if answer.verdict == SEPARATED else replace(answer, road=self.road(start, goal))
         return self._decided(answer, enclosures, seed, budget)
+
+    def road(self, start: ClosedConfiguration, goal: ClosedConfiguration) -> SampledRoad:
+        """The straight way of the platform from a configuration to the pose of another, sampled."""
+        motion, question = self.motion, self.setting.samples.question
+        target, X = motion.whole(goal.pose(motion.link)), start.pose(motion.link)
+        way = [start]
+        fractions = np.linspace(0, 1, SAMPLES)
+        for fraction in fractions[1:]:
+            there, came = led(way[-1], motion, target.towards(X, float(fraction)), last=fraction == 1)
+            if not came:
+                break
+            way.append(there)
+        scene = self.structure.values_at(way)
+        values = self.condition.expressed(scene) if self.condition.signed else smallest_of(self.condition.rows(scene))
+        worst = int(np.argmin(np.abs(values)))
+        changes = int(np.sum(values[1:] * values[:-1] < 0)) if self.condition.signed else None
+        lost = next((f"{o.kind} {o.leg}" for at in way if (o := unseen(at, question)) is not None), None)
+        return SampledRoad(len(way), float(abs(values[worst])), motion.pose(way[worst].pose(motion.link)), changes,
+                           float(fractions[len(way) - 1]), lost)
 
     def _decided(self, answer: PathAnswer, enclosures: Sequence[ConditionEnclosure], seed: int, budget: int
                  ) -> PathAnswer:
@@ -223,7 +277,7 @@ class Aspects(Value):
         if enclosures[0].signed and values[0] * values[1] < 0:
             return replace(answer, verdict=SEPARATED, certified=not fitted, margin=margin, boxes=2, reason=(
                 "the expression is enclosed with opposite signs at the two configurations: every path between them "
-                f"crosses its zeros{forms}"))
+                f"{answer.where}crosses its zeros{forms}"))
         if answer.signed and answer.start.value * answer.goal.value < 0:
             return _pointwise(answer, "its sign is that of a determinant")
         for end, enclosure, place, turn in zip(("start", "goal"), enclosures, p, R, strict=False):
@@ -253,16 +307,18 @@ class Aspects(Value):
 
 
 @question()
-def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *,
+def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
          start: PoseLike, goal: PoseLike, seed: int = 0, budget: int = BUDGET) -> PathAnswer:
     """Whether a path without Type 2 singularity of the hidden robot joins two poses (docs/pages/theory.md, section 9).
+    Of what is seen the path goes through poses at which it has a value, in front of the camera or not.
 
     Both are reached from the zero configuration in its working mode; or, where no small steps lead to a pose that is a
     mode of the other, as ``modes`` found the robot assembled there. On the way legs may pass their limits into other
     working modes (Type 1). A certificate encloses, by interval arithmetic, the condition's value away from zero, the
     reach of every leg and the limits of R and P joints all along the path, for all poses within
     ``tolerances.FOLLOWED`` of it; opposite signs of an expression at the two ends separate them. At most ``budget``
-    intervals are tried. ``observe`` and ``camera`` as for ``derive``.
+    intervals are tried. Where nothing can be enclosed the straight way is sampled. ``observe``, ``camera`` and ``see``
+    as for ``derive``.
 
     Raises ``BadRequest`` for names and parts of a pose that there are not, ``PoseNotReached``.
 
@@ -270,7 +326,7 @@ def path(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, 
     <PathAnswer: 3rrr_m1, watching 1, 2, 3: same aspect>
     """
     wanted = [asked_pose(each) for each in (start, goal)]
-    aspects = Aspects.of(ObservedRobot.of(robot, observe, camera, seed=seed).telling(wanted), seed=seed)
+    aspects = Aspects.of(ObservedRobot.of(robot, observe, camera, see=see, seed=seed).telling(wanted), seed=seed)
     tell("poses")
     first, last = configurations_at(aspects.setting, wanted, by_modes=True)
     return aspects.join(first, last, seed=seed, budget=budget)
@@ -307,6 +363,6 @@ def _pointwise(answer: PathAnswer, why: str) -> PathAnswer:
     ends = answer.start.value, answer.goal.value
     if answer.signed and ends[0] * ends[1] < 0:
         return replace(answer, verdict=SEPARATED, margin=min(map(abs, ends)), reason=(
-            "the expression has opposite signs at the two configurations, every path between them crosses its zeros; "
-            f"not certified by intervals: {why}"))
+            "the expression has opposite signs at the two configurations, every path between them "
+            f"{answer.where}crosses its zeros; not certified by intervals: {why}"))
     return replace(answer, reason=f"no path can be certified: {why}")

@@ -10,7 +10,18 @@ import numpy as np
 
 from ...closed_forms.legs import ClosedFormLeg, OnCrank, OnRail, SlidingRod
 from ...closed_forms.platform_points import ORIGIN, PlatformPoint, platform_point
-from ...constraints.named_vectors import BodyPoint, NamedVector, Segment, Tangent, axis_of, centre_of, poses_at
+from ...constraints.named_vectors import (
+    BodyPoint,
+    CrossProduct,
+    NamedVector,
+    Ray,
+    Segment,
+    Tangent,
+    TangentNormal,
+    axis_of,
+    centre_of,
+    poses_at,
+)
 from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Joint, JointType, Mechanism
@@ -22,6 +33,7 @@ from .vector_expressions import (
     JointRules,
     LegVector,
     NoLegForm,
+    SightVector,
     SimpleVector,
     VectorExpression,
 )
@@ -181,7 +193,12 @@ class SampledMechanism:
                 offset = values - sense * self.values(each)
                 if np.max(np.ptp(offset, axis=0)) < FOLLOWED:
                     yield LegVector(i, sense, np.where(np.abs(offset[0]) < FOLLOWED, 0.0, offset[0]), True)
-        if isinstance(feature, Tangent | Segment) and self.lasting(feature):
+        if isinstance(feature, CrossProduct | TangentNormal):
+            parts = ((feature.one, feature.other) if isinstance(feature, CrossProduct) else
+                     (feature.start, feature.on_axis, feature.axis))
+            yield SightVector(tuple(self.source(part, carried) for part in parts),
+                              feature.radius if isinstance(feature, TangentNormal) else None)
+        if isinstance(feature, Ray) or (isinstance(feature, Tangent | Segment) and self.lasting(feature)):
             try:
                 start, end = (self.source(part, carried) for part in (feature.start, feature.end))
                 axis = self.source(feature.axis, carried) if isinstance(feature, Tangent) else None

@@ -16,7 +16,7 @@ from ...closed_forms.platform_points import ORIGIN, PlatformPoint
 from ...constraints.named_vectors import BodyPoint, BodyVector, NamedVector
 from ...geometry.balls import Field, normed
 from ...geometry.lines import distance
-from ...geometry.vectors import Array, cross
+from ...geometry.vectors import Array, cross, dot
 from ...kinematics.configuration import ClosedConfiguration
 from ...mechanism import Joint, JointType, Mechanism
 from ...mechanism.legs import LegDecomposition
@@ -55,7 +55,34 @@ class DerivedVector:
         return any(part is not None and part.fitted for part in (self.start, self.end, self.axis))
 
 
-VectorExpression = PlatformPoint | LegVector | DerivedVector
+@dataclass(frozen=True, eq=False)
+class SightVector:
+    """A vector of what a camera sees: the unit cross product of two ``parts``; or, of a centre, a point and an axis,
+    the normal of the plane through the centre that touches the cylinder of this ``radius``. It has no value just where
+    nothing is seen, and is enclosed nowhere near."""
+
+    parts: tuple[VectorExpression, ...]
+    radius: float | None = None
+
+    @property
+    def fitted(self) -> bool:
+        """Whether one of its parts was."""
+        return any(part.fitted for part in self.parts)
+
+    def value(self, *parts: Field) -> Field:
+        """Of those of its parts."""
+        if self.radius is None:
+            one, other = parts
+            return normed(cross(one, other))
+        start, on, d = parts
+        out = on - start
+        foot = out - dot(out, d)[..., None] * d
+        square = dot(foot, foot)[..., None]
+        aside = np.sqrt(square - self.radius**2)
+        return np.asarray((self.radius * foot + aside * cross(d, foot)) / square)
+
+
+VectorExpression = PlatformPoint | LegVector | DerivedVector | SightVector
 
 
 def value_of(each: VectorExpression, p: Field, R: Field, carried: Sequence[Field]) -> Field:
@@ -63,6 +90,8 @@ def value_of(each: VectorExpression, p: Field, R: Field, carried: Sequence[Field
         return each.value(p, R)
     if isinstance(each, LegVector):
         return np.asarray(each.sense * carried[each.limb] + each.offset)
+    if isinstance(each, SightVector):
+        return each.value(*(value_of(part, p, R, carried) for part in each.parts))
     along = value_of(each.end, p, R, carried) - value_of(each.start, p, R, carried)
     return normed(along if each.axis is None else cross(value_of(each.axis, p, R, carried), along))
 

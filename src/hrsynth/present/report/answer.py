@@ -9,6 +9,7 @@ import numpy as np
 from ...analysis.accuracy.accuracy import Accuracy
 from ...analysis.controllability import Legs
 from ...analysis.derive import Derivation
+from ...analysis.observed import ObservedRobot
 from ...analysis.verdict import Verdict
 from ...geometry.vectors import Array
 from ..text.poses import all_of
@@ -26,7 +27,8 @@ def answer(found: Derivation, told: Parts) -> Iterator[str]:
     modes = told.modes
     if not isinstance(modes, Refused) and modes.found.continuum is None and modes.modes:
         count = len(modes.modes)
-        yield (f"At home {count} pose{'s have' if count > 1 else ' has'} the same observed directions ({all_of(modes)})"
+        yield (f"At home {count} pose{'s have' if count > 1 else ' has'} the same {held(found.setting)} "
+               f"({all_of(modes)})"
                + ("; a run that starts far away may end at another than its goal." if count > 1 else "."))
     if not isinstance(told.accuracy, Refused):
         yield from errors(told.accuracy)
@@ -34,7 +36,7 @@ def answer(found: Derivation, told: Parts) -> Iterator[str]:
 
 def seen(found: Derivation) -> str:
     """How many freedoms are seen, and what is not."""
-    verdict, watched = found.verdict, _legs(found.setting.labels)
+    verdict, watched = found.verdict, _legs(found.setting.labels, found.setting)
     if (bodies := verdict.formation) is not None:
         rest = "".join(f"; {each.name}" for each in bodies.flexes) or "; nothing else"
         return (f"Watching {watched} shows {verdict.rank} of the bodies' {found.dof} freedoms. Not seen: "
@@ -46,9 +48,10 @@ def seen(found: Derivation) -> str:
 def enough(found: Derivation, legs: Legs) -> str:
     """Which sets of legs are the smallest that show as much as any."""
     best = max(each.rank for each in legs.sets)
-    sets = "; ".join(_legs(each) for each in legs.minimal[:4])
+    sets = "; ".join(_legs(each, found.setting) for each in legs.minimal[:4])
     more = len(legs.minimal) - 4
-    return (f"Fewest legs that show {best} of {found.dof}: {sets}" + (f"; {more} more sets" if more > 0 else "") + ".")
+    return (f"Fewest {things(found.setting)} that show {best} of {found.dof}: {sets}"
+            + (f"; {more} more sets" if more > 0 else "") + ".")
 
 
 def errors(found: Accuracy) -> Iterator[str]:
@@ -58,7 +61,8 @@ def errors(found: Accuracy) -> Iterator[str]:
     said = [f"{_median(values):.2g} {unit}" for values, unit in (
         (1e3 * field.position, "mm"), (np.degrees(field.orientation), "degrees")) if _median(values) > 0]
     if said:
-        yield (f"Directions wrong by {CONE.replace('deg', '°')} put the platform off by up to {' and '.join(said)} "
+        what = "Directions" if found.blur.noise is None else "Measurements"
+        yield (f"{what} wrong by {wrong(found)} put the platform off by up to {' and '.join(said)} "
                "(median over the map below, to first order).")
 
 
@@ -67,8 +71,24 @@ def _median(values: Array) -> float:
     return float(np.median(finite)) if finite.size else 0.0
 
 
-def _legs(labels: tuple[str, ...] | list[str]) -> str:
-    return f"leg{'s' * (len(labels) > 1)} {', '.join(labels)}"
+def wrong(found: Accuracy) -> str:
+    """How wrong measurements may be, for the map."""
+    return (CONE if found.blur.noise is None else str(found.blur.noise)).replace("deg", "°")
+
+
+def things(setting: ObservedRobot) -> str:
+    """What sets are sets of."""
+    return "legs" if all(o.by_segment for o in setting.observed) else "observations"
+
+
+def held(setting: ObservedRobot) -> str:
+    """What assembly modes have in common."""
+    return "observed directions" if things(setting) == "legs" else "measurements"
+
+
+def _legs(labels: tuple[str, ...] | list[str], setting: ObservedRobot) -> str:
+    known = f"leg{'s' * (len(labels) > 1)} " if things(setting) == "legs" else ""
+    return known + ", ".join(labels)
 
 
 def good(found: Verdict) -> bool:

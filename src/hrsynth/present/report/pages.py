@@ -16,10 +16,11 @@ from ..portrait import Portrait
 from ..text.poses import all_of, at_mode, proved
 from ..text.robots import exact_words, unseen
 from ..text.runs import field_rows
-from .answer import answer, good, set_rows
+from ..text.tables import labelled
+from .answer import answer, good, held, set_rows, things, wrong
 from .figures import SOURCES, actuators, pairs, step_figures
 from .formulas import barred, collected, formula, indexed
-from .parts import CONE, Parts, Refused, asked, parts
+from .parts import Parts, Refused, asked, parts
 
 LARGEST_LIST = 63
 """Sets of legs in the table at most: all of six legs; of more, the smallest sets."""
@@ -45,8 +46,10 @@ def page(found: Derivation, told: Parts) -> bytes:
         found=found, setting=found.setting, told=told, answer=list(answer(found, told)),
         portrait=Portrait.of(found.setting).svg(*PORTRAIT), name=name, graphs=graphs, real=str(found.architecture),
         hidden=found.hidden_architecture and str(found.hidden_architecture), pairs=pairs(found),
-        cone=CONE.replace("deg", "°"),
-        watched=[f"leg {o.leg} ({o.link})" for o in found.setting.observed],
+        errors=None if isinstance(errors, Refused) else (
+            f"{errors.blur.inside} of {wrong(errors)}" if errors.blur.noise is None else
+            f"{errors.blur.inside}, {wrong(errors)}"), things=things(found.setting), held=held(found.setting),
+        watched=["leg " * o.by_segment + labelled(o) for o in found.setting.observed],
         scenes=step_figures(found), modes_picture=None if isinstance(modes, Refused) or why_undrawn(modes) is not None
         else _png(picture(modes)),
         map=errors if isinstance(errors, Refused) else asked(name, lambda: _png(error_map(errors))))).encode()

@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from typing import TypeVar
 
 from ...analysis.accuracy.accuracy import Accuracy, sees_all
-from ...analysis.accuracy.cones import half_angles
+from ...analysis.accuracy.cones import Blur
 from ...analysis.accuracy.error_map import Mapper
 from ...analysis.controllability import Legs, legs
 from ...analysis.derive import Derivation
@@ -18,13 +18,15 @@ from ...analysis.modes.modes import AssemblyModes, modes
 from ...analysis.observed import ObservedRobot
 from ...analysis.singularity.singular import Singularity, singular
 from ...errors import BadRequest, HrsynthError
-from ...mechanism.observations.direction import Direction
 from ...mechanism.pose import Pose
+from ...mechanism.sights import CameraObservation
 
 POINTS = 500
 """Random poses at which the singularity condition is checked."""
 CONE = "0.1deg"
 """Half-angle of the cones about the directions."""
+PIXELS, LENGTHS = "0.5px", "1mm"
+"""Errors in images, and of lengths."""
 MAP_SIDE, COARSE_MAP_SIDE = 101, 25
 """Poses a side of the map, where many are evaluated together and where they are found one by one."""
 
@@ -72,10 +74,14 @@ def reason(error: HrsynthError, robot: str) -> str:
 
 def error_plane(setting: ObservedRobot, seed: int) -> Accuracy:
     """The error maxima over a plane of poses through the zero configuration."""
-    if not all(isinstance(o, Direction) for o in setting.observed):
-        raise BadRequest("cones apply to directions, and something else is observed")
-    cones = half_angles(CONE, setting.observed)
+    units: set[str] = set()
+    for each in setting.observed:
+        focal = isinstance(each, CameraObservation) and each.camera is not None and each.camera.focal
+        in_picture = "px" in each.found_by and (focal or len(each.found_by) == 1)
+        units |= {"px"} if in_picture else each.found_by - {"px"}
+    usual = ",".join(noise for noise, unit in ((CONE, "rad"), (PIXELS, "px"), (LENGTHS, "m")) if unit in units)
+    blur = Blur.of(None, usual, setting.observed)
     sees_all(setting)
-    mapper = Mapper(setting, cones)
+    mapper = Mapper(setting, blur)
     grid = mapper.plane(Pose(), COARSE_MAP_SIDE if mapper.batch is None else MAP_SIDE)
-    return Accuracy(setting, cones, (), (), mapper.over(grid, seed))
+    return Accuracy(setting, blur, (), (), mapper.over(grid, seed))

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis.accuracy.cones import Blur
 from ...analysis.accuracy.pose_errors import attained, finite
 from ...analysis.observed import ObservedRobot
 from ...kinematics.configuration import ClosedConfiguration
@@ -40,7 +41,7 @@ def error(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]:
     unit = unit_of(setting)
     if not all(isinstance(each, Direction) for each in setting.observed):
         return {**nothing(unit, "not told: what is watched is no direction"), "step": None}
-    metres, radians = attained(at, setting.samples.question, np.full(len(setting.observed), CONE))
+    metres, radians = attained(at, setting.samples.question, Blur(np.full(len(setting.observed), CONE)))
     if np.isfinite([metres, radians]).all() and not (bounded(metres, at.twin.length) and bounded(radians)):
         return nothing(unit, NOT_BOUNDED)
     return told(finite(1e3 * metres), finite(math.degrees(radians)), unit, bool(setting.motion.rotations.shape[1]))

@@ -19,7 +19,7 @@ from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, known, listin
 
 if TYPE_CHECKING:
     from ...analysis.aspects.atlas import Atlas, ModePair
-    from ...analysis.aspects.path import PathAnswer
+    from ...analysis.aspects.path import PathAnswer, SampledRoad
     from ...analysis.check import Check, GridCheck
     from ...analysis.modes.modes import AssemblyMode, AssemblyModes
     from ...analysis.observed import ObservedRobot
@@ -257,7 +257,19 @@ def path(found: PathAnswer) -> str:
         rows.append(("path" if found.certified else "best path", [str(pose) for pose in found.poses]))
     rows.append(("crossings", [f"leg {leg} changes its working mode at {found.poses[place]}"
                                for leg, place in found.crossings]))
+    if found.road is not None:
+        rows.append(("sampled", road(found.road, value)))
     return listing([*rows, *known("not proved", found.not_proved if found.certified else None)])
+
+
+def road(found: SampledRoad, value: str) -> list[str]:
+    """What poses on the straight way say."""
+    signs = {None: "", 0: ", the same sign at all of them"}.get(found.changes, f", {found.changes} changes of its sign")
+    lines = [f"|{value}| at least {found.least:.3g} at {found.count} poses of the straight way, least at {found.at}"
+             f"{signs}"]
+    if found.reached < 1:
+        lines.append(f"the robot was not led further than {100 * found.reached:.0f} % of that way")
+    return lines + [f"{found.lost} is not in front of its camera all along it"] * (found.lost is not None)
 
 
 _SIGNS = {SAME: "=", SEPARATED: "|", UNDECIDED_PAIR: "?"}

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...geometry.vectors import Array
 from ...tolerances import DAMPED
-from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, listing, table
+from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, labelled, listing, table
 
 if TYPE_CHECKING:
     from ...analysis.accuracy.accuracy import Accuracy
@@ -105,10 +105,9 @@ def _degrees(angle: float) -> str:
 def accuracy(found: Accuracy) -> str:
     """The cones, the range of errors over a grid, a block for each single pose."""
     name, _ = head(found.setting)
-    rows = [name, ("observed", ", ".join(f"{o.leg} ({o.link}) within {np.degrees(cone):.4g}°"
-                                         for o, cone in zip(found.setting.observed, found.cones, strict=True))),
-            *camera(found.setting),
-            ("errors", "largest over all errors of the directions inside their cones, to first order")]
+    rows = [name, ("observed", ", ".join(f"{labelled(o)} {found.blur.words(i, o)}"
+                                         for i, o in enumerate(found.setting.observed))),
+            *camera(found.setting), ("errors", f"largest over all errors {found.blur.inside}, to first order")]
     length = found.setting.everything.twin.length
     if found.field is not None:
         rows += [*GAP, *field_rows(found)]
@@ -135,7 +134,8 @@ def field_rows(found: Accuracy) -> list[tuple[str, str]]:
         rows.append(("checked", f"against Pinocchio at {field.spots.count} random poses, largest difference "
                                 f"{field.spots.difference:.1e}"))
     if field.gap > 1e-9:
-        rows.append(("", f"three cones and more: upper bounds, nowhere more than {100 * field.gap:.2g} % too large"))
+        rows.append(("", f"three {found.blur.each}s and more: upper bounds, nowhere more than {100 * field.gap:.2g} % "
+                         "too large"))
     return rows
 
 
@@ -190,13 +190,15 @@ def _vector(vector: Array) -> str:
 
 def selection(found: Selection) -> str:
     """The displacement, the table, the reasons."""
-    observed, sight = found.setting.observed, found.sight is not None
+    observed, sight, blur = found.setting.observed, found.sight is not None, found.blur
     length = found.setting.everything.twin.length
-    cones = dict.fromkeys(f"{np.degrees(cone):.4g}°" for cone in found.cones)
+    cones = dict.fromkeys(f"{np.degrees(cone):.4g}°" for cone in blur.cones)
     angle = next(iter(cones)) if len(cones) == 1 else ", ".join(
-        f"{o.leg} {np.degrees(cone):.4g}°" for o, cone in zip(observed, found.cones, strict=True))
+        f"{o.leg} {np.degrees(cone):.4g}°" for o, cone in zip(observed, blur.cones, strict=True))
     name, _ = head(found.setting)
-    rows = [name, ("from", str(found.start)), ("to", str(found.goal)), ("cones", f"{angle} about each direction"),
+    wrong = ("cones", f"{angle} about each direction") if blur.noise is None else (
+        "observed", ", ".join(f"{o.leg} {blur.words(i, o)}" for i, o in enumerate(observed)))
+    rows = [name, ("from", str(found.start)), ("to", str(found.goal)), wrong,
             ("sets", f"{len(found.candidates)}, kept: {len(found.kept)}")]
     if found.unexamined:
         rows.append(("", f"not examined: {len(found.unexamined)} ({found.left})"))
@@ -204,8 +206,8 @@ def selection(found: Selection) -> str:
         rows.append(("camera", f"on {found.sight.reference}"))
     blocks = [listing(rows)]
     if found.kept:
-        heads = ["legs", "others", "certified", "mm", "degrees", "modes", "aspect", *(["seen"] if sight else []),
-                 "run"]
+        heads = ["legs" if blur.noise is None else "observed", "others", "certified", "mm", "degrees", "modes",
+                 "aspect", *(["seen"] if sight else []), "run"]
         blocks.append(table([_row(each, sight, length) for each in found.kept], heads))
         blocks.append("others: poses besides the goal that were found to attract the loop; certified: how far\n"
                       "around the goal runs are certified to end at it; mm, degrees: largest errors at the goal;\n"

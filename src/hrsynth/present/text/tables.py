@@ -67,7 +67,12 @@ def known(name: str, value: str | None) -> Rows:
 def head(found: ObservedRobot) -> Rows:
     """The robot and what is observed of it."""
     return [("robot", f"{found.robot.name}   {found.anatomy.architecture()}"),
-            ("observed", ", ".join(f"{o.leg} ({o.link if o.by_segment else seen(o)})" for o in found.observed))]
+            ("observed", ", ".join(map(labelled, found.observed)))]
+
+
+def labelled(observation: Observation) -> str:
+    """An observation's label, with what it is."""
+    return f"{observation.leg} ({observation.link if observation.by_segment else seen(observation)})"
 
 
 def seen(observation: Observation) -> str:

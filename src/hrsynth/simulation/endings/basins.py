@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ...analysis.accuracy.cones import Blur
 from ...analysis.accuracy.error_map import Mapper
 from ...analysis.asked import configurations_at
 from ...analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
@@ -215,7 +216,7 @@ class BasinSearch:
             fixed = Pose(phi=float(place_of(motion, X, ("phi",))[0]))
         else:
             fixed = Pose(z=float(motion.position(X)[2])) if motion.translations.shape[1] == 3 else Pose()
-        return Mapper(self.setting, np.zeros(0)).plane(fixed, steps or (SIDE if self.flow else SIDE_ONE_BY_ONE))
+        return Mapper(self.setting, Blur(np.zeros(0))).plane(fixed, steps or (SIDE if self.flow else SIDE_ONE_BY_ONE))
 
     def over(self, grid: Grid, seed: int) -> Basins:
         """The ends of the runs from all poses of a grid."""

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ....analysis.accuracy.accuracy import sees_all
+from ....analysis.accuracy.cones import Blur
 from ....analysis.accuracy.error_map import Mapper, nested
 from ....analysis.accuracy.pose_errors import attained
 from ....analysis.singularity.agreement import weakest
@@ -64,7 +65,7 @@ def answer(request: Request) -> dict[str, Any]:
         if not low - SLIDER_ARRIVED <= at <= high + SLIDER_ARRIVED:
             raise BadRequest("at", at, f"{low:.6g} to {high:.6g}")
         values[third[0]] = at
-    mapper, unit = Mapper(setting, np.full(len(setting.observed), CONE)), unit_of(setting)
+    mapper, unit = Mapper(setting, Blur(np.full(len(setting.observed), CONE))), unit_of(setting)
     known = mapper.batch is not None and _at_batch(mover, here.real)
     cells = size if known else min(size, LARGEST_STUDIO_SWEEP)
     grid = together(mover, here.real, pair, values, ranges, cells)
@@ -171,11 +172,11 @@ def one_by_one(mover: Mover, here: ClosedConfiguration, pair: tuple[int, int], v
         return there if came == 1 else None
 
     distance = [float(np.linalg.norm(aim.rows(here.twin, here.q)[0])) for aim in aims]
-    cones = np.full(len(setting.observed), CONE)
+    blur = Blur(np.full(len(setting.observed), CONE))
     found = np.full((2, len(aims)), np.nan)
     for i, at in enumerate(spread(here, (size, size), distance, lead)):
         if at is not None:
-            found[:, i] = (weakest(at, question), np.nan) if kind == DISTANCE else attained(at, question, cones)
+            found[:, i] = (weakest(at, question), np.nan) if kind == DISTANCE else attained(at, question, blur)
     table = found[0] if kind == DISTANCE else _shown(found[0], found[1], unit)
     return PoseField(table.reshape(size, size), np.zeros((0, 2, 2)))
 

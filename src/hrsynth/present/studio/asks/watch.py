@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from ....analysis.accuracy.cones import Blur
 from ....analysis.accuracy.pose_errors import error_axes
 from ....analysis.freedoms import Freedom
 from ....analysis.measured import MeasuredRobot
@@ -123,7 +124,7 @@ def ellipsoid(setting: ObservedRobot, at: ClosedConfiguration) -> dict[str, Any]
     they have no bound, or there are none."""
     if not all(isinstance(each, Direction) for each in setting.observed):
         return None
-    axes = error_axes(at, setting.samples.question, np.full(len(setting.observed), CONE))
+    axes = error_axes(at, setting.samples.question, Blur(np.full(len(setting.observed), CONE)))
     if axes is None or not axes.any():
         return None
     return {"center": setting.motion.position(at.pose(setting.motion.link)).tolist(), "axes": axes.tolist()}

@@ -1,0 +1,92 @@
+"""How wrong measurements are: amounts as a user writes them, and what simulated sensors make of them to first order."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..budgets import WIDEST_NOISE
+from ..errors import BadRequest
+from ..geometry.vectors import Array
+from ..tolerances import NOISE_STEP
+from .observation import Observation
+from .sights import CameraObservation
+
+EXAMPLE = "0.1deg or 0.002 (radians), 0.3px in a picture, 1mm of lengths; several with commas"
+UNITS = {"px": ("px", 1.0), "deg": ("rad", math.radians(1)), "mm": ("m", 1e-3), "m": ("m", 1.0), "": ("rad", 1.0)}
+"""Endings of amounts, the longer ones first: what they are told in, and how much of it one is."""
+MOST = {"px": WIDEST_NOISE, "rad": math.pi / 2, "m": math.inf}
+
+
+@dataclass(frozen=True)
+class Noise:
+    """How large errors are, by what they are told in: half-angles of cones (``rad``), errors in the picture (``px``),
+    of lengths (``m``); of a ``bias`` each error stays the same all along a run."""
+
+    amounts: tuple[tuple[str, float], ...]
+    bias: bool = False
+
+    @classmethod
+    def parse(cls, text: str) -> Noise:
+        """The amounts that ``0.1deg``, ``0.002``, ``0.3px`` or ``0.3px,1mm`` says; raises ``BadRequest``."""
+        found: dict[str, float] = {}
+        for word in map(str.strip, text.split(",")):
+            ending = next(each for each in UNITS if word.endswith(each))
+            unit, one = UNITS[ending]
+            try:
+                value = float(word.removesuffix(ending)) * one
+            except ValueError:
+                raise BadRequest("noise: not a number", text, EXAMPLE) from None
+            if not 0 < value < MOST[unit] or unit in found:
+                raise BadRequest("noise", text, "each unit once, more than zero; cones of less than 90deg, less than "
+                                                f"{WIDEST_NOISE:g}px")
+            found[unit] = value
+        return cls(tuple(found.items()))
+
+    def of(self, unit: str) -> float:
+        """The amount in a unit, 0 where none is."""
+        return dict(self.amounts).get(unit, 0.0)
+
+    def __str__(self) -> str:
+        words = {"px": "{:g}px", "m": "{:g}m"}
+        every = [f"{math.degrees(value):.4g}deg" if unit == "rad" else words[unit].format(value)
+                 for unit, value in self.amounts]
+        return ", ".join(every) + (", constant over time" if self.bias else "")
+
+    def required(self, observations: Sequence[Observation]) -> dict[str, float]:
+        """The amounts; raises ``BadRequest`` for noise that none of the observations has, and for pixels of a camera
+        without a focal length."""
+        known = frozenset().union(*(each.found_by for each in observations))
+        for unit, _ in self.amounts:
+            if unit not in known:
+                raise BadRequest(f"noise of what is observed in {unit}", str(self), sorted(known))
+        amounts = dict(self.amounts)
+        for each in observations:
+            if "px" in amounts and "px" in each.found_by and not (
+                    isinstance(each, CameraObservation) and each.camera and each.camera.focal):
+                raise BadRequest(f"noise in pixels: the focal length of the camera of {each.kind} {each.leg}", "none",
+                                 "a camera with one (--camera NAME=LINK@x,y,z/r,p,y/FOCAL)")
+        return amounts
+
+
+def vectors(seen: Observation) -> int:
+    """How many random vectors an observation's noise takes."""
+    return 1 if seen.size <= 3 else 2
+
+
+def blurs(seen: Observation, value: Array, amounts: Mapping[str, float]) -> list[Array]:
+    """The rates (size, 3) of :meth:`.Observation.sensed` by each random vector where there is none, by central
+    differences: to first order the errors are the sums of images of unit balls. ``value`` (size,) in metres."""
+    own = {unit: amount for unit, amount in amounts.items() if unit in seen.found_by}
+    if not own:
+        return []
+    largest = max(seen.pixels(own) if unit == "px" and isinstance(seen, CameraObservation) else amount
+                  for unit, amount in own.items())
+    scale = NOISE_STEP / largest
+    small = {unit: scale * amount for unit, amount in own.items()}
+    ways = np.eye(6).reshape(6, 2, 3)
+    columns = [(seen.sensed(value, way, small) - seen.sensed(value, -way, small)) / (2 * scale) for way in ways]
+    return list(np.stack(columns, axis=1).reshape(seen.size, 2, 3).transpose(1, 0, 2)[: vectors(seen)])
