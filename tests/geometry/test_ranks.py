@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from hrsynth.errors import BadMechanism, LoopsNotClosed, RankUndecided
-from hrsynth.geometry.ranks import CLEAN, Rank, kernel_basis, largest_angle, range_basis, rank_of
+from hrsynth.geometry.ranks import CLEAN, Rank, kernel_basis, largest_angle, range_basis, rank_of, space_basis
 from hrsynth.geometry.vectors import rotation_about
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
@@ -210,3 +210,26 @@ def test_nothing_to_sample() -> None:
     mechanism = builder.build(platform="right")
     with pytest.raises(BadMechanism, match="can move"):
         sample(PinocchioModel(mechanism), Measurement("right", None, "base", mechanism.observations), 2)
+
+
+@quick
+@given(st.integers(1, 6), st.integers(1, 6), seeds)
+def test_a_basis_of_a_space_depends_on_the_space_alone(rows, size, seed):
+    """However it is spanned, to the last digits; the axes where they span it."""
+    rng = np.random.default_rng(seed)
+    size = min(size, rows)
+    A = rng.normal(size=(rows, size))
+    one, other = space_basis(A), space_basis(A @ rng.normal(size=(size, size + 2)) * (1 + 1e-13 * rng.normal()))
+    assert one.shape == other.shape == (rows, size)
+    assert np.allclose(one, other, atol=1e-7)
+    assert np.allclose(one.T @ one, np.eye(size), atol=1e-12)
+    assert np.allclose(one @ one.T @ A, A, atol=1e-9)
+    axes = np.eye(rows)[:, np.sort(rng.permutation(rows)[:size])]
+    assert np.array_equal(space_basis(axes @ rng.normal(size=(size, size))), axes)
+
+
+def test_of_directions_that_are_equally_near_the_first_is_taken():
+    way = np.ones((2, 1)) / np.sqrt(2)
+    for noise in (1e-15, -1e-15):
+        assert np.allclose(space_basis(way + noise * np.array([[1.0], [-1.0]])), way)
+    assert np.allclose(space_basis(-way), way)

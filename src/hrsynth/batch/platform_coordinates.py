@@ -17,7 +17,7 @@ from ..geometry.vectors import Array
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.platform_motion import PlatformMotion
 from ..results import Value
-from ..tolerances import SAME_DIRECTION, SAME_GEOMETRY
+from ..tolerances import SAME_GEOMETRY
 
 Frames = Mapping[str, Array]
 """Poses X_BL (m, 4, 4) of links at m closed configurations, metres."""
@@ -71,7 +71,7 @@ class PlatformCoordinates(Value):
     def twists(self) -> Array:
         """The basis (6, d), along the base frame's axes where these span it: linear rows are the velocity of the
         point."""
-        shifts, spins, zero = _along_axes(self.translations), _along_axes(self.rotations), np.zeros((3, 3))
+        shifts, spins, zero = self.translations, self.rotations, np.zeros((3, 3))
         return np.block([[shifts, zero[:, : spins.shape[1]]], [zero[:, : shifts.shape[1]], spins]])
 
     def place(self, X: Array) -> tuple[Array, Array]:
@@ -87,13 +87,6 @@ class PlatformCoordinates(Value):
         found = {name: body for name in names if motion.body
                  and (body := _body(p, X[:, :3, :3], frames[name], length)) is not None}
         return cls(motion.link, motion.point, motion.translations, motion.rotations, found, motion.dof)
-
-
-def _along_axes(basis: Array) -> Array:
-    """The axes that span the same as an orthonormal basis (3, k), if there are such; else the basis."""
-    onto = basis @ basis.T
-    kept = np.diag(onto) > 0.5
-    return np.eye(3)[:, kept] if np.max(np.abs(onto - np.diag(kept)), initial=0.0) < SAME_DIRECTION else basis
 
 
 def _body(p: Array, R: Array, X: Array, length: float) -> PlatformLink | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import RankUndecided
-from ..tolerances import RANK_CUTOFF, RANK_GAP
+from ..tolerances import NAMED, RANK_CUTOFF, RANK_GAP, SAME_DIRECTION
 from .vectors import Array
 
 CLEAN = float(1 / np.finfo(float).eps)
@@ -57,6 +57,24 @@ def range_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]
     U, s, _ = np.linalg.svd(matrix, full_matrices=False)
     rank = rank_of(s, scale)
     return U[:, : rank.value], rank
+
+
+def space_basis(matrix: Array, scale: float | None = None) -> Array:
+    """An orthonormal basis (rows, rank) of the column space that depends on the space alone, not on its columns or the
+    last digit: coordinate axes where these span it, else those that lie nearest to it, one after the other, as they
+    are in it (a Cholesky decomposition of the projector with pivots; of equal ones the first)."""
+    found = range_basis(matrix, scale)[0]
+    onto = found @ found.T
+    along = np.diag(onto) > 0.5
+    if np.max(np.abs(onto - np.diag(along)), initial=0.0) < SAME_DIRECTION:
+        return np.eye(len(matrix))[:, along]
+    basis = np.zeros_like(found)
+    for k in range(found.shape[1]):
+        near = np.diag(onto)
+        i = int(np.argmax(near > (1 - NAMED) * near.max()))
+        basis[:, k] = onto[i] / np.sqrt(onto[i, i])
+        onto = onto - np.outer(basis[:, k], basis[:, k])
+    return basis
 
 
 def kernel_basis(matrix: Array, scale: float | None = None) -> tuple[Array, Rank]:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import BadRequest
-from ..geometry.ranks import range_basis
+from ..geometry.ranks import space_basis
 from ..geometry.screws import point_velocity
 from ..geometry.so3 import between, exponential, logarithm, turn_about, wrap_angle
 from ..geometry.vectors import Array, oriented, transform
@@ -128,7 +128,7 @@ class PlatformMotion(Value):
             columns.append(found)
             twin = at.twin
         together = np.hstack(columns)
-        translations, rotations, twists = (range_basis(part, 1.0)[0] for part in (together[:3], together[3:], together))
+        translations, rotations, twists = (space_basis(part, 1.0) for part in (together[:3], together[3:], together))
         home, dof = twin.pose(twin.q0, question.platform), max(column.shape[1] for column in columns)
         return cls(question.platform, point, question.point is None, home, translations, rotations, twists, dof)
 
