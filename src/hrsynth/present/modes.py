@@ -206,4 +206,7 @@ def _legend(whole: Any, drawn: ModesScene) -> float:
         mark, size, words = MARKS[state]
         entries[words] = entry(words, linestyle="", marker=mark, markersize=0.8 * size, color="0.6",
                                markeredgecolor="black")
+    if any(each.platform for each in drawn.placed):
+        entries["platform"] = entry("platform (in the mode's colour)", color=COLOURS[0], linewidth=2.4)
+    entries["ground"] = entry("joints of the base", linestyle="", marker="s", color="black", markersize=3.4)
     return legend_within(whole, list(entries.values()), whole.get_figwidth(), loc="lower center")
