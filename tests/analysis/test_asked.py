@@ -64,6 +64,8 @@ def test_legs_are_counted_from_a_mode_on():
     assert hrsynth.legs(robot, at="mode:2").to_dict() == hrsynth.legs(hrsynth.observe(robot, at="mode:2")).to_dict()
     with pytest.raises(BadRequest, match="mode:1 to mode:2"):
         hrsynth.legs(robot, at="mode:3")
+    with pytest.raises(BadRequest, match="mode:1 to mode:2"):
+        hrsynth.modes(robot, at="mode:3")
     with pytest.raises(BadRequest, match="mode:1, mode:2, …"):
         hrsynth.derive(robot, at="mode:0")
 

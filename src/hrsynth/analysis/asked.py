@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from ..batch.reach import reach
 from ..errors import BadRequest, HrsynthError, PoseNotReached
-from ..kinematics.assembly import of_links
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.locked import rezero
 from ..mechanism.model import Mechanism
@@ -88,7 +87,7 @@ def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber]
     Raises ``BadRequest`` for parts of a pose that the platform cannot change and for modes that there are not,
     ``PoseNotReached`` for poses out of reach and for modes at which the robot was not found assembled.
     """
-    from .modes.modes import modes
+    from .modes.modes import at_mode, modes
 
     if poses:
         require_platform(setting.robot, poses[0])
@@ -114,6 +113,8 @@ def configurations_at(setting: ObservedRobot, poses: Sequence[Pose | ModeNumber]
 def _met(listed: AssemblyModes, pose: Pose, refused: PoseNotReached) -> ClosedConfiguration:
     """The robot at the one mode with this pose at which it was found assembled; raises ``refused`` where there is none.
     """
+    from .modes.modes import at_mode
+
     motion, twin = listed.setting.motion, listed.goal.twin
     wanted = motion.goal(pose, listed.setting.robot.name)
     met = [number for number, mode in enumerate(listed.modes, 1)
@@ -122,20 +123,3 @@ def _met(listed: AssemblyModes, pose: Pose, refused: PoseNotReached) -> ClosedCo
     if len(met) != 1:
         raise refused
     return at_mode(listed, ModeNumber(met[0]))
-
-
-def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfiguration:
-    """The robot assembled at one of its modes, its coordinates counted from the zero configuration; raises
-    ``BadRequest``, ``PoseNotReached``."""
-    assert listed is not None
-    name, count = listed.setting.robot.name, len(listed.modes)
-    if not 1 <= asked.number <= count:
-        raise BadRequest(f"{name}: a mode at {listed.pose}", str(asked),
-                         f"mode:1 to mode:{count}" if count else "no mode" if listed.found.continuum is None else
-                         "poses that are no continuum")
-    mode = listed.modes[asked.number - 1]
-    at = listed.goal if mode.goal else mode.configuration
-    if at is None:
-        raise PoseNotReached(name, f"{asked} ({mode.pose})", 0.0, str(listed.pose), reason="the robot was not found "
-                             f"assembled there without leg {', '.join(mode.open)}")
-    return at if at.twin is listed.goal.twin else of_links(listed.goal.twin, at.pose)

@@ -20,8 +20,7 @@ from ...mechanism.pose import ModeNumber, PoseLike
 from ...progress import tell
 from ...results import Result, Value
 from ...tolerances import FOLLOWED
-from ..asked import at_mode
-from ..modes.modes import AssemblyModes, modes
+from ..modes.modes import AssemblyModes, at_mode, modes
 from ..observed import CameraLike, LegsLike, RobotLike, SeeLike
 from ..question import question
 from .held_leg import HeldLegSection, section

@@ -13,15 +13,15 @@ import numpy as np
 from ...batch.reach import reach
 from ...budgets import EFFORT
 from ...constraints.pattern import attached
-from ...errors import BadRequest, MissingExtra, NotConfined, TooLarge, Unsolved
+from ...errors import BadRequest, MissingExtra, NotConfined, PoseNotReached, TooLarge, Unsolved
 from ...geometry.vectors import Array, pose_difference
-from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly
+from ...kinematics.assembly import NOT_FOUND, Assembler, Assembly, of_links
 from ...kinematics.closures import Miss
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.limits import outside
 from ...kinematics.relation import Measurement
 from ...kinematics.tasks import Task
-from ...mechanism.pose import Pose, PoseLike, as_pose
+from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
 from ...progress import tell
 from ...results import Result
 from ...tolerances import SAME_RELATION
@@ -212,7 +212,9 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
         raise BadRequest("the motors are held instead of what is observed", f"real with {observe or see}",
                          "one of the two")
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
-    asked = None if at is None or isinstance(at, ClosedConfiguration) else as_pose(at)
+    asked = None if at is None or isinstance(at, ClosedConfiguration) else asked_pose(at)
+    if isinstance(asked, ModeNumber):
+        at, asked = at_mode(modes(setting), asked), None
     setting = setting if asked is None else setting.telling([asked])
     motion, wanted = setting.motion, None
     goal = at if isinstance(at, ClosedConfiguration) else setting.everything.start
@@ -244,6 +246,23 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
            if listed.found.continuum is not None else str(listed.found.degenerate))
     found = _searched(setting, measured.question, goal, pose, kind, why)
     return found if moving or not any(mode.proved for mode in listed.modes) else replace(listed, motions=found.motions)
+
+
+def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfiguration:
+    """The robot assembled at one of its modes, its coordinates counted from the zero configuration; raises
+    ``BadRequest``, ``PoseNotReached``."""
+    assert listed is not None
+    name, count = listed.setting.robot.name, len(listed.modes)
+    if not 1 <= asked.number <= count:
+        raise BadRequest(f"{name}: a mode at {listed.pose}", str(asked),
+                         f"mode:1 to mode:{count}" if count else "no mode" if listed.found.continuum is None else
+                         "poses that are no continuum")
+    mode = listed.modes[asked.number - 1]
+    at = listed.goal if mode.goal else mode.configuration
+    if at is None:
+        raise PoseNotReached(name, f"{asked} ({mode.pose})", 0.0, str(listed.pose), reason="the robot was not found "
+                             f"assembled there without leg {', '.join(mode.open)}")
+    return at if at.twin is listed.goal.twin else of_links(listed.goal.twin, at.pose)
 
 
 def _moves(setting: ObservedRobot, question: Measurement, at: ClosedConfiguration) -> bool:

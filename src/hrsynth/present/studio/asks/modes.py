@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ....analysis.asked import at_mode
-from ....analysis.modes.modes import AssemblyMode, AssemblyModes, modes
+from ....analysis.modes.modes import AssemblyMode, AssemblyModes, at_mode, modes
 from ....errors import PoseNotReached
 from ....mechanism.pose import ModeNumber
 from ...text.poses import all_of, assembly
