@@ -16,6 +16,7 @@ from hrsynth.geometry.vectors import oriented
 from hrsynth.kinematics.pinocchio_model import PinocchioModel
 from hrsynth.mechanism.normal import normal_form
 from hrsynth.mechanism.pose import Pose
+from hrsynth.present.text.tables import table
 
 NUMBER = r"-?\d[\d.]*(?:e[-+]\d+)?"
 
@@ -141,3 +142,22 @@ def test_a_grid_says_what_it_held(printed, robot: str, grid: str, lines: list[st
     text = printed(f"check {robot} --grid {grid}")
     rows = [line.strip() for line in text[text.index("\ngrid "):].splitlines()[2:]]
     assert rows == lines
+
+
+@pytest.mark.parametrize("command", ["legs quattro", "legs example:panda", "advise example:panda",
+                                     "advise quattro --observe 1 --offer point:platform"])
+def test_tables_and_lists_are_not_wider_than_a_hundred_columns(printed, command: str):
+    """No word is lost, and vectors stay whole."""
+    text = printed(command)
+    lines = text[text.index("\n\n"):].splitlines()
+    assert max(map(len, lines)) <= 105
+    assert sum(len(line) > 100 for line in lines) <= 1  # the sentence with the smallest gap
+    assert not [line for line in lines if re.search(rf"\({NUMBER}( {NUMBER})?$", line)]
+
+
+def test_a_wrapped_column_keeps_its_words():
+    words = " ".join(f"word{i}" for i in range(60))
+    lines = table([("a", words), ("b", "")], ("one", "two")).splitlines()
+    assert max(map(len, lines)) <= 100
+    assert " ".join(line[5:] for line in lines[2:-1]) == words
+    assert [line[:1] for line in lines[2:]] == ["a", *" " * (len(lines) - 4), "b"]

@@ -83,7 +83,7 @@ def _posture(posture: Posture, length: float, setting: ObservedRobot) -> Rows:
     elif far.type2 is None:
         rows.append(("", NO_MATRIX))
     if posture.real is None:
-        rows.append(("real robot", "has no motors"))
+        rows.append(("real robot", "has no motors: --motors names them"))
     else:
         rows += _kinds("real robot", f"the motors determine {posture.real.rank} of {dof}", posture.real, "not held")
     if posture.constraint_singular:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from ...analysis.exact import ExactVerdict, power_above
 from ...errors import HrsynthError
 from ...tolerances import RANK_CUTOFF, RANK_GAP, SAME_RELATION, SURELY_SOMETHING
-from .tables import Rows, camera, head, known, listing, sets, table, watched
+from .tables import LINE, Rows, camera, head, known, listing, sets, table, watched, wrapped
 
 if TYPE_CHECKING:
     from ...analysis.advice import Advice, FurtherMeasurement
@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
 NO_MATRIX = "there is no interaction matrix: observed links move while the platform rests"
 _KINDS = {"leg": "leg (direction of its default segment)", "direction": "direction of another link",
-          "line": "position of an observed line", "encoder": "encoder on a joint"}
+          "line": "position of an observed line", "encoder": "encoder on a joint", "offered": "--see"}
 _SHOWN = 6
 """Sets of measurements listed at most."""
 
@@ -153,9 +153,10 @@ def legs(found: Legs) -> str:
     if found.setting.mechanism.formation:
         lost = f"not seen (at {found.where})"
     lines = [f"{found.robot}   {found.architecture}   {found.dof} dof", "",
-             f"smallest sets of the best rank: {found.smallest}", "",
+             *wrapped(f"smallest sets of the best rank: {found.smallest}", more="  "), "",
              table(rows, ("legs", "verdict", "rank", "exact", lost)), "",
-             *(f"leg {leg}: {', '.join(seen)}" for leg, seen in watched(found.setting).items())]
+             *(line for leg, seen in watched(found.setting).items()
+               for line in wrapped(f"leg {leg}: {', '.join(seen)}", more="  "))]
     lines += [f"not decided in exact arithmetic: {reason}"
               for reason in dict.fromkeys(each.reason for each in found.exact if not each.exact)]
     chance = max(each.chance for each in found.exact)
@@ -218,7 +219,8 @@ def _missing(found: Advice) -> list[str]:
     ways = "one way" if len(found.sets) == 1 else f"{len(found.sets)} ways"
     lines = [f"{best.verdict.capitalize()} (rank {best.rank} of {best.dof}) with {what}, {ways}, smallest rank gap "
              f"{gap:.1e} (needed {RANK_GAP:.0e}):",
-             *(f"  {line}" for group in groups.items() for line in _ways(*group))]
+             *(f"  {line}" for group in groups.items() for way in _ways(*group)
+               for line in wrapped(way, LINE - 2, more="    "))]
     starred = any(m.actuated for each in found.sets for m in each.measurements)
     return [*lines, *(["* a joint with a motor"] if starred else []), *limits]
 

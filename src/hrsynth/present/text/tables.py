@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+import textwrap
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -16,6 +18,8 @@ Rows = list[tuple[str, str | Sequence[str]]]
 NOT_BOUNDED = "not bounded to first order"
 GAP: Rows = [("", "")]
 """An empty line."""
+LINE, LEAST = 100, 30
+"""Columns of a table, and of its last column at least: beyond, that one is wrapped."""
 
 
 def width(text: str) -> int:
@@ -24,15 +28,27 @@ def width(text: str) -> int:
 
 
 def table(rows: Sequence[Sequence[str]], heads: Sequence[str]) -> str:
-    """Columns set apart by two spaces, a rule under the heads; the last column is not padded."""
-    everything = [list(heads), *map(list, rows)]
+    """Columns set apart by two spaces, a rule under the heads; the last column is not padded, and wrapped where the
+    lines would be too long."""
+    before = sum(max(width(row[i]) for row in (heads, *rows)) + 2 for i in range(len(heads) - 1))
+    everything = [list(heads)]
+    for *cells, last in rows:
+        first, *more = wrapped(last, max(LINE - before, LEAST))
+        everything += [[*cells, first], *([*[""] * len(cells), line] for line in more)]
     columns = [max(width(row[i]) for row in everything) for i in range(len(heads))]
 
     def line(row: Sequence[str]) -> str:
         cells = [cell + " " * (columns[i] - width(cell)) for i, cell in enumerate(row)]
         return "  ".join(cells).rstrip()
 
-    return "\n".join([line(heads), "  ".join("-" * size for size in columns), *map(line, rows)])
+    return "\n".join([line(heads), "  ".join("-" * size for size in columns), *map(line, everything[1:])])
+
+
+def wrapped(text: str, columns: int = LINE, more: str = "") -> list[str]:
+    """The lines of a text, no word, vector or set of it parted; further ones begin with ``more``."""
+    whole = re.sub(r"\([-+.e\d ]+\)|\{[^}]*\}", lambda found: found[0].replace(" ", "\u00a0"), text)
+    lines = textwrap.wrap(whole, columns, subsequent_indent=more, break_long_words=False, break_on_hyphens=False)
+    return [line.replace("\u00a0", " ") for line in lines] or [""]
 
 
 def listing(rows: Iterable[tuple[str, str | Sequence[str]]]) -> str:
