@@ -163,6 +163,18 @@ def test_what_is_refused() -> None:
         export(b.build(platform="bob"))
 
 
+def test_what_is_watched_is_refused_before_the_proof(monkeypatch: pytest.MonkeyPatch) -> None:
+    from hrsynth.description.sights import parse_see, with_sights
+
+    monkeypatch.setattr("hrsynth.codegen.export.branch", lambda *_: pytest.fail("the proof has begun"))
+    robot = four_bar()
+    for wrong, match in (({"observe": "nine"}, "no leg or link"), ({"camera": "eye=base"}, "nothing is seen by")):
+        with pytest.raises(BadRequest, match=match):
+            export(robot, **wrong)
+    with pytest.raises(BadRequest, match="directions of segments only, found 'point point_1'"):
+        export(with_sights(robot, [parse_see(f"point:{robot.platform}@0,0,0.1", [])]))
+
+
 SMALL = {"3rrr_m1": 0.02, "3prr_m1": 0.02, "rrrrr_m2": 0.05, "prrrp_m1": 0.05, "3rps": 0.01, "3rpr_m1": 0.02}
 """Shipped robots, with boxes whose proof is quick."""
 

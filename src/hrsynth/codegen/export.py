@@ -78,11 +78,11 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
     if lang not in TEMPLATES:
         raise BadRequest("language", lang, tuple(TEMPLATES))
     given = as_robot(robot)
+    watched = _watched(given, observe, camera)
     proof = branch(given, box) if box is not None else branch(given)
     if not proof.parts:
         raise BadRequest(f"{proof.robot.name}: loops that its motors move", 0, "one or more")
     tell("code")
-    watched = _watched(given, observe, camera)
     branch_ = TubedBranch.of(proof)
     source = Source.of(branch_, watched, closed_inverse(given, proof, branch_))
     code = program(source, lang, _told(proof, source, lang, box))
@@ -90,13 +90,15 @@ def export(robot: RobotLike, lang: str = "c++", box: BoxLike | None = None, *, o
 
 
 def _watched(robot: Any, observe: LegsLike, camera: CameraLike) -> tuple[Direction, ...]:
-    """The watched directions that are seen from the base; by default none where a robot has no legs to watch."""
+    """The watched directions that are seen from the base; by default none where a robot has no legs to watch. Raises
+    ``BadRequest`` where something else is observed."""
     try:
-        observed = ObservedRobot.of(robot, observe, camera).by_segments("export")
+        observed = ObservedRobot.of(robot, observe, camera)
     except HrsynthError:
         if observe is not None or camera is not None:
             raise
         return ()
+    observed.by_segments("export")
     links, reference = observed.robot.links, observed.normal.mechanism.reference
     if reference != observed.robot.base:
         if camera is not None:
