@@ -101,6 +101,11 @@ def test_a_depth_that_is_only_supposed_bends_the_way_and_may_make_the_goal_repel
         assert repels or growth < -0.9
 
 
+def test_a_depth_that_nothing_needs_is_refused() -> None:
+    with pytest.raises(BadRequest, match=r"--depth: .* found 'desired', allowed: none, or --see"):
+        hrsynth.servo("delta", start="x=0", goal="x=0.05", depth="desired")
+
+
 def test_supposed_depths_make_other_rows_of_what_images_show_alone() -> None:
     robot = hrsynth.observe("gough_stewart", camera=EYE, see=[*POINTS, "distance:platform@0.1,0,0"])
     question, at = robot.samples.question, robot.everything.start

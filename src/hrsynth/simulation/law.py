@@ -145,6 +145,9 @@ def supposed_planes(text: str, goal: ClosedConfiguration, question: Measurement)
         if isinstance(seen, CameraObservation):
             plane = seen.plane_at(goal.pose(seen.seen_from or question.reference), goal.pose(seen.link))
         found.append(plane if plane is None or depth is None else depth_plane(np.array([depth])))
+    if not any(plane is not None for plane in found):
+        raise BadRequest("--depth: the depth of nothing matters that is observed", text,
+                         "none, or --see of what is seen in an image: point, image_line, edge …")
     return tuple(found)
 
 
