@@ -348,13 +348,39 @@ def test_advise_json_where_nothing_is_missing(run):
     (["gough_stewart", "--observe", "1"], [r"with 2 more measurements, 10 ways",
                                            r"^  leg .*: any 2 of 2, 3, 4, 5, 6$"]),
     (["3prp"], [r"^  position of an observed line and encoder on a joint:$", r"^    \{dist_1, guide_2\*\}  .* more "]),
-    (["3puu", "--observe", "1", "--camera", "platform"], [r"encoder .*\w \(first\)"]),
+    (["3puu", "--observe", "1", "--camera", "platform"], [r"encoder .*\w \(first axis\)"]),
 ])
 def test_advise_text_groups_the_cures(run, arguments: list[str], lines: list[str]):
     answer = run("advise", *arguments)
     assert (answer.status, answer.err) == (0, "")
     for line in lines:
         assert re.search(line, answer.out, re.MULTILINE), answer.out
+
+
+def test_advise_tries_what_is_offered(run):
+    """Three rays that do not meet in a point hold a body; with one image point two more are needed, of any offered."""
+    words = ["gough_stewart", "--camera", "eye=base@0.3,0.1,0", "--see", "point:platform@0.1,0,0"]
+    data = run("advise", *words, "--offer", "point:platform", "--json").data
+    check_record(data, "advise", "gough_stewart")
+    offered = {m["of"] for each in data["sets"] for m in each["measurements"] if m["kind"] == "offered"}
+    assert len(offered) == 4
+    pairs = [each for each in data["sets"] if {m["kind"] for m in each["measurements"]} == {"offered"}]
+    assert len(pairs) == 6
+    chosen = [text for m in pairs[0]["measurements"] for text in ("--see", m["of"])]
+    assert run("derive", *words, *chosen, "--json").data["verdict"] == "controllable"
+    assert run("advise", *words, "--offer", "point:platform@0,0.1,0", "--json").data["sets"]
+    assert "--offer encoder:base: an encoder" in run("advise", "delta", "--offer", "encoder:base").refused()[0]
+    assert "--offer point:moon@" in run("advise", "delta", "--offer", "point:moon").refused()[0]
+
+
+def test_advise_names_the_joints_of_the_file(run):
+    """Two R that meet count as a U; an encoder is on one of the two, which `--see encoder:NAME` reads as well."""
+    data = run("advise", "example:panda", "--camera", "hand=panda_hand", "--see", "point:world@0.5,0.1,0",
+               "--json").data
+    joints = {m["of"] for each in data["sets"] for m in each["measurements"] if m["kind"] == "encoder"}
+    assert joints <= {f"panda_joint{number}" for number in range(1, 8)}
+    assert "panda_joint6" in joints
+    assert all(m["axis"] is None for each in data["sets"] for m in each["measurements"] if m["kind"] == "encoder")
 
 
 @pytest.mark.parametrize(("arguments", "words"), [

@@ -54,7 +54,7 @@ def seeing_all(robot: str, rng: np.random.Generator) -> Mechanism:
         for name, vector in (("at", rng.normal(size=3)), ("axis", random_direction(rng))):
             if name in kind.needs:
                 text += ("@" if name == "at" else "/") + ",".join(map(repr, vector.tolist()))
-        specs.append(parse_see(text + "/-0.02" * ("radius" in kind.needs), []))
+        specs.append(parse_see(text + f"/{'-' * (word == 'edge')}0.02" * ("radius" in kind.needs), []))
     seen = replace(specs[0], camera="the hand", link=mechanism.base, leg="seen by the hand")
     return with_sights(mechanism, [*specs, seen], cameras)
 
@@ -107,6 +107,7 @@ WRONG = [
     ('<observe kind="point" camera="eye" link="base" at="0 0 0"/>', "seen from the same link, found base"),
     ('<observe kind="line" link="object" at="0 0 0" axis="0 0 0"/>', "axis, found 0 0 0, allowed: a non-zero vector"),
     ('<observe kind="edge" link="object" at="0 0 0" axis="0 0 1" radius="0"/>', "radius .m., found 0.0"),
+    ('<observe kind="edges" link="object" at="0 0 0" axis="0 0 1" radius="-1"/>', "found -1.0, allowed: more than 0"),
     ('<observe kind="inclination" link="base"/>', "of the base itself, found base"),
     ('<observe kind="encoder" joint="gear"/>', "unknown joint, found gear, allowed: free"),
     ('<observe kind="encoder" joint="free"/>', "the joint 'free', found free, allowed: one with one axis"),
@@ -133,6 +134,15 @@ ASKED_WRONG = [
     (["--see", "point:platform"], "where on the link"),
     (["--see", "point:platform@1,2"], "observe point: at, found '1 2', allowed: 3 numbers"),
     (["--see", "point:thing@1,2,3"], "unknown link, found 'thing', allowed: base"),
+    (["--see", "=point:platform@1,2,3"], "--see =point:platform@1,2,3: the camera's name, found ''"),
+    (["--see", "point:platform@1,2,3,"], "an empty number, found '1,2,3,'"),
+    (["--see", "line:platform@1,2,3/0,0,0"], "--see line:platform@1,2,3/0,0,0: observe line: axis, found '0 0 0'"),
+    (["--see", "direction:platform/0,0,0"], "--see direction:platform/0,0,0: observe direction: axis, found '0 0 0'"),
+    (["--see", "image_circle:platform@1,2,3/0,0,1/-1"], "radius (m), found -1.0, allowed: more than 0"),
+    (["--camera", "eye=base@0,0,0,"], "--camera eye=base@0,0,0,: an empty number"),
+    (["--camera", "eye=base@0,0,0"], "--camera eye=base: nothing is seen by this camera, allowed: --see eye="),
+    (["--camera", "eye=base", "--camera", "far=base", "--see", "eye=point:platform@1,2,3"],
+     "--camera far=base: nothing is seen"),
     (["--see", "line:platform@1,2,3"], "without the attribute, found 'axis'"),
     (["--see", "point:platform@1,2,3/0,0,1"], "more than the kind needs, found '0,0,1', allowed: at"),
     (["--see", "ear=point:platform@1,2,3"], "unknown camera, found 'ear', allowed: none is named"),

@@ -10,17 +10,18 @@ from typing import Any
 
 import numpy as np
 
+from ..description.sights import offers
 from ..errors import HrsynthError, RankUndecided
+from ..geometry import lines
 from ..geometry.ranks import kernel_basis, largest_angle, range_basis, singular_values
 from ..geometry.vectors import Array
 from ..kinematics.sampling import Samples
-from ..mechanism import Direction, JointType, Observation
-from ..mechanism.legs import LegDecomposition
+from ..mechanism import Direction, Joint, JointType, Mechanism, Observation
 from ..mechanism.sensors import encoders, observation_of, observed_line
 from ..progress import tell
 from ..results import Result, Value
 from ..tolerances import RANK_CUTOFF, SAME_RELATION
-from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, restricted
+from .observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike, as_robot, as_texts, restricted
 from .question import question
 from .verdict import CONTROLLABLE, Verdict, verdict_of
 
@@ -33,8 +34,9 @@ class FurtherMeasurement(Value):
     """A measurement that could be added.
 
     ``kind`` is leg (its default segment), direction (of another link), line (the position of a line whose direction is
-    observed) or encoder; ``of`` names the leg, the link or the joint. An encoder says which coordinate of the joint it
-    reads where there are two, and whether a motor drives the joint.
+    observed), encoder or offered (by the user); ``of`` names the leg, the link or the joint, of what is offered the
+    words of ``--see``. An encoder says which coordinate of the joint it reads where there are two, and whether a motor
+    drives the joint.
     """
 
     kind: str
@@ -48,7 +50,8 @@ class FurtherMeasurement(Value):
     def name(self) -> str:
         """The name in words: a star marks a joint with a motor."""
         star = "*" if self.actuated else ""
-        return f"{self.of}{star}" + (f" ({self.axis})" if self.axis else "")
+        which = {"first": " (first axis)", "second": " (second axis)", None: ""}
+        return f"{self.of}{star}{which.get(self.axis, f' ({self.axis})')}"
 
     def to_dict(self) -> dict[str, Any]:
         """The record of the command line."""
@@ -58,9 +61,12 @@ class FurtherMeasurement(Value):
         return {**record, "link": self.observation.link}
 
 
-def candidates(setting: ObservedRobot) -> tuple[FurtherMeasurement, ...]:
-    """Everything that could be added: legs, directions of other links, positions of observed lines, encoders."""
-    return (*_legs(setting), *_directions(setting), *_lines(setting), *_encoders(setting.anatomy))
+def candidates(setting: ObservedRobot, offered: Sequence[str] = ()) -> tuple[FurtherMeasurement, ...]:
+    """Everything that could be added: legs, directions of other links, positions of observed lines, encoders, and what
+    is ``offered``, in the words of ``--see``."""
+    more = [FurtherMeasurement("offered", text, each, each.leg)
+            for text, each in zip(offered, setting.offered, strict=True)]
+    return (*_legs(setting), *_directions(setting), *_lines(setting), *_encoders(setting), *more)
 
 
 def _legs(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
@@ -89,15 +95,27 @@ def _lines(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
             yield FurtherMeasurement("line", seen.link, observed_line(setting.anatomy, seen), seen.leg)
 
 
-def _encoders(anatomy: LegDecomposition) -> Iterator[FurtherMeasurement]:
+def _encoders(setting: ObservedRobot) -> Iterator[FurtherMeasurement]:
     """Encoders on all joints of the normal form, those with motors first; joints between links of an articulated
     platform are of no leg."""
+    anatomy = setting.anatomy
     owner = {joint: leg.label for leg in anatomy.legs for joint in leg.joints}
     for joint in sorted(anatomy.mechanism.joints.values(), key=lambda joint: not joint.actuated):
         leg = owner.get(joint.name)
         for number, encoder in enumerate(encoders(anatomy.mechanism, joint, leg or "")):
             axis = AXES[joint.type][number] if joint.type in AXES else None
-            yield FurtherMeasurement("encoder", joint.name, encoder, leg, axis, joint.actuated)
+            if turned := _turned(setting, joint, number):
+                yield FurtherMeasurement("encoder", " and ".join(turned), encoder, leg, None, joint.actuated)
+            else:
+                yield FurtherMeasurement("encoder", joint.name, encoder, leg, axis, joint.actuated)
+
+
+def _turned(setting: ObservedRobot, joint: Joint, number: int) -> list[str]:
+    """The joints of the file of which a joint of the normal form is made, those about its axis of this number; none
+    where it is one of the file."""
+    axis = joint.axes[min(number, len(joint.axes) - 1)]
+    made = [setting.robot.joints[name] for name in setting.normal.made_of.get(joint.name, ())]
+    return [each.name for each in made if len(each.axes) == 1 and lines.parallel(each.axis, axis)]
 
 
 PROBES = 3
@@ -175,23 +193,27 @@ class Advice(Result, shown_as="advise"):
 
 @question()
 def advise(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-           most: int | None = None, seed: int = 0) -> Advice:
+           offer: SeeLike = None, most: int | None = None, seed: int = 0) -> Advice:
     """The smallest sets of further measurements with which u̇ = 0 forces t = 0 (theory.md 6; MMT 5.3).
 
     ``observe`` holds leg labels or link names (default: all legs), ``camera`` the link that carries the camera. Added
     can be the default segment of a further leg, the direction of any other link of a leg, the position of a line whose
-    direction is observed, and an encoder on any joint. Every set that is returned is verified at all samples; of the
-    smallest ones at most ``most`` are. Raises
-    ``BadRequest`` for unknown names, ``RankUndecided`` where what is seen now has no clear rank.
+    direction is observed, an encoder on any joint, and what is offered (``offer``: texts as of ``see``; one without its
+    place, ``point:plate``, is several places of that link). Every set that is returned is verified at all samples; of
+    the smallest ones at most ``most`` are. Raises ``BadRequest`` for unknown names, ``RankUndecided`` where what is
+    seen now has no clear rank.
 
     >>> hrsynth.advise("3rrr_m1", "1,2")
     <Advice: 3rrr_m1, watching 1, 2: partially controllable, 15 sets of 1 more>
     """
-    setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    robot = as_robot(robot)
+    length = (robot if isinstance(robot, Mechanism) else robot.robot).length
+    offered = [each for text in as_texts(offer) for each in offers(text, length)]
+    setting = ObservedRobot.of(robot, observe, camera, see=see, offer=offered or None, seed=seed)
     now = verdict_of(setting, setting.labels, setting.samples)
     if now.verdict == CONTROLLABLE:
         return Advice(setting, now, (), 0, True)
-    everything = candidates(setting)
+    everything = candidates(setting, offered)
     samples = setting.measuring((*setting.observed, *(each.observation for each in everything)))
     search = Search(samples, len(setting.observed), everything)
     chosen, complete = search.smallest()

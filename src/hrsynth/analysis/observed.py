@@ -14,7 +14,7 @@ import numpy as np
 
 from ..budgets import REMEMBERED
 from ..description import load
-from ..description.sights import CAMERA, SEE, parse_camera, parse_see, with_sights
+from ..description.sights import CAMERA, SEE, SightSpec, parse_camera, parse_see, with_sights
 from ..errors import BadMechanism, BadRequest, NoSegment, NotSampled
 from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
@@ -66,23 +66,25 @@ class ObservedRobot(Value):
     """How many of the observations of ``everything`` are default segments; they come first."""
     form: PoseForm = RADIANS
     """How poses are told."""
+    offered: tuple[Observation, ...] = ()
+    """What could be observed besides; among the observations of ``everything`` too."""
 
     @classmethod
     def of(cls, robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
-           samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
+           offer: SeeLike = None, samples: int = SAMPLES, seed: int = 0) -> ObservedRobot:
         """What a question is asked of: an observed robot itself, or a robot with what is watched of it, as
-        :func:`.asked.observe`."""
+        :func:`.asked.observe`, and in the manner of ``see`` what is ``offer``-ed besides."""
         robot = as_robot(robot)
         names = legs_asked(robot, observe, see)
         if isinstance(robot, ObservedRobot):
-            if (observe, camera, see) != (None, None, None):
-                raise BadRequest(f"{robot.headline()}: what is watched is asked twice", observe or camera or see,
-                                 "nothing besides an observed robot")
+            if (observe, camera, see, offer) != (None,) * 4:
+                raise BadRequest(f"{robot.headline()}: what is watched is asked twice",
+                                 observe or camera or see or offer, "nothing besides an observed robot")
             return robot
         tell("sampling")
         try:
-            return _observed_robot(robot, (robot.file, robot.notes), names, as_texts(camera), as_texts(see), samples,
-                                   seed)
+            return _observed_robot(robot, (robot.file, robot.notes), names, as_texts(camera), as_texts(see),
+                                   as_texts(offer), samples, seed)
         except (BadMechanism, NotSampled) as error:
             error.file = robot.file
             raise
@@ -292,29 +294,31 @@ def forget_robots() -> None:
 
 @lru_cache(maxsize=REMEMBERED)
 def _observed_robot(robot: Mechanism, source: Hashable, observe: tuple[str, ...] | None, cameras: tuple[str, ...],
-                    see: tuple[str, ...], samples: int, seed: int) -> ObservedRobot:
+                    see: tuple[str, ...], offer: tuple[str, ...], samples: int, seed: int) -> ObservedRobot:
     """The answer to the same words for the same value of a robot, of one ``source``, is the same value: it is drawn
     once."""
-    robot, asked = _seeing(robot, cameras, see)
+    robot, asked, possible = _seeing(robot, cameras, see, offer)
     normal = normal_form(robot)
     anatomy = decompose(normal.mechanism)
     defaults = defaults_of(anatomy)
-    given = tuple(o for o in anatomy.mechanism.observations if not (o.by_segment or o.leg in asked))
+    own = tuple(o for o in anatomy.mechanism.observations if o.leg not in asked | possible)
+    given = tuple(o for o in own if not o.by_segment)
     chosen = () if observe is None and asked else (
-        tuple(anatomy.mechanism.observations) if observe is None and given else
-        _observed(anatomy, normal, defaults, observe, given))
+        own if observe is None and given else _observed(anatomy, normal, defaults, observe, given))
     observed = (*chosen, *(o for o in anatomy.mechanism.observations if o.leg in asked))
+    offered = tuple(o for o in anatomy.mechanism.observations if o.leg in possible)
     known = {o.key for o in defaults.values()}
-    extra = tuple(o for o in observed if o.key not in known)
+    extra = tuple(o for o in (*observed, *offered) if o.key not in known)
     first, *others = normal.mechanism.bodies
     question = Measurement(first, None if others else anatomy.point, normal.mechanism.reference,
                            (*defaults.values(), *extra), others=tuple(others))
     drawn = sample(PinocchioModel(normal.mechanism), question, samples, seed, led_by=observed)
-    return ObservedRobot(robot, normal, anatomy, observed, drawn, len(defaults))
+    return ObservedRobot(robot, normal, anatomy, observed, drawn, len(defaults), offered=offered)
 
 
-def _seeing(robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...]) -> tuple[Mechanism, set[str]]:
-    """The robot with cameras and observations that are asked for, and the labels of these."""
+def _seeing(robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...], offer: tuple[str, ...]
+            ) -> tuple[Mechanism, set[str], set[str]]:
+    """The robot with cameras and observations that are asked for and offered, and the labels of these."""
     named = [parse_camera(text) for text in cameras if "=" in text]
     if named and not see:
         raise BadRequest(f"{robot.name}: a camera to which nothing is given to see", named[0].name,
@@ -323,10 +327,30 @@ def _seeing(robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...]) ->
         if link not in robot.links:
             raise BadRequest(f"{robot.name} has no link for the camera", link, sorted(robot.links))
         robot = replace(robot, camera=link)
-    before = {o.leg for o in robot.observations}
     eyes = [each.name for each in named or robot.cameras]
-    robot = with_sights(robot, [parse_see(text, eyes) for text in see], named)
-    return robot, {o.leg for o in robot.observations} - before
+    every = [("--see", text) for text in see] + [("--offer", text) for text in offer]
+    specs = [_spec(option, text, eyes) for option, text in every]
+    for camera in named:
+        if camera.name not in {each.camera for each in specs}:
+            raise BadRequest(f"--camera {camera.name}={camera.link}: nothing is seen by this camera", None,
+                             f"--see {camera.name}=KIND:LINK… with it, where a command has that option; --camera LINK "
+                             "for the camera that watches legs")
+    robot = with_sights(robot, (), named)
+    labels: list[set[str]] = [{o.leg for o in robot.observations}]
+    for (option, text), spec in zip(every, specs, strict=True):
+        try:
+            robot = with_sights(robot, [spec])
+        except BadRequest as error:
+            raise BadRequest(f"{option} {text}: {error.what}", error.value, error.allowed) from None
+        labels.append({o.leg for o in robot.observations}.difference(*labels))
+    return robot, set().union(*labels[1 : len(see) + 1]), set().union(*labels[len(see) + 1 :])
+
+
+def _spec(option: str, text: str, eyes: Sequence[str]) -> SightSpec:
+    try:
+        return parse_see(text, eyes)
+    except BadRequest as error:
+        raise BadRequest(error.what.replace("--see", option, 1), error.value, error.allowed) from None
 
 
 def _observed(anatomy: LegDecomposition, normal: NormalForm, defaults: dict[str, Observation],
@@ -370,7 +394,7 @@ def motors(setting: ObservedRobot) -> Measurement:
     of = {name: leg.label for leg in anatomy.legs for name in leg.joints}
     driven = [joint for joint in mechanism.joints.values() if joint.actuated]
     if not driven:
-        raise BadRequest(f"{mechanism.name} has no motor", None, "a transmission on a joint")
+        raise BadRequest(f"{mechanism.name} has no motor", None, "one or more: --motors names them")
     found = tuple(each for joint in driven for each in encoders(mechanism, joint, of.get(joint.name, "")))
     return replace(setting.everything.question, observations=found)
 

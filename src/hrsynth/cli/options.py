@@ -117,6 +117,9 @@ SEE = Option("see", "What else is observed: circle, depth, direction, distance, 
              "image_line, inclination, line, point or position, with a point, an axis and a radius where the kind "
              "needs them (world: the base; of an encoder the joint); again for more.",
              "[CAMERA=]KIND:LINK@x,y,z/dx,dy,dz/radius", list[str], group=WATCHING)
+OFFER = Option("offer", "What could be seen besides, in the words of --see; without a place, as point:plate, several "
+               "places of that link; again for more.", "[CAMERA=]KIND:LINK[@x,y,z/dx,dy,dz/radius]", list[str],
+               group=WATCHING)
 SEED = Option("seed", "Seed of the random configurations.", "NUMBER", int, 0, low=0)
 SOURCE = (
     Option("robot", "A robot file in any dialect, a shipped robot's name, or example:NAME.", "ROBOT", default=NEEDED,

@@ -15,6 +15,7 @@ from .commands import Group, add_command
 from .options import (
     JSON,
     NEEDED,
+    OFFER,
     OUTPUT,
     SEE,
     SEED,
@@ -156,6 +157,9 @@ def _goal(help: str) -> Option:
     return Option("goal", help, "POSE", default=NEEDED, old=("--to",))
 
 
+POINTS = ("--camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 --see point:platform@-0.1,0.1,0 "
+          "--see point:platform@0,0.1,0.1")
+"""Three image points by a camera beside the robot: an example."""
 FIGURE = (
     Option("width", "Width of a figure, as 88mm or 3.5in: it is laid out for that, with text of 8pt.", "LENGTH",
            group=OUTPUT),
@@ -180,16 +184,18 @@ QUESTIONS = (
                      words=("simplified", "general")),
               _file("derive"), _file("derive", "report"), _file("derive", "certificate")),
              ("quattro --observe 1,4", "quattro --observe 1,4 -o hidden.urdf --report quattro.html",
-              "robot.urdf --platform plate --motors hip_1,hip_2,hip_3")),
+              "robot.urdf --platform plate --motors hip_1,hip_2,hip_3", f"gough_stewart {POINTS}")),
     Question("legs", "Every set of observed legs: its verdict, the freedoms it loses, and the smallest sets that see "
              "most.",
-             (*WATCHED, SEE, BEGIN), ("quattro", "quattro --observe arm_1,arm_2,rod_3a", "quattro --camera platform")),
+             (*WATCHED, SEE, BEGIN), ("quattro", "quattro --observe arm_1,arm_2,rod_3a", "quattro --camera platform",
+                                      "delta --observe 1,2 --see inclination:rod_1a")),
     Question("check", "Mobility, ranks, singularities and redundant constraints at poses, and over a grid of poses.",
              (*WATCHED, SEE, Option("at", f"A pose, such as x=0.02,y=0.1,z=-0.7,phi=10deg; {POSES}", "POSE", list[str]),
               Option("grid", "A line, plane or box of poses, such as x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 "
                      "(from:to:count).", "GRID"),
               _file("check")),
-             ("quattro --at x=0.02,phi=30deg", "quattro --grid x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 -o map.png"),
+             ("quattro --at x=0.02,phi=30deg", "quattro --grid x=-0.3:0.3:21,y=-0.3:0.3:21,z=-0.7 -o map.png",
+              f"gough_stewart {POINTS} --at x=0.02"),
              after=_decided),
     Question("singular", "Where a freedom of the platform is lost: the Type 2 condition in words, as an expression and "
              "drawn.",
@@ -198,26 +204,29 @@ QUESTIONS = (
               Option("points", "Random poses at which the condition is checked.", None, int, 10_000, low=1,
                      high=10_000_000),
               Option("steps", "Poses along each side of the plane.", None, int, 51, low=5, high=300)),
-             ("quattro --observe 1,4", "quattro --observe 1,4 --plane z=-0.7,phi=0 -o locus.png")),
+             ("quattro --observe 1,4", "quattro --observe 1,4 --plane z=-0.7,phi=0 -o locus.png",
+              f"gough_stewart {POINTS}")),
     Question("advise", "What is missing: the smallest sets of further measurements that make a robot controllable.",
-             (*WATCHED, SEE), ("uranesx", "quattro --observe 1")),
+             (*WATCHED, SEE, OFFER), ("uranesx", "quattro --observe 1", "quattro --observe 1 --offer point:platform",
+                                      "gough_stewart --camera eye=base@0.3,0.1,0 --see point:platform@0.1,0,0 "
+                                      "--offer point:platform")),
     Question("branch", "Where the joints are proved to be one function of the motors, on the branch of the zero "
              "configuration, and what ends that.",
              (BOX,
               Option("effort", "Cells that are tried at most, for each part of the loops.", "COUNT", int, BRANCH_CELLS,
                      low=1)),
              ("rrrrr_m1 --box shoulder_1=-0.2:0.2,shoulder_2=-0.2:0.2",), seeded=False),
-    Question("modes", "All assembly modes: every pose of the platform with the same directions.",
-             (Option("at", "Pose whose directions are held, as x=0.02,y=0.1,z=-0.7 (default: the zero "
-                     "configuration's).", "POSE"),
+    Question("modes", "All assembly modes: every pose of the platform with the same measurements.",
+             (Option("at", "Pose whose measurements are held, as x=0.02,y=0.1,z=-0.7, or mode:2 of the list without it "
+                     "(default: the zero configuration's).", "POSE"),
               *WATCHED, SEE, flag("real", "The real robot with its own motors held instead."),
               Option("effort", "Seconds of one core that a list may need, by its size; what needs more is left out "
                      "and told.", "SECONDS", float, EFFORT, low=0),
               _file("modes"), _file("modes", "certificate")),
              ("quattro --observe 1,3 --at x=0.05,y=0.1,z=-0.7", "3rrr_m1 --real -o modes.png",
-              "quattro --observe 1,4 --certificate c.json")),
-    Question("atlas", "Which modes with the same directions can be led to each other without Type 2 singularity, mode "
-             "by mode.",
+              "quattro --observe 1,4 --certificate c.json", f"gough_stewart {POINTS}")),
+    Question("atlas", "Which modes with the same directions can be reached from each other without a Type 2 "
+             "singularity, mode by mode.",
              (Option("at", "Pose whose directions are held, as x=0.02,y=0.1,z=-0.7 (default: the zero "
                      "configuration's).", "POSE"), *WATCHED, SEE, _file("atlas")),
              ("quattro --observe 1,4", "3rrr_m1 --observe 2,1,3 -o atlas.png")),
@@ -242,7 +251,8 @@ QUESTIONS = (
                      default="exact", words=("exact", "edges", "pictures")),
               _file("servo")),
              ("quattro --observe 1,4 --start x=0.1 --goal x=-0.05 -o run.png",
-              "delta --start x=0 --goal x=0.05 --noise 0.1deg --json")),
+              "delta --start x=0 --goal x=0.05 --noise 0.1deg --json",
+              f"gough_stewart {POINTS} --start x=0.02 --goal x=0")),
     Question("endings", "All poses at which the loop can rest, and which of them attract: the goal, modes, antipodal "
              "poses, critical poses of the error.",
              (Option("at", "The goal: pose whose measurements are desired, as x=0.02,y=0.1,z=-0.7; or mode:2.", "POSE",
@@ -303,7 +313,8 @@ QUESTIONS = (
               _file("view", "static"),
               PORT,
               Option("open_", "Open the page in the browser.", None, bool, True, ("--open/--no-open",))),
-             ("quattro --observe 1,4 --hidden", "quattro --observe 1,4 --static quattro.html"),
+             ("quattro --observe 1,4 --hidden", "quattro --observe 1,4 --static quattro.html",
+              f"gough_stewart {POINTS} --static points.html"),
              shows=_served, needs=_servable),
 )
 """The commands in the order of the help."""

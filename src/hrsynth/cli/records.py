@@ -456,8 +456,8 @@ class Singular(OfRobot, WrittenTo):
 class FurtherRecord(TypedDict):
     """A measurement that could be added; an encoder has `axis` and `actuated`, others have `link`."""
 
-    kind: Literal["leg", "direction", "line", "encoder"]
-    of: str
+    kind: Literal["leg", "direction", "line", "encoder", "offered"]
+    of: Annotated[str, "the leg, the link, the joint, or the words of --see"]
     leg: str
     link: NotRequired[str]
     axis: NotRequired[Any]

@@ -28,6 +28,10 @@ from . import numerals
 
 SEE = "[CAMERA=]KIND:LINK[@x,y,z][/dx,dy,dz][/radius]"
 CAMERA = "NAME=LINK[@x,y,z[/roll,pitch,yaw[/focal[,width,height]]]]"
+OFFERED = (((0.5, 0.1, 0.2), (0.0, 0.0, 1.0)), ((-0.3, 0.4, 0.1), (1.0, 0.0, 0.0)),
+           ((-0.1, -0.5, 0.3), (0.0, 1.0, 0.0)), ((0.2, 0.3, -0.4), (0.6, 0.0, 0.8)))
+"""Points of a link (characteristic lengths) and axes, no three points on one line and not four in one plane, that are
+offered where none are given."""
 WORLD = "world"
 """What the base is called besides its own name."""
 
@@ -65,6 +69,8 @@ def spec_of(attributes: Mapping[str, str], line: int | None = None) -> SightSpec
     for name in (own, *needs):
         if not name.endswith("?") and name not in attributes:
             raise BadRequest(f"observe {kind} without the attribute", name)
+    if "axis" in numbers and not any(numbers["axis"]):
+        raise BadRequest(f"observe {kind}: axis", attributes["axis"], "a non-zero vector")
     radius = numbers["radius"][0] if "radius" in numbers else None
     return SightSpec(kind, attributes[own], attributes.get("leg"), attributes.get("camera"), numbers.get("at"),
                      numbers.get("axis"), radius, line)
@@ -102,9 +108,9 @@ def _eye(mechanism: Mechanism, seen: Observation) -> str | None:
 def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
     """What a word of ``--see`` says; without a name, of the one camera in ``cameras`` where there is one."""
     head, given, place = text.partition(":")
-    camera, _, kind = head.rpartition("=")
-    if not given:
-        raise BadRequest("--see", text, SEE)
+    camera, named, kind = head.rpartition("=")
+    if not given or (named and not camera.strip()):
+        raise BadRequest(*(("--see", text) if not given else (f"--see {text}: the camera's name", camera)), SEE)
     needs = _needs(kind)
     # names of links and joints may have slashes: numbers follow the last @, or have commas
     if "at" in needs:
@@ -117,10 +123,10 @@ def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
     if "at" in needs:
         if not link:
             raise BadRequest(f"--see {text}: where on the link", at, SEE)
-        attributes["at"] = at.replace(",", " ")
+        attributes["at"] = _numbers(at, f"--see {text}")
     for name in ("axis", "radius"):
         if more and (name in needs or f"{name}?" in needs):
-            attributes[name] = more.pop(0).replace(",", " ")
+            attributes[name] = _numbers(more.pop(0), f"--see {text}")
     if more:
         raise BadRequest(f"--see {text}: more than the kind needs", "/".join(more), ", ".join(needs) or "nothing more")
     by_camera = issubclass(kinds()[kind], CameraObservation)
@@ -134,6 +140,31 @@ def parse_see(text: str, cameras: Sequence[str]) -> SightSpec:
     return found
 
 
+def offers(text: str, length: float) -> list[str]:
+    """The words of ``--see`` that are offered by one of ``--offer``: itself, or where it names a link and no place on
+    it, several places, for a characteristic ``length`` (m); raises ``BadRequest``."""
+    head, _, place = text.partition(":")
+    kind = head.rpartition("=")[2]
+    needs = kinds()[kind].needs if kind in kinds() else ()
+    if "joint" in needs:
+        raise BadRequest(f"--offer {text}: an encoder", place, "another kind: encoders on all joints are tried anyway")
+    if "radius" in needs or ("at" if "at" in needs else "axis") not in needs or re.search("@|/[^/]*,[^/]*$", place):
+        return [text]
+    found = []
+    for at, axis in OFFERED:
+        numbers = ",".join(f"{length * value:.2g}" for value in at)
+        found.append(text + f"@{numbers}" * ("at" in needs)
+                     + "/{:g},{:g},{:g}".format(*axis) * ("axis" in needs))
+    return found
+
+
+def _numbers(part: str, option: str) -> str:
+    """Numbers with commas between them, as attributes have them; raises ``BadRequest`` where one is empty."""
+    if not all(each.strip() for each in part.split(",")):
+        raise BadRequest(f"{option}: an empty number", part, "numbers with commas between them")
+    return part.replace(",", " ")
+
+
 def parse_camera(text: str) -> NamedCamera:
     """The camera that ``NAME=LINK@x,y,z/r,p,y/FOCAL,WIDTH,HEIGHT`` says; angles in radians or with ``deg``, the rest of
     its picture in pixels."""
@@ -144,6 +175,8 @@ def parse_camera(text: str) -> NamedCamera:
         raise BadRequest("--camera", text, f"LINK or {CAMERA}")
     numbers: list[Array] = [np.zeros(3), np.zeros(3)]
     image: list[Any] = [None, None, None]
+    for part in parts:
+        _numbers(part, f"--camera {text}")
     for part in parts[2:]:
         found = part.split(",")
         try:
@@ -235,8 +268,9 @@ def resolved(mechanism: Mechanism, spec: SightSpec) -> tuple[Observation, ...]:
     if issubclass(kind, Direction):
         return (Direction(label, link, frozen(spec.axis or ()), line=spec.line, seen_from=seen_from),)
     assert issubclass(kind, CameraObservation)
-    if spec.radius is not None and not abs(spec.radius) > 0:
-        raise BadRequest(f"observe {spec}: radius (m)", spec.radius, "another number than 0")
+    if spec.radius is not None and not (abs(spec.radius) if kind.signed else spec.radius) > 0:
+        raise BadRequest(f"observe {spec}: radius (m)", spec.radius,
+                         "another number than 0" if kind.signed else "more than 0")
     axis = None if spec.axis is None else frozen(spec.axis)
     return (kind(label, link, at=frozen(spec.at or (0, 0, 0)), axis=axis, radius=spec.radius, camera=camera,
                  line=spec.line),)

@@ -11,7 +11,7 @@ A link between two merged joints disappears; the base, the platform, the camera'
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -28,23 +28,26 @@ from .wrist import Interval, Wrist, chained
 @dataclass(frozen=True, eq=False, repr=False)
 class NormalForm(Value):
     """The mechanism in normal form, and where its links went: ``into[old]`` is the link that took ``old`` in; how far
-    axes and centres were moved, all together, to make one joint of several (m)."""
+    axes and centres were moved, all together, to make one joint of several (m); of which joints each such one is made.
+    """
 
     mechanism: Mechanism
     into: dict[str, str]
     moved: float = 0.0
+    made_of: dict[str, tuple[str, ...]] = field(default_factory=dict)
 
 
 def normal_form(mechanism: Mechanism) -> NormalForm:
     """Merge until nothing merges; names, frames and order of what stays are kept."""
     into = {name: name for name in mechanism.links}
     current = _without_fixed(mechanism, into)
-    moved = 0.0
+    moved, made_of = 0.0, dict[str, tuple[str, ...]]()
     while (merge := _next_merge(current)) is not None:
         between, gone, joint = merge
         moved += sum(_moved(each, joint, mechanism.length) for each in gone)
+        made_of[_first(current, gone)] = tuple(name for each in gone for name in made_of.pop(each.name, (each.name,)))
         current = _replaced(current, between, gone, joint)
-    return NormalForm(current, into, moved)
+    return NormalForm(current, into, moved, made_of)
 
 
 def _moved(old: Joint, new: Joint, length: float) -> float:
@@ -210,10 +213,13 @@ def _chains_of_three(mechanism: Mechanism, free: set[str]) -> Iterator[tuple[Joi
                    after if after.predecessor == y else after.turned())
 
 
+def _first(mechanism: Mechanism, joints: list[Joint]) -> str:
+    return min((each.name for each in joints), key=list(mechanism.joints).index)
+
+
 def _replaced(mechanism: Mechanism, between: list[str], gone: list[Joint], joint: Joint) -> Mechanism:
     """``joint`` in the place (name and order) of the first of ``gone`` in the mechanism's order."""
-    first = min((j.name for j in gone), key=list(mechanism.joints).index)
-    joint = replace(joint, name=first, xml=())
+    joint = replace(joint, name=_first(mechanism, gone), xml=())
     order = list(mechanism.joints)
     changed = mechanism.changed(remove_links=between, remove_joints=[j.name for j in gone], joints=[joint])
     return replace(changed, joints={n: changed.joints[n] for n in sorted(changed.joints, key=order.index)})

@@ -189,6 +189,8 @@ class CameraObservation(Observation):
     """Whether its rates vanish for just those motions against which its wrenches do no work, wherever it has one."""
     along_z: ClassVar[bool] = False
     """Whether the camera's z axis matters."""
+    signed: ClassVar[bool] = False
+    """Whether the sign of the radius says which of two is meant."""
     spot: ClassVar[bool] = True
     """Whether B itself is in the image, and not any point of a line."""
 

@@ -72,6 +72,7 @@ class CylinderEdge(CameraObservation):
     fed_back = "ρ − ρ*, θ − θ*"
     found_by = frozenset({"px"})
     rational = False
+    signed = True
     spot = False
 
     @staticmethod
