@@ -140,7 +140,7 @@ ASKED_WRONG = [
     (["--see", "direction:platform/0,0,0"], "--see direction:platform/0,0,0: observe direction: axis, found '0 0 0'"),
     (["--see", "image_circle:platform@1,2,3/0,0,1/-1"], "radius (m), found -1.0, allowed: more than 0"),
     (["--camera", "eye=base@0,0,0,"], "--camera eye=base@0,0,0,: an empty number"),
-    (["--camera", "eye=base@0,0,0"], "--camera eye=base: nothing is seen by this camera, allowed: --see eye="),
+    (["--camera", "eye=base@0,0,0"], "a camera to which nothing is given to see, found 'eye', allowed: --see eye="),
     (["--camera", "eye=base", "--camera", "far=base", "--see", "eye=point:platform@1,2,3"],
      "--camera far=base: nothing is seen"),
     (["--see", "line:platform@1,2,3"], "without the attribute, found 'axis'"),
