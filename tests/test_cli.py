@@ -347,7 +347,8 @@ def test_advise_json_where_nothing_is_missing(run):
                    r"^  encoder on a joint: any of guide_1\*, guide_2\*, guide_3\*$", r"^\* a joint with a motor$"]),
     (["gough_stewart", "--observe", "1"], [r"with 2 more measurements, 10 ways",
                                            r"^  leg .*: any 2 of 2, 3, 4, 5, 6$"]),
-    (["3prp"], [r"^  position of an observed line and encoder on a joint:$", r"^    \{dist_1, guide_2\*\}  .* more "]),
+    (["3prp"], [r"^  position of an observed line and encoder on a joint:$",
+                r"^    \{dist_1, guide_2\*\}  [^:]* more "]),
     (["3puu", "--observe", "1", "--camera", "platform"], [r"encoder .*\w \(first axis\)"]),
 ])
 def test_advise_text_groups_the_cures(run, arguments: list[str], lines: list[str]):

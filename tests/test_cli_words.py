@@ -105,6 +105,7 @@ def test_printed_axes_have_that_sense(printed, name: str):
     if name != "gough_stewart":
         text += printed(f"accuracy {name} --cone 0.1deg") if "controllable" in printed(
             f"derive {name}").split("verdict")[1].split()[:1] else ""
+    text = re.sub(r"\s+", " ", text)
     text = re.sub(r"along \([^)]*\) of its frame", "", text)  # what a camera sees of a link has a sense of its own
     vectors = [tuple(map(float, found)) for found in re.findall(
         rf"along \(?({NUMBER}) ({NUMBER}) ({NUMBER})", text)]

@@ -125,6 +125,10 @@ FIRM = 3e-2
 NEWTON_REACH = 1e4
 """Length of a Newton step in a foreign file's loops, as a multiple of the residual that it removes, beyond which it
 follows rounded numbers."""
+COMMAND_STEP = 1e-7
+"""Step (characteristic lengths, radians) of differences of what a servo law commands."""
+COMMAND_CUTOFF = 1e-10
+"""Singular value, as part of the largest, below which such differences show no rate."""
 AT_ORIGIN = 1e-12
 """Distance (m) below which a joint's centre is the origin of the link that it carries, where a file is written."""
 WITHOUT_DIRECTION = 1e-9

@@ -142,7 +142,7 @@ ASKED_WRONG = [
     (["--camera", "eye=base@0,0,0,"], "--camera eye=base@0,0,0,: an empty number"),
     (["--camera", "eye=base@0,0,0"], "a camera to which nothing is given to see, found 'eye', allowed: --see eye="),
     (["--camera", "eye=base", "--camera", "far=base", "--see", "eye=point:platform@1,2,3"],
-     "--camera far=base: nothing is seen"),
+     "a camera to which nothing is given to see, found 'far', allowed: --see far="),
     (["--see", "line:platform@1,2,3"], "without the attribute, found 'axis'"),
     (["--see", "point:platform@1,2,3/0,0,1"], "more than the kind needs, found '0,0,1', allowed: at"),
     (["--see", "ear=point:platform@1,2,3"], "unknown camera, found 'ear', allowed: none is named"),
@@ -179,8 +179,9 @@ def test_commands_that_know_segments_only_say_so(command: str, tmp_path: Path, c
 @pytest.mark.parametrize("words", ["atlas", "path --start x=0 --goal x=0.01", "accuracy --noise 0.1deg,1mm", "derive",
                                    "select --start x=0 --goal x=0.01 --noise 0.1deg,1mm --runs 0"])
 def test_commands_read_what_a_file_observes(words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    sights = [parse_see(text, []) for text in ("point:platform@0,0,0.1", "distance:platform@0,0,0.1")]
-    save(with_sights(load("delta"), sights), tmp_path / "delta.urdf")
+    sights = [parse_see(text, ["eye"]) for text in ("point:platform@0,0,0.1", "distance:platform@0,0,0.1")]
+    below = parse_camera("eye=base@0,0,0/180deg,0,0")
+    save(with_sights(load("delta"), sights, [below]), tmp_path / "delta.urdf")
     command, *more = words.split()
     assert execute([command, str(tmp_path / "delta.urdf"), *more, "--json"]) == 0
     assert '"kind": "point"' in (told := capsys.readouterr().out) or command == "select"

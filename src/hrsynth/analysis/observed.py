@@ -320,9 +320,6 @@ def _seeing(robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...], of
             ) -> tuple[Mechanism, set[str], set[str]]:
     """The robot with cameras and observations that are asked for and offered, and the labels of these."""
     named = [parse_camera(text) for text in cameras if "=" in text]
-    if named and not see:
-        raise BadRequest(f"{robot.name}: a camera to which nothing is given to see", named[0].name,
-                         f"--see {named[0].name}=KIND:LINK…, or no camera")
     for link in [text for text in cameras if "=" not in text]:
         if link not in robot.links:
             raise BadRequest(f"{robot.name} has no link for the camera", link, sorted(robot.links))
@@ -330,9 +327,10 @@ def _seeing(robot: Mechanism, cameras: tuple[str, ...], see: tuple[str, ...], of
     eyes = [each.name for each in named or robot.cameras]
     every = [("--see", text) for text in see] + [("--offer", text) for text in offer]
     specs = [_spec(option, text, eyes) for option, text in every]
+    used = {each.camera for each in specs} & set(eyes)
     for camera in named:
-        if camera.name not in {each.camera for each in specs}:
-            raise BadRequest(f"--camera {camera.name}={camera.link}: nothing is seen by this camera", None,
+        if camera.name not in used and (used or not specs):  # an inclination or an encoder alone needs none
+            raise BadRequest(f"{robot.name}: a camera to which nothing is given to see", camera.name,
                              f"--see {camera.name}=KIND:LINK… with it, where a command has that option; --camera LINK "
                              "for the camera that watches legs")
     robot = with_sights(robot, (), named)

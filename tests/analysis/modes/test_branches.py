@@ -104,8 +104,8 @@ def check_driven(drive: str, seed: int, starts: int) -> None:
 
 
 def test_a_list_is_not_called_all_where_a_leg_is_not_understood():
-    """A coupler that is watched: its leg keeps the curve that its moves show, and the proof says why."""
-    robot = driven("four-bar", 2, watched="coupler")
+    """A coupler on balls that is watched: its leg keeps the curve that its moves show, and the proof says why."""
+    robot = driven("ball rod", 2, watched="coupler")
     found = modes(robot)
     assert not found.found.complete
     assert found.found.bound == "none"

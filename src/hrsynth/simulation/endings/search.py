@@ -40,7 +40,15 @@ from ...kinematics.relation import relation
 from ...mechanism.observations.direction import SeenAxis
 from ...progress import tell
 from ...results import Value
-from ...tolerances import CRITICAL, CRITICAL_FLAT, ERROR_ROUNDING, SAME_ENDING, SEEN_ABOVE
+from ...tolerances import (
+    COMMAND_CUTOFF,
+    COMMAND_STEP,
+    CRITICAL,
+    CRITICAL_FLAT,
+    ERROR_ROUNDING,
+    SAME_ENDING,
+    SEEN_ABOVE,
+)
 from ..law import Law
 from .carried import SweptChains
 from .error import RestEquations, RestSystem
@@ -51,10 +59,6 @@ WALK_STEP = 0.3
 """The same of a random step between starts."""
 WIDEST_SLIDE = 2.5
 """Coordinate of a slide (characteristic lengths) up to which one is drawn."""
-DIFFERENCE = 1e-7
-"""Step (characteristic lengths, radians) of differences of what the law commands."""
-FAINT = 1e-10
-"""Relative size of a singular value that is none."""
 NEARBY = 0.02
 """Step (characteristic lengths, radians) to a configuration that shows the operation mode in which a point lies."""
 
@@ -220,19 +224,19 @@ def settle(system: RestSystem, q: Array, index: NDArray[np.intp], idle: int) -> 
             lost = np.asarray(~np.isfinite(gram).all(axis=(-1, -2)) | ~np.isfinite(pull).all(axis=-1))
             pull, gram = np.where(lost[:, None], 0.0, pull), np.where(lost[:, None, None], 0.0, gram)
             mu, p, v, M = tangents.multipliers(pull), tangents.closing(at.G), _times(back, pull), back @ gram @ Z
-            there = (q[:, None] + DIFFERENCE * back).reshape(-1, q.shape[1])
+            there = (q[:, None] + COMMAND_STEP * back).reshape(-1, q.shape[1])
             turned = RestEquations(system, list(there.T)).commanded()[1].reshape(*back.shape) - pull[:, None]
-            A = back @ (np.swapaxes(np.nan_to_num(turned), -1, -2) / DIFFERENCE + at.bend(mu, error=False) @ Z)
+            A = back @ (np.swapaxes(np.nan_to_num(turned), -1, -2) / COMMAND_STEP + at.bend(mu, error=False) @ Z)
         residual = np.maximum(np.linalg.norm(at.G, axis=-1), np.linalg.norm(v, axis=-1))
         done = (residual < CRITICAL) & ~lost
-        inverse = np.linalg.pinv(M, rcond=FAINT, hermitian=True)
+        inverse = np.linalg.pinv(M, rcond=COMMAND_CUTOFF, hermitian=True)
         for k in np.flatnonzero(done):
             values = np.linalg.eigvals(inverse[k] @ A[k])
             kept = values[np.argsort(np.abs(values))[idle:]].real
             found.append(CriticalPoint(q[k], mu[k], float(residual[k]), np.sort(kept), float(E[k])))
         # steps of half a unit of time where the loop is fast, longer ones where it slows down
         slow = np.where(flows, 2 * np.minimum(1.0, np.linalg.norm(_times(inverse, v), axis=-1)), 0.0)
-        step = -_times(np.linalg.pinv(slow[:, None, None] * M + A, rcond=FAINT), v)
+        step = -_times(np.linalg.pinv(slow[:, None, None] * M + A, rcond=COMMAND_CUTOFF), v)
         q = q + _shortened(_times(Z, step), LONGEST_STEP) + _shortened(p, LONGEST_STEP)
         going = ~done & ~lost & np.isfinite(q).all(axis=-1) & (np.abs(q).max(axis=-1) < FARTHEST_ENDING)
         q, flows = q[going], flows[going]
