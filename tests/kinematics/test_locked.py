@@ -7,6 +7,8 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
+from analysis.modes.gears import five_bar
+from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.geometry.ranks import kernel_basis, range_basis
 from hrsynth.geometry.vectors import Array, hat, unit
 from hrsynth.kinematics.configuration import ClosedConfiguration
@@ -138,3 +140,13 @@ def test_wander(robot: str) -> None:
     again = [at.q for at in random_walk(samples.start, 30, seed=3)]
     assert all(np.array_equal(a.q, q) for a, q in zip(met, again, strict=True))
     assert not np.array_equal(met[0].q, next(random_walk(samples.start, 1, seed=4)).q)
+
+
+@pytest.mark.parametrize(("ratio", "seed"), [(2.0, 3), (-1.5, 1), (0.5, 2)])
+def test_gears_are_among_the_screws(ratio: float, seed: int) -> None:
+    """What is observed of a geared five-bar sees as much by the screws of all joints as by the engine's Jacobians."""
+    setting = ObservedRobot.of(five_bar(ratio, seed)[0])
+    for at in setting.configurations[:5]:
+        seen = by_pinocchio(at, setting.samples.question)
+        assert np.allclose(np.linalg.svd(interaction(at, setting.samples.question), compute_uv=False), seen, atol=1e-9)
+        assert seen[-1] > 1e-3

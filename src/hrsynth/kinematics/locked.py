@@ -17,7 +17,7 @@ import numpy as np
 from ..geometry.ranks import kernel_basis, range_basis
 from ..geometry.screws import point_velocity
 from ..geometry.vectors import Array, hat
-from ..mechanism import Joint, Mechanism, Observation
+from ..mechanism import Coupling, Joint, Mechanism, Observation
 from ..mechanism.legs import Leg
 from ..mechanism.screws import constraints
 from ..tolerances import INVERTED
@@ -33,6 +33,20 @@ class _Bodies:
         self.place = {link: i for i, link in enumerate(links)}
         pose = cache(at.pose)
         self.A = constraints(joints, self.place, lambda joint: joint_at(at, joint, pose))
+        gears = [each for each in at.twin.mechanism.couplings if {each.predecessor, each.successor} <= {*links}]
+        self.A = np.vstack([self.A, *(self._coupled(each, pose) for each in gears)])
+
+    def _coupled(self, coupling: Coupling, pose: Callable[[str], Array]) -> Array:
+        """A coupling's row: the successor's rate less ratio × the predecessor's (metres, radians)."""
+        row, mechanism = np.zeros((1, 6 * len(self.place))), self.at.twin.mechanism
+        for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
+            joint = mechanism.carrier(coupling, link)
+            (axis,), slides = joint_at(self.at, joint, pose)[1], joint.type.slides
+            part = np.r_[axis * self.at.twin.length, 0 * axis] if slides else np.r_[0 * axis, axis]
+            for end, sign in ((joint.successor, factor), (joint.predecessor, -factor)):
+                if end in self.place:
+                    row[0, 6 * self.place[end] : 6 * self.place[end] + 6] += sign * part
+        return row
 
     def pose(self, link: str) -> Array:
         """X_BL with the position in characteristic lengths."""

@@ -182,12 +182,9 @@ class PinocchioModel:
         rows = np.zeros((len(self.mechanism.couplings), self.model.nv))
         for row, coupling in zip(rows, self.mechanism.couplings, strict=True):
             for link, factor in ((coupling.successor, 1.0), (coupling.predecessor, -coupling.ratio)):
-                carriers = [j for j in self.mechanism.joints.values()
-                            if j.successor == link and j.in_tree and j.type.freedoms == 1]
-                if not carriers:
-                    raise BadMechanism(f"coupling {coupling.name!r}: no single joint carries the link", link)
-                unit = self.length if carriers[0].type is JointType.PRISMATIC else 1.0
-                row[self.coordinates[carriers[0].name][0]] += factor * unit
+                carrier = self.mechanism.carrier(coupling, link)
+                unit = self.length if carrier.type is JointType.PRISMATIC else 1.0
+                row[self.coordinates[carrier.name][0]] += factor * unit
         return rows
 
     def parts(self) -> list[tuple[Joint, str, tuple[str, ...]]]:

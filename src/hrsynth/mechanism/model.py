@@ -274,6 +274,13 @@ class Mechanism(Result, shown_as="robot"):
         """The links in order, each with those that a joint joins it to."""
         return adjacency(self.links, (joint.links for joint in self.joints.values()))
 
+    def carrier(self, coupling: Coupling, link: str) -> Joint:
+        """The joint whose coordinate a coupling means by a link; raises ``BadMechanism`` where there is none."""
+        for joint in self.joints.values():
+            if joint.successor == link and joint.in_tree and joint.type.freedoms == 1:
+                return joint
+        raise BadMechanism(f"coupling {coupling.name!r}: no single joint carries the link", link)
+
     @cached_property
     def limited(self) -> dict[str, tuple[float, float]]:
         """The joints whose coordinates are limited: lower and upper limit (m, rad), infinite where there is none."""
