@@ -49,7 +49,8 @@ def centres(leg: LegWord, end: int = 0) -> str | None:
 
 
 def planar_rank(word: RobotWord) -> int:
-    """What the legs of a planar robot see: the rank of their lines of centres; of a point, of the ways left to it."""
+    """What the legs of a planar robot see: the rank of their lines of centres; of a point, of the ways left to it.
+    Rails that are parallel are all along x."""
     point = word.platform == "point"
     found = Counter(centres(leg, 1 if point else 0) for leg in word.legs)
     if point:

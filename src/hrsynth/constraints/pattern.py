@@ -152,6 +152,9 @@ def _one_body(anatomy: LegDecomposition, every: tuple[LockedLeg, ...] | None, le
               motions: Array, samples: Sequence[ClosedConfiguration]) -> ConstraintPattern | None:
     """The pattern of one body: of the ``legs`` that are watched, or of ``every`` leg, None where one has none."""
     base, bodies = anatomy.mechanism.base, attached(anatomy)
+    own = [leg for leg in legs if not leg.virtual]
+    if len(own) < len(anatomy.legs) and motions.shape[2] < (2 if own else 3):  # the other legs hold as well
+        return None
     if _vanishes(motions[:, 3:]):
         return _translating(anatomy, legs, samples)
     if any(leg.turns == 0 for leg in legs):

@@ -88,8 +88,9 @@ def turns_of(found: Relation) -> tuple[int, int, int]:
     """The rank of the angular velocities of the platform (of a formation: of all bodies), and the least and the most
     that may be said to be: singular values above the cutoff, those that surely count, and all but those that surely do
     not."""
-    values = (np.zeros(0) if found.twist_rows == 3 else
-              singular_values(found.twists.reshape(-1, 6, found.dof.value)[:, 3:].reshape(1, -1, found.dof.value)))
+    freedoms = found.dof.value
+    values = (np.zeros(0) if found.twist_rows == 3 or not freedoms else
+              singular_values(found.twists.reshape(-1, 6, freedoms)[:, 3:].reshape(1, -1, freedoms)))
     rank, least, most = (int(np.sum(values > zero)) for zero in (RANK_CUTOFF, SURELY_SOMETHING, SURELY_ZERO))
     return rank, least, most
 

@@ -253,7 +253,7 @@ class PinocchioModel:
         """Poses (k, 4, 4) and velocities (k, 6, nv) of several links at once; after the first ``whole`` (default: all)
         the linear parts are those of the points at the base's origin."""
         X = self.poses(q, links)
-        V = self.data.J * self._several[links][2]
+        V = self.data.J.reshape(6, self.nv) * self._several[links][2]  # of one coordinate J is (6,)
         if whole != 0:
             first = V[:whole]
             x, y, z = (X[:whole, :3, 3] / self.length).T[:, :, None]

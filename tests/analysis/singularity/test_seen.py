@@ -7,12 +7,16 @@ from itertools import combinations
 import numpy as np
 import pytest
 
+from hrsynth.analysis.aspects.path import path
+from hrsynth.analysis.derive import derive
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.singularity.agreement import spectrum
 from hrsynth.analysis.singularity.singular import Singularity, singular
 from hrsynth.constraints.vector_algebra import evaluate
 from hrsynth.geometry.vectors import Array
 from hrsynth.kinematics.locked import interaction
+from hrsynth.mechanism import Mechanism
+from hrsynth.mechanism.builder import Builder
 
 EYE = "eye=base@0.3,0.1,0"
 POINTS = ["point:platform@0.1,0,0", "point:platform@-0.1,0.1,0", "point:platform@0,0.1,0.1",
@@ -124,3 +128,38 @@ def test_the_screws_of_all_joints_give_pinocchios_singular_values(robot: str, se
         found = np.linalg.svd(interaction(at, question), compute_uv=False)
         assert found[-1] == pytest.approx(low, rel=1e-8)
         assert found[0] == pytest.approx(high, rel=1e-8)
+
+
+def slider_crank() -> Mechanism:
+    b = Builder("slider-crank")
+    for link, at in (("base", (0, 0, 0)), ("platform", (0.5, 0, 0)), ("crank", (0, -1, 0)), ("rod", (0.9, -0.9, 0))):
+        b.link(link, at=at)
+    b.joint("slide", "P", "base", "platform", at=(0.5, 0, 0), axis=(1, 0, 0))
+    b.joint("drive", "R", "base", "crank", at=(0, -1, 0), axis=(0, 0, 1), motor=True)
+    b.joint("knee", "R", "crank", "rod", at=(0.9, -0.9, 0), axis=(0, 0, 1))
+    b.joint("pin", "R", "rod", "platform", at=(0.5, 0, 0), axis=(0, 0, 1), loop=True)
+    return b.build(platform="platform")
+
+
+@pytest.mark.parametrize(("see", "camera"), [
+    ("distance:platform@0,0,0", "eye=base@-0.1,0.2,0"), ("encoder:slide", None), ("direction:rod/1,0,0", None),
+    ("point:platform@0,0,0", "eye=base@0,0,-1")])
+def test_legs_that_are_not_watched_hold_as_well(see: str, camera: str | None) -> None:
+    """With one freedom the condition of what is seen alone is not the robot's: it is that of all joints."""
+    robot = slider_crank()
+    found = singular(robot, camera=camera, see=[see], points=60)
+    assert found.checked.disagreements == 0
+    assert found.checked.smallest > 1e-4
+    answer = path(robot, camera=camera, see=see, start="x=0.5", goal="x=0.3")
+    assert answer.verdict == "undecided"
+    assert "locus" not in answer.reason
+    assert min(answer.start.value, answer.goal.value) > 1e-2
+
+
+def test_a_robot_of_one_coordinate_is_read() -> None:
+    b = Builder("slide")
+    b.link("base")
+    b.link("platform", at=(0.5, 0, 0))
+    b.joint("slide", "P", "base", "platform", at=(0.5, 0, 0), axis=(1, 0, 0), motor=True)
+    found = derive(b.build(platform="platform"), camera="eye=base@0.1,0,0", see="distance:platform@0,0,0")
+    assert (found.verdict.rank, found.verdict.dof) == (1, 1)

@@ -24,7 +24,7 @@ from ..asked import configurations_at
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
-from ..singularity.agreement import smallest_of
+from ..singularity.agreement import smallest_of, weakest
 from .condition_enclosure import ConditionEnclosure, PathSegment, enclosed, sign_of
 from .leg_forms import LegPattern, pattern
 from .path_segments import PathCoordinates, Place, WorkingModeChange, path_coordinates
@@ -235,7 +235,11 @@ class Aspects(Value):
         if self.lost:
             return replace(answer, reason=f"every pose is singular, never seen: {'; '.join(self.lost)}")
         if min(abs(end.value) for end in ends) < CLEAR:
-            return replace(answer, reason="a pose lies on the singular locus, or too near to it to be distinguished")
+            least = min(ends, key=lambda end: abs(end.value))
+            told = "a pose lies on the singular locus, or too near to it to be distinguished"
+            if abs(least.value) < SOLVED and weakest(least.configuration, self.setting.samples.question) > CLEAR:
+                told = "the condition vanishes where no freedom is lost: it is not this robot's"
+            return replace(answer, reason=told)
         try:
             enclosures = [self.enclosure(end.configuration) for end in ends]
         except NoLegForm as why:
