@@ -35,7 +35,7 @@ def test_error_of_every_kind(robot: str, kind: str) -> None:
     law feeds back."""
     if (robot, kind) != ("free_body", "encoder"):
         check(watched({"free_body": free_body, "arm": arm}[robot]() if robot in ("free_body", "arm") else load(robot),
-                      kind), wide=1e-8 if kind == "image_circle" else 1e-5)
+                      kind), wide=1e-9 if kind == "image_circle" else 1e-5)
 
 
 def check(found: ObservedRobot, encoders: bool = False, wide: float = 1e-4) -> None:
