@@ -20,8 +20,6 @@ from .paper import PNG, Paper, printed
 from .plots import COLOURS, cell_edges, entry, panels, styled
 
 CELLS = {SAME: ("#b9dcb1", "="), SEPARATED: ("#f2c0b0", "|"), UNDECIDED: ("#e3e3e3", "?")}
-ALONE = "0.6"
-"""The number of a mode at which the robot is not assembled."""
 CURVE, CUSP, NODE = "black", COLOURS[1], COLOURS[2]
 SHADES = ("white", "#e8eef4", "#c9d9e8", "#9dbbd6")
 """No mode, two, four, six."""
@@ -68,14 +66,9 @@ def picture(found: Atlas, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
     for place in axes[count:]:
         place.set_visible(False)
     _table(axes[0], found)
-    entries = [entry(f"{sign}  {verdict}", linestyle="", marker="s", markersize=10, color=colour, markeredgecolor="0.5")
-               for verdict, (colour, sign) in CELLS.items()
+    entries = [entry(verdict, linestyle="", marker="s", markersize=10, color=colour, markeredgecolor="0.5")
+               for verdict, (colour, _) in CELLS.items()
                if any(verdict in row for row in found.table)]
-    if found.groups:
-        entries.append(entry("numbers of one colour: one aspect", linestyle="", marker="$1$", markersize=7,
-                             color=COLOURS[0]))
-    if any(_colour(found, k + 1) == ALONE for k in range(len(found.table))):
-        entries.append(entry("grey number: robot not assembled", linestyle="", marker="$1$", markersize=7, color=ALONE))
     if drawn.found is not None:
         entries += _curves(axes[1:3], found, *drawn.found)
     plots.legend(figure, entries, paper)
@@ -89,7 +82,7 @@ def picture(found: Atlas, drawn: DrawnSection, paper: Paper = PNG) -> bytes:
 def _colour(found: Atlas, number: int) -> str:
     """One colour for all modes of an aspect."""
     groups = [k for k, group in enumerate(found.groups) if number in group]
-    return COLOURS[groups[0] % len(COLOURS)] if groups else ALONE
+    return COLOURS[groups[0] % len(COLOURS)] if groups else "0.6"
 
 
 def _table(place: Any, found: Atlas) -> None:
