@@ -7,13 +7,15 @@ The picture's plane is z = 1 of the camera's frame; noise is in units of it, or 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..geometry.jets import Jet, turn
 from ..geometry.so3 import wrap_angle
 from ..geometry.vectors import Array, cross, unit
+from .sights import CameraObservation
 
 HALF_PICTURE = 1.0
 """A line in the image is found by two points this far on each side of the one nearest to the picture's centre: at the
@@ -133,3 +135,28 @@ def shifted_ellipse(Q: Array, shocks: Array, by: float) -> Array:
     a = np.linalg.svd(np.column_stack([x * x, y * y, np.ones(5), 2 * y, 2 * x, 2 * x * y]))[2][-1]
     found = np.array([[a[0], a[5], a[4]], [a[5], a[1], a[3]], [a[4], a[3], a[2]]])
     return np.asarray(found if np.sum(found * Q) > 0 else -found)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SeenLine(CameraObservation):
+    """A measurement of which the value is the unit normal n of a plane through C: a line in the picture."""
+
+    size = 3
+    angular = True
+    rank = 2
+    found_by = frozenset({"px"})
+    spot = False
+
+    def error(self, value: Array, wanted: Array) -> Array:
+        return line_apart(value, wanted)
+
+    def error_slope(self, value: Array, wanted: Array) -> Array:
+        return line_slope(value)
+
+    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
+        """Through two image points beside the line."""
+        return shifted_line(value, shocks[0], self.pixels(noise))
+
+    @classmethod
+    def shown(cls, p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
+        return cls.outline(p, d, r, size).lines

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,10 +14,9 @@ from ...errors import NotMeasured
 from ...geometry.jets import Jet, inner, moment
 from ...geometry.screws import couple, force
 from ...geometry.vectors import Array, Numbers, cross, unit
-from ..images import line_apart, line_fed, line_slope, shifted_line
+from ..images import SeenLine, line_fed
 from ..observation import Drawn
 from ..sights import (
-    CameraObservation,
     HeldPlace,
     Sighting,
     VirtualJoint,
@@ -58,7 +57,7 @@ def tangent_partials(p: Array, d: Array, r: Array) -> tuple[Array, Array]:
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class CylinderEdge(CameraObservation):
+class CylinderEdge(SeenLine):
     """The normal n of a plane through C that touches the cylinder of axis (B, d); the sign of ``radius`` says which of
     the two (MMT eq. 3-4)."""
 
@@ -66,14 +65,9 @@ class CylinderEdge(CameraObservation):
     words = "an edge of a cylinder of known radius: its tangent plane through C"
     locked = "the force n at the axis, the moment d × n"
     needs = ("at", "axis", "radius")
-    size = 3
-    angular = True
-    rank = 2
     fed_back = "ρ − ρ*, θ − θ*"
-    found_by = frozenset({"px"})
     rational = False
     signed = True
-    spot = False
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -102,25 +96,11 @@ class CylinderEdge(CameraObservation):
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return line_fed(touching(p, d, r), wanted)
 
-    def error(self, value: Array, wanted: Array) -> Array:
-        return line_apart(value, wanted)
-
-    def error_slope(self, value: Array, wanted: Array) -> Array:
-        return line_slope(value)
-
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        """Through two image points beside the line."""
-        return shifted_line(value, shocks[0], self.pixels(noise))
-
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
         """Where the plane through C touches the cylinder, and that plane."""
         piece = stretch(p - r * tangent(p, d, np.array([r])), d, size)
         return Drawn((piece,), (np.vstack([0 * p, piece]),))
-
-    @staticmethod
-    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
-        return CylinderEdge.outline(p, d, r, size).lines
 
     def wrenches(self, at: Sighting) -> list[Numbers]:
         n = self._normal(at)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,10 +13,9 @@ import numpy as np
 from ...geometry.jets import Jet, moment
 from ...geometry.screws import couple, force
 from ...geometry.vectors import Array, Numbers, cross, hat, unit
-from ..images import line_apart, line_fed, line_slope, shifted_line
+from ..images import SeenLine, line_fed
 from ..observation import Drawn
 from ..sights import (
-    CameraObservation,
     HeldPlace,
     Sighting,
     VirtualJoint,
@@ -31,19 +30,14 @@ from ..sights import (
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class ImageLine(CameraObservation):
+class ImageLine(SeenLine):
     """n = p × d/‖p × d‖, the normal of the plane of C and the line (B, d), p from C to B."""
 
     kind = "image_line"
     words = "the plane of C and a line: a line in the image"
     locked = "the force n at the line, the moment d × n"
     needs = ("at", "axis")
-    size = 3
-    angular = True
-    rank = 2
     fed_back = "ρ − ρ*, θ − θ*; x cos θ + y sin θ = ρ"
-    found_by = frozenset({"px"})
-    spot = False
 
     @staticmethod
     def measured(p: Array, d: Array, r: Array) -> Array:
@@ -70,25 +64,11 @@ class ImageLine(CameraObservation):
     def fed(p: Sequence[Jet], d: Sequence[Jet], r: Jet, wanted: Array) -> list[Jet]:
         return line_fed(moment(p, d), wanted)
 
-    def error(self, value: Array, wanted: Array) -> Array:
-        return line_apart(value, wanted)
-
-    def error_slope(self, value: Array, wanted: Array) -> Array:
-        return line_slope(value)
-
-    def sensed(self, value: Array, shocks: Array, noise: Mapping[str, float]) -> Array:
-        """Through two image points beside the line."""
-        return shifted_line(value, shocks[0], self.pixels(noise))
-
     @staticmethod
     def outline(p: Array, d: Array, r: float, size: float) -> Drawn:
         """A piece of the line, and its plane with C."""
         piece = stretch(p, d, size)
         return Drawn((piece,), (np.vstack([0 * p, piece]),))
-
-    @staticmethod
-    def shown(p: Array, d: Array, r: float, size: float) -> tuple[Array, ...]:
-        return (stretch(p, d, size),)
 
     def wrenches(self, at: Sighting) -> list[Numbers]:
         n = cross(at.B - at.C, at.d)
