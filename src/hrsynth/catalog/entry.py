@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from itertools import combinations, groupby
@@ -24,6 +24,7 @@ from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Relation
 from ..kinematics.sampling import Samples
 from ..mechanism.legs import decompose
+from ..mechanism.model import Mechanism
 from ..mechanism.normal import normal_form
 from ..mechanism.sensors import encoders
 from ..rewrite.strategy import Step
@@ -57,12 +58,7 @@ def entry(text: str) -> dict[str, Any]:
     if isinstance(found, str):
         return {**record, "refused": found}
     drawn = mechanism(word, found.attempt)
-    anatomy = decompose(normal_form(drawn).mechanism)
-    driven = [joint for joint in drawn.joints.values() if joint.actuated]
-    rank = found.driven([joint.name for joint in driven])
-    return {**record, "notation": anatomy.architecture().ascii, **found.facts, "attempt": found.attempt or None,
-            "motors": len(driven), "motor_rank": rank, "driven": rank == found.facts["dof"],
-            "base_motors": all(drawn.base in joint.links for joint in driven)}
+    return {**record, **found.record(drawn, [joint.name for joint in drawn.joints.values() if joint.actuated])}
 
 
 def model(word: RobotWord) -> RobotWord:
@@ -84,7 +80,7 @@ def _links(text: str) -> frozenset[str]:
 
 
 @dataclass(frozen=True, eq=False)
-class _Study:
+class ArchitectureStudy:
     """What the architectures of one model have in common, whatever is driven."""
 
     facts: dict[str, Any]
@@ -97,9 +93,17 @@ class _Study:
         """What motors on these joints see of the platform."""
         return selected(self.encoders, [i for i, name in enumerate(self.joints) if name in names]).rank
 
+    def record(self, drawn: Mechanism, motors: Sequence[str]) -> dict[str, Any]:
+        """The fields of a record, of a mechanism with motors on these joints."""
+        rank = self.driven(motors)
+        return {"notation": decompose(normal_form(drawn).mechanism).architecture().ascii, **self.facts,
+                "attempt": self.attempt or None, "motors": len(motors), "motor_rank": rank,
+                "driven": rank == self.facts["dof"],
+                "base_motors": all(drawn.base in drawn.joints[name].links for name in motors)}
+
 
 @lru_cache(maxsize=128)
-def _studied(text: str) -> _Study | str:
+def _studied(text: str) -> ArchitectureStudy | str:
     """The study of a model, or why there is none, with the first dimensions that can be studied."""
     word, reason = parse(text), ""
     for attempt in range(ATTEMPTS):
@@ -110,17 +114,29 @@ def _studied(text: str) -> _Study | str:
     return reason
 
 
-def _study(word: RobotWord, attempt: int) -> _Study:
-    setting = observe(mechanism(word, attempt), samples=SAMPLES)
+def _study(word: RobotWord, attempt: int) -> ArchitectureStudy:
+    kinds = _kinds(word)
+    return study(mechanism(word, attempt), lambda size: _choices(kinds, size), attempt)
+
+
+def study(drawn: Mechanism, sets: Callable[[int], Iterable[tuple[int, ...]]], attempt: int = 0, *,
+          proved: bool = True) -> ArchitectureStudy:
+    """What is said of a mechanism whatever is driven. ``sets`` gives the sets of so many legs, by their places, of
+    which some may be equal but for the names of legs: the first of these. Raises ``NotConfirmed`` where the verdict is
+    not exact, unless it need not be ``proved``.
+    """
+    setting = observe(drawn, samples=SAMPLES)
     if not setting.dof:
         raise NotConfirmed(setting.robot.name, "its platform does not move")
     derivation = derive(setting, paper=False)
-    exact = architecture(setting)
-    _agree(exact, setting.samples, derivation.verdict)
-    fewest = _smallest(setting, exact, _kinds(word), derivation.verdict)
+    exact = architecture(setting) if proved or derivation.exact.exact else None
+    if exact is not None:
+        _agree(exact, setting.samples, derivation.verdict)
+    fewest = _smallest(setting, exact, sets, derivation.verdict)
     facts = {
         "hidden": derivation.hidden_architecture and derivation.hidden_architecture.ascii,
-        "steps": _steps(derivation.steps), "legs": len(word.legs), "dof": setting.dof, "motion": _motion(setting),
+        "steps": _steps(derivation.steps), "legs": len(setting.segments), "dof": setting.dof,
+        "motion": _motion(setting),
         "mobility": setting.mobility.total, "idle": setting.mobility.idle,
         "verdict": derivation.verdict.verdict, "rank": derivation.verdict.rank, "exact": derivation.exact.exact,
         "instances": derivation.exact.instances, "confirmed": len(setting.configurations),
@@ -132,7 +148,7 @@ def _study(word: RobotWord, attempt: int) -> _Study:
         facts.update(_singular(setting), **_modes(setting, fewest))
     else:
         facts["cure"] = _cure(advise(setting, most=1))
-    return _Study(facts, attempt, *_encoders(setting))
+    return ArchitectureStudy(facts, attempt, *_encoders(setting))
 
 
 def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
@@ -150,19 +166,20 @@ def _kinds(word: RobotWord) -> list[str]:
     return [f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs]
 
 
-def _smallest(setting: ObservedRobot, exact: ExactArchitecture, kinds: Sequence[str], best: Verdict
-              ) -> list[tuple[str, ...]]:
+def _smallest(setting: ObservedRobot, exact: ExactArchitecture | None,
+              sets: Callable[[int], Iterable[tuple[int, ...]]], best: Verdict) -> list[tuple[str, ...]]:
     """The smallest sets of legs that see as much as all together, one of those that differ by equal legs; each rank
-    exact and confirmed."""
+    confirmed, and exact where that is asked for."""
     if not best.rank:
         return []
-    for size in range(1, len(kinds) + 1):
+    for size in range(1, len(setting.segments) + 1):
         found = []
-        for places in _choices(kinds, size):
+        for places in sets(size):
             seen = [setting.segments[i] for i in places]
             samples = restricted(setting.everything, seen)
             verdict = verdict_of(setting, [o.leg for o in seen], samples)
-            _agree(exact, samples, verdict)
+            if exact is not None:
+                _agree(exact, samples, verdict)
             if verdict.rank == best.rank:
                 found.append(verdict.legs)
         if found:

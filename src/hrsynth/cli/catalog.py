@@ -10,25 +10,34 @@ its table by groups and every disagreement.
 from __future__ import annotations
 
 import json as javascript
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from .colour import say
 from .commands import Group, add_command
 from .options import JSON, NEEDED, Option, flag, output, warn
 from .progress import Progress
 
+if TYPE_CHECKING:
+    from ..catalog.build import WordSource
+    from ..mechanism import Mechanism
+
 catalog = Group("hrsynth catalog", "The catalog of architectures: what can be controlled by watching legs.")
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
 KEPT = Option("kept", "A folder or SQLite file (default: what is shipped).", "PATH", flags=("--catalog",))
 WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
+TABLES = Option("tables", "Of published tables (the page 'audit' has their format), not of the words listed here.",
+                "FOLDER")
 ANEW = flag("anew", "Discard the results of an interrupted build.")
 FILTER = (
     Option("legs", "Number of legs, or a pattern of the notation or of one leg's chain: 3-R*, PUS.", "LEGS"),
     Option("dof", "Freedoms of the platform.", kind=int, low=0),
     Option("motion", "Its translations and rotations, as 3T or 2T1R."),
     Option("verdict", f"{', '.join(VERDICTS)}.", words=VERDICTS),
-    Option("group", "planar, pods, deltas, spatial.", words=("planar", "pods", "deltas", "spatial")),
+    Option("group", "planar, pods, deltas, spatial; of published tables 3T0R and the like."),
     Option("base_motors", "All motors on the base, or not.", kind=bool, flags=("--base-motors/--moving-motors",)),
     Option("fewest", "Number of legs that must be watched.", kind=int, low=0),
     Option("modes", "Number of assembly modes, complex ones too.", kind=int, low=0),
@@ -43,8 +52,8 @@ def _say(command: str, fields: dict[str, Any], text: str, json: bool) -> None:
     say(record(f"catalog {command}", None, fields) if json else text)
 
 
-def build(groups: list[str] | None, output: str | None, workers: int, cluster: str | None, check: bool,
-          sample: int | None, limit: int | None, anew: bool, json: bool, seed: int) -> None:
+def build(groups: list[str] | None, output: str | None, tables: str | None, workers: int, cluster: str | None,
+          check: bool, sample: int | None, limit: int | None, anew: bool, json: bool, seed: int) -> None:
     """Build the catalog or (``check``) compare what is stored with what would be built."""
     from ..errors import BadRequest, CatalogStale
 
@@ -52,13 +61,16 @@ def build(groups: list[str] | None, output: str | None, workers: int, cluster: s
     for option, given in senseless.items():
         if given:
             raise BadRequest(f"{option} {'with' if check else 'without'} --check", None)
+    if tables is not None and output is None:
+        raise BadRequest("--tables without a catalog of their own", None, "-o FOLDER or -o FILE.sqlite")
+    source = None if tables is None else _published(tables)
     if check:
         from ..catalog.build import check as run
         from ..catalog.store import shipped
 
         with Progress(counted=True) as progress:
-            stale = run(output or shipped(), groups or [], workers=workers, cluster=cluster, sample=sample, seed=seed,
-                        tell=progress.count)
+            stale = run(output or shipped(), groups or [], source=source, workers=workers, cluster=cluster,
+                        sample=sample, seed=seed, tell=progress.count)
         if json or not stale:
             _say("build", {"stale": stale}, "not stale", json)
         if stale:
@@ -69,8 +81,8 @@ def build(groups: list[str] | None, output: str | None, workers: int, cluster: s
 
     target = _target(output)
     with Progress(counted=True) as progress:
-        done = [each.to_dict() for each in make(target, groups or [], workers=workers, cluster=cluster, limit=limit,
-                                                anew=anew, tell=progress.count)]
+        done = [each.to_dict() for each in make(target, groups or [], source=source, workers=workers,
+                                                cluster=cluster, limit=limit, anew=anew, tell=progress.count)]
     _say("build", {"groups": done}, built(done), json)
 
 
@@ -89,36 +101,83 @@ def entries(kept: str | None, json: bool, **asked: Any) -> None:
          json)
 
 
-def show(word: str, output: str | None, kept: str | None, json: bool) -> None:
+def show(word: str, output: str | None, tables: str | None, kept: str | None, json: bool) -> None:
     """Show one architecture."""
-    from ..catalog.drawing import drawing
-    from ..catalog.geometry import mechanism
-    from ..catalog.words import parse
     from ..description import save, targets
     from ..present.text.catalog import entry
 
     if output is not None:
         targets(output)
     with Progress():
-        word, others = _word(word, kept)
-        architecture = parse(word)
-        record, note = _known(str(architecture), kept)
-    note = "; ".join(each for each in (note, others) if each)
+        found = _of_word(word, kept) if tables is None else _of_tables(word, tables, kept)
+        if output is not None:
+            robot = found.mechanism()
     if output is not None:
-        for warning in save(mechanism(architecture, record.get("attempt", 0)), output):
+        for warning in save(robot, output):
             warn(str(warning))
-    drawn = drawing(architecture)
-    _say("show", {"entry": dict(record), "drawing": drawn.splitlines(), "note": note or None, "file": output},
-         entry(record, drawn, note) + ("" if output is None else f"\n\nThe robot is written to {output}."), json)
+    _say("show", {"entry": dict(found.record), "drawing": found.drawn.splitlines(), "note": found.note or None,
+                  "file": output},
+         entry(found.record, found.drawn, found.note)
+         + ("" if output is None else f"\n\nThe robot is written to {output}."), json)
+
+
+@dataclass(frozen=True)
+class _Shown:
+    """An architecture: its record, how it is drawn (nothing where it is no word), what else is to be said, and a robot
+    of it."""
+
+    record: Any
+    drawn: str
+    note: str
+    mechanism: Callable[[], Mechanism]
+
+
+def _no_geometry(name: str) -> Mechanism:
+    from ..errors import BadRequest
+
+    raise BadRequest("a published robot's chain is in its tables", name, "--tables FOLDER")
+
+
+def _of_word(text: str, kept: str | None) -> _Shown:
+    from ..catalog import load
+    from ..catalog.drawing import drawing
+    from ..catalog.geometry import mechanism
+    from ..catalog.words import parse
+
+    if text.isalnum() and kept is not None and text in (every := load(kept)) and "choices" in every[text]:
+        return _Shown(every[text], "", "", partial(_no_geometry, text))
+    word, others = _word(text, kept)
+    architecture = parse(word)
+    record, note = _known(str(architecture), kept)
+    return _Shown(record, drawing(architecture), "; ".join(each for each in (note, others) if each),
+                  lambda: mechanism(architecture, record.get("attempt", 0)))
+
+
+def _of_tables(name: str, folder: str, kept: str | None) -> _Shown:
+    from ..catalog import load
+    from ..catalog.build import made
+    from ..catalog.published import PublishedEntry, mechanism, published_robot
+
+    robot = published_robot(folder, name)
+    found = None if kept is None else load(kept)
+    if found is not None and name in found:
+        record, note = found[name], ""
+    else:
+        ((_, line),) = made(PublishedEntry(folder), robot.group, [name])
+        record, note = javascript.loads(line), "studied now"
+    return _Shown(record, "", note, lambda: mechanism(robot))
 
 
 def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **asked: Any) -> None:
     """Write the pages of the architectures that fit."""
     from ..catalog import load
     from ..catalog.site import site as run
+    from ..errors import BadRequest
     from ..present.text.catalog import sited
 
     found = load(kept, **asked)
+    if published := [each["word"] for each in found if "choices" in each]:
+        raise BadRequest("no pages are made of published robots", published[0], "hrsynth catalog show, list")
     with Progress(counted=True) as progress:
         done = run(found, output, workers=workers, anew=anew, tell=progress.count)
     if done.differ:
@@ -178,6 +237,12 @@ def _known(word: str, kept: str | None) -> tuple[Any, str]:
     return javascript.loads(line), "not in the catalog, studied now"
 
 
+def _published(folder: str) -> WordSource:
+    from ..catalog.published import published
+
+    return published(folder)
+
+
 def _target(output: str | None) -> Path:
     """Where to build: what was named, or ``catalog/`` of the checkout; never an installed package."""
     from importlib import resources
@@ -196,7 +261,7 @@ def _target(output: str | None) -> Path:
 COMMANDS = (
     ("build", "Build the catalog, or go on where a build was broken off; the bytes do not depend on who builds.", build,
      (Option("groups", "Groups (default: all).", "[GROUP]...", list[str], argument=True),
-      output("A folder, or a file that ends in .sqlite (default: catalog/ of the checkout).", "PATH"), WORKERS,
+      output("A folder, or a file that ends in .sqlite (default: catalog/ of the checkout).", "PATH"), TABLES, WORKERS,
       Option("cluster", "A dask cluster that shares the work.", "ADDRESS"),
       flag("check", "Build nothing: compare what is stored (default: what is shipped) with what would be built; exit 3 "
            "if it is stale."),
@@ -206,9 +271,10 @@ COMMANDS = (
       Option("seed", "Seed of --sample.", None, int, 0, low=0))),
     ("list", "The architectures that fit.", entries, (*FILTER, KEPT, JSON)),
     ("show", "One architecture, drawn and in full; one that is not in the catalog is studied now.", show,
-     (Option("word", "An architecture, as '3(Rz*-Rz-Rz)', or a name or legs: Delta, 3-RPS.", "WORD", default=NEEDED,
+     (Option("word", "An architecture, as '3(Rz*-Rz-Rz)', or a name or legs: Delta, 3-RPS; with --tables "
+                    "a robot of these.", "WORD", default=NEEDED,
              argument=True),
-      output("Write a robot of this architecture (.urdf, or another dialect)."), KEPT, JSON)),
+      output("Write a robot of this architecture (.urdf, or another dialect)."), TABLES, KEPT, JSON)),
     ("site", "Pages of the architectures that fit: a list that filters, drawings, derivations, robot files; needs no "
      "server.", site,
      (output("A new or empty folder, or an older site, which is replaced.", "DIR", NEEDED), *FILTER, WORKERS, ANEW,
@@ -224,9 +290,9 @@ COMMANDS = (
       Option("seed", "Seed of --sample and of dimensions and configurations.", None, int, 0, low=0))),
 )
 EXAMPLES = {
-    "build": ("planar -o mine.sqlite", "--check --sample 20"),
+    "build": ("planar -o mine.sqlite", "--check --sample 20", "3T1R --tables tables -o published.sqlite"),
     "list": ("--legs 3-R*RR --verdict controllable", "--motion 2T1R --base-motors --modes 6", "--text Hexaglide"),
-    "show": ("'3(Rz*-Rz-Rz)'", "Delta -o delta.urdf"),
+    "show": ("'3(Rz*-Rz-Rz)'", "Delta -o delta.urdf", "P4RPRRR8V1G1P3 --tables tables -o robot.urdf"),
     "site": ("-o pages --group planar",),
     "audit": ("tables --only 3T1R", "tables --sample 2000 -o audit.jsonl"),
 }

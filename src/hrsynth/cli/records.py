@@ -1097,6 +1097,13 @@ class Verify(Head):
     proved: str
 
 
+class MotorChoiceRecord(TypedDict):
+    """A choice of motors of a published robot: the joints driven in each leg, from 1, and the freedoms they see."""
+
+    joints: list[list[int]]
+    rank: int
+
+
 class Entry(TypedDict, total=False):
     """An architecture of the catalog; of one that is refused only its word, its group, its notation and why."""
 
@@ -1105,6 +1112,7 @@ class Entry(TypedDict, total=False):
     notation: str
     refused: str
     base_motors: bool
+    choices: list[MotorChoiceRecord]
     condition: str
     confirmed: int
     cure: str

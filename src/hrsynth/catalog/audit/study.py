@@ -81,6 +81,8 @@ class Studied:
     watched: WatchedLegs | None = None
     others: tuple[tuple[int, int], ...] = ()
     """Motions that were found instead, where it does not move as stated."""
+    screws: Array | None = field(default=None, repr=False, compare=False)
+    """Of its joints, (n, m, 6), told at the platform's point, where its dimensions are generic."""
 
 
 def axes_of(robot: PublishedRobot) -> Array:
@@ -157,7 +159,7 @@ def _trial(robots: Sequence[PublishedRobot], letters: Sequence[str], random: np.
         found.append(Studied(
             True, motion, bool(finite[b]) if two.dof[b] > wanted else None, int(two.idle[b]),
             {driven: HeldMotors(int(each[0][b]), int(each[1][b])) for driven, each in motors.items()}, related,
-            letters[b], gap, trial + 1, watching(later[b], robot.chain.kinds, int(two.dof[b]))))
+            letters[b], gap, trial + 1, watching(later[b], robot.chain.kinds, int(two.dof[b])), screws=later[b]))
     instead = [(int(two.translations[b]), int(two.rotations[b])) if same[b] and not related else None
                for b in range(len(robots))]
     return found, instead

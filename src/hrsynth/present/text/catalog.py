@@ -24,7 +24,8 @@ def entries(records: Sequence[Record], total: int) -> str:
 def entry(record: Record, drawn: str, note: str = "") -> str:
     """One entry: its legs drawn, then what is known of it."""
     head = f"{record['word']}   {record.get('notation', '')}".rstrip()
-    return "\n\n".join([head, f"{drawn}\n{LEGEND}", listing(_all(record)), *filter(None, [note])])
+    legs = [f"{drawn}\n{LEGEND}"] if drawn else []
+    return "\n\n".join([head, *legs, listing(_all(record)), *filter(None, [note])])
 
 
 def built(groups: Iterable[Mapping[str, Any]]) -> str:
@@ -49,7 +50,8 @@ def _row(record: Record) -> tuple[str, ...]:
 
 def _all(record: Record) -> list[tuple[str, str]]:
     found = [("group", str(record["group"])), *facts(record)]
-    return [*found, ("motors", motors(record))] if "motors" in record else found
+    found += [("motors", motors(record))] if "motors" in record else []
+    return [*found, ("choices", "  ".join(map(choice, record["choices"])))] if "choices" in record else found
 
 
 def facts(record: Record) -> Iterable[tuple[str, str]]:
@@ -60,7 +62,10 @@ def facts(record: Record) -> Iterable[tuple[str, str]]:
     yield "dof", f"{record['dof']}, {record['motion']} (mobility {record['mobility']}, of which {record['idle']} idle)"
     yield "hidden robot", str(record.get("hidden", "none"))
     yield "verdict", f"{record['verdict']} (rank {record['rank']} of {record['dof']})"
-    yield "exact", "proved" if record["instances"] == 1 else f"{record['instances']} instances"
+    if record["exact"]:
+        yield "exact", "proved" if record["instances"] == 1 else f"{record['instances']} instances"
+    else:
+        yield "exact", "no: ranks of numbers; the geometry is more special than its relations say"
     if "confirmed" in record:
         yield "confirmed", f"at {record['confirmed']} closed configurations"
     if record.get("steps"):
@@ -79,6 +84,12 @@ def facts(record: Record) -> Iterable[tuple[str, str]]:
         yield "modes", f"a continuum of dimension {record['dof'] - record['rank']} with all legs watched"
     if record.get("cure"):
         yield "cure", str(record["cure"])
+
+
+def choice(each: Mapping[str, Any]) -> str:
+    """Which joints of each leg are driven, and of how many freedoms they determine."""
+    driven = [",".join(map(str, joints)) or "none" for joints in each["joints"]]
+    return f"joint {driven[0] if len(set(driven)) == 1 else ' | '.join(driven)} of each leg: {each['rank']}"
 
 
 def motors(record: Record) -> str:
