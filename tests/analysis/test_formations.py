@@ -22,7 +22,7 @@ import pytest
 from hrsynth.analysis.check import check
 from hrsynth.analysis.controllability import _smallest, legs
 from hrsynth.analysis.derive import Derivation, derive
-from hrsynth.analysis.modes.modes import modes
+from hrsynth.analysis.singularity.singular import singular
 from hrsynth.certificates import certificate, verify
 from hrsynth.description import load, native, save
 from hrsynth.errors import BadRequest, BadRobotFile
@@ -391,7 +391,7 @@ def test_poses_of_a_formation_are_refused():
 
 def test_other_questions_refuse_formations_in_one_line():
     with pytest.raises(BadRequest, match="formation"):
-        modes(drawn(3, "position", [(1, 2), (2, 3), (1, 3)])[0])
+        singular(drawn(3, "position", [(1, 2), (2, 3), (1, 3)])[0])
     with pytest.raises(BadRequest, match="two of 1 to 3"):
         formation(np.eye(3), [(1, 4)])
     with pytest.raises(BadRequest, match="yaw"):

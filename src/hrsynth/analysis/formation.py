@@ -16,7 +16,7 @@ import numpy as np
 
 from ..geometry.ranks import kernel_basis, range_basis
 from ..geometry.screws import rotation, translation
-from ..geometry.vectors import Array, Numbers, hat, oriented, unit
+from ..geometry.vectors import Array, Numbers, hat, oriented, rotation_about, unit
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Measurement, Relation
 from ..mechanism import Observation
@@ -97,6 +97,50 @@ class Flex(Value):
 
 
 @dataclass(frozen=True, eq=False, repr=False)
+class Similarities(Value):
+    """All x → s R x + t that trivial motions make of what is sensed: shifts along ``shifts`` (3, k), turns about
+    ``axes`` (3, 0 to 3) through ``centre`` (3,), metres, and where ``scaled`` a scale about it."""
+
+    shifts: Array
+    axes: Array
+    scaled: bool
+    centre: Array
+
+    @classmethod
+    def of(cls, S: Array, centre: Array, length: float) -> Similarities | None:
+        """Those that a space S (7, k) of rates (v, ω, s) about a centre (m), in characteristic lengths, generates; None
+        where it ties a turn or a scale to another motion."""
+        shifts = range_basis((S @ kernel_basis(S[3:], 1.0)[0])[:3], 1.0)[0]
+        axes = range_basis((S @ kernel_basis(S[6:], 1.0)[0])[3:6], 1.0)[0]
+        scaled = bool(np.linalg.norm(S[6]) > NAMED)
+        across = np.eye(3) - shifts @ shifts.T
+        rows = np.vstack([np.zeros((0, 3)), *(across @ (hat(each[3:6]) + each[6] * np.eye(3)) for each in S.T)])
+        shifted = (across @ S[:3]).T.ravel()
+        fixed = np.linalg.lstsq(rows, -shifted, rcond=None)[0] if len(rows) else np.zeros(3)
+        tied = np.linalg.norm(rows @ fixed + shifted) + np.linalg.norm(S[3:6] - axes @ (axes.T @ S[3:6]))
+        if shifts.shape[1] + axes.shape[1] + scaled != S.shape[1] or tied > NAMED:
+            return None
+        return cls(shifts, axes, scaled, centre + length * fixed)
+
+    def nearest(self, points: Array, wanted: Array) -> tuple[float, Array, Array]:
+        """s, R and t that take points (n, 3) nearest to those that are ``wanted``: means and sizes made equal, then
+        the turn of least squares (W. Kabsch, Acta Cryst. A32, 1976, 922)."""
+        one, other = (self.centre + self.shifts @ (self.shifts.T @ (each.mean(axis=0) - self.centre))
+                      for each in (points, wanted))
+        p, w = points - one, wanted - other
+        s = float(np.linalg.norm(w) / np.linalg.norm(p)) if self.scaled else 1.0
+        R = np.eye(3)
+        if self.axes.shape[1] == 1:
+            axis = self.axes[:, 0]
+            flat = p - np.outer(p @ axis, axis)
+            R = rotation_about(axis, float(np.arctan2(np.cross(p, w).sum(axis=0) @ axis, (flat * w).sum())))
+        elif self.axes.shape[1]:
+            U, _, V = np.linalg.svd(w.T @ p)
+            R = U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V
+        return s, R, other - s * R @ one
+
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Formation(Value):
     """What observations do not see of a formation at a configuration: trivial motions by name, and flexes; ``special``
     is the line or plane in which all points lie here that are sensed, and generically do not."""
@@ -105,6 +149,8 @@ class Formation(Value):
     trivial: tuple[str, ...]
     flexes: tuple[Flex, ...]
     special: str = ""
+    group: Similarities | None = None
+    """All that the trivial motions make of what is sensed, where that is told by turns and scales about one place."""
 
     @property
     def verdict(self) -> str:
@@ -126,7 +172,7 @@ def formation_at(at: ClosedConfiguration, question: Measurement, found: Relation
                  ) -> Formation:
     """What ``found``, ρ at a configuration, leaves unseen."""
     bodies, length = (question.platform, *question.others), at.twin.length
-    told, points = _seen(at, question)
+    told, points = seen_at(at, question)
     centre = points.mean(axis=0) if len(points) else np.zeros(3)
     random = np.random.default_rng(0)
     places = [(AWAY * length * unit(random.normal(size=3)), unit(random.normal(size=3))) for _ in range(PLACES)]
@@ -138,7 +184,8 @@ def formation_at(at: ClosedConfiguration, question: Measurement, found: Relation
         arm = (at.pose(body)[:3, 3] - centre) / length
         twists[body] = np.vstack([twist[:3] + hat(arm) @ twist[3:], twist[3:]])
     if not parts or not K.shape[1]:
-        return Formation(bodies, (), _flexes(K, K[:, :0], bodies))
+        return Formation(bodies, (), _flexes(K, K[:, :0], bodies),
+                         group=Similarities.of(np.zeros((7, 0)), centre, length))
     motions, common = following(parts, twists)
     inert = kernel_basis(common, 1.0)[0]
     both = kernel_basis(np.hstack([motions, -common]), 1.0)[0]
@@ -148,10 +195,10 @@ def formation_at(at: ClosedConfiguration, question: Measurement, found: Relation
     moved = both[: K.shape[1]] - idle @ (idle.T @ both[: K.shape[1]])
     trivial = range_basis(moved, 1.0)[0]
     return Formation(bodies, _common_names(followed, points, centre, length, anatomy),
-                     _flexes(K, K @ trivial, bodies))
+                     _flexes(K, K @ trivial, bodies), group=Similarities.of(followed, centre, length))
 
 
-def _seen(at: ClosedConfiguration, question: Measurement) -> tuple[list[tuple[Observation, Sighting]], Array]:
+def seen_at(at: ClosedConfiguration, question: Measurement) -> tuple[list[tuple[Observation, Sighting]], Array]:
     """The observations that sense anything, each with where it is, and all points that are sensed (n, 3)."""
     found = list[tuple[Observation, Sighting]]()
     for each in question.observations:
@@ -221,7 +268,7 @@ def _flexes(K: Array, trivial: Array, bodies: tuple[str, ...]) -> tuple[Flex, ..
 
 def special_at(at: ClosedConfiguration, question: Measurement) -> str:
     """The line or plane that holds all points that are sensed, in words; empty where they have none in common."""
-    points = _seen(at, question)[1] / at.twin.length
+    points = seen_at(at, question)[1] / at.twin.length
     points = np.array([P for i, P in enumerate(points) if all(np.linalg.norm(P - Q) > NAMED for Q in points[:i])])
     if len(points) < 3:
         return ""

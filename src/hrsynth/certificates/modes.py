@@ -47,6 +47,8 @@ WITHIN = tuple(Fraction(1, 10 ** k) for k in range(13, 5, -1))
 def certificate(found: AssemblyModes) -> dict[str, Any]:
     """The certificate of a list of modes, accepted by the checker; raises ``NoCertificate`` where the list is not
     complete or no bound of the checker proves the count."""
+    if found.formation is not None:
+        raise NoCertificate(found.setting.robot.name, "the checker knows no formations")
     about = {"robot": found.setting.robot.name, "kind": found.kind, "at": found.pose.to_dict(),
              "observed": [[o.leg, o.link if o.by_segment else o.leg] for o in found.setting.observed]}
     if found.found.complete and not found.found.solved and found.confined is not None:  # a copy: solved again

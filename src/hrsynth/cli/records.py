@@ -552,6 +552,13 @@ class MissRecord(TypedDict):
     unit: str
 
 
+class PlaceRecord(TypedDict):
+    """Where a body of a formation is."""
+
+    link: str
+    pose: PoseRecord
+
+
 class ModeRecord(TypedDict):
     """An assembly mode; its radius is null where it is not known, `fits` where its place is decided by all legs."""
 
@@ -574,6 +581,8 @@ class ModeRecord(TypedDict):
     fits: Number
     opposite: list[str]
     behind: list[str] | None
+    places: NotRequired[Annotated[list[PlaceRecord], "of a formation: all bodies, moved by a trivial motion to where "
+                                                     "they are nearest to the file's"]]
 
 
 class MeantRecord(TypedDict):
@@ -600,10 +609,11 @@ class SelfMotionRecord(TypedDict):
 class ListedModes(OfRobot, WrittenTo):
     """All assembly modes; `complex` is null where no count is proved."""
 
-    kind: Literal["hidden", "real"]
+    kind: Literal["hidden", "real", "formation"]
     at: PoseRecord
     within: str | None
     observed: list[Watched]
+    formation: NotRequired[FormationRecord]
     complex: int | None
     complete: bool
     bound: str

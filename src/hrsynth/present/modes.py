@@ -54,7 +54,9 @@ def picture(found: AssemblyModes, paper: Paper = PNG) -> bytes:
 
 
 def why_undrawn(found: AssemblyModes) -> str | None:
-    """Why there is nothing to draw: a continuum of modes, or none at all."""
+    """Why there is nothing to draw: a formation, a continuum of modes, or none at all."""
+    if found.formation is not None:
+        return "a formation has no platform, on which ends of legs would be drawn"
     if found.found.continuum is not None or not (found.modes or found.near):
         return found.found.degenerate or "there is no mode"
     return None

@@ -25,12 +25,14 @@ from ...mechanism.pose import ModeNumber, Pose, PoseLike, asked_pose
 from ...progress import tell
 from ...results import Result
 from ...tolerances import SAME_RELATION
+from ..formation import Formation
 from ..measured import MeasuredRobot
 from ..observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..question import question
 from ..singularity.agreement import weakest
 from .branches import Model, solve_all
 from .drift import drift
+from .formed import formed
 from .motions import SelfMotion, self_motion
 from .planar_loops import PlanarLoops, solve_loops
 from .posed import PosedPlatform, most_posed, solve_posed
@@ -39,7 +41,8 @@ from .sighted import all_loci, behind, opposite, sights
 from .solve import SystemMode, SystemModes, continuum
 from .tips import TipLoci
 
-WITHIN = {"translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
+WITHIN = {"formation": "configurations up to trivial motions",
+          "translations": "poses turned as this one", "bodies": "poses whose bodies are turned as at this one",
           "planar": "poses in the plane of motion", "spatial": "poses in space", "oriented": "poses in space"}
 """Among which poses the modes are listed, for each way in which the platform moves."""
 
@@ -82,7 +85,8 @@ class AssemblyMode:
     length: float = 1.0
     """The robot's characteristic length (m)."""
     bodies: dict[str, Array] | None = None
-    """Poses (4, 4) of the bodies on which legs end."""
+    """Poses (4, 4) of the bodies on which legs end; of a formation of all bodies, moved by a trivial motion to where
+    they are nearest to the goal's."""
     opposite: tuple[str, ...] = ()
     """What is seen there as the opposite value: then it is *antipodal* and no mode."""
     behind: tuple[str, ...] | None = None
@@ -134,10 +138,14 @@ class AssemblyModes(Result, shown_as="modes"):
     motions: tuple[SelfMotion, ...] = ()
     antipodal: tuple[AssemblyMode, ...] = ()
     """Solutions of the same equations at which something is seen as the opposite value."""
+    formation: Formation | None = None
+    """Of several bodies: what is not seen of them at the goal."""
 
     @property
     def within(self) -> str | None:
         """Among which poses the modes are all."""
+        if self.formation is not None:
+            return WITHIN["formation"]
         if self.confined is not None:
             return WITHIN[self.confined.motion]
         system = None if self.model is None else self.model.system
@@ -152,12 +160,14 @@ class AssemblyModes(Result, shown_as="modes"):
 
     def headline(self) -> str:
         """The robot and how many modes there are."""
+        if self.formation is not None:
+            return f"{self.setting.headline()}: {self.count} (formation)"
         return f"{self.setting.headline()}: {self.count} ({self.kind} robot) at {self.pose}"
 
     @property
     def count(self) -> str:
         """How many there are, in words."""
-        if self.found.continuum is not None and self.found.complex is not None:
+        if self.found.continuum is not None and (self.found.complex is not None or self.formation is not None):
             return "a continuum"
         if self.motions:
             return (f"{len(self.motions)} self-motion{'s' * (len(self.motions) > 1)}, and {len(self.modes)} real that "
@@ -177,14 +187,20 @@ class AssemblyModes(Result, shown_as="modes"):
                 "observed": [o.to_dict() for o in self.setting.observed],
                 "complex": None if found.continuum else found.complex, "complete": found.complete,
                 "bound": found.bound, "proof": found.proof,
-                "modes": [each.to_dict() for each in self.modes], "near": [each.to_dict() for each in self.near],
-                "antipodal": [each.to_dict() for each in self.antipodal],
+                **({} if self.formation is None else {"formation": self.formation.to_dict()}),
+                "modes": [self._record(each) for each in self.modes], "near": [each.to_dict() for each in self.near],
+                "antipodal": [self._record(each) for each in self.antipodal],
                 "degenerate": found.degenerate, "continuum": found.continuum,
                 "motions": [{"pose": self.pose_of(each).to_dict(), **each.to_dict()} for each in self.motions],
                 "meant": [each.to_dict(self.labels) for each in found.meant]}
 
+    def _record(self, mode: AssemblyMode) -> dict[str, Any]:
+        places = [] if self.formation is None else [
+            {"link": link, "pose": Pose.of(X).to_dict()} for link, X in (mode.bodies or {}).items()]
+        return {**mode.to_dict(), **({"places": places} if places else {})}
 
-@question()
+
+@question(formations=True)
 def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None, *, see: SeeLike = None,
           at: PoseLike | ClosedConfiguration | None = None, real: bool = False, as_written: bool = False,
           effort: float = EFFORT, seed: int = 0) -> AssemblyModes:
@@ -195,7 +211,8 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
     poses that are turned all the same (another operation mode) are not looked for. ``observe``, ``camera`` and ``see``
     as for ``derive``; ``at`` may be a closed configuration of an observed robot. Joint centres that nearly coincide and
     solutions nearly at infinity, are taken to be so where that is clearly meant, unless ``as_written`` is true.
-    ``effort``: seconds of one core that a list may need, told by its size before it starts.
+    ``effort``: seconds of one core that a list may need, told by its size before it starts. Of a formation all
+    configurations, trivial motions taken out, with what is measured at the zero configuration.
 
     Where the tips' paths are none of those known, or the solver that they need gives up or is not installed, the whole
     robot is closed from random starts (:mod:`.search`): modes that are found, of any kind of closing, and nothing says
@@ -212,6 +229,8 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
         raise BadRequest("the motors are held instead of what is observed", f"real with {observe or see}",
                          "one of the two")
     setting = ObservedRobot.of(robot, observe, camera, see=see, seed=seed)
+    if setting.robot.formation:
+        return _formed(setting, at, real)
     asked = None if at is None or isinstance(at, ClosedConfiguration) else asked_pose(at)
     if isinstance(asked, ModeNumber):
         at, asked = at_mode(modes(setting), asked), None
@@ -246,6 +265,30 @@ def modes(robot: RobotLike, observe: LegsLike = None, camera: CameraLike = None,
            if listed.found.continuum is not None else str(listed.found.degenerate))
     found = _searched(setting, measured.question, goal, pose, kind, why)
     return found if moving or not any(mode.proved for mode in listed.modes) else replace(listed, motions=found.motions)
+
+
+def _formed(setting: ObservedRobot, where: object, real: bool) -> AssemblyModes:
+    """The modes of a formation; refuses poses and motors, which are those of one platform."""
+    if where is not None or real:
+        raise BadRequest(f"{setting.robot.name}: poses and motors are those of one platform, and this is a formation",
+                         "real" if real else str(where),
+                         "nothing: what is measured at the file's configuration is held")
+    tell("modes")
+    found, goal = formed(setting), setting.everything.start
+    system = SystemModes(found.complex, (), found.complete, found.proof, degenerate=found.degenerate,
+                         continuum=found.continuum, bound=found.bound)
+    first = setting.samples.question.platform
+    listed = list[AssemblyMode]()
+    for each in found.modes:
+        at = each.configuration
+        whole = Assembly(at, (), tuple(outside(at.twin, at.q)))
+        listed.append(AssemblyMode(
+            Pose.of(each.bodies[first]), np.inf, np.pi, each.residual, at is goal, whole.reachable, None, whole.verdict,
+            (), whole.beyond, (), at, proved=found.complete, length=goal.twin.length, bodies=each.bodies,
+            opposite=each.opposite))
+    return AssemblyModes(setting, "formation", goal, Pose.of(goal.pose(first)), system,
+                         tuple(mode for mode in listed if not mode.opposite), (), formation=found.formation,
+                         antipodal=tuple(mode for mode in listed if mode.opposite))
 
 
 def at_mode(listed: AssemblyModes | None, asked: ModeNumber) -> ClosedConfiguration:
@@ -390,7 +433,7 @@ class _ModeReader:
         scale = self.made.system.size / size
         base = self.goal.twin.mechanism.base
         pose = {base: self.goal.pose(base), **bodies}.__getitem__
-        antipodal = opposite(self.seen, self.goal, self.question.reference, pose)
+        antipodal = opposite([each.seen for each in self.seen], self.goal, self.question.reference, pose)
         found = Assembly(self.goal)
         if antipodal:  # no mode: whether the robot can be assembled is not asked
             found = Assembly(None, platform=self.assembler.platform(bodies))

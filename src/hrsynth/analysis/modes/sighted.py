@@ -187,10 +187,9 @@ def conditions(seen: Sequence[Sight], middle: Middle, turned: bool) -> list[Pose
 Poses = Callable[[str], Array]
 
 
-def opposite(seen: Sequence[Sight], goal: ClosedConfiguration, reference: str, pose: Poses) -> tuple[str, ...]:
-    """The sights whose value at a pose of the links is not that of the goal: the opposite one."""
-    return tuple(each.seen.leg for each in seen
-                 if not _same_value(each.seen, each.seen.seen_from or reference, goal, pose))
+def opposite(seen: Sequence[Observation], goal: ClosedConfiguration, reference: str, pose: Poses) -> tuple[str, ...]:
+    """The observations whose value at a pose of the links is not that of the goal: the opposite one."""
+    return tuple(each.leg for each in seen if not _same_value(each, each.seen_from or reference, goal, pose))
 
 
 def _same_value(seen: Observation, reference: str, goal: ClosedConfiguration, pose: Poses) -> bool:

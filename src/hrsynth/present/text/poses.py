@@ -13,6 +13,7 @@ import numpy as np
 from ...analysis.aspects.path import SAME, SEPARATED
 from ...analysis.aspects.path import UNDECIDED as UNDECIDED_PAIR
 from ...analysis.posture import CONSTRAINT, REGULAR, UNDECIDED
+from ...mechanism.pose import Pose
 from ...tolerances import NOISE, RANK_GAP
 from .robots import NO_MATRIX, formation
 from .tables import GAP, NOT_BOUNDED, Rows, bounded, camera, head, known, listing, watched
@@ -152,6 +153,8 @@ def modes(found: AssemblyModes) -> str:
     """The pose whose measurements are held, the count with its proof, a block for each mode."""
     count = found.found
     name, seen = head(found.setting)
+    if found.formation is not None:
+        return _formed(found, [name, seen, *formation(found.formation)])
     rows = [name, *([seen] if found.kind == "hidden" else []), ("held", f"{_held(found)} at {found.pose}")]
     if count.continuum is None or count.complex is None:
         rows += [("modes", f"{found.count}, {all_of(found)}"),
@@ -176,6 +179,22 @@ def modes(found: AssemblyModes) -> str:
     for number, mode in enumerate(found.near, 1):
         rows += [*GAP, (f"near {number}", [f"{mode.pose}   residual {mode.residual:.2e}: almost a mode"
                  + (", and none" if count.complete else ""), *at_mode(mode, found.kind)])]
+    return listing(rows)
+
+
+def _formed(found: AssemblyModes, rows: Rows) -> str:
+    """The count with its proof, a block with the places of all bodies for each mode of a formation."""
+    if found.found.continuum is None:
+        rows += [("modes", f"{found.count}, {all_of(found)}"), ("proof", found.found.proof)]
+    rows += known("special", found.found.degenerate)
+    for word, listed in (("mode", found.modes), ("antipodal", found.antipodal)):
+        for number, mode in enumerate(listed, 1):
+            told = [f"{body}: {Pose.of(X)}" for body, X in (mode.bodies or {}).items()]
+            rows += [*GAP, (f"{word} {number}", [
+                *["the configuration itself"] * mode.goal,
+                *[f"no mode: the opposite value of {', '.join(mode.opposite)}"] * bool(mode.opposite), *told,
+                f"residual {mode.residual:.1e}",
+                *[f"beyond the limits of {', '.join(mode.beyond)}"] * bool(mode.beyond)])]
     return listing(rows)
 
 
