@@ -109,11 +109,25 @@ def forget_pose(record: Record, rng: random.Random) -> None:
 
 def wrong_caps(record: Record, rng: random.Random) -> None:
     bound = rng.choice(record["systems"])["bound"]
+    if bound["kind"] == "degrees":
+        return wrong_groups(bound["groups"], rng)
     if bound["kind"] != "rank":
         return wrong_count(record, rng)
     for group in bound["groups"]:
         group[1] = rng.choice((0, 1, 13, -1, 2.5, "3"))
     return None
+
+
+def wrong_groups(groups: list[list[int]], rng: random.Random) -> None:
+    """An unknown in no group, in two, or one that there is not."""
+    group = rng.choice(groups)
+    match rng.randrange(3):
+        case 0:
+            group.pop()
+        case 1:
+            group.append(rng.choice(rng.choice(groups)))
+        case 2:
+            group[0] = sum(map(len, groups))
 
 
 def other_far(record: Record, rng: random.Random) -> None:
@@ -136,8 +150,16 @@ def other_far(record: Record, rng: random.Random) -> None:
 
 
 def other_geometry(record: Record, rng: random.Random) -> None:
-    """A curve of another size, or a tip elsewhere."""
+    """A curve of another size, a tip elsewhere, or another vector of a loop."""
     system = rng.choice(record["systems"])
+    if system["kind"] == "loops":
+        vectors = [vector for loop in system["loops"] for vector, slide, _ in loop if slide < 0]
+        if not vectors:
+            return wrong_count(record, rng)
+        vector = rng.choice(vectors)
+        k = rng.randrange(2)
+        vector[k] = moved(vector[k], amount(rng))
+        return None
     reach = rng.choice(system["reaches"][:system.get("square")])
     (kind, vectors), = reach.items()
     if kind == "circle":
@@ -149,6 +171,7 @@ def other_geometry(record: Record, rng: random.Random) -> None:
         across = vectors[1] if kind == "plane" else other(vectors[1]) if kind == "line" else ["1"] * len(vectors[0])
         by = amount(rng)
         vectors[0] = [moved(x, by * Fraction(d)) for x, d in zip(vectors[0], across, strict=True)]
+    return None
 
 
 def other(direction: list[str]) -> list[str]:
@@ -226,7 +249,7 @@ def missing_key(record: Record, rng: random.Random) -> None:
 def wrong_type(record: Record, rng: random.Random) -> None:
     system = rng.choice(record["systems"])
     key = rng.choice(["kind", "reaches", "tips", "boxes", "bound"])
-    system[key] = rng.choice([None, 3, "x", [], {}])
+    system[key] = rng.choice([None, 3, "x", *([[], {}] if system[key] else [])])
 
 
 FALSE: tuple[Callable[[Record, random.Random], None], ...] = (

@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from itertools import product
 from typing import Any
 
+from ..analysis.modes.planar_loops import groupings
 from .refining import Polynomial
-from .verify_certificate import PRIME, NotAccepted, multiples, poses, rank
+from .verify_certificate import PRIME, NotAccepted, degrees, multiples, poses, rank
 
 CAPS = 6
 """Largest cap of the monomials of a rank bound."""
-COLUMNS = 220
-"""The largest number of monomials."""
+COLUMNS, UNKNOWNS = 220, 4
+"""The largest number of monomials, and of unknowns."""
 PATIENCE = 3
 """After so many bounds that are no better the search for one ends."""
 ABOVE = 2
@@ -27,7 +29,13 @@ def bound(record: dict[str, Any], equations: Sequence[Polynomial], halves: Seque
         if poses(equations, halves, record) == count:
             return {"kind": "poses"}
         raise NotAccepted(f"{count} solutions are enclosed, but there may be more, for all that the checker knows")
-    for most in (0, ABOVE):
+    if record["kind"] == "loops":
+        for grouping in groupings(record["angles"], record["slides"]):
+            with suppress(TypeError):  # no bound
+                least = min(least, int(degrees(equations, halves, record | {"bound": {"groups": grouping}})))
+            if least == count:
+                return {"kind": "degrees", "groups": grouping}
+    for most in (0, ABOVE) if len(halves) <= UNKNOWNS else ():
         best, worse = math.inf, 0
         for groups in _groups(halves, most):
             found = _most(equations, halves, groups)

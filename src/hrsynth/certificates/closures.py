@@ -6,7 +6,7 @@ has one point and one set of axes for both of its links, and closes at Dâ‚, Dâ‚
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -17,12 +17,13 @@ from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.modes import AssemblyModes
 from ..analysis.modes.quadrics import WorkingFrame
 from ..analysis.modes.solve import SystemMode
+from ..constraints.pattern import attached
 from ..geometry.vectors import Array, inverse
 from ..kinematics.configuration import ClosedConfiguration
 from ..mechanism import Joint, JointType, Mechanism
 from ..mechanism.observations.direction import Direction
 from ..mechanism.observations.encoder import Encoder
-from ..tolerances import SOLVED
+from ..tolerances import CLOSED
 
 
 def written(values: Any) -> Any:
@@ -45,7 +46,7 @@ class ClosedRobot:
         mechanism = found.setting.mechanism
         held = list(_held(found))
         kinds = {joint.type for joint in mechanism.joints.values()}
-        if mechanism.couplings or not held or None in held or JointType.FREE in kinds or found.confined is None:
+        if mechanism.couplings or not held or None in held or JointType.FREE in kinds or found.model is None:
             return None
         length = found.goal.twin.length
         joints = [[joint.type.value, joint.predecessor, joint.successor,
@@ -53,12 +54,15 @@ class ClosedRobot:
                   for joint in mechanism.joints.values()]
         return cls(found, {"joints": joints, "held": held})
 
-    def at(self, mode: SystemMode) -> ClosedConfiguration | None:
-        """The configuration at a mode of a system; None where the robot was not found closed."""
+    def bodies(self, mode: SystemMode) -> dict[str, Array]:
+        """The poses (4, 4) of the bodies on which legs end at a mode of the list's own system."""
         assert self.found.model is not None
-        bodies = self.found.model.bodies(mode.q)
+        return self.found.model.bodies(mode.q)
+
+    def at(self, bodies: Mapping[str, Array]) -> ClosedConfiguration | None:
+        """The configuration with bodies there; None where the robot was not found closed."""
         return next((each.configuration for each in self.found.modes if each.bodies is not None and all(
-            np.abs(X - each.bodies[body]).max() <= SOLVED for body, X in bodies.items())), None)
+            np.abs(X - each.bodies[body]).max() <= CLOSED for body, X in bodies.items())), None)
 
     def links(self, at: ClosedConfiguration) -> dict[str, Any]:
         """The displacements of all links."""
@@ -69,10 +73,10 @@ class ClosedRobot:
                arrows: int, hub: Sequence[Any]) -> dict[str, Any]:
         """A system's frame, and its tips as points or, the last, arrows of the robot's links, by where they are at a
         configuration in working coordinates."""
-        assert self.found.confined is not None
+        names = attached(self.found.setting.anatomy) if self.found.confined is None else self.found.confined.bodies
         length, found = at.twin.length, []
         for k, (body, tip) in enumerate(zip(bodies, tips, strict=True)):
-            link, point = self.found.confined.bodies[body], float(k < len(tips) - arrows)
+            link, point = names[body], float(k < len(tips) - arrows)
             there = np.array(tip, dtype=float) - (1.0 - point) * np.array(hub, dtype=float)[:len(tip)]
             D = displaced(self.found.setting.mechanism, at, link)
             v = (point * frame.origin + frame.size * there @ frame.R) / length - point * D[:, 3]

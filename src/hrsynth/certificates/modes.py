@@ -9,26 +9,27 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from contextlib import suppress
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
 import numpy as np
 
-from ..analysis.modes.conditions import OnMovingPlane
+from ..analysis.measured import MeasuredRobot
 from ..analysis.modes.curves import Circle, Curve, Line, Plane, Point, Reach, Sphere, Surface, shifted
 from ..analysis.modes.modes import AssemblyModes, modes
-from ..analysis.modes.posed import PosedPlatform
+from ..analysis.modes.planar_loops import PlanarLoop, PlanarLoops, enclosures, excluded, planar_loops
 from ..analysis.modes.quadrics import UNIT, PoseSystem, Rounded, WorkingFrame, direction, spokes
 from ..analysis.modes.rigid import Planar, Spatial
 from ..analysis.modes.roots import Roots, is_real
-from ..analysis.modes.solve import Solved, SystemModes, solve
+from ..analysis.modes.solve import Solved, SystemModes
 from ..analysis.modes.squares import TURNS, SquareSystem
 from ..analysis.modes.translating import Articulated, Translating, coplanar, met_normal
 from ..analysis.observed import ObservedRobot
-from ..errors import NoCertificate
+from ..errors import NoCertificate, NotConfined
 from ..geometry.so3 import quaternions
-from ..geometry.vectors import Array, cross, pose, unit
+from ..geometry.vectors import Array, cross, rotation_about, unit
 from ..mechanism import Mechanism
 from ..mechanism.pose import Pose
 from ..tolerances import NO_POSE_START
@@ -53,27 +54,14 @@ def certificate(found: AssemblyModes) -> dict[str, Any]:
              "observed": [[o.leg, o.link if o.by_segment else o.leg] for o in found.setting.observed]}
     if found.found.complete and not found.found.solved and found.confined is not None:  # a copy: solved again
         found = modes(found.setting, at=found.goal, real=found.kind == "real", as_written=found.confined.as_written)
-    listed = _seen_from_platform(found) or found.found
+    robot = ClosedRobot.of(found)
     try:
-        return of_systems(listed, about, ClosedRobot.of(found))
+        if found.found.complete and not found.found.solved:
+            with suppress(NotConfined):
+                return of_loops(found, about, robot)
+        return of_systems(found.found, about, robot)
     except NotAccepted as reason:
         raise NoCertificate(found.setting.robot.name, str(reason)) from None
-
-
-def _seen_from_platform(found: AssemblyModes) -> SystemModes | None:
-    """The modes as poses of the base, as the platform sees it, where each leg keeps a point of the base on a line of a
-    platform that moves in a plane; None elsewhere."""
-    system = None if found.model is None else found.model.system
-    if not (isinstance(system, PosedPlatform) and found.found.complete and system.poses.motion == "planar"
-            and all(isinstance(each, OnMovingPlane) for each in system.conditions)):
-        return None
-    n, size = cross(*system.poses.moves.T), system.size
-    frame = pose(np.zeros(3), np.column_stack([system.poses.moves, n]))
-    rows = [each for each in system.conditions if isinstance(each, OnMovingPlane)]
-    lines = tuple(Line(size * (row.h + row.b @ row.c) / (row.c @ row.c) * row.c, cross(n, row.c)) for row in rows)
-    tips = size * np.array([row.o @ system.poses.moves for row in rows])
-    turned = solve(Planar(lines, tips, frame, error=system.error), near=False)
-    return turned if (turned.complex, len(turned.modes)) == (found.found.complex, len(found.modes)) else None
 
 
 def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot | None = None) -> dict[str, Any]:
@@ -82,10 +70,23 @@ def of_systems(found: SystemModes, about: Mapping[str, Any], robot: ClosedRobot 
         raise NotAccepted("the list is not proved complete")
     if not found.solved:
         raise NotAccepted("the list is complete by conditions of kinds that the checker does not know")
-    systems = [_system(each, robot) for each in found.solved]
+    proposed = [_proposed(each, robot) for each in found.solved]
+    return _sealed([_system(each, robot) for each in proposed], about, robot,
+                   sum(each.roots.complex if each.part.whole else sum(each.kept) for each in found.solved))
+
+
+def of_loops(found: AssemblyModes, about: Mapping[str, Any], robot: ClosedRobot | None) -> dict[str, Any]:
+    """The certificate of the modes of a planar mechanism from its joints; raises ``NotAccepted``, ``NotConfined``."""
+    measured = MeasuredRobot.driven(found.setting) if found.kind == "real" else MeasuredRobot.watched(found.setting)
+    proposed = _closings(planar_loops(measured, found.goal), found.found.complex or 0)
+    return _sealed([_system(proposed, robot)], about, robot, found.found.complex or 0)
+
+
+def _sealed(systems: list[dict[str, Any]], about: Mapping[str, Any], robot: ClosedRobot | None, count: int
+            ) -> dict[str, Any]:
+    """A record of systems that have so many complex solutions, accepted."""
     record = {"format": "hrsynth-certificate-1", "claim": "modes", **about,
-              "real": sum("pose" in box for each in systems for box in each["boxes"]),
-              "complex": sum(each.roots.complex if each.part.whole else sum(each.kept) for each in found.solved),
+              "real": sum("pose" in box for each in systems for box in each["boxes"]), "complex": count,
               "systems": systems, **({} if robot is None else {"assembly": robot.record})}
     record["sha256"] = digest(record)
     verify(record)
@@ -103,26 +104,39 @@ def again(record: dict[str, Any], robot: Mechanism) -> dict[str, Any]:
     return certificate(modes(setting, at=None if start == at else at, real=real))
 
 
-def _system(solved: Solved, robot: ClosedRobot | None) -> dict[str, Any]:
+@dataclass(frozen=True, eq=False)
+class _Proposed:
+    """A system in rational numbers without boxes and bound; about where its solutions are, and whether they are real
+    (None: too far to be poses); of the real ones the poses (3, 4) as the checker is told them, whether they are modes,
+    and the coordinates of the system in which they were found; its working frame."""
+
+    record: dict[str, Any]
+    starts: Sequence[tuple[Sequence[complex], bool | None]]
+    poses: Sequence[Array]
+    kept: Sequence[bool]
+    bodies: Sequence[Mapping[str, Array] | None]
+    frame: WorkingFrame
+
+
+def _system(proposed: _Proposed, robot: ClosedRobot | None) -> dict[str, Any]:
     """A system with its boxes and its bound."""
-    record, starts, placed = _written(solved)
+    record, frame = proposed.record, proposed.frame
     equations, halves, points, legs = KINDS[record["kind"]][0](record, rational(record["tips"]))
     equations = [integral(p) for p in equations]
-    real = iter(zip(placed, solved.kept, solved.modes, strict=True))
+    real = iter(zip(proposed.poses, proposed.kept, proposed.bodies, strict=True))
     record["boxes"], refining = [], Refining(equations)
-    for start, is_real_ in [*starts, *((each, None) for each in _no_poses(equations, halves))]:
+    for start, is_real_ in [*proposed.starts, *((each, None) for each in _no_poses(equations, halves))]:
         middle, inverse = refining.box(start, bool(is_real_))
         box = {"middle": written(middle), "radius": str(RADIUS), "inverse": written(inverse)}
-        pose, kept, mode = next(real) if is_real_ else (np.empty(0), False, None)
+        pose, kept, bodies = next(real) if is_real_ else (np.empty(0), False, None)
         if kept:
             box |= _pose(record, box, points, pose)
-            at = None if robot is None or mode is None else robot.at(mode)
+            at = None if robot is None or bodies is None else robot.at(bodies)
             if robot is not None and at is not None:
                 box["links"] = robot.links(at)
                 if "places" not in record:
-                    frame = solved.part.chart.frame if isinstance(solved.part, PoseSystem) else solved.part.frame
-                    assert frame is not None
-                    tips = [[value(p, middle)[0] / value(w, middle)[0] for p in N] for N, _, w in points]
+                    tips = [[value(p, middle)[0] / value(w, middle)[0] for p in N]
+                            for N, _, w in points[:len(record["tips"])]]
                     record["places"] = robot.places(record.get("bodies", [0] * len(tips)), frame, at, tips,
                                                     record.get("arrows", 0), rational(record.get("hub", ["0"] * 3)))
         elif is_real_ or (legs and is_real_ is not None):
@@ -153,6 +167,115 @@ def _pose(record: dict[str, Any], box: dict[str, Any], points: Any, placed: Arra
     raise NotAccepted("a pose that its box does not put where it was told")
 
 
+def _proposed(solved: Solved, robot: ClosedRobot | None) -> _Proposed:
+    """The solutions of a square part of a system."""
+    record, starts, poses = _written(solved)
+    frame = solved.part.chart.frame if isinstance(solved.part, PoseSystem) else solved.part.frame
+    assert frame is not None
+    return _Proposed(record, starts, poses, solved.kept,
+                     [None if robot is None else robot.bodies(mode) for mode in solved.modes], _in_space(frame))
+
+
+def _in_space(frame: WorkingFrame) -> WorkingFrame:
+    """A frame of a plane with the plane's normal."""
+    return frame if len(frame.R) == 3 else replace(frame, R=np.vstack([frame.R, cross(*frame.R)]))
+
+
+def _closings(system: PlanarLoops, count: int) -> _Proposed:
+    """The closings of a planar mechanism, ``count`` of which fit all that is measured."""
+    first, n = system.bodies[0], system.angles
+    frame = WorkingFrame(system.goal.pose(first)[:3, 3], np.vstack([system.frame, system.normal]), system.size,
+                         system.normal)
+    still, ends = (-1, (0,) * n), list[tuple[str, Any, dict[Any, complex]]]()
+    for body in system.bodies:
+        X, shift = system.goal.pose(body), dict(system.shifts[body])
+        shift[still] = shift.get(still, 0j) + complex(*frame.point(X[:3, 3])[:2])
+        ends += [(body, end, shift) for end in (
+            [(0.0, 0.0), (1.0, 0.0)] if system.point is None else [frame.vector(X[:3, :3] @ system.point)[:2]])]
+    first_ends = [each for each in ends if each[0] == first]
+
+    def carried(body: str, end: Any) -> PlanarLoop:
+        return PlanarLoop({(-1, system.turns[body]): complex(*end)}, n, system.slides)
+
+    record = {"kind": "loops", "angles": n, "slides": system.slides, "loops": [*map(_vectors, system.loops)],
+              "besides": [*map(_vectors, system.besides)], "reaches": [],
+              "tips": [[*written(_rounded(end)), "0"] for _, end, _ in first_ends],
+              "links": [[list(system.turns[first]), _vectors(PlanarLoop(shift, n, system.slides))]
+                        for _, _, shift in first_ends],
+              "others": [_vectors(PlanarLoop(shift, n, system.slides)) + _vectors(carried(body, end))
+                         for body, end, shift in ends if body != first]}
+    boxes = enclosures(system)
+    real = [box for box in boxes if box.real]
+    q = [np.array([*np.arctan2(x[n:2 * n], x[:n]), *x[2 * n:]]) for x in (box.middle.real for box in real)]
+    kept = [not excluded(system, box) for box in real]
+    if sum(kept) + (not system.besides) * (len(boxes) - len(real)) != count:
+        raise NotAccepted("the closings of the loops are not those of the list")
+    poses = [np.column_stack([rotation_about((0.0, 0.0, 1.0), float(np.array(system.turns[first]) @ x[:n])),
+                              frame.point(system.pose_of(first, x)[:3, 3])]) for x in q]
+    return _Proposed(record, [([*map(complex, box.middle)], box.real) for box in boxes], poses, kept,
+                     [system.placed(x) for x in q], frame)
+
+
+def _vectors(loop: PlanarLoop) -> list[Any]:
+    """The vectors of a sum, each along a slide or none (-1), and by how much of each angle it turns."""
+    return [[written(_rounded([a.real, a.imag])), k, list(e)] for (k, e), a in loop.terms.items()]
+
+
+def _planar(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
+    """A platform in a plane as loops: of the first leg's tip, the platform and another leg's tip. The angles are the
+    platform's and those of spokes of circles, the slides are along lines."""
+    system, part = solved.system, solved.part
+    assert isinstance(part, SquareSystem)
+    assert part.frame is not None
+    frame, turns, tips = part.frame, part.turns(solved.roots.turn), solved.system.tips / part.frame.size
+    reaches = [system.curves[k] for k in part.legs]
+    circles, lines = ([k for k, each in enumerate(reaches) if isinstance(each, kind)] for kind in (Circle, Line))
+    arms = [complex(*tips[k]) for k in part.legs]
+
+    def vector(a: complex, slide: int = -1, angle: int = -1, sign: int = 1) -> list[Any]:
+        return [written(_rounded([sign * a.real, sign * a.imag])), slide,
+                [int(k == angle) for k in range(1 + len(circles))]]
+
+    def tip(k: int, sign: int = 1) -> list[Any]:
+        found = [vector(centres[k], sign=sign)]
+        if k in circles:
+            found.append(vector(spokes_[k], angle=1 + circles.index(k), sign=sign))
+        return found + ([vector(spokes_[k], slide=lines.index(k), sign=sign)] if k in lines else [])
+
+    centres = [complex(*frame.point(each.centre)) for each in reaches]
+    spokes_ = [each.radius / frame.size + 0j if isinstance(each, Circle) else complex(*(frame.R @ each.direction))
+               if isinstance(each, Line) else 0j for each in reaches]
+    others = [k for k in range(len(system.curves)) if k not in part.legs]
+    start = next((k for k in range(len(reaches)) if k not in lines), 0)  # loops with fewer slides have lower degrees
+    record = {"kind": "loops", "angles": 1 + len(circles), "slides": len(lines), "besides": [], "others": [],
+              "loops": [[*tip(k), *tip(start, -1), vector(arms[start] - arms[k], angle=0)] for k in range(len(reaches))
+                        if k != start],
+              "links": [[[1] + [0] * len(circles), [*tip(0), vector(-arms[0], angle=0)]]] * len(tips),
+              "tips": [[*written(_rounded(tips[k])), "0"] for k in (*others, *part.legs)],
+              "reaches": [{kind: [[*x, "0"] for x in vectors]} for k in others
+                          for kind, vectors in _reach(system.curves[k], frame, 0.0).items()]}
+    values, real = _starts(solved.roots)
+    starts = []
+    for each in values:
+        known = iter(zip(each, turns, strict=False))
+        ends = [frame.point(np.asarray(reaches[k].centre, dtype=complex)) if isinstance(reaches[k], Point) else
+                frame.point(_at(reaches[k], frame, turn, t)) for k in (0, 1) for t, turn in
+                ([(0j, 0.0)] if isinstance(reaches[k], Point) else [next(known)])]
+        z = [(x + 1j * y, x - 1j * y) for x, y in ends]
+        arm = arms[1] - arms[0]
+        u = (z[1][0] - z[0][0]) / arm, (z[1][1] - z[0][1]) / arm.conjugate()
+        z += [(z[0][0] + u[0] * (b - arms[0]), z[0][1] + u[1] * (b - arms[0]).conjugate()) for b in arms[2:]]
+        way = [((x - c) / a, (y - c.conjugate()) / a.conjugate()) if a else (0j, 0j)
+               for (x, y), c, a in zip(z, centres, spokes_, strict=True)]
+        both = [u, *(way[k] for k in circles)]
+        starts.append([*((x + y) / 2 for x, y in both), *((x - y) / 2j for x, y in both),
+                       *(sum(way[k]) / 2 for k in lines)])
+    plane = np.eye(4)[[0, 1, 3]]
+    poses = [plane.T[:3] @ np.vstack([_placed(mode.pose, frame, 2), [0, 0, 1]]) @ plane + np.diag([0, 0, 1.0, 0])[:3]
+             for mode in solved.modes]
+    return record, list(zip(starts, real, strict=True)), poses
+
+
 def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], bool | None]], list[Array]]:
     """A system in rational numbers without boxes and bound; about where its solutions are, and whether they are real;
     the real ones' poses, as the checker is told them."""
@@ -163,16 +286,17 @@ def _written(solved: Solved) -> tuple[dict[str, Any], list[tuple[list[complex], 
         raise NotAccepted("tips at rest leave one pose: there is nothing to enclose")
     frame, turns = part.frame, part.turns(roots.turn)
     values, real = _starts(roots)
-    if isinstance(system, Spatial | Planar):
+    if isinstance(system, Planar):
+        return _planar(solved)
+    if isinstance(system, Spatial):
         legs = [*part.legs, *(k for k in range(len(system.curves)) if k not in part.legs)]
-        d = system.space
         origins = iter(turns)
         curves = [system.curves[k] for k in legs]
-        record = {"kind": "planar" if d == 2 else "spatial",
+        record = {"kind": "spatial",
                   "reaches": [_reach(each, frame, 0.0 if isinstance(each, Point | Surface) else
                                                          next(origins, 0.0)) for each in curves],
                   "tips": written(_rounded(system.tips[legs] / frame.size)), "square": len(part.legs)}
-        return record, list(zip(values, real, strict=True)), [_placed(mode.pose, frame, d) for mode in solved.modes]
+        return record, list(zip(values, real, strict=True)), [_placed(mode.pose, frame, 3) for mode in solved.modes]
     assert isinstance(system, Translating | Articulated)
     if isinstance(system, Translating):
         record, starts = _translating(system, part, frame, turns, values)

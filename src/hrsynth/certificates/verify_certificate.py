@@ -9,13 +9,15 @@
   Where they annul f independent vectors on H (zeros at infinity), rank H <= |H| - f. If the rank of H and S is no less
   than |H| - f + |S|, B spans all modulo the equations: |B| + |S| + |H| - f - rank zeros; modulo a prime ranks are no
   larger. The tangent of half an angle has its own cap, no H: a pose where it is infinite would be such a vector on S.
+* At most, *degrees*: Bezout in a product of projective spaces, and no curve besides so many zeros: on it the leading
+  forms would have a zero, and isolated ones be fewer (Bernstein, Funct. Anal. Appl. 9, 1975, Theorem B).
 * At most, *poses*: conditions *on a sphere*, *on a plane* on points of a rigid body are linear in 17 coordinates in
   which poses have dimension 6 and degree 40 (Gallet, Nawratil, Schicho, J. Geom. 106, 2015): of six at most 40 zeros,
   at infinity too, and no curve besides 40. With a tip at rest, or on six planes, three quadrics of the quaternion
   remain: 8; three rods in one ball put it in two places: 16.
-* A real pose puts each tip where its box does, to the distance told. With more legs than needed, the others miss one,
-  poses fit to 1e-9. Systems (branches of legs) are counted one by one. The robot *closes* where places of its links are
-  told: its joints fit, tips are in place, and what is measured is as told once for all poses.
+* A real pose puts each tip where its box does, to the distance told. With more legs than needed, others miss one, poses
+  fit to 1e-9. Systems (branches of legs) are counted one by one. The robot *closes* where places of its links are told:
+  its joints fit, tips are in place, and what is measured is as told once for all poses.
 
 *ranks*: of stacks of integer matrices, by a minor that is not zero modulo a prime and vectors that the stack annuls.
 """
@@ -52,9 +54,8 @@ def formal(p, w): return dict.fromkeys(w, Fraction(0)) | p  # p times w: w has i
 def slope(p, k): return {(*e[:k], e[k] - 1, *e[k + 1:]): c * e[k] for e, c in p.items() if e[k]}
 def integral(p):  # with integer coefficients that have no common divisor
     need(any(p.values()), "an equation vanishes")
-    below = math.lcm(*(c.denominator for c in p.values()))
-    common = math.gcd(*(int(c * below) for c in p.values()))
-    return {e: int(c * below) // common for e, c in p.items()}
+    common = Fraction(math.gcd(*(c.numerator for c in p.values())), math.lcm(*(c.denominator for c in p.values())))
+    return {e: int(c / common) for e, c in p.items()}
 def cross(u, v, mul=lambda a, b: a * b, minus=lambda a, b: a - b):
     return [minus(mul(u[i], v[j]), mul(u[j], v[i])) for i, j in ((1, 2), (2, 0), (0, 1))]
 def rational(value):
@@ -62,9 +63,9 @@ def rational(value):
         return list(map(rational, value))
     need(isinstance(value, str) and len(value) < 300 and not set(value) - set("0123456789/.-"), "a number in words")
     return Fraction(value)
-def reach_of(record, size=3):  # a kind, its centre; direction, normal, spokes of a circle, squared radius
+def reach_of(record):  # a kind, its centre; direction, normal, spokes of a circle, squared radius
     (kind, values), = record.items()
-    lengths = {"point": [size], "line": [size] * 2, "circle": [size] * 3, "plane": [3] * 2, "sphere": [3, 1]}
+    lengths = {"point": [3], "line": [3] * 2, "circle": [3] * 3, "plane": [3] * 2, "sphere": [3, 1]}
     _, *rest = vectors = rational(values)
     need(kind in lengths and [len(v) for v in vectors] == lengths[kind], f"{kind!r} is no curve or surface")
     need(kind != "circle" or dot(*rest) == 0 == dot(rest[0], rest[0]) - dot(rest[1], rest[1]), "the spokes of a circle")
@@ -82,32 +83,21 @@ def running(reach, k, n):  # N / w, a curve's point, Q / w its square, at x_k: t
     return N, inner(N, N), one
 def apart(one, other, squared):  # |P1 - P2|^2 = squared
     (N, Q, w), (M, P, v) = one, other
-    return add(mul(Q, v), mul(P, w), times(-2, inner(N, M)), times(-squared, mul(w, v)))
-def on_plane(point, normal, centre):
-    N, _, w = point
-    return add(*(times(c, p) for c, p in zip(normal, N)), times(-dot(normal, centre), w))
-def on_sphere(point, centre, squared):
-    N, Q, w = point
-    return add(Q, *(times(-2 * c, p) for c, p in zip(centre, N)), times(dot(centre, centre) - squared, w))
+    return formal(add(mul(Q, v), mul(P, w), times(-2, inner(N, M)), times(-squared, mul(w, v))), mul(w, v))
 def conditions(point, reach):  # planes and spheres that a point is on: (equation, normal or squared radius)
-    kind, (c, *rest) = reach
+    (N, Q, w), (kind, (c, *rest)) = point, reach
     axes = [[Fraction(int(i == k)) for i in range(3)] for k in range(3)]
     if kind == "sphere":
-        return [(on_sphere(point, c, rest[0][0]), rest[0])]
+        return [(add(Q, *(times(-2 * x, p) for x, p in zip(c, N)), times(dot(c, c) - rest[0][0], w)), rest[0])]
     if kind == "circle":
-        n = cross(*rest)
-        return [(on_plane(point, n, c), n), (on_sphere(point, c, dot(rest[0], rest[0])), [dot(rest[0], rest[0])])]
+        both = ("plane", [c, cross(*rest)]), ("sphere", [c, [dot(rest[0], rest[0])]])
+        return [each for reach in both for each in conditions(point, reach)]
     if kind == "line":
         first = cross(rest[0], min(axes, key=lambda axis: abs(dot(rest[0], axis))))
         rest = [first, cross(rest[0], first)]
-    return [(on_plane(point, n, c), n) for n in rest or axes]
+    return [(add(*map(times, n, N), times(-dot(n, c), w)), n) for n in rest or axes]
 def misfits(equations):  # by how much lengths miss: over a plane's normal, over the squared radius of small spheres
-    return [times(1 / (max(map(abs, n)) if len(n) > 1 else min(n[0], 1)), p) for p, n in equations]
-def tips_on(reaches):  # points of curves, each with an unknown; for each unknown whether it is a half-angle tangent
-    need({kind for kind, _ in reaches} <= {"point", "line", "circle"}, "tips on surfaces need another kind")
-    moving = [k for k, (kind, _) in enumerate(reaches) if kind != "point"]
-    points = [running(reach, moving.index(k) if k in moving else None, len(moving)) for k, reach in enumerate(reaches)]
-    return points, [reaches[k][0] == "circle" for k in moving]
+    return [times(1 / (max(map(abs, n)) if len(n) > 1 else min(n[0], Fraction(1))), p) for p, n in equations]
 
 def spatial(system, tips):
     """Three tips of a rigid body on curves, their distances; others are b1 + i u + j v + k u x v, u, v between tips."""
@@ -115,41 +105,40 @@ def spatial(system, tips):
     u, v = sub(tips[1], tips[0]), sub(tips[2], tips[0])
     up = cross(u, v)
     need(system["square"] == 3 <= len(tips) == len(reaches) and any(up), "three tips that are not on one line")
-    (points, halves), legs = tips_on(reaches[:3]), []
-    found = [formal(apart(points[i], points[j], dot(arm, arm)), mul(points[i][2], points[j][2]))
-             for i, j, arm in ((0, 1, u), (1, 2, sub(v, u)), (2, 0, v))]
+    need({kind for kind, _ in reaches[:3]} <= {"point", "line", "circle"}, "tips on surfaces need another kind")
+    moving = [k for k in range(3) if reaches[k][0] != "point"]  # the tips with an unknown, a half-angle tangent or not
+    points = [running(reaches[k], moving.index(k) if k in moving else None, len(moving)) for k in range(3)]
+    legs, halves = [], [reaches[k][0] == "circle" for k in moving]
+    found = [apart(points[i], points[j], dot(w, w)) for i, j, w in ((0, 1, u), (1, 2, sub(v, u)), (2, 0, v))]
     (N, _, w), (M, _, x), (L, _, y) = points
     U, V = ([minus(mul(b, w), mul(a, z)) for a, b in zip(N, other)] for other, z in ((M, x), (L, y)))
     W, wxy = cross(U, V, mul, minus), mul(mul(w, w), mul(x, y))
-    for tip, reach in zip(tips[3:], reaches[3:]):
-        b = sub(tip, tips[0])
+    for b, reach in zip((sub(tip, tips[0]) for tip in tips[3:]), reaches[3:]):
         i, j, k = (dot(b, each) / dot(up, up) for each in (cross(v, up), cross(up, u), up))
         P = [add(mul(a, mul(w, mul(x, y))), times(i, mul(c, mul(w, y))), times(j, mul(d, mul(w, x))), times(k, e))
              for a, c, d, e in zip(N, U, V, W)]
         legs.append(misfits(conditions(([mul(p, wxy) for p in P], inner(P, P), mul(wxy, wxy)), reach)))
     return found, halves, points, legs
 
-def planar(system, tips):
-    """Two tips in a plane, their distance; others, in complex numbers: (b2 - b1) P3 = (b2 - b3) P1 + (b3 - b1) P2."""
-    reaches = [reach_of(each, 2) for each in system["reaches"]]
-    need(len(tips) == len(reaches) >= system["square"] in (2, 3) and any(sub(tips[1], tips[0])), "two or three tips")
-    points, halves = tips_on(reaches[:2])
-    arm, legs = sub(tips[1], tips[0]), []
-    found = [apart(*points, dot(arm, arm))]
-    (N, Q, w), (M, P, v) = points
-    for tip, (kind, (c, *rest)) in zip(tips[2:], reaches[2:]):
-        x, y = (dot(sub(tip, tips[0]), each) / dot(arm, arm) for each in (arm, [-arm[1], arm[0]]))
-        T, U = [[1 - x, y], [-y, 1 - x]], [[x, -y], [y, x]]
-        A, B = ([add(*(times(x, p) for x, p in zip(row, at))) for row in turn] for turn, at in ((T, N), (U, M)))
-        point = ([add(mul(a, v), mul(b, w)) for a, b in zip(A, B)],
-                 add(times(dot(T[0], T[0]), mul(Q, v)), times(dot(U[0], U[0]), mul(P, w)), times(2, inner(A, B))),
-                 mul(w, v))
-        normals = [[1, 0], [0, 1]] if kind == "point" else [[-rest[0][1], rest[0][0]]]
-        legs.append(misfits([(on_sphere(point, c, dot(rest[0], rest[0])), [dot(rest[0], rest[0])])]
-                            if kind == "circle" else [(on_plane(point, n, c), n) for n in normals]))
-    need(system["square"] == 2 or len(legs[0]) == 1, "the third tip is at rest")
-    found += legs[0] if system["square"] == 3 else []
-    return [formal(p, mul(w, v)) for p in found], halves, points, legs[system["square"] - 2:]
+def loops(system, tips):
+    """Links in the plane z = 0 that turn by whole multiples of angles: sums of their vectors vanish, some along slides.
+    Unknowns: cosines, sines, slides. Of each tip's link it is told how it turns and shifts; also points of others."""
+    a, n = system["angles"], 2 * system["angles"] + system["slides"]
+    def turned(vector, slide, turns):  # times cos + i sin of each angle so often, and a slide where it is not -1
+        need(slide in range(-1, n - 2 * a) and len(turns) == a and all(abs(k) < 13 for k in turns), "turns and slides")
+        x, y = (mul(term(c, n), term(1, n, 2 * a + slide if slide >= 0 else None)) for c in rational(vector))
+        for j, sign in ((j, k // abs(k)) for j, k in enumerate(turns) for _ in range(abs(k))):
+            c, s = term(1, n, j), term(sign, n, a + j)
+            x, y = minus(mul(x, c), mul(y, s)), add(mul(x, s), mul(y, c))
+        return x, y
+    def total(vectors): return [add(*parts) for parts in zip(*(turned(*each) for each in vectors))]
+    need(system["slides"] >= 0 and len(system["reaches"]) <= len(tips) and not any(b[2] for b in tips), "a plane")
+    found = [p for loop in system["loops"] for p in total(loop)]
+    found += [add(*(mul(x, x) for x in (term(1, n, j), term(1, n, a + j))), term(-1, n)) for j in range(a)]
+    at = [total([*shift, [b[:2], -1, e]]) for b, (e, shift) in zip(system["tips"], system["links"], strict=True)]
+    points = [([*N, {}], inner(N, N), term(1, n)) for N in (*at, *map(total, system["others"]))]
+    legs = [misfits(conditions(*each)) for each in zip(points, map(reach_of, system["reaches"]))]
+    return found, [False] * n, points, [*map(total, system["besides"]), *legs]
 
 def shifting(system, tips):
     """Bodies that translate: x, y, z of the first, the second on ``slide`` about it. Of spheres, and of
@@ -200,8 +189,8 @@ def pose(system, tips):
         found += [equation for equation, _ in conditions(points[-1], reach)]
     return found, [False] * n, points, []
 
-KINDS = {"spatial": (spatial, "square"), "planar": (planar, "square"), "shifting": (shifting, "square bodies slide"),
-         "pose": (pose, "chart arrows hub")}
+KINDS = {"spatial": (spatial, "square"), "loops": (loops, "angles slides loops besides links others"),
+         "shifting": (shifting, "square bodies slide"), "pose": (pose, "chart arrows hub")}
 
 def whole(x):  # complex numbers, pairs of fractions, as integers, and what they are over
     q = math.lcm(*(u.denominator for z in x for u in z))
@@ -235,12 +224,11 @@ def enclosed(equations, m, r, Y):  # Krawczyk's condition; see above
         wide += sum(size(z) * h for z, h in zip(y, H))
         need(size(along(y, F)) + wide * r < r, "a box in which no solution is proved")
 def multiples(equations, halves, groups):  # monomials above, at, below the caps, how many; all multiples within
-    n = len(halves)
-    need(n <= 4 and sorted(k for group, _, _ in groups for k in group) == [*range(n)], "each unknown in one group")
+    need(len(halves) < 5 and sorted(k for group, _, _ in groups for k in group) == [*range(len(halves))], "each once")
     need(all(group and cap in range(1, 13) and more in range(13) and (not any(halves[k] for k in group) or (
         len(group) == 1 and more == 0)) for group, cap, more in groups), "caps of 1 to 12, one for each half-angle")
-    below = {e: min(cap - sum(e[k] for k in group) for group, cap, _ in groups) for e in product(range(13), repeat=n)
-             if all(sum(e[k] for k in group) <= cap + more for group, cap, more in groups)}
+    below = {e: min(cap - sum(e[k] for k in group) for group, cap, _ in groups) for e in product(
+        range(13), repeat=len(halves)) if all(sum(e[k] for k in group) <= cap + more for group, cap, more in groups)}
     columns = sorted(below, key=lambda e: min(max(below[e], -1), 1))
     need(len(columns) <= 300, "more than 300 monomials")
     moved = [{tuple(map(sum, zip(e, shift))): c for e, c in p.items()} for p in equations for shift in columns]
@@ -270,18 +258,29 @@ def poses(equations, halves, system):
     kinds = {kind for kind, _ in reaches}
     together = max(each.count(b) for each in (tips, [v[0] for _, v in reaches]) for b in each)
     return 8 if "point" in kinds or kinds <= {"line", "plane"} else 16 if kinds == {"sphere"} and together > 2 else 40
+def degrees(equations, halves, system):  # of loops and conjugates in u = cos + i sin, v = cos - i sin; u v = 1
+    groups, a, n = system["bound"]["groups"], system["angles"], len(halves)
+    need(n < 25 and all(groups) and sorted(k for group in groups for k in group) == [*range(n)], "each unknown once")
+    forms = [[[j, a + j]] for j in range(a)]  # the unknowns of each term, u before v before slides
+    forms += [[[j + a * (sign * k < 0) for j, k in enumerate(e) for _ in range(abs(k))] + [2 * a + slide] * (slide >= 0)
+               for _, slide, e in loop] for loop in system["loops"] for sign in (1, -1)]
+    total = term(1, len(groups))
+    for form in forms:
+        high = [max(sum(k in group for k in one) for one in form) for group in groups]
+        total = mul(total, add(*(term(c, len(groups), g) for g, c in enumerate(high))))
+        total = {e: c for e, c in total.items() if all(k <= len(group) for k, group in zip(e, groups))}
+    return sum(total.values()) or None  # no zero at all, or curves
 def modes(record):
     seen, proofs, real, complex_, closed, apart = [], [], 0, 0, 0, 0
     for system in record["systems"]:
-        tips = rational(system["tips"])
-        far = FAR * fair(system, tips, 2 if system["kind"] == "planar" else 3)
+        far = FAR * fair(system, tips := rational(system["tips"]))
         equations, halves, points, legs = KINDS[system["kind"]][0](system, tips)
         equations = [integral(p) for p in equations]
         need((equations, legs) not in seen, "a system that is told twice")
         seen.append((equations, legs))
         need(len(equations) == len(halves), f"{len(equations)} equations in {len(halves)} unknowns")
-        flat = [times(Fraction(1, 2 ** max(map(abs, p.values())).bit_length()), p) for p in equations]
-        bound, boxes = {"rank": rank, "poses": poses}[system["bound"]["kind"]](equations, halves, system), []
+        flat, boxes = [times(Fraction(1, 2 ** max(map(abs, p.values())).bit_length()), p) for p in equations], []
+        bound = {"rank": rank, "poses": poses, "degrees": degrees}[system["bound"]["kind"]](equations, halves, system)
         need(len(system["boxes"]) == bound, f"{len(system['boxes'])} boxes, but there may be {bound} solutions")
         for each in system["boxes"]:
             m, r = rational(each["middle"]), rational(each["radius"])
@@ -308,6 +307,8 @@ def modes(record):
             real, complex_ = real + ("pose" in each), complex_ + (not away and "misses" not in each)
         for (m, r), (k, s) in combinations(boxes, 2):
             need(any(max(abs(a - c), abs(b - d)) > r + s for (a, b), (c, d) in zip(m, k)), "two boxes touch")
+            need(system["kind"] != "loops" or any(size(sub(value(p, m), value(p, k))) / 2 > change(p, m, r) + change(
+                p, k, s) for N, _, _ in points for p in N), "two closings may be of one pose")
     need(seen and record["real"] == real and record["complex"] == complex_, f"{real} real of {complex_} are proved")
     for each in proofs:
         enclosed(*each)
@@ -315,25 +316,24 @@ def modes(record):
     more += f" nearer than 10^7 of its sizes ({apart} solutions are farther)" * (apart > 0)
     more += f"; the robot closes at {closed} of the real ones, to 1e-9" * ("assembly" in record)
     return f"{real} real of {complex_} complex poses, and no other{more}"
-def fair(system, tips, d):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
+def fair(system, tips):  # has its kind's keys; lengths in units of about its size (translation along planes: any)
     need(system.keys() <= {*f"kind reaches tips boxes bound places {KINDS[system['kind']][1]}".split()}, "another key")
-    need(len(tips) < 50 and all(len(b) == d for b in tips), "tips of another dimension, or too many")
-    reaches = [reach_of(each, d) for each in system["reaches"]]
+    need(len(tips) < 50 and all(len(b) == 3 for b in tips), "tips of another dimension, or too many")
+    reaches = [reach_of(each) for each in system["reaches"]]
     radii = [v[1] for kind, v in reaches if kind in ("circle", "sphere")]
     spans = [sub(b, places[0]) for places in (tips, [v[0] for _, v in reaches]) for b in places]
     extent = max(abs(x) for span in radii + spans for x in span)
-    need(extent > Fraction(1, 1000) or (system["kind"] == "shifting" and not radii), "lengths in units not of its size")
+    need(extent > Fraction(1, 1000) or not reaches or (system["kind"] == "shifting" and not radii), "another unit")
     return extent
 def moved(D, x): return [dot(row, x) for row in D]  # a point (x, y, z, 1) or direction (x, y, z, 0) of a link
-def turn_of(P, d):  # the rotation of a pose in space or in a plane
-    need(len(P) == d and all(len(row) == d + 1 for row in P), "a pose of another form")
-    turn = [row[:d] for row in P]
-    need(all(abs(dot(turn[i], turn[j]) - int(i == j)) < FIT for i in range(d) for j in range(d))
-         and (dot(cross(*turn[:2]), turn[2]) if d == 3 else cross(*([*row, 0] for row in turn))[2]) > 0, "no turn")
+def turn_of(P):  # the rotation of a pose
+    turn = [row[:3] for row in P]
+    need([*map(len, P)] == [4] * 3 and dot(cross(*turn[:2]), turn[2]) > 0 and all(
+        abs(dot(u, v) - (u is v)) < FIT for u in turn for v in turn), "no pose")
     return turn
 def closes(robot, links):  # its joints fit to 1e-9 with links displaced since zero, and what is held is as told
     D, off = {name: rational(rows) for name, rows in links.items()}, []
-    turns = {name: turn_of(rows, 3) for name, rows in D.items()}
+    turns = {name: turn_of(rows) for name, rows in D.items()}
     for kind, one, other, *vectors in robot["joints"]:  # the point, then axes
         x = rational(vectors)
         (p, *u), (q, *v) = ([moved(D[link], y) for y in x] for link in (one, other))
@@ -348,12 +348,12 @@ def closes(robot, links):  # its joints fit to 1e-9 with links displaced since z
     need(robot["held"] and robot["joints"] and all(abs(x) < FIT for x in off), "an open joint, or another measurement")
     return True
 def told(system, each, points, tips, m, r):  # whether the pose puts the tips where the box does
-    P, within, d = rational(each["pose"]), rational(each["within"]), len(points[0][0])
-    turn = turn_of(P, d)
-    need(within <= WITHIN and (system["kind"] != "shifting" or all(turn[i][i] == 1 for i in range(d))), "another pose")
+    P, within = rational(each["pose"]), rational(each["within"])
+    turn = turn_of(P)
+    need(within <= WITHIN and (system["kind"] != "shifting" or all(turn[i][i] == 1 for i in range(3))), "another pose")
     arrows, bodies = system.get("arrows", 0), system.get("bodies", [0] * len(tips))
     for k, (b, (N, _, w), body) in enumerate(zip(tips, points, bodies)):
-        start = rational(system["hub"]) if k >= len(tips) - arrows else [row[d] for row in P]
+        start = rational(system["hub"]) if k >= len(tips) - arrows else [row[3] for row in P]
         at = [value(p, m)[0] / value(w, m)[0] for p in N]
         off = max(change(minus(p, times(x, w)), m, r) / least(w, m, r) for p, x in zip(N, at))
         need(body or all(abs(x - start[i] - dot(turn[i], b)) + off <= within for i, x in enumerate(at)),

@@ -17,6 +17,8 @@ from hrsynth.analysis.modes.modes import AssemblyModes
 from hrsynth.analysis.modes.multiples import Residues
 from hrsynth.analysis.modes.planar_loops import planar_loops, solve_loops, whole_kernel
 from hrsynth.analysis.modes.search import search
+from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.words import parse
 from hrsynth.constraints.pattern import attached
 from hrsynth.description import load, shipped
 from hrsynth.errors import NotConfined, Unsolved
@@ -126,6 +128,18 @@ def test_a_six_bar_of_two_loops(motor: str, platform: str, count: int, loops: in
     assert len(system.loops) == loops
     _, found = solve_loops(driven, observed.everything.start)
     assert (found.complete, found.complex) == (True, count)
+
+
+@pytest.mark.parametrize(("word", "count"), [
+    ("(Rz!-Rz*-Ph)+(Rz!-Rz-Rz*)+(Rz!-Rz*-Rz)", 6), ("(Ph*-Rz-Pj)+(Ph-Rz-Rz*)+(Rz-Ph*-Pj)", 4)])
+def test_loops_are_told_so_that_their_degrees_are_low(word: str, count: int):
+    """A tip on a line of the platform, two on circles: 6, as a coupler curve meets a circle; lines alone leave 4."""
+    found = hrsynth.modes(mechanism(parse(word)), real=True)
+    assert (found.found.complete, found.found.complex) == (True, count)
+    others = search(found.goal, measured(found).question, attached(found.setting.anatomy))
+    for mode in others.modes:
+        assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
+                   for each in found.modes if each.bodies) < 1e-6
 
 
 def test_slides_that_are_coupled():

@@ -46,7 +46,7 @@ def most_zeros(quadrics: Sequence[Quadric], enough: int) -> int | None:
         return None
     flat = [{tuple(e[k] for k in left): int(c * math.lcm(*(d.denominator for d in form.values())))
              for e, c in form.items()} for form in forms]
-    return _least(flat, _partitions(list(range(len(left)))), enough) if left else 1
+    return _least(flat, partitions(list(range(len(left)))), enough) if left else 1
 
 
 def _least(forms: Sequence[Form], groupings: Iterable[Sequence[Sequence[int]]], enough: int) -> int | None:
@@ -88,15 +88,15 @@ class Residues:
     def most_by_degrees(self) -> int:
         """The least number of isolated zeros, multiple ones counted so often, that the degrees in groups of unknowns
         allow (Bézout's theorem in a product of projective spaces)."""
-        return min(_bezout(self.forms, groups) for groups in _partitions(list(range(self.n))))
+        return min(bezout(self.forms, groups) for groups in partitions(list(range(self.n))))
 
     def most_by_ranks(self, enough: int) -> int | None:
         """The least bound by ranks of multiples, the first that is ``enough``, in the groups of the least degrees."""
-        groupings = sorted(_partitions(list(range(self.n))), key=lambda groups: _bezout(self.forms, groups))
+        groupings = sorted(partitions(list(range(self.n))), key=lambda groups: bezout(self.forms, groups))
         return _least(self.forms, groupings[:GROUPINGS], enough) if self.n else 1
 
 
-def _bezout(forms: Sequence[Form], groups: Sequence[Sequence[int]]) -> int:
+def bezout(forms: Sequence[Form], groups: Sequence[Sequence[int]]) -> int:
     """The coefficient of the product of all hₖ to the number of unknowns in group k, in that of Σ dₖ hₖ for each
     polynomial, dₖ its degree in the group."""
     ways = {(0,) * len(groups): 1}
@@ -181,12 +181,12 @@ def _times(one: Form, other: Form) -> Form:
     return total
 
 
-def _partitions(left: list[int]) -> Iterator[list[list[int]]]:
+def partitions(left: list[int]) -> Iterator[list[list[int]]]:
     """All ways to group unknowns."""
     if not left:
         yield []
         return
-    for rest in _partitions(left[1:]):
+    for rest in partitions(left[1:]):
         yield [[left[0]], *rest]
         for k in range(len(rest)):
             yield [*rest[:k], [left[0], *rest[k]], *rest[k + 1:]]

@@ -30,7 +30,7 @@ from ...tolerances import NEARLY_REAL_POSE, NUMBER_ROUNDING, SAME_DIRECTION, SAM
 from ..measured import MeasuredRobot
 from .branches import Model
 from .fits import words
-from .multiples import Residues
+from .multiples import Residues, bezout, partitions
 from .polynomials import Polynomial, krawczyk
 from .pose_boxes import PRECISION, PoseBox, as_box
 from .solve import SystemMode, SystemModes
@@ -40,6 +40,8 @@ Exponents = tuple[int, ...]
 Sum = dict[tuple[int, Exponents], complex]
 """Coefficients by the number of a slide (-1: none) and the exponents of u, negative ones of v."""
 KINDS = (JointType.REVOLUTE, JointType.PRISMATIC)
+MOST_GROUPED = 6
+"""Unknowns up to which all ways to group them are tried."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,6 +196,17 @@ class PlanarLoops(System):
                  for k in range(self.angles)]
         return [*(form for loop in self.loops for form in loop.forms()), *units]
 
+    @cached_property
+    def residues(self) -> Residues:
+        """The equations modulo a prime."""
+        return Residues.of(self.forms)
+
+    @cached_property
+    def most(self) -> int:
+        """How many isolated closings the degrees allow, with unknowns eliminated or not."""
+        groups = groupings(self.angles, self.slides)
+        return min(self.residues.most_by_degrees(), *(bezout(self.forms, each) for each in groups))
+
     def pose_of(self, link: str, q: Array) -> Array:
         """X_BL of a link (4, 4), m."""
         psi, t = q[:self.angles], q[self.angles:]
@@ -328,12 +341,14 @@ class _Reading:
         def of(terms: Sum) -> Sum:
             return {(slides.index(k) if k in slides else -1, kept(e)): a for (k, e), a in terms.items()}
 
-        made = [tuple(PlanarLoop(of(loop), len(angles), len(slides)) for loop in part) for part in (loops, more)]
-        return PlanarLoops((), np.zeros((0, 3)), self.goal, self.normal, {k: kept(e) for k, e in turns.items()},
+        whole = [tuple(PlanarLoop(of(loop), len(angles), len(slides)) for loop in part)
+                 for part in (map(_turned, loops), loops, more)]
+        found = PlanarLoops((), np.zeros((0, 3)), self.goal, self.normal, {k: kept(e) for k, e in turns.items()},
                            {body: of(shifts[body]) for body in self.bodies},
                            {name: (slides.index(k) if k in slides else -1, by) for name, (k, by) in moves.items()},
-                           made[0], len(angles), len(slides), self.bodies, self.point, made[1],
+                           whole[0], len(angles), len(slides), self.bodies, self.point, whole[2],
                            error=self.dropped * self.goal.twin.length)
+        return min(found, replace(found, loops=whole[1]), key=lambda each: each.most)
 
     def _turns(self) -> dict[str, Exponents]:
         """E: all turns that slides, gears, and what is measured of turns allow."""
@@ -424,13 +439,18 @@ class _Reading:
         loops = [loop for loop in loops if loop]
         while (better := self._fewer(loops)) is not None:
             loops[better[0]] = better[1]
-        return shifts, [_simplest(loop) for loop in loops]
+        return shifts, loops
 
     def _fewer(self, loops: Sequence[Sum]) -> tuple[int, Sum] | None:
-        """A loop's place, and its sum with another or difference from it, where that has fewer unknowns."""
+        """A loop's place, and its sum with another or difference from it, where that has fewer unknowns, or of as many
+        fewer slides: the degrees are lower."""
+        def size(loop: Sum) -> tuple[int, int]:
+            unknowns = _unknowns(loop)
+            return len(unknowns), sum(slide for slide, _ in unknowns)
+
         for (i, one), (_, other), sign in ((a, b, s) for a, b in permutations(enumerate(loops), 2) for s in (1, -1)):
             total = self._sum(one, other, sign)
-            if len(_unknowns(total)) < len(_unknowns(one)):
+            if size(total) < size(one):
                 return i, total
         return None
 
@@ -452,7 +472,7 @@ class _Reading:
         return {key: a for key, a in total.items() if abs(a) >= SAME_POINT}
 
 
-def _simplest(loop: Sum) -> Sum:
+def _turned(loop: Sum) -> Sum:
     """A loop, turned with what most of its slides are on."""
     on = Counter(e for k, e in loop if k >= 0)
     if not on:
@@ -491,6 +511,17 @@ def whole_kernel(rows: Sequence[Sequence[int]], whole: bool = False) -> list[lis
 
 def _products(row: Sequence[int], vectors: Sequence[Sequence[int]]) -> list[int]:
     return [sum(a * b for a, b in zip(row, each, strict=True)) for each in vectors]
+
+
+def groupings(angles: int, slides: int) -> Iterator[list[list[int]]]:
+    """Ways to group all u, all v and all t: by kinds, each alone, few unknowns in all ways."""
+    u, v, t = ([*range(k, k + n)] for k, n in ((0, angles), (angles, angles), (2 * angles, slides)))
+    n = 2 * angles + slides
+    alone = [[k] for k in t]
+    for groups in ([u, v, t], [u + v + t], [u, v, *alone], [u + v, t], [[k] for k in range(n)],
+                   [*map(list, zip(u, v, strict=True)), t]):
+        yield [*filter(None, groups)]
+    yield from partitions([*range(n)]) if n <= MOST_GROUPED else ()
 
 
 def proposals(forms: Sequence[dict[Exponents, complex]], angles: int, enough: int) -> Array:
@@ -543,12 +574,11 @@ def _judged(system: PlanarLoops) -> SystemModes:
     loops, angles, slides = (f"{n} {word}{'s' * (n != 1)}" for n, word in (
         (len(system.loops), "loop"), (system.angles, "angle"), (system.slides, "slide")))
     size = f"{loops}, {angles} and {slides}"
-    residues = Residues.of(system.forms)
-    most, why, bound = residues.most_by_degrees(), "degrees in groups of unknowns (Bézout)", "class"
+    most, why, bound = system.most, "degrees in groups of unknowns (Bézout)", "class"
     if most > LARGEST_LOOPS:
         raise Unsolved("the loops", f"{size}: up to {most} closings, too many (at most {LARGEST_LOOPS})")
     boxes, lost = _enclosed(system, proposals(system.forms, system.angles, most))
-    if len(boxes) < most and (fewer := residues.most_by_ranks(len(boxes))) is not None and fewer < most:
+    if len(boxes) < most and (fewer := system.residues.most_by_ranks(len(boxes))) is not None and fewer < most:
         most, why, bound = fewer, "ranks modulo a prime of 62 bits", "rank"
     start = np.array([1.0] * system.angles + [0.0] * (system.angles + system.slides))
     at_goal = [box for box in boxes if box.real and box.holds(start)]
@@ -564,7 +594,7 @@ def _judged(system: PlanarLoops) -> SystemModes:
     if not system.besides:
         modes = tuple(_mode(system, box, True) for box in real)
         return SystemModes(len(boxes), modes, True, proof, bound=bound, enclosed=True)
-    kept = [box for box in real if box is at_goal[0] or not _excluded(system, box)]
+    kept = [box for box in real if box is at_goal[0] or not excluded(system, box)]
     modes = tuple(_mode(system, box, box is at_goal[0]) for box in kept)
     fitting = tuple(mode for mode in modes if mode.proved or mode.residual <= VANISHES)
     others = [mode.residual for mode in fitting if not mode.proved]
@@ -573,7 +603,12 @@ def _judged(system: PlanarLoops) -> SystemModes:
     return SystemModes(len(fitting), fitting, not open_, proof, bound="none" if open_ else bound, enclosed=True)
 
 
-def _excluded(system: PlanarLoops, box: PoseBox) -> bool:
+def enclosures(system: PlanarLoops) -> list[PoseBox]:
+    """Boxes of closings, complex ones too, apart from each other."""
+    return _enclosed(system, proposals(system.forms, system.angles, system.most))[0]
+
+
+def excluded(system: PlanarLoops, box: PoseBox) -> bool:
     """Whether something that is measured besides is another at each closing in a real box."""
     return any(not _Part(each, part, system.slack).value(_balls(box)).contains(0) for each in system.besides
                for part in (False, True))
