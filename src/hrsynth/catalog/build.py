@@ -66,9 +66,9 @@ class WordSource:
 def architectures() -> WordSource:
     """The catalog itself."""
     from .entry import entry
-    from .groups import GROUPS
+    from .groups import EVERY
 
-    return WordSource(GROUPS, entry, unmoved)
+    return WordSource(EVERY, entry, unmoved)
 
 
 def unmoved(word: str) -> str:

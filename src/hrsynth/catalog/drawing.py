@@ -9,7 +9,7 @@ from ..mechanism.legs import decompose
 from ..mechanism.normal import normal_form
 from ..mechanism.sensors import default_observation
 from .geometry import mechanism
-from .words import COMPOSITE, LegWord, RobotWord
+from .words import COMPOSITE, LegWord, RobotWord, counted
 
 ENDS = {"": ("platform",), "point": ("platform, a point",), "bar": ("plate 1", "plate 2"),
         "slide": ("plate", "platform")}
@@ -31,7 +31,8 @@ def drawing(word: RobotWord) -> str:
     width = max(map(len, heads))
     lines = [f"{head:<{width}}  {_chain(leg, watched.get(numbers[0]), ENDS[word.platform][body])}"
              for head, ((body, leg), numbers) in zip(heads, groups.items(), strict=True)]
-    return "\n".join([*lines, *([BETWEEN[word.platform]] if word.platform in BETWEEN else [])])
+    seen = [f"seen of the platform: {counted(word.seen)}"] if word.seen else []
+    return "\n".join([*lines, *([BETWEEN[word.platform]] if word.platform in BETWEEN else []), *seen])
 
 
 def _head(numbers: list[int]) -> str:
@@ -56,7 +57,9 @@ def _line(leg: LegWord, place: int, watched: int | None) -> str:
 
 def _watched(word: RobotWord) -> dict[int, int]:
     """The place of the observed link in each leg: the joint inside or after which it lies; nothing where the mechanism
-    cannot be made."""
+    cannot be made, or something else is seen."""
+    if word.seen:
+        return {}
     try:
         anatomy = decompose(normal_form(mechanism(word)).mechanism)
         given = {seen.leg: seen.link for seen in anatomy.mechanism.observations if seen.by_segment}

@@ -14,7 +14,8 @@ from ..analysis.asked import observe
 from ..analysis.derive import derive
 from ..analysis.exact import ExactArchitecture, architecture
 from ..analysis.measured import MeasuredRobot
-from ..analysis.modes.modes import counted, expected
+from ..analysis.modes.modes import counted as counted_modes
+from ..analysis.modes.modes import expected
 from ..analysis.modes.solve import SystemModes
 from ..analysis.observed import ObservedRobot, restricted, selected
 from ..analysis.verdict import CONTROLLABLE, Verdict, verdict_of
@@ -23,6 +24,7 @@ from ..geometry.ranks import range_basis
 from ..kinematics.configuration import ClosedConfiguration
 from ..kinematics.relation import Relation
 from ..kinematics.sampling import Samples
+from ..mechanism import Observation
 from ..mechanism.legs import decompose
 from ..mechanism.model import Mechanism
 from ..mechanism.normal import normal_form
@@ -31,7 +33,7 @@ from ..rewrite.strategy import Step
 from ..tolerances import PROVED_CHANCE
 from .geometry import mechanism
 from .groups import group
-from .words import RobotWord, parse
+from .words import RobotWord, counted, parse
 
 SAMPLES = 10
 """Closed configurations at which an exact verdict is confirmed."""
@@ -53,7 +55,7 @@ def entry(text: str) -> dict[str, Any]:
     The same for the same word, whatever was asked before. Raises ``BadRequest`` for a text that is no word.
     """
     word = parse(text)
-    record: dict[str, Any] = {"word": str(word), "group": group(word)}
+    record: dict[str, Any] = {"word": str(word), "group": group(word), "see": counted(word.seen) or None}
     found = _studied(str(model(word)))
     if isinstance(found, str):
         return {**record, "refused": found}
@@ -161,9 +163,14 @@ def _agree(exact: ExactArchitecture, samples: Samples, found: Verdict) -> None:
                                                  f"freedoms in exact arithmetic, {found.rank} at samples")
 
 
+def _watched(setting: ObservedRobot) -> tuple[Observation, ...]:
+    """The segments of all legs, or what is seen instead."""
+    return setting.segments if all(each.by_segment for each in setting.observed) else setting.observed
+
+
 def _kinds(word: RobotWord) -> list[str]:
-    """What each leg is, in the order of the labels: equal legs of one body can be exchanged."""
-    return [f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs]
+    """What each leg is, in the order of the labels: equal legs of one body can be exchanged; or each thing seen."""
+    return [str(each) for each in word.seen] or [f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs]
 
 
 def _smallest(setting: ObservedRobot, exact: ExactArchitecture | None,
@@ -172,10 +179,10 @@ def _smallest(setting: ObservedRobot, exact: ExactArchitecture | None,
     confirmed, and exact where that is asked for."""
     if not best.rank:
         return []
-    for size in range(1, len(setting.segments) + 1):
+    for size in range(1, len(_watched(setting)) + 1):
         found = []
         for places in sets(size):
-            seen = [setting.segments[i] for i in places]
+            seen = [_watched(setting)[i] for i in places]
             samples = restricted(setting.everything, seen)
             verdict = verdict_of(setting, [o.leg for o in seen], samples)
             if exact is not None:
@@ -225,7 +232,7 @@ def _singular(setting: ObservedRobot) -> dict[str, Any]:
 def _modes(setting: ObservedRobot, fewest: Sequence[Sequence[str]]) -> dict[str, Any]:
     """Complex assembly modes of a smallest set of legs, by what there are no more if not by a resultant, and the most
     real ones of some configurations: of the first set, or else of that of which fewest can be expected."""
-    robots = [MeasuredRobot.watched(replace(setting, observed=tuple(o for o in setting.segments if o.leg in legs)))
+    robots = [MeasuredRobot.watched(replace(setting, observed=tuple(o for o in _watched(setting) if o.leg in legs)))
               for legs in fewest]
     at = setting.configurations[0]
     others = sorted(range(1, len(fewest)), key=lambda k: expected(robots[k], at))
@@ -247,7 +254,7 @@ def _lists(measured: MeasuredRobot, configurations: Sequence[ClosedConfiguration
         if k >= count:
             return
         try:
-            found = counted(measured, at)
+            found = counted_modes(measured, at)
         except (NotConfined, Unsolved, MissingExtra, BadRequest):
             return
         yield found

@@ -13,14 +13,17 @@ from typing import cast
 
 import numpy as np
 
+from ..description.sights import SightSpec, with_sights
 from ..errors import BadRequest
-from ..geometry.vectors import Array, perpendicular, rotation_about, unit
+from ..geometry.vectors import Array, perpendicular, pose, rotation_about, unit
 from ..mechanism.builder import Builder
 from ..mechanism.legs import decompose
 from ..mechanism.model import Mechanism
 from ..mechanism.normal import normal_form
+from ..mechanism.observations import kinds
 from ..mechanism.observations.direction import Direction
 from ..mechanism.sensors import default_observation, observation_of
+from ..mechanism.sights import CameraObservation, NamedCamera
 from ..tolerances import SQUARE_AXES
 from .words import COMPOSITE, JointSymbol, LegWord, RobotWord
 
@@ -33,7 +36,30 @@ def mechanism(word: RobotWord, attempt: int = 0) -> Mechanism:
 
     Raises ``BadRequest`` where the axes of a U cannot be at right angles.
     """
-    return _Draft(word, attempt).build()
+    drawn = _Draft(word.unseen, attempt).build()
+    return _seen(drawn, word, attempt) if word.seen else drawn
+
+
+def _seen(drawn: Mechanism, word: RobotWord, attempt: int) -> Mechanism:
+    """The mechanism with what the word says to be seen of its platform: places, axes and cameras in general position.
+
+    The cameras see upwards from below the platform.
+    """
+    rng = np.random.default_rng(np.frombuffer(sha256(f"{word.unmoved} {attempt} seen".encode()).digest(), np.uint32))
+    centre = drawn.links["platform"].pose[:3, 3]
+    cameras, specs = dict[str, NamedCamera](), list[SightSpec]()
+    for number, each in enumerate(word.seen, 1):
+        kind, name = kinds()[each.kind], f"camera_{number}" if each.own else "camera"
+        by_camera = issubclass(kind, CameraObservation)
+        if by_camera and name not in cameras:
+            at = centre + [*rng.uniform(-0.3, 0.3, size=2), -rng.uniform(0.5, 0.7)]
+            cameras[name] = NamedCamera(name, "base", pose(at, rotation_about(rng.normal(size=3), 0.2)))
+        at, axis = 0.12 * rng.normal(size=3), unit(rng.normal(size=3))
+        specs.append(SightSpec(
+            each.kind, "platform", f"{each.kind}_{number}", name if by_camera else None,
+            tuple(at.tolist()) if "at" in kind.needs else None, tuple(axis.tolist()) if "axis" in kind.needs else None,
+            0.03 if "radius" in kind.needs else None))
+    return with_sights(replace(drawn, observations=()), specs, cameras.values())
 
 
 def planar(word: RobotWord) -> bool:

@@ -16,9 +16,9 @@ from ..errors import BadRequest
 from ..results import Value
 from .jsonl import Record, record
 from .store import DATABASES, Store, shipped, store
-from .words import parse
+from .words import SENSORS, counted, parse, sights
 
-EXACT = ("group", "dof", "motion", "verdict", "base_motors", "fewest")
+EXACT = ("group", "dof", "motion", "verdict", "base_motors", "fewest", "see")
 """Fields that have to be equal to what is asked for."""
 ASKED = (*EXACT, "modes", "legs", "text")
 """What can be asked for."""
@@ -51,7 +51,8 @@ class Catalog(Value):
         """The records that fit all that is asked for and not None; raises ``BadRequest`` for what cannot be asked.
 
         ``group``, ``dof``, ``motion`` ("3T", "2T1R"), ``verdict``, ``base_motors``, ``fewest`` (legs of the smallest
-        set that sees all that can be seen) and ``modes`` (complex ones of such a set) have to be equal. ``legs`` is
+        set that sees all that can be seen), ``modes`` (complex ones of such a set) and ``see`` ("3point": what is seen
+        of the platform instead of legs) have to be equal. ``legs`` is
         their number, or a pattern of ``*`` and ``?`` for the notation or for the chain of one leg, with or without the
         marks of motors. ``text`` has to occur in some field, or in a name
         under which the robot is known. Several values in a tuple: one of them.
@@ -81,6 +82,7 @@ class Catalog(Value):
 def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     """The shipped catalog, or that of a folder or SQLite file; ``asked`` as for ``Catalog.where``.
 
+    What is seen of platforms instead of legs (the group ``sensors``) is left out unless ``group`` or ``see`` asks for it.
     Of a SQLite file only the records that fit are read. Raises ``BadRequest`` where there is none or one of
     another version.
     """
@@ -90,7 +92,8 @@ def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     exactly = {name: value for name, value in asked.items()
                if name in EXACT and value is not None and not isinstance(value, tuple)}
     wanted = asked.get("group")
-    groups = [name for name in kept.groups() if wanted is None or name in _tuple(wanted)]
+    groups = [name for name in kept.groups() if name in _tuple(wanted) or (
+        wanted is None and (name == SENSORS) == (asked.get("see") is not None))]
     return Catalog(tuple(record(line) for name in groups for line in kept.lines(name, exactly))).where(**asked)
 
 
@@ -123,6 +126,8 @@ def _one(record: Record, name: str, value: Any) -> bool:
     match name:
         case "legs":
             return _legs(record, value)
+        case "see":
+            return bool(record.get("see") == counted(sights(value)))
         case "modes":
             return bool(record.get("modes_bound") == value)
         case "text":

@@ -9,6 +9,7 @@ from ..analysis.verdict import BLIND, CONTROLLABLE, PARTIAL
 from ..present.readme import replaced
 from .query import Catalog, load
 from .store import shipped
+from .words import SENSORS
 
 START = "<!-- generated: catalog -->"
 VERDICTS = (CONTROLLABLE, PARTIAL, BLIND, None)
@@ -18,7 +19,7 @@ HEADS = ("group", "architectures", "controllable", "partially controllable", "un
 def table(catalog: Catalog | None = None) -> str:
     """The Markdown table of how many architectures of each group have which verdict (default: of what is shipped)."""
     if catalog is None:
-        catalog = load() if shipped().groups() else Catalog(())
+        catalog = Catalog((*load(), *load(group=SENSORS))) if shipped().groups() else Catalog(())
     lines = [_line(HEADS), "|".join(["", " --- ", *(" ---: " for _ in HEADS[1:]), ""])]
     for group, in catalog.count("group"):
         lines.append(_row(str(group), catalog.where(group=group)))

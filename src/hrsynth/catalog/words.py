@@ -2,13 +2,16 @@
 
 A word says what stays so in motion and nothing else, no lengths::
 
-    robot    = [platform ":"] legs ["|" legs]
+    robot    = [platform ":"] legs ["|" legs] ["@" sights]
     platform = "point" (all legs end on one R axis) or "bar" / "slide" (two plates, joined by a bar on two R and its
                parallel twin, or by a P; "|" parts the legs of the one from those of the other)
     legs     = [count] "(" joint ("-" joint)* ")", several joined by "+"
     joint    = letter axes ["*"] ["!"]
     letter   = R P C (one axis), U (two, at right angles), S (none), Pi (the normal of a parallelogram), 2SS (two equal
                parallel rods between S joints, the axis along their distance), 2US (the same with U at the upper ends)
+
+    sights   = [count] kind ["'"], several joined by "+": what cameras on the base, or IMUs, see of the platform in the
+               place of the legs; ``'`` gives each a camera of its own, the others have one in common
 
 ``*`` marks a motor, ``!`` the joint after which the observed link follows (of two rods, the first of them), where it is
 not the default segment. Axes are directions at the zero configuration, named by
@@ -34,11 +37,14 @@ from __future__ import annotations
 
 import re
 from collections import Counter
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 from ..budgets import LARGEST_WORD
 from ..errors import BadRequest
+from ..mechanism.observations import kinds
+from ..mechanism.observations.encoder import Encoder
 
 VERSION = 1
 """Version of the words and of the mechanisms they stand for."""
@@ -54,11 +60,14 @@ NAMES = "xyztrkhjmabclonq"
 """Names of directions."""
 ALIKE = ("hjm", "abc")
 """Names that stand for the same kind of direction, in the order in which a leg uses them."""
+SENSORS = "sensors"
+"""The group of words whose platform is seen; all others watch legs."""
 PLATFORMS = {"": 1, "point": 1, "bar": 2, "slide": 2}
 """Platforms, and the bodies on which legs end."""
 
 _JOINT = re.compile(r"(?P<letter>2SS|2US|Pi|[RPCUS])(?P<axes>[a-z]*)(?P<motor>\*?)(?P<watched>!?)")
 _LEGS = re.compile(r"(?P<count>[0-9]*)\((?P<leg>[^()]*)\)")
+_SIGHTS = re.compile(r"(?P<count>[0-9]*)(?P<kind>[a-z_]+)(?P<own>'?)")
 
 
 @dataclass(frozen=True, order=True)
@@ -142,18 +151,33 @@ def _order(leg: LegWord) -> tuple[LegWord, LegWord]:
     return leg.unmoved, leg
 
 
+@dataclass(frozen=True, order=True)
+class SightWord:
+    """An observation of the platform: its kind, and whether by a camera of its own."""
+
+    kind: str
+    own: bool = False
+
+    def __str__(self) -> str:
+        return self.kind + "'" * self.own
+
+
 @dataclass(frozen=True)
 class RobotWord:
-    """An architecture: a platform and, for each of its bodies, the legs that end on it, sorted."""
+    """An architecture: a platform and, for each of its bodies, the legs that end on it, sorted; and what is seen of the
+    platform instead of the legs, sorted too."""
 
     platform: str
     bodies: tuple[tuple[LegWord, ...], ...]
+    seen: tuple[SightWord, ...] = ()
 
     @classmethod
-    def of(cls, legs: list[LegWord], *more: list[LegWord], platform: str = "") -> RobotWord:
+    def of(cls, legs: list[LegWord], *more: list[LegWord], platform: str = "", seen: Iterable[SightWord] = ()
+           ) -> RobotWord:
         """The canonical word of these legs; ``more``: those of a second body."""
         bodies = (tuple(sorted((leg.canonical for leg in body), key=_order)) for body in (legs, *more))
-        return cls(platform, tuple(sorted(bodies, key=lambda body: ([leg.unmoved for leg in body], body))))
+        return cls(platform, tuple(sorted(bodies, key=lambda body: ([leg.unmoved for leg in body], body))),
+                   tuple(sorted(seen)))
 
     @property
     def legs(self) -> tuple[LegWord, ...]:
@@ -163,32 +187,60 @@ class RobotWord:
     @property
     def unmoved(self) -> RobotWord:
         """The architecture without its motors: what the hidden robot is found from."""
-        return RobotWord.of(*[[leg.unmoved for leg in body] for body in self.bodies], platform=self.platform)
+        return RobotWord.of(*[[leg.unmoved for leg in body] for body in self.bodies], platform=self.platform,
+                            seen=self.seen)
 
     @property
     def driven(self) -> RobotWord:
         """The architecture with a motor on the first R or P of each leg: three R that meet in a point are no S then."""
-        return RobotWord.of(*[[leg.driven for leg in body] for body in self.bodies], platform=self.platform)
+        return RobotWord.of(*[[leg.driven for leg in body] for body in self.bodies], platform=self.platform,
+                            seen=self.seen)
+
+    @property
+    def unseen(self) -> RobotWord:
+        """The architecture without its sensors."""
+        return replace(self, seen=())
 
     def __str__(self) -> str:
-        bodies = ["+".join(f"{count if count > 1 else ''}{leg}" for leg, count in Counter(body).items())
-                  for body in self.bodies]
-        return f"{self.platform}:{'|'.join(bodies)}" if self.platform else bodies[0]
+        bodies = [counted(body) for body in self.bodies]
+        seen = f"@{counted(self.seen)}" if self.seen else ""
+        return (f"{self.platform}:{'|'.join(bodies)}" if self.platform else bodies[0]) + seen
+
+
+def counted(symbols: Iterable[LegWord | SightWord]) -> str:
+    """Equal ones once with their number, joined by +."""
+    return "+".join(f"{count if count > 1 else ''}{each}" for each, count in Counter(symbols).items())
 
 
 def parse(text: str) -> RobotWord:
     """The word that ``text`` writes, canonical; raises ``BadRequest`` with what is wrong in it."""
-    platform, colon, rest = text.strip().rpartition(":")
+    robot, at, seen = text.strip().partition("@")
+    platform, colon, rest = robot.rpartition(":")
     if platform not in PLATFORMS or bool(colon) != bool(platform):
         raise BadRequest(f"word {text!r}: unknown platform", platform, [name for name in PLATFORMS if name])
     bodies = [_legs(text, part) for part in rest.split("|")]
     if len(bodies) != PLATFORMS[platform]:
         raise BadRequest(f"word {text!r}: bodies on which legs end", len(bodies),
                          str(PLATFORMS[platform]))
-    word = RobotWord.of(*bodies, platform=platform)
+    word = RobotWord.of(*bodies, platform=platform, seen=sights(seen) if at else ())
+    if at and any(leg.observed is not None for leg in word.legs):
+        raise BadRequest(f"word {text!r}: links of legs are not watched", "!", "no ! where something else is seen")
     if not 2 <= len(word.legs) <= LARGEST_WORD:
         raise BadRequest(f"word {text!r}: number of legs", len(word.legs), f"2 to {LARGEST_WORD}")
     return word
+
+
+def sights(text: str) -> tuple[SightWord, ...]:
+    """What is seen of the platform, canonical; raises ``BadRequest``."""
+    known, found = [name for name, kind in kinds().items() if not issubclass(kind, Encoder)], list[SightWord]()
+    for term in text.split("+"):
+        match = _SIGHTS.fullmatch(term.strip())
+        count = int(match["count"] or 1) if match else 0
+        if match is None or match["kind"] not in known or not 1 <= count <= LARGEST_WORD:
+            raise BadRequest(f"what is seen, {text!r}: cannot be read", term,
+                             f"kinds such as 3point, joined by +: {', '.join(known)}; up to {LARGEST_WORD}")
+        found += [SightWord(match["kind"], bool(match["own"]))] * count
+    return tuple(sorted(found))
 
 
 def _legs(text: str, part: str) -> list[LegWord]:

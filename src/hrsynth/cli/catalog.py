@@ -37,7 +37,9 @@ FILTER = (
     Option("dof", "Freedoms of the platform.", kind=int, low=0),
     Option("motion", "Its translations and rotations, as 3T or 2T1R."),
     Option("verdict", f"{', '.join(VERDICTS)}.", words=VERDICTS),
-    Option("group", "planar, pods, deltas, spatial; of published tables 3T0R and the like."),
+    Option("see", "What is seen of the platform instead of legs, as 3point, or 2point+image_line; with ' by a camera "
+           "each.", "KINDS"),
+    Option("group", "planar, pods, deltas, spatial, sensors; of published tables 3T0R and the like."),
     Option("base_motors", "All motors on the base, or not.", kind=bool, flags=("--base-motors/--moving-motors",)),
     Option("fewest", "Number of legs that must be watched.", kind=int, low=0),
     Option("modes", "Number of assembly modes, complex ones too.", kind=int, low=0),
@@ -89,10 +91,11 @@ def build(groups: list[str] | None, output: str | None, tables: str | None, work
 def entries(kept: str | None, json: bool, **asked: Any) -> None:
     """List the architectures that fit."""
     from ..catalog import load
+    from ..catalog.words import SENSORS
     from ..errors import BadRequest
     from ..present.text.catalog import entries as written
 
-    every = load(kept)
+    every = load(kept, group=SENSORS if asked["see"] is not None or asked["group"] == SENSORS else None)
     for name, known in (("group", {str(each) for each, in every.count("group")}), ("verdict", VERDICTS)):
         if asked[name] not in (None, *known):
             raise BadRequest(f"no {name} of the catalog", asked[name], sorted(known))
@@ -176,6 +179,8 @@ def site(output: str, workers: int, anew: bool, kept: str | None, json: bool, **
     from ..present.text.catalog import sited
 
     found = load(kept, **asked)
+    if seen := [each["word"] for each in found if "see" in each]:
+        raise BadRequest("no pages are made of words with sensors", seen[0], "hrsynth catalog show, list")
     if published := [each["word"] for each in found if "choices" in each]:
         raise BadRequest("no pages are made of published robots", published[0], "hrsynth catalog show, list")
     with Progress(counted=True) as progress:
@@ -227,10 +232,10 @@ def _known(word: str, kept: str | None) -> tuple[Any, str]:
     from ..catalog.build import architectures, made
     from ..catalog.groups import group
     from ..catalog.store import shipped
-    from ..catalog.words import parse
+    from ..catalog.words import SENSORS, parse
 
     if kept is not None or shipped().groups():
-        found = load(kept)
+        found = load(kept, group=SENSORS if parse(word).seen else None)
         if word in found:
             return found[word], ""
     ((_, line),) = made(architectures().entry, group(parse(word)), [word])

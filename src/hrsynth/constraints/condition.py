@@ -330,7 +330,7 @@ def _listed(features: Iterable[NamedVector | None]) -> str:
     return " and ".join(f"the {kind} {', '.join(names)}" for kind, names in groups.items())
 
 
-_KINDS = {"u": "watched directions", "p": "P axes", "t": "tangents", "a": "axes", "r": "directions"}
+_KINDS = {"u": "watched directions", "p": "P axes", "t": "tangents", "a": "axes", "r": "directions", "n": "normals"}
 
 
 def _moves(legs: Sequence[LockedLeg]) -> str:

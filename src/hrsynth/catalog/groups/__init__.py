@@ -8,8 +8,8 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Mapping
 from functools import partial
 
-from ..words import RobotWord
-from . import deltas, planar, pods, spatial
+from ..words import SENSORS, RobotWord
+from . import deltas, planar, pods, sensors, spatial
 
 _LISTED: Mapping[str, Callable[[], Iterable[RobotWord]]] = {
     "planar": planar.words, "pods": pods.words, "deltas": deltas.words, "spatial": spatial.words}
@@ -18,6 +18,8 @@ _LISTED: Mapping[str, Callable[[], Iterable[RobotWord]]] = {
 
 def group(word: RobotWord) -> str:
     """The group to which a word belongs: the first whose law it obeys."""
+    if word.seen:
+        return SENSORS
     if planar.belongs(word):
         return "planar"
     return next((name for name, law in (("pods", pods.belongs), ("deltas", deltas.belongs)) if law(word)), "spatial")
@@ -25,8 +27,12 @@ def group(word: RobotWord) -> str:
 
 def words(name: str) -> list[str]:
     """All canonical words that are listed in a group, sorted, each once."""
+    if name == SENSORS:
+        return sorted({str(word) for word in sensors.words()})
     return sorted({str(word) for word in _LISTED[name]() if group(word) == name})
 
 
 GROUPS: Mapping[str, Callable[[], list[str]]] = {name: partial(words, name) for name in _LISTED}
+"""The words of each group that watches legs."""
+EVERY: Mapping[str, Callable[[], list[str]]] = {**GROUPS, SENSORS: partial(words, SENSORS)}
 """The words of each group."""

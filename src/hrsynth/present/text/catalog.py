@@ -73,15 +73,17 @@ def facts(record: Record) -> Iterable[tuple[str, str]]:
     if record.get("lost"):
         yield "lost", "; ".join(record["lost"])
     if record.get("minimal"):
-        yield "legs needed", "  ".join("{" + ", ".join(legs) + "}" for legs in record["minimal"])
+        yield "needed" if "see" in record else "legs needed", "  ".join("{" + ", ".join(legs) + "}" for legs in record["minimal"])
     if record.get("condition"):
         yield "Type 2", str(record["condition"])
     if record.get("modes_bound") is not None:
-        legs = f" with legs {', '.join(record['modes_legs'])} watched" if record.get("modes_legs") else ""
+        legs = "" if not record.get("modes_legs") else " with {} {} {}".format(*(
+            ("only", ", ".join(record["modes_legs"]), "seen") if "see" in record else
+            ("legs", ", ".join(record["modes_legs"]), "watched")))
         proof = f", {PROOFS[record['modes_proof']]}" if record.get("modes_proof") else ""
         yield "modes", f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}{proof}"
     elif record["rank"] < record["dof"]:
-        yield "modes", f"a continuum of dimension {record['dof'] - record['rank']} with all legs watched"
+        yield "modes", f"a continuum of dimension {record['dof'] - record['rank']} with all {'seen' if 'see' in record else 'legs watched'}"
     if record.get("cure"):
         yield "cure", str(record["cure"])
 

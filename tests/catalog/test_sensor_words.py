@@ -1,0 +1,119 @@
+"""Words whose platform is seen: canonical, the legs' mechanism, verdicts of the shipped group against plain screws."""
+
+from __future__ import annotations
+
+import json
+import random
+
+import numpy as np
+import pytest
+from jsonschema import Draft202012Validator
+
+from hrsynth.catalog import load
+from hrsynth.catalog.entry import entry
+from hrsynth.catalog.geometry import mechanism
+from hrsynth.catalog.groups import group, words
+from hrsynth.catalog.jsonl import line
+from hrsynth.catalog.words import RobotWord, parse, sights
+from hrsynth.cli import execute
+from hrsynth.cli.schema import schema
+from hrsynth.errors import BadRequest
+from hrsynth.mechanism.legs import decompose
+from hrsynth.mechanism.normal import normal_form
+from oracle import Oracle
+
+LISTED = words("sensors")
+
+
+def test_what_is_listed_is_canonical_and_belongs_there():
+    for text in LISTED:
+        assert str(parse(text)) == text
+        assert group(parse(text)) == "sensors"
+        assert str(parse(text).unmoved.driven.unseen) == str(parse(text.partition("@")[0]).unmoved.driven)
+    assert str(parse("3(Rz*-Rz-Rz)@point+ inclination+point'+2point")) == "3(Rz*-Rz-Rz)@inclination+3point+point'"
+
+
+@pytest.mark.parametrize(("text", "told"), [
+    ("3(Rz*-Rz-Rz)@", "''"), ("3(Rz*-Rz-Rz)@3dot", "3dot"), ("3(Rz*-Rz-Rz)@0point", "0point"),
+    ("3(Rz*-Rz!-Rz)@point", "!"), ("3(Rz*-Rz-Rz)@encoder", "encoder"), ("3(Rz*-Rz-Rz)@99point", "99point")])
+def test_what_is_no_sight_is_refused(text: str, told: str):
+    with pytest.raises(BadRequest) as caught:
+        parse(text)
+    assert "\n" not in str(caught.value)
+    assert told in str(caught.value)
+
+
+def test_sensors_do_not_change_the_mechanism():
+    for text in random.Random(5).sample(LISTED, 6):
+        word = parse(text)
+        seen, plain = mechanism(word), mechanism(word.unseen)
+        assert seen.links == plain.links
+        assert seen.joints == plain.joints
+        assert [o.kind for o in seen.observations] == [each.kind for each in word.seen]
+        own = {each.camera for each, symbol in zip(seen.observations, word.seen, strict=True)
+               if getattr(each, "camera", None) is not None and symbol.own}
+        assert len(own) == sum(symbol.own for symbol in word.seen)
+
+
+def _rank(rows: np.ndarray) -> int:
+    return int(np.linalg.matrix_rank(rows, tol=1e-8))
+
+
+@pytest.mark.parametrize("text", random.Random(3).sample(LISTED, 12))
+def test_screws_without_pinocchio_see_the_same(text: str):
+    """At the zero configuration, in maximal coordinates: the rank of the shipped record, of all that is seen and of the
+    smallest sets."""
+    found = load(group="sensors")[text]
+    if "refused" in found:
+        return
+    built = normal_form(mechanism(parse(text), found.get("attempt", 0))).mechanism
+    oracle, size = Oracle(built), 3 if decompose(built).point is not None else 6
+    for labels in [None, *found["minimal"]]:
+        seen = [o for o in built.observations if labels is None or o.leg in labels]
+        basis = oracle.relation(oracle.zero(), seen, point_only=size == 3)
+        assert _rank(basis[:size]) == found["dof"]
+        assert _rank(basis[:size]) - (basis.shape[1] - _rank(basis[size:])) == found["rank"]
+
+
+def test_known_answers():
+    """Three image points: the danger cylinder, eight modes; fewer freedoms need fewer points; a yaw is never seen by an
+    IMU alone."""
+    catalog = load(group="sensors")
+    three = catalog["6(Utn-Pl*-S)@3point"]
+    assert three["verdict"] == "controllable"
+    assert "danger cylinder" in three["condition"]
+    assert (three["modes_bound"], three["hidden"]) == (8, "3-U*PS")
+    assert catalog["6(Utn-Pl*-S)@2point"]["rank"] == 4
+    assert catalog["6(Utn-Pl*-S)@inclination"]["rank"] == 2
+    assert catalog["3(Rz*-Rz-Rz)@inclination"]["verdict"] == "uncontrollable"
+    assert catalog["3(Rz*-Rz-Rz)@2point"]["verdict"] == "controllable"
+    asked = load(see="3point")
+    assert {each["word"].partition("@")[2] for each in asked} == {"3point"}
+    assert {each["see"] for each in load(see="point+point+point")} == {"3point"}
+    assert len(load(see="3point", verdict="controllable")) >= 5
+    assert all("see" not in each for each in load())
+
+
+def test_a_record_is_fresh():
+    text = "3(Rz*-Rz-Rz)@2point"
+    assert line(entry(text)) == line(load(group="sensors")[text])
+
+
+def test_the_command_line_lists_and_shows_them(capsys: pytest.CaptureFixture[str]):
+    def call(*words: str) -> tuple[int, str]:
+        capsys.readouterr()
+        return execute(["catalog", *words]), capsys.readouterr().out
+
+    listed = json.loads(call("list", "--see", "3point", "--verdict", "controllable", "--json")[1])
+    assert listed["total"] == len(LISTED)
+    assert all(each["see"] == "3point" for each in listed["entries"])
+    Draft202012Validator(schema("catalog list")).validate(listed)
+    shown = call("show", "6(Utn-Pl*-S)@3point")[1]
+    assert "seen of the platform: 3point" in shown
+    assert "danger cylinder" in shown
+    assert call("list", "--see", "3dot")[0] == call("site", "-o", "nowhere", "--group", "sensors")[0] == 2
+
+
+def test_a_word_is_one_value():
+    word = parse("3(Rz*-Rz-Rz)")
+    assert RobotWord.of(*map(list, word.bodies), seen=sights("2point")) == parse("3(Rz*-Rz-Rz)@2point")
