@@ -169,8 +169,9 @@ def _watched(setting: ObservedRobot) -> tuple[Observation, ...]:
 
 
 def _kinds(word: RobotWord) -> list[str]:
-    """What each leg is, in the order of the labels: equal legs of one body can be exchanged; or each thing seen."""
-    return [str(each) for each in word.seen] or [f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs]
+    """What each leg is, in the order of the labels: equal legs of one body can be exchanged; or what is seen."""
+    return [str(each) for each in word.seen] or [
+        f"{body}{leg}" for body, legs in enumerate(word.bodies) for leg in legs]
 
 
 def _smallest(setting: ObservedRobot, exact: ExactArchitecture | None,

@@ -82,7 +82,8 @@ class Catalog(Value):
 def load(path: str | Path | None = None, **asked: Any) -> Catalog:
     """The shipped catalog, or that of a folder or SQLite file; ``asked`` as for ``Catalog.where``.
 
-    What is seen of platforms instead of legs (the group ``sensors``) is left out unless ``group`` or ``see`` asks for it.
+    What is seen of platforms instead of legs (the group ``sensors``) is left out unless ``group`` or ``see`` asks for
+    it.
     Of a SQLite file only the records that fit are read. Raises ``BadRequest`` where there is none or one of
     another version.
     """

@@ -330,7 +330,8 @@ def _listed(features: Iterable[NamedVector | None]) -> str:
     return " and ".join(f"the {kind} {', '.join(names)}" for kind, names in groups.items())
 
 
-_KINDS = {"u": "watched directions", "p": "P axes", "t": "tangents", "a": "axes", "r": "directions", "n": "normals"}
+_KINDS = {"u": "watched directions", "p": "P axes", "t": "tangents", "a": "axes", "r": "directions", "n": "normals",
+          "z": "z axes", "d": "axes", "e": "directions"}
 
 
 def _moves(legs: Sequence[LockedLeg]) -> str:

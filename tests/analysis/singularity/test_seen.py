@@ -9,6 +9,7 @@ import pytest
 
 from hrsynth.analysis.aspects.path import path
 from hrsynth.analysis.derive import derive
+from hrsynth.analysis.measured import MeasuredRobot
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.analysis.singularity.agreement import spectrum
 from hrsynth.analysis.singularity.singular import Singularity, singular
@@ -66,6 +67,19 @@ def test_four_points_are_on_all_danger_cylinders() -> None:
         P = places @ X[:3, :3].T + X[:3, 3]
         for three in combinations(range(4), 3):
             assert abs(off_the_cylinder(P[list(three)], np.array([0.3, 0.1, 0]))) < 1e-6
+
+
+@pytest.mark.parametrize(("see", "words"), [
+    (LINES, "the normals n4, n5, n6 are parallel to one plane"),
+    ([each.replace("image_line", "line") for each in LINES], "the axes d4, d5, d6 are all parallel"),
+    ([each.partition("/")[0].replace("image_line", "distance") for each in LINES],
+     "the directions r4, r5, r6 are parallel to one plane"),
+    ([LINES[0].replace("image_line", "line"), POINTS[0]], "the axes d4 and the directions r5 are parallel"),
+    (POINTS[:3], "the directions r4, r5, r6 are all parallel")])
+def test_a_platform_that_translates_has_a_condition_of_all_kinds(see: list[str], words: str) -> None:
+    """Three vectors have rank two just there; each is named by what it is."""
+    setting = ObservedRobot.of("delta", camera=EYE, see=see)
+    assert MeasuredRobot.watched(setting).condition.words == words
 
 
 def test_points_on_one_line() -> None:

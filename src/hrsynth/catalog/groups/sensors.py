@@ -1,5 +1,5 @@
-"""Robots whose platform is seen by cameras on the base or carries an IMU: known architectures, each with several sets of
-what is seen."""
+"""Robots whose platform is seen by cameras on the base or carries an IMU: known architectures, each with several sets
+of what is seen."""
 
 from __future__ import annotations
 

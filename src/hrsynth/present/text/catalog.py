@@ -72,18 +72,17 @@ def facts(record: Record) -> Iterable[tuple[str, str]]:
         yield "rules", "; ".join(record["steps"])
     if record.get("lost"):
         yield "lost", "; ".join(record["lost"])
+    told, what = ("held", "observations") if "see" in record else ("watched", "legs")
     if record.get("minimal"):
-        yield "needed" if "see" in record else "legs needed", "  ".join("{" + ", ".join(legs) + "}" for legs in record["minimal"])
+        yield f"{what} needed", "  ".join("{" + ", ".join(legs) + "}" for legs in record["minimal"])
     if record.get("condition"):
         yield "Type 2", str(record["condition"])
     if record.get("modes_bound") is not None:
-        legs = "" if not record.get("modes_legs") else " with {} {} {}".format(*(
-            ("only", ", ".join(record["modes_legs"]), "seen") if "see" in record else
-            ("legs", ", ".join(record["modes_legs"]), "watched")))
+        legs = f" with {what} {', '.join(record['modes_legs'])} {told}" if record.get("modes_legs") else ""
         proof = f", {PROOFS[record['modes_proof']]}" if record.get("modes_proof") else ""
         yield "modes", f"{record['modes_seen']} real seen of {record['modes_bound']} complex{legs}{proof}"
     elif record["rank"] < record["dof"]:
-        yield "modes", f"a continuum of dimension {record['dof'] - record['rank']} with all {'seen' if 'see' in record else 'legs watched'}"
+        yield "modes", f"a continuum of dimension {record['dof'] - record['rank']} with all {what} {told}"
     if record.get("cure"):
         yield "cure", str(record["cure"])
 
