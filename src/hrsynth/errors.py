@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -107,12 +108,12 @@ class Unanswered(HrsynthError):
 
 
 class LoopsNotClosed(Unanswered):
-    """The loops cannot be closed: the residual that is left, the loop that misses most, and what may help, if known."""
+    """Loops are open: the residual that is left, the loop that misses most, and what may help, if known."""
 
     def __init__(self, robot: str, residual: float, tolerance: float, loop: str, cure: str = "") -> None:
         self.robot, self.residual, self.tolerance, self.loop = robot, residual, tolerance, loop
         super().__init__(
-            f"{robot}: the loop {loop!r} cannot be closed at the zero configuration, residual {residual:.3g} "
+            f"{robot}: the loop {loop!r} is open at the zero configuration, residual {residual:.3g} "
             f"(characteristic lengths, radians), allowed: {tolerance:.3g}" + (f"; {cure}" if cure else "")
         )
 
@@ -277,8 +278,8 @@ class MissingExtra(Unanswered):
 
     def __init__(self, what: str, extra: str) -> None:
         self.what, self.extra = what, extra
-        self.reason = (f'{what} needs an optional package: pip install "hrsynth[{extra}]", '
-                       f'in a checkout pip install ".[{extra}]"')
+        self.reason = (f'{what} needs an optional package: {sys.executable or "python"} -m pip install '
+                       f'"hrsynth[{extra}]", in a checkout -m pip install ".[{extra}]"')
         MissingExtra.met += 1
         super().__init__(self.reason)
 

@@ -16,6 +16,8 @@ def require_folder(path: str | Path) -> None:
     folder = Path(os.path.realpath(path)).parent
     if not folder.is_dir():
         raise BadRequest("cannot write the file: no such folder", str(folder))
+    if not os.access(folder, os.W_OK):
+        raise BadRequest("cannot write the file: no permission to write in the folder", str(folder))
 
 
 def require_other(path: str | Path, *sources: str | Path | None) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import difflib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -192,9 +193,12 @@ class JointGraph:
             self.gears = [gear for gear in self.gears if {gear.driver, gear.driven} <= set(self.joints)]
 
 
-def comma_list(names: Iterable[str], most: int = 8) -> str:
-    """Names set apart by commas, the first of many."""
+def comma_list(names: Iterable[str], most: int = 8, like: str | None = None) -> str:
+    """Names set apart by commas, the first of many; those most ``like`` a text come first."""
     every = list(names)
+    if like is not None:
+        close = difflib.get_close_matches(like, every, n=most)
+        every = [*close, *(name for name in every if name not in close)]
     return ", ".join(every[:most]) + (" …" if every[most:] else "")
 
 

@@ -125,7 +125,8 @@ def require_closed(robot: str, loops: Sequence[tuple[JointSpec, Array, Array]], 
         worst = int(np.argmax(misses))
         joint = loops[worst][0]
         where = robot if joint.line is None else f"{robot}:{joint.line}"
-        raise LoopsNotClosed(where, misses[worst], SAME_GEOMETRY, joint.name, cure(misses[worst]))
+        raise LoopsNotClosed(where, misses[worst], SAME_GEOMETRY, joint.name,
+                             "; ".join(filter(None, [cure(misses[worst]), "hrsynth lint says how it closes"])))
 
 
 def cure(opening: float) -> str:

@@ -75,7 +75,7 @@ class Overrides:
             _close(graph, closure)
         for name in self.freeze:
             if name not in graph.joints:
-                raise BadRequest("--freeze: no such joint", name, comma_list(graph.joints))
+                raise BadRequest("--freeze: no such joint", name, comma_list(graph.joints, like=name))
             graph.joints[name] = replace(graph.joints[name], type=JointType.FIXED, axes=(), motor=None, limits=None)
         if self.motors is not None:
             _drive(graph, self.motors)
@@ -110,7 +110,7 @@ def _close(graph: JointGraph, wish: str) -> None:
     for end in (match["one"], match["two"]):
         link, at, point = end.partition("@")
         if link not in graph.links:
-            raise BadRequest("--close: no such link", link, comma_list(graph.links))
+            raise BadRequest("--close: no such link", link, comma_list(graph.links, like=link))
         try:
             ends.append(FrameSpec(link, frozen(pose(numerals.parse(point.replace(",", " "), 3)))) if at
                         else FrameSpec(link))
@@ -138,7 +138,8 @@ def _drive(graph: JointGraph, wanted: Iterable[str]) -> None:
     for name in wanted:
         own = [each for each in graph.joints if each == name or each.rpartition("__")[0] == name]
         if not own or all(graph.joints[each].type is JointType.FIXED for each in own):
-            raise BadRequest("--motors: no such joint that moves", name, comma_list(graph.joints))
+            moving = [each for each, joint in graph.joints.items() if joint.type is not JointType.FIXED]
+            raise BadRequest("--motors: no such joint that moves", name, comma_list(moving, like=name))
         chosen.update(own)
     for name, joint in graph.joints.items():
         motor = (joint.motor or Motor(f"motor_{name}")) if name in chosen else None
@@ -152,7 +153,8 @@ def observe_links(mechanism: Mechanism, links: Iterable[str]) -> Mechanism:
     found = []
     for link in links:
         if normal.into.get(link) not in normal.mechanism.links:
-            raise BadRequest(f"{mechanism.name}: no link of a leg to observe", link, comma_list(normal.mechanism.links))
+            raise BadRequest(f"{mechanism.name}: no link of a leg to observe", link,
+                             comma_list(normal.mechanism.links, like=link))
         default = observation_of(legs, normal.into[link])
         turn = mechanism.links[link].pose[:3, :3].T @ normal.mechanism.links[default.link].pose[:3, :3]
         found.append(replace(default, link=link, direction=turn @ default.direction))

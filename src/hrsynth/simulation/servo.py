@@ -8,13 +8,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..analysis.accuracy.accuracy import seen_words
+from ..analysis.accuracy.accuracy import sees_all
 from ..analysis.accuracy.cones import IN_SIGHT
 from ..analysis.asked import configurations_at
 from ..analysis.observed import CameraLike, LegsLike, ObservedRobot, RobotLike, SeeLike
 from ..analysis.posture import REGULAR, UNDECIDED, ConfigurationAnalysis
 from ..analysis.question import question
-from ..analysis.verdict import verdict_of
 from ..budgets import LONGEST_RUN, RUN_EVALUATIONS
 from ..errors import BadRequest, RankUndecided
 from ..geometry.so3 import angle_of
@@ -285,15 +284,10 @@ class ServoTask:
 
 def require_seen(setting: ObservedRobot) -> None:
     """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms."""
-    robot, name = setting.robot.name, ", ".join(setting.labels)
-    verdict = verdict_of(setting, setting.labels, setting.samples)
-    if verdict.lost:
-        lost = "; ".join(freedom.name for freedom in verdict.lost)
-        what, cure = seen_words(setting)
-        raise BadRequest(f"{robot}: {what} not see {lost}", name, f"{cure} it controllable (hrsynth legs lists them)")
+    sees_all(setting, "")
     if any(member.relation.RI for member in setting.samples.members):
-        raise BadRequest(f"{robot}: observed links move while the platform rests, there is no interaction matrix", name,
-                         "other legs")
+        raise BadRequest(f"{setting.robot.name}: observed links move while the platform rests, there is no interaction "
+                         "matrix", ", ".join(setting.labels), "other legs")
 
 
 def _unit(seen: Observation, noise: Set[str] | None) -> tuple[str, str] | None:

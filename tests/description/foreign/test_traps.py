@@ -76,7 +76,7 @@ def test_an_open_zero_pose_is_solved_with_its_joints_told(tmp_path: Path):
 
 def test_what_cannot_be_closed_is_refused(tmp_path: Path):
     far = bars([("p", "one", "base", origin(0)), ("q", "two", "base", origin(9))], revolute("one", 1.0, "two", 1.0))
-    with pytest.raises(LoopsNotClosed, match=r"'close' cannot be closed.*--keyframe NAME"):
+    with pytest.raises(LoopsNotClosed, match=r"'close' is open at.*--keyframe NAME"):
         read(tmp_path, far, platform="two")
 
 

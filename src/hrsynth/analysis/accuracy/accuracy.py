@@ -129,17 +129,12 @@ def errors_at(setting: ObservedRobot, blur: Blur, at: ClosedConfiguration) -> Po
     return measured(at, question, blur, pose)
 
 
-def sees_all(setting: ObservedRobot) -> None:
-    """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms."""
+def sees_all(setting: ObservedRobot, otherwise: str = "the error is infinite at every pose, ") -> None:
+    """Raise ``BadRequest`` where the observed legs do not see all of the platform's freedoms, saying what follows."""
     verdict = verdict_of(setting, setting.labels, setting.samples)
     if verdict.lost:
         lost = "; ".join(freedom.name for freedom in verdict.lost)
-        what, cure = seen_words(setting)
-        raise BadRequest(f"{setting.robot.name}: the error is infinite at every pose, {what} not see {lost}",
-                         ", ".join(setting.labels), f"{cure} it controllable (hrsynth legs lists them)")
-
-
-def seen_words(setting: ObservedRobot) -> tuple[str, str]:
-    """What is observed, with its verb, and what to ask for instead."""
-    return (("the legs do", "legs that make") if all(each.by_segment for each in setting.observed) else
-            ("what is observed does", "observations that make"))
+        what, cure = (("the legs do", "legs that make") if all(each.by_segment for each in setting.observed) else
+                      ("what is observed does", "observations that make"))
+        raise BadRequest(f"{setting.robot.name}: {otherwise}{what} not see {lost}", ", ".join(setting.labels),
+                         f"{cure} it controllable (hrsynth legs lists them, hrsynth advise what else to measure)")

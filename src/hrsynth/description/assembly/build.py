@@ -44,7 +44,7 @@ def build(graph: JointGraph, overrides: Overrides) -> Mechanism:
     graph.prune(base)
     for role, link in (("base", overrides.base), ("platform", overrides.platform)):
         if link is not None and link not in graph.links:
-            raise BadRequest(f"{graph.file}: no such {role} link", link, comma_list(graph.links))
+            raise BadRequest(f"{graph.file}: no such {role} link", link, comma_list(graph.links, like=link))
     if open_chain := without_loop(graph, base):
         graph.note("open", open_chain)
     graph.formation = graph.formation and overrides.platform is None

@@ -20,7 +20,7 @@ from ...geometry.gauss_newton import Damping, Residual, descend
 from ...geometry.vectors import Array
 from ...mechanism.model import Mechanism, Note
 from ...mechanism.normal import normal_form
-from ...tolerances import EXACT, NO_FINER, RANK_CUTOFF, RANK_GAP
+from ...tolerances import EXACT, NO_FINER, RANK_CUTOFF, RANK_GAP, SAME_GEOMETRY
 from ..jointgraph import comma_list
 from ..tree import spanning
 from .loops import LoopAssembly
@@ -95,7 +95,10 @@ def as_meant(mechanism: Mechanism, residual: float, tolerance: float, possible: 
     if rank.gap < RANK_GAP or firm.value != rank.value:
         raise RankUndecided(f"{mechanism.file}: loops with rounded numbers", min(rank.gap, firm.gap), RANK_GAP)
     if not ideal.mended:
-        return mechanism
+        return mechanism if residual <= SAME_GEOMETRY else replace(mechanism, notes=(*mechanism.notes, Note(
+            "merged", f"the loops are open by up to {residual:.2g} (characteristic lengths, radians; a gap of "
+                      f"{1e3 * residual * mechanism.length:.2g} mm) at zero, within the tolerance of {tolerance:.1g}: "
+                      "the joints that close them are put in the middle")))
     written = LoopAssembly.of(mechanism)
     gap = written.rank(written.zero(), max(RANK_CUTOFF, NO_FINER * tolerance)).gap
     return replace(spanning(ideal.mechanism), notes=(*mechanism.notes, *ideal.notes(tolerance, mechanism.length, gap)))

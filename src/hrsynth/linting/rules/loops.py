@@ -12,6 +12,7 @@ from ...description import numerals, xml
 from ...description.assembly import guess
 from ...description.assembly.candidates import closure_candidates
 from ...description.assembly.loops import LoopAssembly, LoopSolution, Values, solve
+from ...description.assembly.zero import moves
 from ...description.jointgraph import JointGraph, JointSpec
 from ...description.jointmotion import displacement, opening
 from ...errors import HrsynthError
@@ -66,6 +67,7 @@ def _open(file: LintedFile) -> Iterator[Spot]:
                                                     f"{closed.residual:.3g})", None,
                    "correct the dimensions, or the frames in which the closures are given")
         return
+    text += f"; they close with {moves(assembly, closed.values)}"
     yield Spot(graph.joints[worst].line, text, _closed(file, graph, assembly, closed),
                severity="warning" if file.refusal is None else None)
 
@@ -225,7 +227,8 @@ RULES = (
     LintRule("loop-open", "error", "loops that are open at the zero configuration",
              "A simulator pulls them shut with a jump, and where two closings are possible the wrong one may be taken. "
              "This program solves for the nearest closed pose, tells the joints that it moves, and counts from there.",
-             "count the joints that moved from where the loops close (hrsynth convert does it in any dialect)", _open,
+             "correct the dimension that is mistyped, or, if all are right, count the joints that moved from where the "
+             "loops close", _open,
              mends=True),
     LintRule("loop-mirrored", "error", "a closure whose two axes point opposite ways",
              "The hinge fits, but to make the axes agree a link has to be turned by half a turn: the robot is read as "

@@ -44,8 +44,10 @@ def _angles(file: LintedFile) -> Iterator[Spot]:
     for element in file.root.iter():
         words = (element.get("rpy") or "").split() if isinstance(element.tag, str) else []
         ends = [NumberAt(element, "rpy", place) for place in range(len(words))]
-        if any(in_degrees(end.value) for end in ends):
-            yield Spot(xml.line(element), f"rpy {' '.join(words)}, of <{element.tag}>", _converted(ends))
+        sure = any(in_degrees(end.value) for end in ends)
+        if sure or any(TURN_IN_RADIANS < abs(end.value or 0.0) <= 360 for end in ends):
+            yield Spot(xml.line(element), f"rpy {' '.join(words)}, of <{element.tag}>",
+                       _converted(ends) if sure else None)
 
 
 def _length(file: LintedFile) -> Iterator[Spot]:

@@ -9,6 +9,8 @@ from .tables import listing, table
 
 HEADS = ("word", "robot", "dof", "motion", "hidden robot", "verdict", "rank", "legs needed")
 LEGEND = "* a motor   ══ the watched link"
+SHOWN = 100
+"""Entries of a list that are printed."""
 PROOFS = {"class": "no more by the degrees of their equations", "rank": "no more by ranks modulo a prime"}
 """By what there are no more modes, where that is no resultant."""
 
@@ -16,9 +18,11 @@ Record = Mapping[str, Any]
 
 
 def entries(records: Sequence[Record], total: int) -> str:
-    """A line an entry, and how many of all they are."""
+    """A line an entry, the first of many, and how many of all they are."""
     count = f"{len(records)} of {total} architectures"
-    return f"{table([_row(record) for record in records], HEADS)}\n\n{count}" if records else count
+    if records[SHOWN:]:
+        count += f", the first {SHOWN} shown (all with --json; --legs, --motion, --verdict … ask for fewer)"
+    return f"{table([_row(record) for record in records[:SHOWN]], HEADS)}\n\n{count}" if records else count
 
 
 def entry(record: Record, drawn: str, note: str = "") -> str:

@@ -222,7 +222,20 @@ def _missing(found: Advice) -> list[str]:
              *(f"  {line}" for group in groups.items() for way in _ways(*group)
                for line in wrapped(way, LINE - 2, more="    "))]
     starred = any(m.actuated for each in found.sets for m in each.measurements)
-    return [*lines, *(["* a joint with a motor"] if starred else []), *limits]
+    return [*lines, *(["* a joint with a motor"] if starred else []), *_asked(found), *limits]
+
+
+def _asked(found: Advice) -> list[str]:
+    """The options of other commands that ask with the first set that has such."""
+    if not all(each.by_segment for each in found.setting.observed):
+        return []
+    for each in found.sets:
+        see = [m.of if m.kind == "offered" else f"encoder:{m.of}" for m in each.measurements if m.kind != "leg"]
+        if all(m.kind in ("leg", "offered") or (m.kind == "encoder" and m.of in found.setting.robot.joints
+                                                and m.axis is None) for m in each.measurements):
+            legs = ",".join([*found.setting.labels, *(m.of for m in each.measurements if m.kind == "leg")])
+            return ["asked of other commands: " + " ".join([f"--observe {legs}", *(f"--see {text}" for text in see)])]
+    return []
 
 
 def _ways(kinds: tuple[str, ...], found: Sequence[tuple[FurtherMeasurement, ...]]) -> list[str]:

@@ -48,8 +48,8 @@ def servo(found: Servo) -> str:
                                "numbered as modes --at the goal lists them"]))
     if found.spread is not None:
         s = found.spread
-        rows.append(("noise", f"keeps it within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} degrees of "
-                              f"there, root mean square {1e3 * s.rms_metres:.2g} mm and "
+        rows.append(("noise", f"in this run it stayed within {1e3 * s.metres:.3g} mm and {_degrees(s.radians)} "
+                              f"degrees of there, root mean square {1e3 * s.rms_metres:.2g} mm and "
                               f"{_degrees(s.rms_radians)} degrees"))
         if s.aside:
             rows.append(("", f"holds it aside: on average {1e3 * s.offset:.3g} mm from there, at "
