@@ -30,6 +30,7 @@ from hrsynth.catalog.geometry import mechanism
 from hrsynth.catalog.words import parse
 from hrsynth.constraints.pattern import attached
 from hrsynth.geometry.vectors import pose_difference
+from strategies import spherical
 
 SAME = 1e-6
 """Poses that differ by less are one (characteristic lengths, entries of the rotations)."""
@@ -191,3 +192,15 @@ def test_legs_that_are_not_watched_are_not_forgotten():
     assert found.found.complete
     assert (found.found.complex, len(found.modes)) == (2, 2)
     assert found.within == "poses turned as this one"
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_body_that_turns_about_a_point_has_eight_modes(seed: int):
+    """Three legs RRR whose axes meet in one point, driven at the base: an axis of the platform keeps an angle to each
+    elbow's axis, three quadrics of the quaternion."""
+    found = modes(spherical(np.random.default_rng(seed)), real=True)
+    assert (found.found.complete, found.found.complex) == (True, 8)
+    others = search(found.goal, MeasuredRobot.driven(found.setting).question, attached(found.setting.anatomy))
+    for mode in others.modes:
+        assert min(max(np.abs(X - each.bodies[body]).max() for body, X in mode.bodies.items())
+                   for each in found.modes if each.bodies) < 1e-6

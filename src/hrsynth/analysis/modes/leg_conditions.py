@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 
@@ -15,12 +15,12 @@ from ...geometry.vectors import Array
 from ...kinematics.configuration import ClosedConfiguration
 from ...kinematics.locked import carry_joint, leg_twists
 from ...kinematics.relation import Measurement
-from ...mechanism import Observation
+from ...mechanism import JointType, Observation
 from ...mechanism.composites import WordEdge
 from ...mechanism.legs import Leg, LegDecomposition
 from ...mechanism.notation import Rods
 from ...mechanism.observations.direction import Direction
-from ...tolerances import CHAIN_ROUNDING, SAME_RELATION
+from ...tolerances import CHAIN_ROUNDING, SAME_POINT, SAME_RELATION
 from .chain import Chain, ChainBody, Underived, chain
 from .conditions import (
     AtAngle,
@@ -69,28 +69,38 @@ def leg_conditions(anatomy: LegDecomposition, leg: Leg, question: Measurement, g
         return [[]], 0.0
     path = anatomy.path(leg)
     rods = _Rods.of(anatomy, path[-1], own, goal)
-    tip = rods.tip if rods is not None else carry_joint(
-        anatomy.mechanism, anatomy.mechanism.joints[path[-1].joints[-1]], goal.pose)[0]
     reasons = []
-    try:
-        found = chain(anatomy, leg, own, goal, tip, "free")
-        ways: list[tuple[_Reading, Chain]] = [(partial(_of_tip, rods=rods), found), (_of_foot, found),
-                                              (_in_plane, found)]
-        if kept:
-            ways = [(_of_tip, replace(found, kept=True))]
-        elif plane is not None:
-            bodies = (*found.bodies, ChainBody(plane, tip))
-            ways = [(_of_tip, replace(found, bodies=bodies, kept=True)), (_of_foot, found)]
-        for read, each in ways:
-            try:
-                branches, radii = read(leg.label, each, count, tip, middle, plane)
-                return branches, found.moved + (radii if radii > CHAIN_ROUNDING * found.extent else 0.0)
-            except Underived as error:
-                reasons.append(str(error))
-    except Underived as error:
-        reasons.append(str(error))
+    for tip in _tips(anatomy, path, goal) if rods is None else (rods.tip,):
+        try:
+            found = chain(anatomy, leg, own, goal, tip, "free")
+            ways: list[tuple[_Reading, Chain]] = [(partial(_of_tip, rods=rods), found), (_of_foot, found),
+                                                  (_in_plane, found)]
+            if kept:
+                ways = [(_of_tip, replace(found, kept=True))]
+            elif plane is not None:
+                bodies = (*found.bodies, ChainBody(plane, tip))
+                ways = [(_of_tip, replace(found, bodies=bodies, kept=True)), (_of_foot, found)]
+            for read, each in ways:
+                try:
+                    branches, radii = read(leg.label, each, count, tip, middle, plane)
+                    return branches, found.moved + (radii if radii > CHAIN_ROUNDING * found.extent else 0.0)
+                except Underived as error:
+                    reasons.append(str(error))
+        except Underived as error:
+            reasons.append(str(error))
     raise NotConfined(anatomy.mechanism.name, f"what leg {leg.label} asks of the platform is not known: "
                                               f"{'; '.join(dict.fromkeys(reasons))}")
+
+
+def _tips(anatomy: LegDecomposition, path: Sequence[WordEdge], goal: ClosedConfiguration) -> Iterator[Array]:
+    """The centre of the last joint (m), and where its axis meets those of other joints: about these a leg turns."""
+    joints = [anatomy.mechanism.joints[name] for edge in path for name in edge.joints]
+    *others, (end, axes) = (carry_joint(anatomy.mechanism, joint, goal.pose) for joint in joints)
+    yield end
+    if joints[-1].type is JointType.REVOLUTE:
+        met = (lines.meeting_point([(end, axes[0]), (at, each)], SAME_POINT * goal.twin.length)
+               for at, own in others for each in own if not lines.parallel(axes[0], each))
+        yield from (at for at in met if at is not None)
 
 
 @dataclass(frozen=True, eq=False)

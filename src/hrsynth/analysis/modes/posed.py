@@ -5,6 +5,7 @@ At least so many as boxes are apart from each other, complex ones too; at most a
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from math import prod
@@ -17,10 +18,10 @@ from ...errors import NotConfined, Unsolved
 from ...geometry.so3 import exponential, logarithm, rotation_of
 from ...geometry.vectors import Array, frozen, inverse, pose
 from ...kinematics.configuration import ClosedConfiguration
-from ...tolerances import MOVED, SAME_RELATION, VANISHES
+from ...tolerances import MOVED, RANK_GAP, SAME_POINT, SAME_RELATION, VANISHES
 from ..measured import MeasuredRobot
 from .branches import Model
-from .conditions import PoseCondition
+from .conditions import OnPlane, PoseCondition
 from .fits import words
 from .leg_conditions import Branches, Middle, leg_conditions
 from .pose_bound import bound
@@ -100,8 +101,23 @@ def posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> list[PosedPlatf
         raise NotConfined(name, "the conditions of its legs are not met at the pose itself")
     poses = (Poses.translating() if motion == "translations" else
              Poses.spatial() if normal is None else Poses.planar(normal))
-    return [PosedPlatform((), np.zeros((0, 3)), tuple(c for branch in chosen for c in branch), middle, poses,
-                          turned, seen, error=moved) for chosen in product(*legs)]
+    asked = (_once([c for branch in chosen for c in branch]) for chosen in product(*legs))
+    return [PosedPlatform((), np.zeros((0, 3)), kept, middle, poses, turned, seen,
+                          error=moved + MOVED * goal.twin.length * off) for kept, off in asked]
+
+
+def _once(conditions: Sequence[PoseCondition]) -> tuple[tuple[PoseCondition, ...], float]:
+    """Conditions without those that several legs have in common, as where all turn about one point; and how far the
+    numbers of such are apart (sizes)."""
+    kept, off = list[PoseCondition](), 0.0
+    for c in conditions:
+        apart = min((max(float(np.abs(c.b - k.b).max()), float(np.abs(c.n - k.n).max()), abs(c.h - k.h))
+                     for k in kept if isinstance(c, OnPlane) and isinstance(k, OnPlane)), default=np.inf)
+        if apart > SAME_POINT / RANK_GAP:
+            kept.append(c)
+        else:
+            off = max(off, apart)
+    return tuple(kept), off
 
 
 def most_posed(measured: MeasuredRobot, goal: ClosedConfiguration) -> int:
