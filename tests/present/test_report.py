@@ -317,3 +317,19 @@ def test_accuracy_is_about_directions_that_see_everything():
     found = made(*FAST)[0]
     with pytest.raises(BadRequest, match="infinite"):
         parts.error_plane(found.setting, 0)
+
+
+@pytest.mark.slow
+def test_a_report_speaks_of_what_is_seen_whatever_kind_it_is(tmp_path: Path):
+    """A leg and two kinds besides on a planar robot: sets, condition, modes and accuracy are of all three."""
+    page = tmp_path / "report.html"
+    assert execute(["derive", "3rrr_m1", "--observe", "1", "--camera", "eye=base@0.1,0.05,-0.4", "--see",
+                    "point:platform@0.05,0,0", "--see", "distance:platform@0,0.1,0", "--report", str(page)]) == 0
+    said = text_of(read(page.read_text(encoding="utf-8")))
+    asked = legs("3rrr_m1", "eye=base@0.1,0.05,-0.4", observe="1", see=["point:platform@0.05,0,0",
+                                                                         "distance:platform@0,0.1,0"])
+    assert asked.minimal == (("1", "point_1"), ("point_1", "distance_1"))
+    assert "Fewest observations that show 3 of 3: 1, point_1; point_1, distance_1." in said
+    assert "movesB1alongτ1,B4alongr4andB5normaltor5" in said.replace(" ", "")
+    assert "At home 1 pose has the same measurements" in said
+    assert "Measurements wrong by 0.1°, 0.001m put the platform off" in said
