@@ -163,7 +163,8 @@ def parts(terminal: int) -> str:
 
 
 def test_a_long_silence_has_its_bar():
-    """Work that tells nothing shows a bar after a second all the same, on a terminal; else nothing."""
+    """Work that tells nothing shows a bar after a second all the same, on a terminal; else nothing, but for a line
+    now and then of what takes longer still."""
     code = ("import time\nfrom hrsynth.cli.progress import Progress\n"
             "with Progress(wait=0.2) as bar:\n    bar.tell('thinking')\n    time.sleep(1.5)\nprint('done')")
     main, end = pty.openpty()
@@ -176,6 +177,11 @@ def test_a_long_silence_has_its_bar():
     assert re.search(r"step 1 \d:\d\d:\d\d", re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", shown))
     quiet = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
     assert (quiet.stdout, quiet.stderr) == ("done\n", "")
+    code = "import hrsynth.cli.progress as progress\nprogress.SILENT = 0.3\n" + code
+    told = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert told.stdout == "done\n"
+    assert 1 <= len(told.stderr.splitlines()) <= 3
+    assert all(re.fullmatch(r"hrsynth: thinking, step 1, \d s", line) for line in told.stderr.splitlines())
 
 
 def test_short_work_has_no_bar(monkeypatch: pytest.MonkeyPatch, capsys):

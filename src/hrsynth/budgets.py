@@ -266,6 +266,20 @@ ENDING_STEPS = 80
 """Steps of one start."""
 FARTHEST_ENDING = 50.0
 """Coordinate (characteristic lengths, radians) beyond which a start is given up."""
+POSE_WALKS = 0.5
+"""Part of the rounds of starts over the joints that is left where critical poses are sought as well."""
+POSE_STARTS, POSE_ROUNDS = 400, 24
+"""Starts of one round in which critical poses are sought where legs have closed forms, and rounds at most."""
+POSE_THINNED = 16
+"""So many times as many poses are drawn at most: not all of them are in reach."""
+POSE_STEPS = 60
+"""Steps of one such start."""
+POSE_LATE = 0.01
+"""Part of the critical poses that the later half of the rounds may find first for the search to end."""
+POSE_TRIES = 12
+"""Configurations, the nearest first, from which one at a critical pose is sought."""
+POSE_MIRRORS = 3
+"""Rods that slide through a base point, as many at most for which both directions are listed at each pose."""
 AXIS_SEEN = 0.5
 """Part of a leg's axis that is to be seen by a camera: its direction is rebuilt from what is seen of its edges."""
 WIDEST_NOISE = 50.0

@@ -1,15 +1,19 @@
-"""Progress on standard error: nothing before a second has passed, nothing where that is no terminal."""
+"""Progress on standard error: a bar on a terminal once a second has passed; elsewhere a line now and then once half a
+minute has."""
 
 from __future__ import annotations
 
 import sys
 import threading
 import time
+from collections.abc import Callable
 from types import TracebackType
 from typing import Any, Self
 
 SPEED_OVER = 600.0
 """Seconds over which the speed of a build is averaged: words differ much."""
+SILENT = 30.0
+"""Seconds after which a line is written where there is no terminal; each time as long again as all before."""
 
 
 class Progress:
@@ -17,10 +21,11 @@ class Progress:
     whose number nobody knows, or (``counted``) the parts of a build that are there of all, with the time left."""
 
     def __init__(self, wait: float = 1.0, *, counted: bool = False) -> None:
-        self._start = time.monotonic() + wait
+        self._began = time.monotonic()
+        self._start = self._began + wait
         self._counted = counted
-        self._timer = threading.Timer(max(0.0, wait), self._begin)
-        self._timer.daemon = True
+        self._timer = self._armed(max(0.0, wait), self._begin) if sys.stderr.isatty() else self._armed(
+            SILENT, self._line)
         self._lock = threading.Lock()
         self._what = "working"
         self._bar: Any = None
@@ -28,17 +33,17 @@ class Progress:
         self._parts: dict[str, tuple[int, int]] = {}
 
     def __enter__(self) -> Self:
-        if sys.stderr.isatty() and not self._counted:
+        if not self._counted:
             self._timer.start()
         return self
 
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None,
                  trace: TracebackType | None) -> None:
-        self._timer.cancel()
         with self._lock:
             self._start = float("inf")
             if self._bar is not None:
                 self._bar.stop()
+        self._timer.cancel()
 
     def tell(self, what: str) -> None:
         """One more step done."""
@@ -66,6 +71,22 @@ class Progress:
                 bar.add_task(self._what, total=None, completed=self._steps)
                 bar.start()
                 self._bar = bar
+
+    @staticmethod
+    def _armed(seconds: float, then: Callable[[], None]) -> threading.Timer:
+        timer = threading.Timer(seconds, then)
+        timer.daemon = True
+        return timer
+
+    def _line(self) -> None:
+        """Write what it is at, and when it is to be written again."""
+        with self._lock:
+            if self._start == float("inf"):
+                return
+            passed = time.monotonic() - self._began
+            print(f"hrsynth: {self._what}, step {self._steps}, {passed:.0f} s", file=sys.stderr, flush=True)
+            self._timer = self._armed(passed, self._line)
+            self._timer.start()
 
     def _made(self) -> Any:
         """A bar of rich, which is imported here."""

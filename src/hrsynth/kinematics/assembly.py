@@ -171,8 +171,9 @@ class Assembler:
 
 def of_links(twin: PinocchioModel, pose: Callable[[str], Array]) -> ClosedConfiguration:
     """The configuration of a twin at which its links have their poses (4, 4); raises ``LoopsNotClosed``."""
-    q, residual = solve(twin, twin.read(pose), tolerance=SOLVED)
-    if residual > CLOSED or not all(_turned_as(twin.pose(q, link), pose(link)) for link in twin.mechanism.links):
+    poses = {link: pose(link) for link in twin.mechanism.links}
+    q, residual = solve(twin, twin.read(poses.__getitem__), tolerance=SOLVED)
+    if residual > CLOSED or not all(_turned_as(twin.pose(q, link), X) for link, X in poses.items()):
         raise LoopsNotClosed(twin.mechanism.name, residual, CLOSED, "in coordinates of the zero configuration")
     return ClosedConfiguration.of(twin, q)
 

@@ -162,11 +162,12 @@ class LoopSystem(Value):
                 found[turns] = turns_about(np.array([self.coordinates[i].axis for i in turns]), moved[:3, :3])
         return found
 
-    def pose(self, link: str, values: Sequence[float]) -> Array:
-        """X_BL (4, 4), m, of a link for coordinates (N,)."""
-        swept = self.displacement(self.way(self.body[link]), np.asarray(values, dtype=float))
-        X = np.eye(4)
-        X[:3, :3], X[:3, 3] = swept.R, swept.at(np.zeros(3)) * self.length
+    def pose(self, link: str, values: Sequence[float] | Array) -> Array:
+        """X_BL (…, 4, 4), m, of a link for coordinates (N, …)."""
+        values = np.asarray(values, dtype=float)
+        swept = self.displacement(self.way(self.body[link]), values)
+        X = np.zeros((*values.shape[1:], 4, 4))
+        X[..., :3, :3], X[..., :3, 3], X[..., 3, 3] = swept.R, swept.at(np.zeros(3)) * self.length, 1.0
         return np.asarray(X @ self.mechanism.links[link].pose)
 
 

@@ -83,7 +83,7 @@ def cover(setting: ObservedRobot, goal: ClosedConfiguration, *, every_mode: bool
             raise NotEnclosed("the platform turns about more than one axis")
     except NotEnclosed as why:
         return Cover((), (), (), 1.0, 0, False, (), str(why))
-    return _Covering(error, *_bounds(error, reach), every_mode, vanishing, budget).answer()
+    return _Covering(error, *bounds(error, reach), every_mode, vanishing, budget).answer()
 
 
 class _Covering:
@@ -189,7 +189,7 @@ def _charts(error: PoseError) -> list[Array]:
     return [error.R, exponential(np.pi * error.turns[:, 0]) @ error.R]
 
 
-def _bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
+def bounds(error: PoseError, reach: float) -> tuple[Array, Array, bool]:
     """The box of coordinates that the legs can reach, and whether it is all of it: a rod's tip is no farther from its
     crank's centre or its rail than its length and the crank's."""
     from scipy.optimize import linprog

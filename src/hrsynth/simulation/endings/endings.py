@@ -36,6 +36,7 @@ from ..law import FixedDirections, Law, Measures, measured, supposed_planes
 from ..servo import require_regular, require_seen, require_sight
 from .carried import SweptChains
 from .completeness import Covers
+from .critical_poses import Further, Lift, critical_poses
 from .enclosure import EnclosedPoint, enclosed
 from .error import RestSystem
 from .rests import CRITICAL, Endings, RestPoint, SignedModes, stability
@@ -101,7 +102,8 @@ class RestSearch:
         """The rests that were found; ``minima`` and ``rounds`` as for :func:`.critical_points`, of minima alone neither
         lists nor enclosures; ``complete``: whether it is to be proved that they are all."""
         setting, motion = self.setting, self.setting.motion
-        found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds)
+        found = critical_points(self.system, setting, self.goal, seed, minima=minima, rounds=rounds,
+                                further=None if minima or self.system.supposes else self._further(seed))
         isolated = self._in_mode(found.isolated)
         covers = None
         if not minima and all(each.by_segment for each in setting.observed):
@@ -125,6 +127,15 @@ class RestSearch:
         return Endings(setting, self.goal, motion.pose(self.goal.pose(motion.link)), self.desired, tuple(rests),
                        tuple(continua), tuple(lists), measured, found,
                        None if covers is None else covers.judged(rests), self.depth)
+
+    def _further(self, seed: int) -> Further | None:
+        """What finds critical points over the pose; None where legs have no closed forms."""
+        told = critical_poses(self.setting, self.goal, seed)
+        if told is None:
+            return None
+        seen = self.setting.samples.members[0].relation
+        return Further(Lift(self.system, self.law.question.observations, told[0]), told[1],
+                       seen.mobility - seen.dimension)
 
     def _lists(self, found: Sequence[Critical]) -> list[SignedModes]:
         """The lists of modes of those combinations of signs at which the error was found to vanish, that of the goal

@@ -8,9 +8,8 @@ critical points of index k (C. J. Cerjan, W. H. Miller, J. Chem. Phys. 75, 1981)
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from functools import partial
 from itertools import islice
 from typing import Any
 
@@ -29,6 +28,7 @@ from ...budgets import (
     ENDING_STEPS,
     ENDING_WALK,
     FARTHEST_ENDING,
+    POSE_WALKS,
 )
 from ...constraints.pattern import attached
 from ...errors import LoopsNotClosed
@@ -255,19 +255,21 @@ class Critical(Value):
 class CriticalPoints(Value):
     """What a search found: isolated critical points, and of those that fill curves or surfaces one for each value of E
     and signs of the curvatures; how many ``starts`` there were, and how many of the isolated ones the last half of them
-    found first (``late``)."""
+    found first (``late``); how many only the search over the platform's pose found (``posed``)."""
 
     isolated: tuple[Critical, ...]
     continua: tuple[Critical, ...]
     idle: int
     starts: int
     late: int
+    posed: int = 0
 
     @property
     def words(self) -> str:
         """What was done, and how well it covers."""
-        return (f"found from {self.starts:,} random starts, {self.late} of {len(self.isolated)} configurations first "
-                "in the second half of these")
+        also = f", {self.posed} more over the platform's pose" if self.posed else ""
+        return (f"found from {self.starts:,} random starts, {self.late} of {len(self.isolated) - self.posed} "
+                f"configurations first in the second half of these{also}")
 
 
 def starts(system: RestSystem, homes: Array, seed: int = 0, setting: ObservedRobot | None = None) -> Iterator[Array]:
@@ -290,51 +292,77 @@ def starts(system: RestSystem, homes: Array, seed: int = 0, setting: ObservedRob
 
 
 def critical_points(system: RestSystem, setting: ObservedRobot, goal: ClosedConfiguration, seed: int = 0, *,
-                    minima: bool = False, rounds: Iterable[Array] | None = None) -> CriticalPoints:
+                    minima: bool = False, rounds: Iterable[Array] | None = None,
+                    further: Callable[[Array], Sequence[CriticalPoint]] | None = None) -> CriticalPoints:
     """The critical points to which random walks from the samples and from random closings lead, in rounds, until the
     later half of the starts finds few new ones; ``minima``: only descent, which finds what attracts; ``rounds``: of
-    :func:`starts`, where they are known."""
+    :func:`starts`, where they are known; ``further`` finds more of them, from configurations (n, N)."""
     seen = setting.samples.members[0].relation
     idle, freedoms = seen.mobility - seen.dimension, seen.dimension
     homes = np.array([system.system.read(at.pose) for at in (goal, *setting.configurations)])
     rng = np.random.default_rng([seed, 1])
-    bodies = attached(setting.anatomy)
-    known: dict[tuple[int, ...], list[tuple[Array, CriticalPoint, int, int]]] = {}
-    families: dict[tuple[int, ...], Critical] = {}
+    known = ToldApart(system, setting)
     fresh: list[int] = []
     points = descend(system, homes[:1], np.zeros(1, dtype=np.intp), idle)
     most = max(ENDING_ROUNDS, ENDING_EFFORT // system.size[0])
-    for number, q in enumerate(islice(rounds or starts(system, homes, seed, setting), most)):
+    met = [homes]
+    most = most if further is None else int(POSE_WALKS * most)
+    for q in islice(rounds or starts(system, homes, seed, setting), most):
         tell("starts")
         # what attracts matters most: two of five starts go down all along
         index = rng.integers(freedoms + 1, size=len(q)) * (rng.random(len(q)) < (0.0 if minima else 0.6))
         points += descend(system, q, index, idle)
+        fresh.append(known.add(points))
+        points = []
+        met.append(q)
+        least, part = (ENDING_DESCENTS, ENDING_LATE_DESCENT) if minima else (ENDING_LEAST, ENDING_LATE)
+        if len(fresh) > least and sum(fresh[len(fresh) // 2 :]) <= part * known.count:
+            break
+    late, posed = sum(fresh[len(fresh) // 2 :]), 0
+    if further is not None:
+        pool = np.concatenate([*met, *(each.point.q[None] for each in known.isolated)])
+        posed = known.add(further(pool))
+    return CriticalPoints(known.isolated, tuple(known.families.values()), idle, ENDING_STARTS * len(fresh), late, posed)
+
+
+class ToldApart:
+    """Critical points, told apart; those that are not isolated by E and the signs of the curvatures."""
+
+    def __init__(self, system: RestSystem, setting: ObservedRobot) -> None:
+        self.system, self.setting, self.bodies = system, setting, attached(setting.anatomy)
+        self.own: dict[tuple[int, ...], list[tuple[Array, CriticalPoint, int]]] = {}
+        self.families: dict[tuple[int, ...], Critical] = {}
+
+    def add(self, points: Sequence[CriticalPoint]) -> int:
+        """How many isolated ones are new."""
         new = 0
-        for point, mark in zip(points, marks(system, setting, bodies, points), strict=True):
-            least = SAME_ENDING * system.scale(point.curvatures)
+        for point, mark in zip(points, marks(self.system, self.setting, self.bodies, points), strict=True):
+            least = SAME_ENDING * self.system.scale(point.curvatures)
             flat = np.abs(point.curvatures) < least
             key = (*(int(np.sum(each)) for each in (point.curvatures < -least, flat)),)
             if flat.any():
                 key = (*key, round(point.value / SAME_ENDING))
-                old = families.get(key)
-                families[key] = Critical(point, 1) if old is None else Critical(old.point, old.met + 1)
+                old = self.families.get(key)
+                self.families[key] = Critical(point, 1) if old is None else Critical(old.point, old.met + 1)
                 continue
-            own = known.setdefault(key, [])
+            own = self.own.setdefault(key, [])
             near = next((k for k, each in enumerate(own) if np.abs(mark - each[0]).max() < SAME_ENDING), None)
             if near is None:
-                own.append((mark, point, 1, number))
+                own.append((mark, point, 1))
                 new += 1
             else:
-                own[near] = (*own[near][:2], own[near][2] + 1, own[near][3])
-        points = []
-        fresh.append(new)
-        count = sum(map(len, known.values()))
-        least, part = (ENDING_DESCENTS, ENDING_LATE_DESCENT) if minima else (ENDING_LEAST, ENDING_LATE)
-        if number >= least and sum(fresh[len(fresh) // 2 :]) <= part * count:
-            break
-    late = sum(fresh[len(fresh) // 2 :])
-    isolated = tuple(Critical(point, met) for own in known.values() for _, point, met, _ in own)
-    return CriticalPoints(isolated, tuple(families.values()), idle, ENDING_STARTS * len(fresh), late)
+                own[near] = (*own[near][:2], own[near][2] + 1)
+        return new
+
+    @property
+    def count(self) -> int:
+        """How many are isolated."""
+        return sum(map(len, self.own.values()))
+
+    @property
+    def isolated(self) -> tuple[Critical, ...]:
+        """These, with how often each was met."""
+        return tuple(Critical(point, met) for own in self.own.values() for _, point, met in own)
 
 
 def anywhere(system: RestSystem, rng: np.random.Generator, count: int) -> Array:
@@ -350,9 +378,10 @@ def in_mode(system: RestSystem, setting: ObservedRobot, q: Array) -> NDArray[np.
     with all that is to be seen in front of its camera."""
     drawn, kept = setting.everything, np.zeros(len(q), dtype=bool)
     law = Law(setting.samples.question, setting.dof, 1.0)
-    for k, each in enumerate(q):
+    poses = {link: system.system.pose(link, q.T) for link in drawn.twin.mechanism.links}
+    for k in range(len(q)):
         try:
-            at = of_links(drawn.twin, partial(system.system.pose, values=each.tolist()))
+            at = of_links(drawn.twin, {link: X[k] for link, X in poses.items()}.__getitem__)
         except LoopsNotClosed:
             continue
         kept[k] = law.in_front(at) > SEEN_ABOVE and (
