@@ -1,11 +1,11 @@
 """What the catalog says, as tables and as rules that need no computation; ``python docs/catalog_says.py`` writes the
-tables between the marks of docs/pages/catalog_says.md."""
+tables between the marks of docs/pages/catalog_says.md, and that of published robots on docs/pages/audit.md."""
 
 from __future__ import annotations
 
 import math
 from collections import Counter
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from hrsynth.catalog.words import LegWord, RobotWord, parse
 from hrsynth.present.readme import replaced
 
 PAGE = Path(__file__).resolve().parent / "pages" / "catalog_says.md"
+AUDIT = PAGE.with_name("audit.md")
 VERDICTS = (CONTROLLABLE, PARTIAL, BLIND)
 INFINITY, RAIL, GENERAL = "line at infinity", "line across the rails", "line in general position"
 Record = Mapping[str, Any]
@@ -140,7 +141,25 @@ def rules(catalog: Catalog) -> str:
     return _table(("rule", "agree"), rows)
 
 
+def published(catalog: Catalog) -> str:
+    """Verdicts of published robots by the motion that their tables state, and how many of them are not exact."""
+    rows = []
+    for group, in catalog.count("group"):
+        every = list(catalog.where(group=group))
+        found = studied(Catalog(tuple(every)))
+        legs = Counter(each["fewest"] for each in found if each["verdict"] == CONTROLLABLE)
+        rows.append((group, f"{len(every):,}", *(f"{sum(each['verdict'] == v for each in found):,}" for v in VERDICTS),
+                     f"{len(every) - len(found):,}", f"{sum(not each['exact'] for each in found):,}",
+                     ", ".join(f"{n}: {count:,}" for n, count in sorted(legs.items())),
+                     f"{sum('modes_bound' in each for each in found):,}"))
+    return _table(("group", "robots", *VERDICTS, "refused", "not exact", "legs to watch: controllable robots",
+                   "with a list of modes"), rows)
+
+
 TABLES = {"motions": motions, "fewest": fewest, "chains": chains, "cures": cures, "rules": rules}
+PAGES: Sequence[tuple[Path, str | None, Mapping[str, Callable[[Catalog], str]]]] = (
+    (PAGE, None, TABLES), (AUDIT, "published", {"published": published}))
+"""Each page, the catalog of its tables, and what makes them."""
 
 
 def start(name: str) -> str:
@@ -148,9 +167,9 @@ def start(name: str) -> str:
     return f"<!-- generated: {name} -->"
 
 
-def written(text: str, catalog: Catalog) -> str:
-    """The page with its tables."""
-    for name, made in TABLES.items():
+def written(text: str, catalog: Catalog, tables: Mapping[str, Callable[[Catalog], str]] = TABLES) -> str:
+    """A page with its tables."""
+    for name, made in tables.items():
         text = replaced(text, made(catalog), start(name))
     return text
 
@@ -165,4 +184,5 @@ def _table(heads: Sequence[object], rows: Iterable[Sequence[object]]) -> str:
 
 
 if __name__ == "__main__":
-    PAGE.write_text(written(PAGE.read_text(encoding="utf-8"), load()), encoding="utf-8", newline="\n")
+    for page, which, tables in PAGES:
+        page.write_text(written(page.read_text(encoding="utf-8"), load(which), tables), encoding="utf-8", newline="\n")

@@ -80,7 +80,8 @@ class Catalog(Value):
 
 
 def load(path: str | Path | None = None, **asked: Any) -> Catalog:
-    """The shipped catalog, or that of a folder or SQLite file; ``asked`` as for ``Catalog.where``.
+    """The shipped catalog, or that of a folder or SQLite file; ``published``: the shipped one of published robots
+    (docs/pages/audit.md). ``asked`` as for ``Catalog.where``.
 
     What is seen of platforms instead of legs (the group ``sensors``) is left out unless ``group`` or ``see`` asks for
     it.
@@ -103,7 +104,7 @@ def _tuple(value: object) -> tuple[object, ...]:
 
 
 def _require_there(kept: Store, path: str | Path | None) -> None:
-    if path is not None and not Path(path).exists():
+    if path is not None and not kept.path.exists():
         raise BadRequest("no such catalog", str(path), f"a folder, or a file that ends in {', '.join(DATABASES)}")
     if not kept.groups():
         raise BadRequest("nothing in the catalog", str(kept.path), "one that was built by hrsynth catalog build")

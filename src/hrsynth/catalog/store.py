@@ -18,6 +18,8 @@ from .words import VERSION
 
 DATABASES = (".sqlite", ".sqlite3", ".db")
 """Endings of a store that is one SQLite file."""
+PUBLISHED = "published"
+"""The shipped catalog of published robots."""
 FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 COLUMNS = {"legs": "INTEGER", "dof": "INTEGER", "motion": "TEXT", "verdict": "TEXT", "base_motors": "INTEGER",
            "fewest": "INTEGER"}
@@ -122,8 +124,11 @@ class Database:
 
 
 def store(path: str | Path) -> Store:
-    """The store of this name: a SQLite file by its ending, else a folder."""
+    """The store of this name: a SQLite file by its ending, else a folder; ``published`` of the package, where there is
+    no such folder."""
     path = Path(path)
+    if path == Path(PUBLISHED) and not path.exists():
+        return Folder(shipped().path / PUBLISHED)
     return Database(path) if path.suffix in DATABASES else Folder(path)
 
 

@@ -27,7 +27,8 @@ if TYPE_CHECKING:
 
 catalog = Group("hrsynth catalog", "The catalog of architectures: what can be controlled by watching legs.")
 VERDICTS = ("controllable", "partially controllable", "uncontrollable")
-KEPT = Option("kept", "A folder or SQLite file (default: what is shipped).", "PATH", flags=("--catalog",))
+KEPT = Option("kept", "A folder or SQLite file, or published: what is shipped of published robots (default: what is "
+              "shipped of words).", "PATH", flags=("--catalog",))
 WORKERS = Option("workers", "Processes that share the work.", None, int, 1, low=1)
 TABLES = Option("tables", "Of published tables (the page 'audit' has their format), not of the words listed here.",
                 "FOLDER")
