@@ -27,6 +27,20 @@ def nothing_answered_before():
     forget_answers()
 
 
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Of a law that is marked ``some(n)`` so many members, spread over all, are quick; the others are slow."""
+    laws: dict[tuple[str, int], list[pytest.Item]] = {}
+    for item in items:
+        if (mark := item.get_closest_marker("some")) and not item.get_closest_marker("slow"):
+            laws.setdefault((item.nodeid.partition("[")[0], *mark.args), []).append(item)
+    for (_, count), members in laws.items():
+        quick = {round(k * (len(members) - 1) / max(count - 1, 1)) for k in range(count)}
+        for k, item in enumerate(members):
+            if k not in quick:
+                item.add_marker("slow")
+
+
 @pytest.hookimpl(wrapper=True)
 def pytest_collection() -> Iterator[object]:
     """Nothing that is collected is garbage: to look for some takes a third of the time."""

@@ -439,6 +439,7 @@ def test_singular_text(run):
         assert re.search(line, answer.out, re.MULTILINE), answer.out
 
 
+@pytest.mark.slow
 def test_singular_draws_the_locus(run, tmp_path: Path):
     picture = tmp_path / "locus.png"
     data = run("singular", "rrrrr_m1", "--points", "30", "--steps", "9", "-o", picture, "--json").data
@@ -618,6 +619,7 @@ def test_servo_refuses_what_does_not_fit(run, arguments: list[str], words: list[
     assert all(word in line for word in words)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("arguments", [
     ["derive", "--at", "x=9"], ["legs", "--at", "x=9"], ["check", "--at", "x=9"], ["check", "--grid", "x=8:9:2"],
     ["modes", "--at", "x=9"], ["path", "--start", "x=0", "--goal", "x=9"], ["path", "--start", "x=9", "--goal", "x=0"],

@@ -33,6 +33,7 @@ def test_json_of_a_plane_is_the_contract(capsys: pytest.CaptureFixture[str]) -> 
     assert data["checked"]["poses"] > 0
 
 
+@pytest.mark.slow
 def test_files_and_text(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     for grid, name in ((("--plane", "z=-0.7", "--steps", "15"), "map.png"),
                        (("--grid", "x=-0.9:0.9:5,y=0,z=-0.7"), "line.png"),

@@ -45,6 +45,7 @@ def test_every_drawing_command_is_among_them():
     assert {name for name, each in OUTPUTS.items() if any(file.drawn for file in each.files)} == DRAWN.keys()
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("arguments", "files"), [each for group in FILES.values() for each in group],
                          ids=lambda each: " ".join(each))
 def test_one_sentence_names_what_is_written(here: Path, capsys, arguments: list[str], files: list[str]):
@@ -58,6 +59,7 @@ def test_one_sentence_names_what_is_written(here: Path, capsys, arguments: list[
     assert all(sentences[0].count(name) == 1 for name in files)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.slow] * (name in ("singular", "endings")))
                                   for name in DRAWN])
 def test_figures_are_written_as_wide_as_asked(here: Path, capsys, name: str):
@@ -79,6 +81,7 @@ def width_of(file: Path) -> float:
     return float(Xml.fromstring(content).get("width").removesuffix("pt")) / 72
 
 
+@pytest.mark.slow
 def test_a_figure_has_the_font_that_is_asked_for(here: Path):
     for font, inside in (("serif", b"Serif"), ("DejaVu Sans Mono 11pt", b"SansMono")):
         file = here / "figure.pdf"
@@ -86,6 +89,7 @@ def test_a_figure_has_the_font_that_is_asked_for(here: Path):
         assert re.search(rb"/BaseFont /\S*" + inside, file.read_bytes())
 
 
+@pytest.mark.slow
 def test_the_same_figure_twice_is_the_same_file(here: Path):
     for ending in FIGURES:
         assert execute([*DRAWN["check"], "-o", f"a{ending}"]) == execute([*DRAWN["check"], "-o", f"b{ending}"]) == 0

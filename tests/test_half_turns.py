@@ -281,6 +281,7 @@ def prepared_once(monkeypatch: pytest.MonkeyPatch) -> None:
 QUICK = ("reached", "led_whole", "checked", "swept", "moded")
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "command"), [
     *(("3rpr_m1, tilted", command) for command in COMMANDS), *(("gough_stewart", command) for command in QUICK),
     *(pytest.param("gough_stewart", command, marks=pytest.mark.slow) for command in COMMANDS if command not in QUICK)])

@@ -39,6 +39,7 @@ def as_shipped(name: str) -> tuple[object, ...]:
     return essence(derive(load(name)))
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize("change", CHANGES)
 @pytest.mark.parametrize("name", [pytest.param(n, marks=() if n in QUICK else pytest.mark.slow) for n in shipped()])
 def test_the_same_robot_written_differently_has_the_same_hidden_robot(name: str, change: str) -> None:
@@ -46,6 +47,7 @@ def test_the_same_robot_written_differently_has_the_same_hidden_robot(name: str,
     assert essence(derive(changed(load(name), change, rng))) == as_shipped(name)
 
 
+@pytest.mark.slow
 @given(st.data(), st.integers(0, 2**31))
 @settings(max_examples=4, deadline=None, suppress_health_check=list(HealthCheck), derandomize=True)
 def test_random_robots_are_certified_and_keep_their_hidden_robot(data: st.DataObject, seed: int) -> None:

@@ -31,6 +31,7 @@ def same(one: object, other: object) -> bool:
     return str(one) == str(other) if isinstance(one, Exception) else one == other
 
 
+@pytest.mark.slow
 def test_answers_are_those_of_the_questions_one_by_one_in_their_order():
     expected = one_by_one()
     for jobs in (1, 2):
@@ -89,6 +90,7 @@ def test_what_cannot_be_asked_is_refused_before_the_work(question, robots, optio
         hrsynth.map(question, robots, **options)
 
 
+@pytest.mark.slow
 def test_a_script_needs_no_guard(tmp_path):
     """Workers do not run the script again."""
     script = tmp_path / "study.py"

@@ -249,6 +249,7 @@ class TestErrors:
 
 
 class TestExamples:
+    @pytest.mark.slow
     def test_robots_of_the_package_are_read_by_name(self):
         names = hrsynth.examples()
         assert len(names) > 60

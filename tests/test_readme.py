@@ -38,6 +38,7 @@ def test_the_table_has_every_shipped_robot_in_order():
     assert list(lines()) == list(shipped())
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", ["3prp", "3ppr_m1", "prrrp_parallel", "delta", "3upu"])
 def test_some_rows_are_fresh(name: str):
     assert lines()[name] == readme.row(name), "the page is stale: make readme"
@@ -93,6 +94,7 @@ def test_the_python_example_runs_and_prints_what_it_says():
     assert output.getvalue().splitlines() == said
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("command", [pytest.param(each, marks=[pytest.mark.slow] * each.startswith("basins"))
                                      for each in dict.fromkeys(re.findall(r"\$ hrsynth (\w.*)", SHOWN))])
 def test_the_commands_print_what_is_shown(command: str, capsys: pytest.CaptureFixture[str], tmp_path: Path,

@@ -84,6 +84,7 @@ def test_what_needs_a_package_that_is_missing_says_so_in_one_line(packages, extr
     assert list(tmp_path.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_core_answers_without_any_extra(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     every = "matplotlib mujoco cv2 numba dask distributed xacro mkdocs nbclient IPython"

@@ -57,6 +57,7 @@ def kinds() -> set[type]:
     return {each for each in Result.__subclasses__() if each.__module__.startswith("hrsynth.")}
 
 
+@pytest.mark.slow
 def test_every_kind_of_answer_is_tried():
     assert kinds() <= {type(asked(name)) for name in ASKED}
 
@@ -97,6 +98,7 @@ def test_a_robot_is_equal_to_itself_wherever_it_is_read_and_to_no_other(tmp_path
     assert moved != robot
 
 
+@pytest.mark.slow
 def test_what_was_loaded_goes_on_working():
     """Models, formulas and batches are made again: a loaded answer answers further questions as its original."""
     one, other = asked("observe"), pickle.loads(pickle.dumps(asked("observe")))
@@ -118,6 +120,7 @@ def test_arrays_stay_read_only():
         next(iter(robot.links.values())).pose[0, 3] = 1.0
 
 
+@pytest.mark.slow
 def test_an_answer_is_read_in_another_process(tmp_path):
     """Nothing in it depends on what was computed in the process that made it."""
     for name in ("singular", "modes", "derive"):

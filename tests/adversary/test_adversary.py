@@ -117,6 +117,7 @@ def test_a_false_error_bound_is_found():
         assert WRONG in outcomes(case, "error bound"), factor
 
 
+@pytest.mark.slow
 def test_an_enclosure_that_misses_is_found():
     case = shipped("gough_stewart")
     asked = "x=-0.0123,y=0.0456,z=0.3789,rpy=0.11/-0.07/0.2"

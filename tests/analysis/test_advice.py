@@ -102,6 +102,7 @@ def sets_of(answer: Advice) -> set[Set]:
     return {frozenset(name_of(m.observation) for m in each.measurements) for each in answer.sets}
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "observe", "camera"), [
     ("uranesx", "all", None), ("i4l", "all", None), ("i4l", "1", "platform"), ("prrrp_parallel", "all", None),
     ("prrrp_parallel_point", "all", None), ("3prp", "all", None), ("3rrp", "all", None), ("3ppr_m1", "all", None),

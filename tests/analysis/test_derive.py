@@ -137,6 +137,7 @@ def test_every_robot_is_expected() -> None:
     assert set(EXPECTED) == set(ROBOTS)
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_all_legs_observed(robot: str) -> None:
     derivation, expected = derived(robot), EXPECTED[robot]
@@ -193,6 +194,7 @@ def name(case: object) -> str:
     return "".join(case) if isinstance(case, tuple) else str(case)
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize(("robot", "legs"), SUBSETS, ids=name)
 def test_every_set_of_legs_is_certified(robot: str, legs: tuple[str, ...]) -> None:
     derivation = derived(robot, legs)
@@ -312,6 +314,7 @@ def test_nothing_is_answered_without_a_certificate(monkeypatch: pytest.MonkeyPat
 
 # --- other segments, other cameras, other forms ------------------------------------------------------------------
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "observe", "camera"), [
     ("gough_stewart", ("1", "2", "3"), "platform"),
     ("delta", None, "platform"),
@@ -328,6 +331,7 @@ def test_a_camera_on_any_link(robot: str, observe: tuple[str, ...] | None, camer
     assert derivation.to_dict()["camera"] == camera
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "observe"), [
     ("delta", ("arm_1", "rod_2a")), ("delta", ("rod_1b", "2")), ("delta", ("arm_1", "arm_2", "arm_3")),
     ("quattro", ("rod_1a", "rod_1b", "4")), ("3rrr_m1", ("1", "2", "3")), ("delta", ("arm_1", "rod_1a", "2"))])
@@ -340,6 +344,7 @@ def test_other_segments(robot: str, observe: tuple[str, ...]) -> None:
     assert len(links) == len(observe)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("observe", ["link_2_1,link_2_2", "link_2_2,link_2_1", "link_1_1,link_1_2,link_2_1,3"])
 @pytest.mark.parametrize("form", ["simplified", "general"])
 def test_two_links_that_a_slide_joins_are_both_watched(observe: str, form: str) -> None:

@@ -61,6 +61,7 @@ def checked(verdict: ExactVerdict) -> None:
     assert verdict.instances == (1 if verdict.rank == verdict.dof else INSTANCES)
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_exact_ranks_are_the_numerical_ones(robot: str) -> None:
     """Every shipped robot, every set of legs."""

@@ -92,6 +92,7 @@ def complete(bodies: str, n: int) -> Derivation:
     return derive(drawn(n, bodies, list(permutations(range(1, n + 1), 2)), seed=n)[0])
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("n", [3, pytest.param(4, marks=pytest.mark.slow), pytest.param(5, marks=pytest.mark.slow)])
 @pytest.mark.parametrize("bodies", sorted(MOVES))
 def test_generic_ranks_of_complete_formations_are_those_of_the_literature(bodies: str, n: int):
@@ -209,6 +210,7 @@ def test_mixed_cases(bearings: Pairs, distances: Pairs, compass: bool, trivial: 
     assert found.exact.rank == found.verdict.rank
 
 
+@pytest.mark.slow
 def test_a_camera_of_the_ground_leaves_a_scale_about_it():
     """The first body moves along its ray, all others with it; the rest scales about the first: no similarity that keeps
     the ground's camera where it is."""

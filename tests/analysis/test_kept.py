@@ -52,6 +52,7 @@ def test_all_relations_of_shipped_robots_are_derived(robot: str) -> None:
     assert basis.missed is None
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_what_is_kept_holds_far_away(robot: str) -> None:
     """Relations are proposed and kept from one small step; they hold at the end of a long walk by the oracle."""

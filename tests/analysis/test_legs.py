@@ -29,6 +29,7 @@ def table(robot: str) -> dict[tuple[str, ...], Verdict]:
     return {each.legs: each for each in found(robot).sets}
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", ["quattro", "quattro_rigid", "delta", "orthoglide", "gough_stewart", "3rrr_m1", "i4l",
                                    "hexaglide", "3ppr_m1", "prrrp_parallel_point", "3upu"])
 def test_all_sets_obey(robot: str) -> None:

@@ -180,6 +180,7 @@ def test_a_crank_stays_on_its_branch_over_a_whole_turn():
             assert bool(np.all(np.abs(off) <= cell.radius + 1e-9)) is inside
 
 
+@pytest.mark.slow
 def test_the_proof_ends_where_the_loop_toggles():
     """No crank: it turns as far as coupler and rocker are in line, and these are named."""
     (part,) = branch(four_bar(1.0, 0.9, 0.6, 0.8, 1.2)).parts
@@ -194,6 +195,7 @@ def test_the_proof_ends_where_the_loop_toggles():
     assert not part.turns
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [0, *(pytest.param(seed, marks=pytest.mark.slow) for seed in range(1, 6))])
 def test_tubes_hold_what_small_steps_find_in_random_four_bars(seed):
     rng = np.random.default_rng(seed)
@@ -241,6 +243,7 @@ def test_motors_that_do_not_make_a_function_are_refused():
         branch(robot, "shoulder_1=1:2")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("flipped", [False, True])
 def test_a_joint_that_is_idle_at_zero_alone_closes_no_loop(flipped):
     """A U joint with one axis along its rod at zero, and a knee that is tilted: the ball leaves the plane, so that the

@@ -102,6 +102,7 @@ def certified(mechanism: Mechanism, kind: str, form: str = "simplified") -> Deri
     return found
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robot", ["free_body", "arm", "gough_stewart"])
 def test_every_kind_is_certified(robot: str, kind: str) -> None:
@@ -113,6 +114,7 @@ def test_every_kind_is_certified(robot: str, kind: str) -> None:
     assert certified(mechanism, kind).verdict.rank > 0
 
 
+@pytest.mark.some(7)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robot", ["free_body", "arm", "gough_stewart", "delta"])
 def test_exact_ranks_are_those_of_samples(robot: str, kind: str) -> None:

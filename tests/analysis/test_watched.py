@@ -51,6 +51,7 @@ def test_a_report_of_few_legs_still_knows_all_sets():
     assert len(legs(ObservedRobot.of("delta", "1,2")).sets) == 7
 
 
+@pytest.mark.slow
 def test_sets_for_a_displacement_are_those_asked_for():
     found = select("delta", observe="1,2", start="x=0.05", goal="x=-0.05", runs=0, examine=1)
     assert {each.legs for each in found.candidates} == {("1",), ("2",), ("1", "2")}

@@ -85,6 +85,7 @@ def check_law(setting: ObservedRobot, legs: Sequence[str], count: int, seed: int
     return compared
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_a_batch_is_the_relation_at_every_pose(robot: str) -> None:
     setting, batch = shipped_batch(robot)

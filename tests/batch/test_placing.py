@@ -27,6 +27,7 @@ def placer_of(robot: str) -> tuple[ObservedRobot, Placer]:
     return setting, setting.placer
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_every_pose_that_is_reached_becomes_a_closed_configuration(robot: str) -> None:
     setting, batch = shipped_batch(robot)

@@ -25,6 +25,7 @@ def records(group: str) -> list[dict[str, object]]:
     return [json.loads(line) for line in lines]
 
 
+@pytest.mark.slow
 def test_every_known_robot_is_in_the_catalog_under_its_canonical_word():
     held = {bare(str(each["word"])) for group in ("deltas", "planar", "pods", "spatial")
             for each in records(group) if "!" not in str(each["word"])}
@@ -41,6 +42,7 @@ def test_names_are_found_without_reading_every_word(group: str):
         assert is_called(each, "tripod") == (name is not None and "tripod" in name), each["word"]
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("text", "word"), [
     ("Delta", "3(Rt*-2SSt)"), ("3-RPS", "3(Rt-Pl*-S)"), ("stewart", "6(S-Pl*-S)"), ("Hexaglide", "6(Px*-Uyn-S)"),
     ("3-R*RR", "3(Rz*-Rz-Rz)"), ("'3(Rz-Rz*-Rz)'", "3(Rz-Rz*-Rz)")])

@@ -86,6 +86,7 @@ def everything(target: Path) -> dict[str, bytes]:
     return {str(file.relative_to(target)): file.read_bytes() for file in target.rglob("*") if file.is_file()}
 
 
+@pytest.mark.slow
 def test_every_record_has_its_page_and_its_robot_file(made, catalog):
     target, done = made
     assert (done.architectures, done.differ) == (len(WORDS), ())
@@ -143,6 +144,7 @@ def test_a_page_says_what_the_record_says(made, catalog):
             assert "{" + ", ".join(legs) + "}" in text
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("word", [word for word in WORDS if word != REFUSED])
 def test_the_robot_file_is_what_save_writes_and_derives_as_the_record(made, catalog, word, tmp_path):
     target, _ = made

@@ -53,6 +53,7 @@ def ranks(legs: str) -> str:
     return json.dumps(hrsynth.certificate(hrsynth.derive(hrsynth.load("quattro"), legs.split(","))))
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", ROBOTS)
 def test_what_is_listed_is_certified(name, tmp_path):
     found = hrsynth.modes(hrsynth.load(name), list(ROBOTS[name]))
@@ -78,6 +79,7 @@ NEEDED = {name: [mark for mark, names in ((pytest.mark.slow, LONGER), (needs_mso
           for name in sorted(FAMILIES | MEETING | SURFACES)}
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize("name", [pytest.param(name, marks=marks) for name, marks in NEEDED.items()])
 def test_random_platforms(name):
     """The checker's bound, which trusts no resultant, is the engine's count."""
@@ -139,6 +141,7 @@ def test_another_robot_is_told():
         hrsynth.verify(record, scaled("quattro"))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["quattro", "delta"])
 def test_a_certificate_of_the_real_robot_is_about_it(name: str):
     record = json.loads(json.dumps(hrsynth.certificate(hrsynth.modes(name, real=True))))
@@ -184,6 +187,7 @@ def test_false_certificates_are_refused(name):
     assert sum(attacked(of(name), 40, 1).values()) == 40
 
 
+@pytest.mark.slow
 def test_every_kind_of_falsehood_is_tried():
     told = attacked(of("3rpr_m1"), 300, 2)
     assert set(told) == {change.__name__ for change in FALSE}

@@ -49,6 +49,7 @@ def test_a_loop_of_every_type(kind: JointType, seed: int):
     assert [joint.type for joint in read.joints.values() if not joint.in_tree] == [kind, kind]
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=150)
 @given(st.lists(st.sampled_from(IN_TREE), min_size=1, max_size=12), st.lists(st.sampled_from(IN_LOOP), max_size=6),
        SEEDS, st.sampled_from([1.0, 1e-3, 0.99, 500.0]))

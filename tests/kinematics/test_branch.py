@@ -48,6 +48,7 @@ def parallelogram(angle: float, normal: tuple[float, float, float] = (0, 0, 1)) 
     return builder.build(platform="coupler")
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("angle", [0.02, 0.1, 0.3, 1.2, np.pi - 0.05])
 @pytest.mark.parametrize("normal", [(0, 0, 1), (0.48, 0.6, 0.64)])
 def test_a_parallelogram_does_not_cross_over(angle: float, normal: tuple[float, float, float]) -> None:
@@ -83,6 +84,7 @@ def test_a_sample_with_a_faint_turn_is_of_the_same_mode(dimensions: int) -> None
     assert {setting.everything.signature.motion for setting in found} == {"1T3R"}
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("dimensions", "seed"), [(7, 0), (140, 1), (185, 3), (518, 1), (572, 0)])
 def test_samples_of_a_pod_stay_in_its_operation_mode(dimensions: int, seed: int) -> None:
     """The rails of legs 2 and 3 are along z, so neither sees the platform, which only translates, move along z. In its

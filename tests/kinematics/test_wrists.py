@@ -66,6 +66,7 @@ def chain(axes: list[np.ndarray], rng: Rng, types: str) -> Mechanism:
     return b.build("tip")
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize("types", ["RRR", "RRRR", "UR", "RU", "RUR", "RRRRR"])
 @pytest.mark.parametrize("seed", range(6))
 def test_the_interval_is_what_the_axes_reach(types: str, seed: int) -> None:

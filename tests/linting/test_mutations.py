@@ -94,6 +94,7 @@ def outcome(files: dict[str, str], folder: Path, *, fix: bool) -> str:
     return "mended" if found.written else "read"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("count", [60, pytest.param(2000, marks=pytest.mark.long)])
 def test_damaged_files_are_looked_at_or_refused(count: int, tmp_path: Path):
     rng, base = random.Random(count), originals()

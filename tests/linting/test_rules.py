@@ -57,6 +57,7 @@ def test_every_rule_has_a_case():
     assert set(lint_rules()) == {each.rule for each in CASES} | ELSEWHERE | compared
 
 
+@pytest.mark.some(6)
 @pytest.mark.parametrize("case", CASES, ids=lambda case: f"{case.rule}{case.ending}")
 def test_a_rule_finds_its_defect_and_no_other(case: Case, tmp_path: Path, shelf: Path):
     _, two = files(case, tmp_path, shelf)
@@ -73,6 +74,7 @@ def test_a_rule_finds_its_defect_and_no_other(case: Case, tmp_path: Path, shelf:
 MENDED = [case for case in CASES if lint_rules()[case.rule].mends]
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("case", MENDED, ids=lambda case: f"{case.rule}{case.ending}")
 def test_what_is_mended_is_the_sound_file_again(case: Case, tmp_path: Path, shelf: Path):
     one, two = files(case, tmp_path, shelf)

@@ -68,6 +68,7 @@ def test_mesh_files_beside_the_robot_are_read(tmp_path: Path, address: str):
     assert not any("visual" in note for note in found.notes)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", [
     ".xml", pytest.param(".sdf", marks=pytest.mark.slow), pytest.param(".usda", marks=pytest.mark.slow)])
 def test_other_dialects_show_the_same_meshes(ending: str, tmp_path: Path):
@@ -115,6 +116,7 @@ def test_a_mesh_that_is_none_is_a_note(tmp_path: Path):
     assert rods(found, "prox_1") == 1
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ending", ["xml", pytest.param("sdf", marks=pytest.mark.slow),
                                     pytest.param("usda", marks=pytest.mark.slow)])
 def test_a_robot_of_another_dialect_is_drawn_with_the_same_shapes(tmp_path: Path, ending: str):

@@ -155,6 +155,7 @@ def test_a_name_cannot_break_the_page():
     assert text.count("</script>") == 3
 
 
+@pytest.mark.slow
 def test_an_interrupt_ends_the_server_quietly():
     pytest.importorskip("uvicorn")
     command = [sys.executable, "-m", "hrsynth.cli", "view", "rrrrr_m1", "--no-open"]

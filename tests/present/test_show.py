@@ -75,6 +75,7 @@ def test_each_option_goes_somewhere(question):
     assert {name for file in files for name in (*file.needs, *file.takes)} <= {each.name for each in question.options}
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("command", ASKED)
 def test_a_result_is_printed_as_by_the_command_line(command: str, capsys: pytest.CaptureFixture[str]):
     found = answer(command)

@@ -40,6 +40,7 @@ def test_all_loops_are_closed_at_every_position_of_every_slider(name: str):
     law_joints_hold(found)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_slider_moves_one_coordinate_and_keeps_the_others(name: str):
     found = seen(name)

@@ -167,6 +167,7 @@ def test_why_fewer_legs_are_better() -> None:
         fewer_are_better(best, [(("1", "2", "3"), ends((), 0.004))]))
 
 
+@pytest.mark.slow
 def test_endings_are_those_of_the_single_questions() -> None:
     """The kinds of what attracts besides the goal, and the certified radius, of the set that is kept."""
     best = select("rrrrr_m1", start="x=0.05", goal="x=-0.01,y=0.03", runs=0).kept[0]
@@ -260,6 +261,7 @@ def test_a_camera_has_a_whole_pose() -> None:
     assert camera_at("x=0,y=0,z=1,rpy=180deg/0/0", 500.0).place[2, 2] == pytest.approx(-1)
 
 
+@pytest.mark.slow
 def test_command_line(capsys: pytest.CaptureFixture[str]) -> None:
     arguments = ["select", "rrrrr_m1", "--start", "x=0.05", "--goal", "x=-0.01,y=0.03", "--runs", "1"]
     assert execute([*arguments, "--sight", "auto", "--json"]) == 0

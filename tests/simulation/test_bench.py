@@ -59,6 +59,7 @@ def check_together(name: str) -> None:
     assert np.linalg.norm(motion.position(there) - motion.position(start.pose(motion.link))) > 1e-3 or motion.body
 
 
+@pytest.mark.slow
 def test_the_simulated_robot_ends_where_the_loop_without_dynamics_does():
     check_together("delta")
 

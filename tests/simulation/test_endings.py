@@ -22,6 +22,7 @@ LASTS = (30.0, 60.0, 150.0)
 """Seconds that a run may take: by the first most have ended."""
 
 
+@pytest.mark.slow
 def test_a_leg_that_is_stretched_is_a_boundary_however_long_the_run_may_take() -> None:
     """It was *time* after 75 s, and *boundary* with 400 s; at the fold integrators chatter."""
     scene = ServoTask.of(ObservedRobot.of(load("quattro_rigid"), "1,3"), start="x=-0.314,y=0.319,z=-0.64",

@@ -82,6 +82,7 @@ def test_more_far_runs_end_as_they_are_named(name: str):
 # ---- the papers' cases (docs/pages/papers.md: what their geometry gives)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("legs", "ended", "z"), [
     ("1,4", MODE, -0.9019), pytest.param("2,3", GOAL, -0.56, marks=pytest.mark.slow)])
 def test_two_legs_of_the_robot_with_an_articulated_platform(legs: str, ended: str, z: float):
@@ -101,6 +102,7 @@ def test_two_legs_of_the_robot_with_a_rigid_platform(legs: str, ended: str, z: f
 # ---- noise, trajectories, limits
 
 
+@pytest.mark.slow
 def test_noise_keeps_the_platform_about_the_goal_and_more_of_it_further_away():
     def far(noise: str, seed: int = 0) -> float:
         found = servo(load("rrrrr_m1"), start="x=0.02,y=0.2195", goal="x=0.02,y=0.22", gain=4, noise=noise, time=3.0,

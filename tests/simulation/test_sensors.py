@@ -262,6 +262,7 @@ def test_a_line_that_comes_to_the_cameras_centre_ends_the_run(tmp_path: Path) ->
     assert "has no value there" in found.ending.reason
 
 
+@pytest.mark.slow
 def test_supposed_depths_at_which_the_law_loses_rank_are_told(tmp_path: Path) -> None:
     """Three image points are as many numbers as freedoms: no more are measured."""
     found = body(tmp_path, ["point:platform@-0.094037,-0.078560,-0.075302", "point:platform@0.292467,0.079654,0.104594",

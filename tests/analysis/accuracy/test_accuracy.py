@@ -122,6 +122,7 @@ def check_extents(setting: ObservedRobot, cones: Array) -> None:
             assert widths.max() <= extent.largest * (1 + 1e-9)
 
 
+@pytest.mark.some(5)
 @pytest.mark.parametrize("robot", ROBOTS)
 def test_extremes_are_attained_and_not_exceeded(robot: str) -> None:
     setting = ObservedRobot.of(load(robot), samples=3)
@@ -139,6 +140,7 @@ def test_extremes_of_random_robots(robot) -> None:
     check_extents(setting, np.full(len(setting.observed), CONE))
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", ["quattro", "3rrr_m1", "gough_stewart", "orthoglide", "delta"])
 def test_samples_approach_the_linear_maxima_as_cones_shrink(robot: str) -> None:
     setting = ObservedRobot.of(load(robot), samples=3)

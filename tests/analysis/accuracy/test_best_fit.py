@@ -89,6 +89,7 @@ def ways(setting: ObservedRobot, at: ClosedConfiguration, cone: float, count: in
     return [cone * _tangents(rng, u) for _ in range(count)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("legs", "at", "chosen"), [
     ("1,2", "x=0.1,y=0.1,z=-0.7", [0, 1, 20]),
     pytest.param("3,4", "x=0.15,y=0.2,z=-0.75", [2, 13, 24, 29], marks=pytest.mark.slow)])
@@ -136,6 +137,7 @@ def check_fit(setting: ObservedRobot, at: ClosedConfiguration, way: Array) -> Fi
     return fit
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", ["3rps", "gough_stewart", "rrrrr_m1", "orthoglide", "quattro", "delta"])
 def test_best_fits_are_where_the_loop_rests(robot: str) -> None:
     setting = ObservedRobot.of(load(robot), samples=3)
@@ -143,6 +145,7 @@ def test_best_fits_are_where_the_loop_rests(robot: str) -> None:
     assert [check_fit(setting, at, way).outcome for way in ways(setting, at, 5e-3, 2, 1)] == [FIT] * 2
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None, suppress_health_check=list(HealthCheck))
 @given(parallel_robots())
 def test_best_fits_of_random_robots(robot) -> None:

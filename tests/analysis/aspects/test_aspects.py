@@ -64,6 +64,7 @@ def signs(aspects: Aspects, *configurations: ClosedConfiguration) -> np.ndarray:
 # ---- the certificate is never wrong
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "observe"), KNOWN)
 def test_a_certified_path_is_free_of_singularities_and_within_reach(robot: str, observe: str | None):
     aspects = aspects_of(robot, observe)
@@ -139,6 +140,7 @@ def test_nine_of_ten_pairs_on_one_side_are_joined():
     assert verdicts.count(SAME) >= 0.9 * (len(verdicts) - verdicts.count(SEPARATED))
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "observe"), [
     ("3rrr_m1", None), ("3rpr_m1", None), ("rrrrr_m1", None), ("gough_stewart", "1,2,3"), ("quattro", "1,4"),
     ("quattro_rigid", None)])
@@ -255,6 +257,7 @@ def test_a_crossing_leads_from_one_working_mode_to_the_other():
 # ---- random planar robots
 
 
+@pytest.mark.slow
 @settings(max_examples=5, deadline=None)
 @given(words=st.lists(st.sampled_from(["RRR", "RPR", "PRR"]), min_size=3, max_size=3), seed=st.integers(0, 10**6))
 def test_random_planar_robots(words: list[str], seed: int):
@@ -306,6 +309,7 @@ def test_the_mean_value_form_holds_all_values_and_is_sharper_on_short_intervals(
 # ---- answers that are no path
 
 
+@pytest.mark.slow
 def test_reasons_why_nothing_is_decided():
     lost = aspects_of("prrrp_parallel")
     places = list(random_walk(lost.setting.samples.start, 2))

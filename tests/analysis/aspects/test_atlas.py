@@ -71,6 +71,7 @@ def test_signs_of_the_determinant_agree_with_the_table(name: str, observe: str |
         assert (found.verdict(i, j) == SEPARATED) == (one != other)
 
 
+@pytest.mark.slow
 def test_a_cuspidal_robot_goes_from_mode_to_mode_with_the_same_directions():
     """The six poses of 1992: three in each of two aspects; all along each path, looked at again by Pinocchio, loops
     close and the rank is full, and both ends have the same directions and are apart."""

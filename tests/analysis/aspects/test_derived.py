@@ -39,6 +39,7 @@ def known(aspects: Aspects) -> LegPattern:
     return aspects.pattern
 
 
+@pytest.mark.some(3)
 @pytest.mark.parametrize("name", [*SHIPPED, *RANDOM])
 def test_forms_are_read_from_the_joints_and_hold_at_other_poses(name: str):
     """No form is fitted; at configurations that no form was compared with, tips and what limbs carry are where the

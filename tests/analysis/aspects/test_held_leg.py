@@ -79,6 +79,7 @@ def drawn(request: pytest.FixtureRequest) -> HeldLegSection:
     return drawn_of(request.param)
 
 
+@pytest.mark.slow
 def test_three_modes_meet_at_a_cusp(drawn: HeldLegSection):
     """The distance to the third circle has a triple zero there."""
     assert len(drawn.cusps) >= 2

@@ -49,6 +49,7 @@ def limited(robot: str, observe: str | None) -> Aspects:
         mechanism)}), observe)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("robot", "observe"), KNOWN)
 def test_a_reserve_tells_how_far_a_coordinate_is_from_its_limits(robot: str, observe: str | None):
     aspects = limited(robot, observe)

@@ -94,6 +94,7 @@ def test_equal_parallel_legs_carry_a_congruent_platform_on_a_circle(seed: int):
     assert told == pytest.approx([2 * math.asin(r / (2 * 0.5))] * 2, abs=1e-6)
 
 
+@pytest.mark.slow
 def test_a_self_motion_away_from_the_pose_is_found():
     """The same robot at one of its two other modes, which is regular."""
     rng, tilt = tilted(3)
@@ -107,6 +108,7 @@ def test_a_self_motion_away_from_the_pose_is_found():
     assert [mode.goal for mode in found.modes] == [True, False]
 
 
+@pytest.mark.slow
 def test_an_octahedron_of_bricard_moves():
     """R. Bricard 1897, symmetric to a line: opposite corners of the octahedron change places by a half turn about it.
     Three corners are the base, the opposite ones the platform, the six edges between them the legs."""
@@ -169,6 +171,7 @@ def test_two_circles_in_one_move_a_five_bar():
     assert found.modes == ()
 
 
+@pytest.mark.slow
 def test_a_singular_pose_is_no_self_motion():
     """A 3-RPR whose legs' lines meet in a point: it can turn about it to first order only."""
     rng, tilt = tilted(8)
@@ -182,6 +185,7 @@ def test_a_singular_pose_is_no_self_motion():
     assert sum(mode.goal for mode in found.modes) == 1
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("name", "observe"), [
     ("i4l", "1"), ("3rrp", "1"), ("hexaglide", "1"), ("quattro", "1"), ("prrrp_parallel_point", None), ("3prp", None)])
 def test_freedoms_that_are_never_seen_are_moved(name: str, observe: str | None):

@@ -63,6 +63,7 @@ def apart(point: np.ndarray, curve: np.ndarray, normal: np.ndarray | None) -> fl
 # ---- what is drawn
 
 
+@pytest.mark.some(2)
 @MANY
 def test_modes_are_where_the_curves_meet(name: str, observe: str | None, real: bool):
     view, size = drawn(name, observe, real), found(name, observe, real).goal.twin.length

@@ -143,6 +143,7 @@ def check_random(kind: str, seed: int, starts: int) -> str:
     return "listed"
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("kind", "seed"), [("planar", 2), ("planar, a point", 1), ("pod", 0), ("delta", 0)])
 def test_what_closes_is_listed_for_random_robots(kind: str, seed: int):
     assert check_random(kind, seed, 20) in ("listed", "continuum", "found")
@@ -218,6 +219,7 @@ def asked_directions(found: AssemblyModes) -> Array:
     return oracle.directions(state_of(found.goal.twin, found.goal.q), asked(found).observations)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("name", "observe", "size"), [
     ("3rrr_m1", ("1",), 2), ("gough_stewart", ("1", "2"), 2), ("quattro", ("1",), 2), ("prrrp_parallel", None, 1),
     ("3ppr_m1", None, 3), ("3prp", None, 2), ("uranesx", None, 1)])

@@ -46,6 +46,7 @@ def check_agreement(listed: AssemblyModes) -> None:
     assert sum(mode.met for mode in found.modes) == found.closed + 1
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("name", "observe", "real"), LISTED)
 def test_a_search_finds_only_what_a_complete_list_has(name: str, observe: str | None, real: bool):
     check_agreement(hrsynth.modes(robot(name), observe, real=real))
@@ -61,6 +62,7 @@ def test_a_search_finds_only_what_a_complete_list_of_a_random_robot_has(kind: st
         check_agreement(listed)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("word", WORDS)
 def test_a_robot_without_a_list_has_modes_that_are_found(word: str):
     observed = hrsynth.observe(robot(word))
@@ -84,6 +86,7 @@ def test_a_platform_that_is_a_point_has_modes_at_points():
     assert len(found.modes) == len(listed.modes) == 2
 
 
+@pytest.mark.slow
 def test_poses_that_the_measurements_leave_free_are_told_and_not_listed():
     """Watched legs that see all freedoms at a generic pose, at a zero pose where they do not: it moves in two ways."""
     found = hrsynth.modes(robot("3(Ra-Rb*-Ph-Rb-Pj)"))
@@ -94,6 +97,7 @@ def test_poses_that_the_measurements_leave_free_are_told_and_not_listed():
     assert found.modes == ()
 
 
+@pytest.mark.slow
 def test_without_the_solver_the_modes_are_found_and_the_extra_is_named(monkeypatch: pytest.MonkeyPatch):
     import importlib.metadata
 
@@ -109,6 +113,7 @@ def test_without_the_solver_the_modes_are_found_and_the_extra_is_named(monkeypat
     assert PACKAGE not in found.found.proof
 
 
+@pytest.mark.slow
 def test_what_was_found_is_drawn(tmp_path):
     from hrsynth.present.modes import drawable, picture
 

@@ -51,6 +51,7 @@ def check(name: str, seed: int) -> SystemModes:
     return found
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", NAMED)
 def test_named_classes_are_proved(name: str):
     check(name, 100)

@@ -40,6 +40,7 @@ def test_a_point_on_surfaces_has_its_number_of_places(name: str):
         check_member(name, seed)
 
 
+@pytest.mark.some(4)
 @needs_msolve
 @pytest.mark.parametrize("name", [name for name in QUICK if name not in SURFACES])
 def test_msolve_lists_the_same_poses(name: str):
@@ -55,6 +56,7 @@ def test_msolve_lists_the_same_poses_at_many_instances(name: str):
         check_agreement(name, 1000 + seed)
 
 
+@pytest.mark.some(2)
 @needs_msolve
 @pytest.mark.parametrize("name", [name for name in QUICK if name in SURFACES])
 def test_tips_on_surfaces_have_their_number_of_poses(name: str):

@@ -41,6 +41,7 @@ def missed(found) -> float:
     return max(float(np.linalg.norm(tip.curve.miss(B[:3]))) for tip, B in points) / found.goal.twin.length
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("name", HIDDEN)
 def test_tips_of_hidden_robots_lie_on_their_curves(name: str):
     found = confined(name)

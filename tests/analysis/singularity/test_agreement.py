@@ -45,6 +45,7 @@ def check(answer: Singularity, points: int) -> None:
         assert each.lost
 
 
+@pytest.mark.some(7)
 @pytest.mark.parametrize(("robot", "legs", "real"), [
     pytest.param(*case, marks=pytest.mark.slow if case[0] in HEAVY and case[1:] == (None, False) else ())
     for case in CASES])
@@ -141,6 +142,7 @@ def test_another_tip_is_told(robot: Sequence[str]) -> None:
     assert answer.setting.mechanism.name in str(caught.value)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("robot", [("3rrr_m1",), ("delta",), ("orthoglide",), ("gough_stewart", "1,2,3"),
                                    ("quattro", "1,4"), ("rrrrr_m1",)])
 def test_another_line_is_told(robot: Sequence[str]) -> None:

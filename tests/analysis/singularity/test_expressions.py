@@ -181,6 +181,7 @@ def test_translations_vanish_exactly_where_some_translation_is_allowed(case: tup
         assert (at(expression(*case), vectors) == 0) is (rank < 3)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", SEEDS)
 def test_three_rods_leave_a_translation_where_they_are_parallel_to_a_plane(seed: int) -> None:
     rng = np.random.default_rng(seed)

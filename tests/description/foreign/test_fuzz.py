@@ -12,6 +12,7 @@ from description.foreign.test_dialects import written
 from hrsynth.description import load
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("seed", [11, 12])
 def test_damaged_files_are_read_or_refused(seed: int):
     counts: Counter[str] = Counter()

@@ -115,6 +115,7 @@ def test_a_million_links_are_refused_in_time_and_memory(name: str, tmp_path: Pat
 TURN = "<origin xyz='0.1 0 0'/><axis xyz='0 0 1'/></joint>"
 
 
+@pytest.mark.slow
 def test_a_long_chain_is_refused_in_time_where_its_twin_would_be_too_large(tmp_path: Path):
     links = "".join(CHAIN.replace("fixed", "continuous").format(i, i - 1) for i in range(990)).replace("</joint>", TURN)
     path = made(tmp_path, f"<robot name='r'><link name='l-1'/>{links}</robot>", "robot.urdf")

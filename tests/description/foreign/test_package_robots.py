@@ -90,6 +90,7 @@ LEGS = {"cassie.sdf": (10, 5), "cassie_v2.sdf": (12, 6), "cassie_simple.sdf": (1
         "cassie_wo_gearbox_spring.sdf": (13, 6)}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", [each if each == "cassie.sdf" else pytest.param(each, marks=pytest.mark.slow)
                                   for each in LEGS])
 def test_its_robot_with_closed_loops_has_its_mobility(name: str):

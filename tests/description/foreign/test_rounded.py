@@ -44,6 +44,7 @@ def variants(robot: Mechanism) -> dict[str, Mechanism]:
     return found | {f"{name}, mm": in_millimetres(each) for name, each in found.items()}
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("decimals", [7, 5, 4])
 @pytest.mark.parametrize(("name", "ending"), list(zip(SOME, (".urdf", ".xml", ".sdf", ".yaml", ".urdf"), strict=True)))
 def test_a_rounded_robot_is_the_same(name: str, ending: str, decimals: int, tmp_path: Path):

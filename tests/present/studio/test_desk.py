@@ -206,6 +206,7 @@ def test_a_servo_run_ends_where_the_camera_sees_the_goal():
     assert ask("move", "rrrrr_m1", here=found["frames"][-1]["here"])["values"] == pytest.approx(goal, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_a_servo_run_aims_at_the_configuration_that_was_set():
     """Also where it lies in another mode than the start: the picture that is wanted is the one there."""
     goal = ask("modes", "3rrr_m1")["modes"][1]["here"]
@@ -244,6 +245,7 @@ def test_what_is_exported_is_the_file_that_its_name_says(kind: str, tmp_path: Pa
         assert file.read_text(encoding="utf-8").lstrip().lower().startswith(("<svg", "<!doctype html"))
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize(("what", "robot", "fields"), [
     ("open", "rrrrr_m1", {}), ("watch", "prrrp_parallel", {"watch": ["1"]}),
     ("modes", "rrrrr_m1", {"watch": ["2", "1"]}), ("aspects", "rrrrr_m1", {}),
@@ -364,6 +366,7 @@ def test_the_error_of_orientation_is_told_where_the_platform_turns(robot: str):
         assert f"turned by about {rounded(found)}°" in wrong["words"]
 
 
+@pytest.mark.slow
 def test_meshes_of_a_dropped_file_are_those_that_were_dropped_with_it(tmp_path: Path):
     """Flat beside it, whatever folder it names; none from anywhere else, by no way."""
     trimesh = pytest.importorskip("trimesh")

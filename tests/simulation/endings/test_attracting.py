@@ -20,6 +20,7 @@ def same(one: RestPoint, other: RestPoint) -> bool:
     return all(np.abs(one.configuration.pose(link) - other.configuration.pose(link)).max() < SAME for link in names)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", ["rrrrr_m1", pytest.param("3rps", marks=pytest.mark.slow)])
 def test_descent_alone_finds_what_attracts(name: str) -> None:
     """All that the search for all critical points often comes to; from starts that are given, too."""

@@ -93,6 +93,7 @@ def ends_agree(name: str, legs: str | None, X: np.ndarray, to: str | None = None
     return count
 
 
+@pytest.mark.slow
 def test_runs_abreast_end_where_single_runs_end():
     assert ends_agree("3rrr_m1", None, poses(task("3rrr_m1")[1], 2, 2, 1.0)) == 2
 
@@ -140,6 +141,7 @@ def stretched() -> tuple[np.ndarray, Runs]:
     return X, runs(flow, X)
 
 
+@pytest.mark.slow
 def test_a_watched_leg_passes_its_fixed_point_with_its_direction():
     """A rod through a point turns over there: the direction is kept, the working mode is not."""
     _, flow = task("3rpr_m1")
@@ -213,6 +215,7 @@ def small() -> module.Basins:
     return hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid=GRID, jobs=1)
 
 
+@pytest.mark.slow
 def test_every_start_has_its_end():
     found = small()
     assert found.cells.shape == (6, 7)
@@ -266,6 +269,7 @@ def test_every_start_within_the_certified_radius_ends_at_the_goal():
     np.testing.assert_allclose(runs(flow, X).X, np.broadcast_to(goal, X.shape), atol=1e-8)
 
 
+@pytest.mark.slow
 def test_what_is_drawn_as_certified_is_around_the_goal():
     found = hrsynth.basins("3rpr_m1", to="x=0,y=0,phi=0", grid="x=-0.1:0.1:5,y=-0.1:0.1:5,phi=0", jobs=1)
     grid, inside = found.region
@@ -284,6 +288,7 @@ def test_the_table_has_a_line_a_start():
     assert all(names[row["end"]] == row["ended"] for row in rows)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("grid", ["x=-0.02:0.02:4,y=0.02,phi=0", "x=-0.02:0.02:3,y=0:0.01:2,phi=-0.1:0.1:2"])
 def test_lines_and_boxes_are_drawn(grid: str, tmp_path):
     found = hrsynth.basins("3rrr_m1", to="x=0,y=0,phi=0", grid=grid, jobs=1)
@@ -293,6 +298,7 @@ def test_lines_and_boxes_are_drawn(grid: str, tmp_path):
     assert "goal" in hrsynth.text(found)
 
 
+@pytest.mark.slow
 def test_other_robots_are_simulated_one_by_one():
     found = hrsynth.basins("rrrrr_m1", to="x=0.02,y=0.24", grid="x=0:0.02:2,y=0.22:0.24:2", jobs=1)
     assert not found.abreast
@@ -312,6 +318,7 @@ def test_every_ending_has_its_colours_and_its_mark():
     assert set(ENDINGS) == set(SHADES) == set(MARKS)
 
 
+@pytest.mark.slow
 def test_a_servo_run_takes_the_example_of_each_end_and_ends_there():
     """The platform's turn follows from x and y: an example that says another one is refused."""
     found = hrsynth.basins("rrrrr_m1", to="x=0.02,y=0.15", grid="x=-0.01:0.24:2,y=-0.08:0.1:2", jobs=1)
@@ -339,6 +346,7 @@ def test_why_runs_are_simulated_one_by_one_is_told():
     assert module.hindrances(ObservedRobot.of("3rrr_m1")) == ()
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("grid", "hollow"), [("x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0", False),
                                               ("x=-0.02:0.02:2,y=-0.02:0.02:2,phi=0.1", True),
                                               ("x=-0.02:0.02:2,y=0,phi=0.1", True)])

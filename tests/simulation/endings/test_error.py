@@ -19,6 +19,7 @@ ROBOTS = few_first(["3prr_m1", "3rpr_m1", "3rps", "3upu", "6pus", "delta", "goug
 STEP = 1e-6
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("encoders", [False, True])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_error_gradient_and_hessian(name: str, encoders: bool) -> None:
@@ -27,6 +28,7 @@ def test_error_gradient_and_hessian(name: str, encoders: bool) -> None:
     check(setting(name), encoders)
 
 
+@pytest.mark.some(2)
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("robot", ["free_body", pytest.param("arm", marks=pytest.mark.slow),
                                    pytest.param("gough_stewart", marks=pytest.mark.slow)])

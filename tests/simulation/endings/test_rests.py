@@ -52,6 +52,7 @@ def nearby(found: Endings, each: RestPoint, size: float = 1e-3) -> ClosedConfigu
     return chart.at(size * way / np.linalg.norm(way), each.configuration.q)
 
 
+@pytest.mark.slow
 def test_enclosed_rests_are_rests_for_the_oracle() -> None:
     """The gradient of E along the oracle's constraints vanishes at each, and the signs of its Hessian there, by
     differences along the oracle's kernel, are those that are proved."""
