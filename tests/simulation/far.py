@@ -90,7 +90,8 @@ def untrue(found: Servo) -> Iterator[str]:
             yield "the command does not vanish"
     if found.ended == BOUNDARY:
         moved = np.linalg.norm(found.way[-1] - found.way[0]) / at.twin.length
-        if moved < RUN_AWAY and relation(at, question).dof.weakest > 1e-2:
+        dof = relation(at, question).dof
+        if moved < RUN_AWAY and dof.value == found.setting.dof and dof.weakest > 1e-2:
             yield "no boundary is near"
 
 
