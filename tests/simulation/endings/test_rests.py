@@ -14,6 +14,7 @@ import pytest
 from scipy.linalg import null_space
 from scipy.optimize import least_squares
 
+import hrsynth
 from hrsynth.analysis.modes.modes import modes
 from hrsynth.analysis.observed import ObservedRobot
 from hrsynth.errors import BadRequest
@@ -23,6 +24,8 @@ from hrsynth.geometry.vectors import pose
 from hrsynth.kinematics.chart import TangentChart
 from hrsynth.kinematics.configuration import ClosedConfiguration
 from hrsynth.kinematics.locked import joint_at
+from hrsynth.mechanism.model import Limits
+from hrsynth.present.text.endings import endings as text
 from hrsynth.simulation.endings.completeness import Covers
 from hrsynth.simulation.endings.critical_poses import Lift, critical_poses
 from hrsynth.simulation.endings.enclosure import _rates, enclosed
@@ -411,3 +414,17 @@ def test_a_flat_direction_never_attracts_for_sure(curvatures: list[float], word:
     """Only where all curvatures are surely positive does a rest attract; one that is surely negative is enough that it
     does not."""
     assert stability(curvatures) == word
+
+
+@pytest.mark.parametrize("reach", [0.3, 2.25])
+def test_rests_within_the_limits_of_joints_are_counted(reach: float) -> None:
+    robot = hrsynth.load(FIVE_BAR)
+    motors = [joint for joint in robot.joints.values() if joint.actuated]
+    found = endings(robot.changed(joints=[replace(joint, limits=Limits(-reach, reach)) for joint in motors]), at=POSE)
+    turns = [[each.configuration.q[list(each.configuration.twin.coordinates[joint.name])] for joint in motors]
+             for each in found.attracting]
+    inside = sum(bool(np.all(np.abs(each) <= reach)) for each in turns)
+    assert 0 < inside < len(turns)
+    (told,) = [line.strip() for line in text(found).splitlines() if "within all limits" in line]
+    alone = inside == 1
+    assert told == f"within all limits of joints {inside} of these {len(turns)}" + ": the goal alone" * alone

@@ -21,6 +21,10 @@ def endings(found: Endings) -> str:
     rows: Rows = [*head(found.setting), *camera(found.setting), ("goal", str(found.pose)),
                   *([] if found.depth == "exact" else [("depth", f"{found.depth}, as the law supposes it")]), *GAP,
                   ("attract", table([_line(each) for each in drawn], HEADS).splitlines()), *GAP]
+    if any(each.beyond for each in drawn):
+        inside = [each for each in drawn if not each.beyond]
+        rows[-1:] = [("", f"within all limits of joints {len(inside)} of these {len(drawn)}"
+                          + (": the goal alone" if [each.kind for each in inside] == ["goal"] else "")), *GAP]
     if others:
         told = table([_line(each) for each in others[:LISTED_SADDLES]], HEADS).splitlines()
         left = len(others) - LISTED_SADDLES
