@@ -27,6 +27,12 @@ def nothing_answered_before():
     forget_answers()
 
 
+@pytest.fixture(autouse=True)
+def nothing_said_after_half_a_minute(monkeypatch: pytest.MonkeyPatch):
+    """On a busy machine commands tell on standard error what they are at; what they answer is the same."""
+    monkeypatch.setattr("hrsynth.cli.progress.SILENT", 1e6)
+
+
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Of a law that is marked ``some(n)`` so many members, spread over all, are quick; the others are slow."""
